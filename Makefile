@@ -1,0 +1,82 @@
+# Stillhook's chores. Everything runs in a private .venv beside this file: nothing is installed
+# elsewhere, and the package names `models`, `synth` and `mpc` cannot meet anybody else's.
+
+# Candidates for the interpreter, best first; name your own with `make demo PYTHON=/path/to/python`.
+PYTHON ?= python3.11 python3 python3.12 python3.13
+# Two workers: what the smallest machine that the tests run on can use.
+PYTEST_ARGS ?= -n 2
+
+VENV := .venv
+PY := $(VENV)/bin/python
+PIP_INSTALL := $(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.NOTPARALLEL:
+.PHONY: help demo test test-all lint bench docs clean
+
+help:  ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F'\t' '{printf "make %-9s %s\n", $$1, $$2}'
+
+demo: $(VENV)/.installed  ## install, then find the gains of the bundled subsea crane
+	$(VENV)/bin/stillhook optimise subsea-crane --out out/subsea-crane
+
+test: $(VENV)/.installed-dev  ## the tests, without those marked slow
+	$(PY) -m pytest $(PYTEST_ARGS)
+
+test-all: $(VENV)/.installed-dev  ## the tests, the slow ones too
+	$(PY) -m pytest -m "slow or not slow" $(PYTEST_ARGS)
+
+lint: $(VENV)/.installed-dev  ## ruff, mypy --strict and the import contract
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m mypy --strict
+	$(VENV)/bin/lint-imports
+
+bench: $(VENV)/.installed-dev  ## how good and how fast the gain synthesis is
+	$(PY) benchmarks/synthesis.py
+
+docs: $(VENV)/.installed-docs  ## the documentation, into docs/_build/html
+	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	@echo "docs/_build/html/index.html"
+
+clean:  ## remove what was built or measured; .venv stays
+	rm -rf out dist build docs/_build docs/api
+	rm -rf .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find stillhook models synth mpc tests benchmarks docs -type d -name __pycache__ -exec rm -rf {} +
+
+# One stamp for each set of packages. A stamp is renewed when the requirements change, and on
+# its first use in a .venv that was made by other means.
+$(VENV)/.installed: pyproject.toml constraints.txt | $(PY)
+	$(call install,.)
+	@touch $@
+
+$(VENV)/.installed-dev: pyproject.toml constraints.txt | $(PY)
+	$(call install,.[dev])
+	@touch $(VENV)/.installed $@
+
+$(VENV)/.installed-docs: pyproject.toml constraints.txt | $(PY)
+	$(call install,.[docs])
+	@touch $(VENV)/.installed $@
+
+define install
+@$(PY) -c "import sys; v = sys.version_info; sys.exit(None if v >= (3, 11) else \
+	f'Stillhook needs Python 3.11 or later, and $(VENV) holds {v.major}.{v.minor}: remove $(VENV) and try again.')"
+@echo "Installing stillhook from $(1) into $(VENV); the first time this takes a minute or two."
+@$(PIP_INSTALL) -e '$(1)'
+endef
+
+$(PY):
+	@for python in $(PYTHON); do \
+	    if "$$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
+	        if "$$python" -c 'import ensurepip, venv' 2>/dev/null; then \
+	            exec "$$python" -m venv $(VENV); \
+	        fi; \
+	        echo "$$python cannot make virtual environments: install its venv module" \
+	             "(on Debian and Ubuntu: apt install python3-venv) and try again." >&2; \
+	        exit 1; \
+	    fi; \
+	done; \
+	echo "Stillhook needs Python 3.11 or later, and none of these is that: $(PYTHON)." \
+	     "Name one with: make PYTHON=/path/to/python" >&2; \
+	exit 1

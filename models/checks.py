@@ -1,0 +1,149 @@
+"""Errors and the few checks made at every door.
+
+Everything that enters the toolkit (a case file, a table, an argument) is checked where it
+enters, and a bad value is answered with one sentence that names its owner, the field, the
+range that is allowed with its unit, and the value that came.  This module holds the one
+exception family and the helpers that word those sentences; it imports nothing of ours, so
+every other module may use it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = [
+    "InputError",
+    "SolverError",
+    "StillhookError",
+    "SynthesisError",
+    "check_ascending",
+    "check_finite",
+    "check_range",
+    "read_only",
+]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class StillhookError(Exception):
+    """Base of every error that the toolkit raises on purpose."""
+
+
+class InputError(StillhookError, ValueError):
+    """The user's input is wrong; the message says where, what is allowed and what came."""
+
+
+class SynthesisError(StillhookError):
+    """A design problem is stated in a way that cannot be solved at all."""
+
+
+class SolverError(StillhookError):
+    """A numerical solver failed in a way that says nothing about the user's input."""
+
+
+def check_range(
+    owner: str,
+    name: str,
+    value: float,
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    unit: str = "",
+    open_low: bool = False,
+    open_high: bool = False,
+) -> float:
+    """Return `value` as a float if it is finite and within the range.
+
+    Parameters
+    ----------
+    owner, name
+        What the value belongs to, and what it is called there.
+    value
+        The value that came.
+    low, high
+        Ends of the range [unit]; `open_low` and `open_high` exclude them.
+    unit
+        The unit that the message names.
+
+    Raises
+    ------
+    InputError
+        If the value is not a finite number within the range.
+    """
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    inside = (number > low if open_low else number >= low) and (
+        number < high if open_high else number <= high
+    )
+    if not (math.isfinite(number) and inside):
+        raise InputError(
+            f"{owner}: {name} must be {_range_text(low, high, unit, open_low, open_high)}, "
+            f"got {value!r}"
+        )
+    return number
+
+
+def check_finite(owner: str, name: str, values: npt.ArrayLike) -> FloatArray:
+    """Return `values` as a float array if every entry is finite.
+
+    Raises
+    ------
+    InputError
+        If an entry is NaN or infinite, or is no number; its index is named.
+    """
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{owner}: {name} must be numbers, got {values!r}") from error
+    bad = np.argwhere(~np.isfinite(array))
+    if bad.size:
+        where = ", ".join(str(int(i)) for i in bad[0])
+        raise InputError(
+            f"{owner}: {name} must be finite numbers, got {array[tuple(bad[0])]} at index {where}"
+        )
+    return array
+
+
+def check_ascending(owner: str, name: str, values: Sequence[float] | FloatArray) -> FloatArray:
+    """Return `values` as an array if they are finite and strictly ascending.
+
+    Raises
+    ------
+    InputError
+        If two neighbours are equal or in the wrong order; both are named.
+    """
+    array = check_finite(owner, name, values)
+    wrong = np.flatnonzero(np.diff(array) <= 0.0)
+    if wrong.size:
+        i = int(wrong[0])
+        kind = "repeated" if array[i + 1] == array[i] else "out of order"
+        raise InputError(
+            f"{owner}: {name} must be strictly ascending, got {array[i]:g} followed by "
+            f"{array[i + 1]:g} ({kind}, index {i + 1})"
+        )
+    return array
+
+
+def read_only(array: npt.ArrayLike) -> FloatArray:
+    """Return a float copy of `array` that cannot be written to."""
+    copy = np.array(array, dtype=np.float64)
+    copy.setflags(write=False)
+    return copy
+
+
+def _range_text(low: float, high: float, unit: str, open_low: bool, open_high: bool) -> str:
+    tail = f" {unit}" if unit else ""
+    if math.isinf(low) and math.isinf(high):
+        return f"a finite number{' in' + tail if unit else ''}"
+    if math.isinf(high):
+        return f"{'above' if open_low else 'at least'} {low:g}{tail}"
+    if math.isinf(low):
+        return f"{'below' if open_high else 'at most'} {high:g}{tail}"
+    left, right = "(" if open_low else "[", ")" if open_high else "]"
+    return f"in {left}{low:g}, {high:g}{right}{tail}"

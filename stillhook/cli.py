@@ -1,0 +1,183 @@
+"""The command line: what can be asked, and how every ending is told.
+
+    arguments -> parser -> one module of `stillhook.commands` -> exit status
+
+Exit status: 0 all is well; 1 the design is not ok (unstable, infeasible, a limit broken, not
+verified); 2 bad input; 3 an error in Stillhook itself; 130 interrupted.  The commands are
+imported when they run, so that ``stillhook --help`` imports nothing heavy.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import warnings
+from collections.abc import Sequence
+from importlib import import_module
+
+# Before numpy is imported.  The matrices here have some tens of rows: threads of the linear
+# algebra libraries would spend their time waiting for each other, several times slower on a
+# busy machine.
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+__all__ = ["build_parser", "main"]
+
+OK, NOT_OK, BAD_INPUT, OUR_FAULT, INTERRUPTED = 0, 1, 2, 3, 130
+
+_CASE = "a bundled case (see `stillhook cases`) or a case file (.yaml, .json, .toml)"
+_EPILOG = """\
+exit status: 0 all is well; 1 the design is not ok: unstable, infeasible, a
+limit broken, not verified; 2 bad input; 3 an error in Stillhook itself;
+130 interrupted
+
+to begin with:
+  stillhook cases                     what comes with the toolkit
+  stillhook optimise subsea-crane     the gains of a winch that can do its job
+  stillhook new my.yaml               a commented case file of your own
+"""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of all commands."""
+    from . import __version__
+
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(
+        prog="stillhook",
+        description="Keep the load on a vessel's hook still: gains for offshore winches.",
+        epilog=_EPILOG,
+        formatter_class=raw,
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"stillhook {__version__}")
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
+    commands = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")
+
+    def command(name: str, module: str, text: str) -> argparse.ArgumentParser:
+        added = commands.add_parser(
+            name, help=text, description=f"{text[0].upper()}{text[1:]}.", allow_abbrev=False
+        )
+        added.set_defaults(module=module)
+        # Wherever it stands; without a default of its own, lest it undo the one before it.
+        added.add_argument(
+            "--debug", action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS
+        )
+        return added
+
+    def case(added: argparse.ArgumentParser) -> None:
+        added.add_argument("case", metavar="CASE", help=_CASE)
+        added.add_argument(
+            "--set",
+            dest="changes",
+            metavar="PATH=VALUE",
+            action="append",
+            default=[],
+            help="change a field of the case, as in --set limits.max_sensitivity=2.5 "
+            "or --set 'sensors.telemetry.delay=50 ms'; may be repeated",
+        )
+
+    text = "find the gains that hold the payload stillest within the limits"
+    optimise = command("optimise", "optimise", text)
+    case(optimise)
+    optimise.add_argument(
+        "--out", metavar="DIR", help="folder for the results (default: out/<name of the case>)"
+    )
+    optimise.add_argument(
+        "--starts", type=int, default=16, metavar="N", help="starts of the search (default: 16)"
+    )
+    optimise.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="seed of the starts (default: 0)"
+    )
+    optimise.add_argument("--quiet", action="store_true", help="print the verdict only")
+
+    evaluate = command("evaluate", "evaluate", "say what given gains do")
+    case(evaluate)
+    evaluate.add_argument(
+        "--gains",
+        metavar="A=..,a=..,a1=..,a2=..",
+        help="the gains (default: those that the case has in use)",
+    )
+    evaluate.add_argument("--out", metavar="DIR", help="folder for the results (default: none)")
+    evaluate.add_argument("--quiet", action="store_true", help="print the verdict only")
+
+    case(command("check", "check", "read a case, and show what follows from it"))
+
+    command("cases", "files", "list the bundled cases")
+
+    new = command("new", "files", "write a commented case file that runs as it is")
+    new.add_argument("file", metavar="FILE", help="the file to write")
+    new.add_argument("--force", action="store_true", help="overwrite the file if it exists")
+
+    schema = command("schema", "files", "write the JSON Schema of a case file, for editors")
+    schema.add_argument(
+        "file", metavar="FILE", nargs="?", help="the file to write (default: standard output)"
+    )
+    schema.add_argument("--force", action="store_true", help="overwrite the file if it exists")
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status.
+
+    Parameters
+    ----------
+    argv
+        The arguments; by default those of the process.
+
+    Returns
+    -------
+    int
+        0, 1, 2, 3 or 130, see the module.
+
+    Raises
+    ------
+    SystemExit
+        From the parser: with 0 for ``--help`` and ``--version``, with 2 for arguments that it
+        does not understand.
+    """
+    parser = build_parser()
+    arguments = parser.parse_args(argv)
+    if arguments.command is None:
+        parser.print_help(sys.stderr)
+        return BAD_INPUT
+    try:
+        status = _run(arguments)
+        # What is still in the buffer can fail too: a reader that has gone, a full disk.
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:
+        # The reader (`head`, a closed pager) has what it wanted; leave Python nothing to flush.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return OK
+    except KeyboardInterrupt as stop:
+        print(f"stillhook: interrupted{f'; {stop}' if str(stop) else ''}", file=sys.stderr)
+        return INTERRUPTED
+    except Exception as error:
+        if arguments.debug:
+            raise
+        return _failed(error)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    module = import_module(f".commands.{arguments.module}", __package__)
+    with warnings.catch_warnings():  # what a command sets about warnings ends with it
+        status: int = module.run(arguments)
+    return status
+
+
+def _failed(error: Exception) -> int:
+    """Write one sentence (or one for each error in a file), and return the exit status."""
+    from models.checks import InputError, StillhookError
+
+    if isinstance(error, InputError):
+        print(error, file=sys.stderr)
+        return BAD_INPUT
+    hint = "run the command again with --debug to see where"
+    if isinstance(error, StillhookError):
+        print(f"stillhook: the computation failed: {error}; {hint}", file=sys.stderr)
+        return NOT_OK
+    what = f"{type(error).__name__}: {error}".partition("\n")[0]
+    print(f"stillhook: unexpected error, {what}; {hint}", file=sys.stderr)
+    return OUR_FAULT

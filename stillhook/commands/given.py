@@ -1,0 +1,122 @@
+"""What the user gave: a case with changes, gains as text, and the same as a command again."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import shlex
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from models import Case, load_case
+from models.checks import InputError
+from models.physics_warning import PhysicsWarning
+from models.yaml_lines import read_yaml
+
+from ..terminal import told_once
+
+__all__ = ["case_words", "gains_text", "given_case", "parse_gains"]
+
+_NAMES = ("A", "a", "a1", "a2")
+
+
+def given_case(arguments: argparse.Namespace) -> Case:
+    """Return the case that the arguments name, with their changes; tell what is implausible.
+
+    Everything about the case that there is to warn of is told here, each thing once, and then
+    no more: a search looks at seas and drives that nobody has asked for.
+
+    Raises
+    ------
+    InputError
+        If the case is wrong, or a change is.
+    """
+    from models.hook import HookMotion
+
+    with told_once():
+        case = load_case(arguments.case)
+        changes = parse_changes(arguments.changes)
+        if changes:
+            case = case.replace(changes)
+        HookMotion.from_case(case)  # warns of a sea beyond the RAO's table
+    warnings.simplefilter("ignore", PhysicsWarning)
+    return case
+
+
+def parse_changes(texts: Sequence[str]) -> dict[str, Any]:
+    """Return changes by dotted path from texts PATH=VALUE, VALUE as in a case file.
+
+    Raises
+    ------
+    InputError
+        If a text is not of that form, or a path comes twice.
+
+    Examples
+    --------
+    >>> parse_changes(["rope.length=800 m", "limits.roll_off=null", "vessel.below=zero"])
+    {'rope.length': '800 m', 'limits.roll_off': None, 'vessel.below': 'zero'}
+    """
+    changes: dict[str, Any] = {}
+    for text in texts:
+        path, sign, value = text.partition("=")
+        path = path.strip()
+        if not sign or not path:
+            raise InputError(f"--set: must be PATH=VALUE, as in rope.length=800, got {text!r}")
+        if path in changes:
+            raise InputError(f"--set: {path} is given twice")
+        changes[path], _ = read_yaml(value, f"--set {path}")
+    return changes
+
+
+def parse_gains(text: str) -> dict[str, float]:
+    """Return gains by name from a text.
+
+    Raises
+    ------
+    InputError
+        If a gain is not a number, unknown, missing or given twice; `A` may be missing.
+
+    Examples
+    --------
+    >>> parse_gains("A=200, a=50, a1=100, a2=1e2")
+    {'A': 200.0, 'a': 50.0, 'a1': 100.0, 'a2': 100.0}
+    """
+    gains: dict[str, float] = {}
+    for part in text.split(","):
+        name, sign, value = (piece.strip() for piece in part.partition("="))
+        if not sign or name not in _NAMES:
+            raise InputError(
+                f"--gains: must be numbers for A, a, a1 and a2, as in A=1,a=0,a1=0,a2=0.5; "
+                f"got {part.strip()!r}"
+            )
+        if name in gains:
+            raise InputError(f"--gains: {name} is given twice")
+        try:
+            gains[name] = float(value)
+        except ValueError:
+            raise InputError(f"--gains: {name} must be a number, got {value!r}") from None
+        if not math.isfinite(gains[name]):
+            raise InputError(f"--gains: {name} must be a finite number, got {value!r}")
+    missing = [name for name in _NAMES[1:] if name not in gains]
+    if missing:
+        raise InputError(f"--gains: {' and '.join(missing)} must be given too, got {text!r}")
+    return gains
+
+
+def gains_text(gains: Mapping[str, float]) -> str:
+    """Return gains as `parse_gains` reads them, to eight digits: enough to keep the limits."""
+    return ",".join(f"{name}={gains[name]:.8g}" for name in _NAMES)
+
+
+def case_words(arguments: argparse.Namespace, written: str | None = None) -> str:
+    """Return the case as words of a command: its name, or with its changes where they are kept.
+
+    `written` is the case file of the output folder, if there is one.
+    """
+    if not arguments.changes:
+        return shlex.quote(arguments.case)
+    if written is not None:
+        return shlex.quote(written)
+    sets = [f"--set {shlex.quote(change)}" for change in arguments.changes]
+    return " ".join([shlex.quote(arguments.case), *sets])

@@ -1,0 +1,355 @@
+"""The linear quadratic Gaussian controller: where a search of free controllers begins.
+
+For white noise and a full-order controller it is the optimum that `synth.tune` must find, and
+so its test oracle; for everything else (a spectrum with a peak, delays, limits, a controller of
+lower order, a static gain) it is a good place to start from.  Two Riccati equations, solved by
+SciPy, and a balanced truncation of what the controller makes of the innovations, in the manner
+of Liu and Anderson, "Controller reduction via stable factorization and balancing" (Int. J.
+Control 44, 1986).
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
+
+from models.checks import InputError, SynthesisError
+from models.linear import LinearPlant
+
+from .controller import Controller
+from .disturbance import Disturbance, White
+
+__all__ = [
+    "LQG",
+    "Estimator",
+    "Regulator",
+    "designs",
+    "estimator",
+    "lqg",
+    "projected",
+    "reduced",
+    "regulator",
+    "state_covariance",
+    "weighing",
+    "whitened",
+]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Regulator:
+    """State feedback u = `gain` x, (nu, n), from the weights R on u, and its Riccati solution X."""
+
+    gain: FloatArray
+    R: FloatArray
+    X: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Estimator:
+    """Kalman filter for the noise intensity V on y: `gain`, (n, ny), and error covariance Y."""
+
+    gain: FloatArray
+    V: FloatArray
+    Y: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LQG:
+    """The optimal controller of full order; `cost` is the root of the weighted variance."""
+
+    controller: Controller
+    cost: float
+    regulator: Regulator
+    estimator: Estimator
+
+
+def lqg(plant: LinearPlant, *, minimise: Mapping[str, float], spectrum: Mapping[str, White]) -> LQG:
+    """Return the controller that minimises a weighted variance under white noise.
+
+    Parameters
+    ----------
+    plant
+        A plant without delays and rates.
+    minimise
+        Weights on the variances of performance outputs by name; together they must weigh
+        every input.
+    spectrum
+        White noises by the name of their disturbance; together they must disturb every
+        measurement.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or the plant has delays or rates.
+    SynthesisError
+        If an input is free of charge, a measurement is free of noise, a weighted output
+        hears white noise directly, or a Riccati equation has no stabilising solution.
+    """
+    if any(plant.delays) or plant.rates:
+        raise InputError("LQG: the plant must have neither delays nor rates")
+    for kind, known, given in (
+        ("output", plant.outputs, minimise),
+        ("disturbance", plant.disturbances, spectrum),
+    ):
+        for name in given:
+            if name not in known:
+                raise InputError(
+                    f"LQG: there is no {kind} {name!r}; there are: {', '.join(known) or 'none'}"
+                )
+    weights = np.array([minimise.get(name, 0.0) for name in plant.outputs])
+    noise = np.array([spectrum[n].intensity if n in spectrum else 0.0 for n in plant.disturbances])
+    if np.any(weights @ plant.Fz**2 @ noise > 0.0):
+        raise SynthesisError("LQG: a weighted output hears white noise directly: infinite cost")
+    Q, R, S = weighing(plant.Cz, plant.Dz, weights)
+    feedback = regulator(plant, Q, R, S)
+    kalman = estimator(plant, *_noises(plant, noise))
+    variance = np.trace(plant.E.T @ feedback.X @ plant.E * noise) + np.trace(
+        feedback.gain.T @ R @ feedback.gain @ kalman.Y
+    )
+    return LQG(
+        controller=reduced(plant, feedback, kalman, len(plant.states)),
+        cost=float(np.sqrt(variance)),
+        regulator=feedback,
+        estimator=kalman,
+    )
+
+
+def regulator(plant: LinearPlant, Q: FloatArray, R: FloatArray, S: FloatArray) -> Regulator:
+    """Return the state feedback that minimises E[x'Qx + 2 x'Su + u'Ru].
+
+    Raises
+    ------
+    SynthesisError
+        If R is singular or the Riccati equation has no stabilising solution.
+    """
+    X, gain = _riccati("regulator", plant.A, plant.B, Q, R, S)
+    return Regulator(gain=gain, R=R, X=X)
+
+
+def estimator(plant: LinearPlant, W: FloatArray, V: FloatArray, U: FloatArray) -> Estimator:
+    """Return the filter for noises of intensity W on x', V on y, and U between the two.
+
+    Raises
+    ------
+    SynthesisError
+        If V is singular or the Riccati equation has no stabilising solution.
+    """
+    Y, gain = _riccati("estimator", plant.A.T, plant.C.T, W, V, U)
+    return Estimator(gain=-gain.T, V=V, Y=Y)
+
+
+def state_covariance(plant: LinearPlant, feedback: Regulator) -> FloatArray:
+    """Return the covariance of the state, (n, n), under u = K x and white noises of intensity 1."""
+    covariance = solve_continuous_lyapunov(plant.A + plant.B @ feedback.gain, -plant.E @ plant.E.T)
+    return np.asarray(0.5 * (covariance + covariance.T))
+
+
+def projected(plant: LinearPlant, feedback: Regulator, mask: BoolArray) -> FloatArray:
+    """Return the gain on what is measured, (nu, ny), that comes closest to a state feedback.
+
+    Closest in the mean square of u in the loop that the state feedback makes, with the entries
+    outside `mask`, (nu, ny), kept at zero; exact where the measurements hold the state.
+    """
+    heard = plant.C + plant.D @ feedback.gain
+    covariance = state_covariance(plant, feedback)
+    gain = np.zeros(mask.shape)
+    for i, free in enumerate(mask):
+        row = heard[free] @ covariance
+        gain[i, free] = np.linalg.lstsq(row @ heard[free].T, row @ feedback.gain[i], rcond=1e-12)[0]
+    return gain
+
+
+def reduced(plant: LinearPlant, feedback: Regulator, kalman: Estimator, order: int) -> Controller:
+    """Return the controller of a regulator and a filter, truncated to at most `order` states.
+
+    In the loop that the state feedback makes, white innovations drive the state estimate, and
+    that drives u; the states that matter least on the way from one to the other are dropped.
+    Any regulator with any filter stabilises the plant at full order (the separation
+    principle); a truncated one need not.
+    """
+    K, L = feedback.gain, kalman.gain
+    A = plant.A + plant.B @ K - L @ (plant.C + plant.D @ K)
+    B, C = L, K
+    if order < len(A):
+        loop = plant.A + plant.B @ K
+        reached = solve_continuous_lyapunov(loop, -L @ kalman.V @ L.T)
+        heard = solve_continuous_lyapunov(loop.T, -K.T @ feedback.R @ K)
+        left, right = _balancing(np.asarray(heard, float), np.asarray(reached, float), order)
+        A, B, C = left @ A @ right, left @ B, C @ right
+    return Controller(
+        A=A,
+        B=B,
+        C=C,
+        D=np.zeros((len(plant.inputs), len(plant.measurements))),
+        measurements=plant.measurements,
+        inputs=plant.inputs,
+    )
+
+
+def whitened(plant: LinearPlant, disturbances: Sequence[Disturbance]) -> LinearPlant:
+    """Return a plant that white noises of intensity 1 shake about as the disturbances do.
+
+    A spectrum that is not white becomes that of an oscillator with the same peak frequency,
+    peak density and variance (three numbers, for a starting point); its two states are the
+    disturbance and its rate.  A white noise whose rate acts too has no finite variance and
+    keeps the rate out.
+    """
+    n = len(plant.states)
+    known = {name: k for k, name in enumerate(plant.disturbances)}
+    rate_of = {base: rate for rate, base in plant.rates.items()}
+    extra = 2 * sum(not _is_white(d) for d in disturbances)
+    count = len(disturbances)
+    A = np.zeros((n + extra, n + extra))
+    E, F = np.zeros((n + extra, count)), np.zeros((len(plant.measurements), count))
+    Fz = np.zeros((len(plant.outputs), count))
+    C, Cz = (np.hstack([m, np.zeros((len(m), extra))]) for m in (plant.C, plant.Cz))
+    A[:n, :n] = plant.A
+    at = n
+    for k, disturbance in enumerate(disturbances):
+        column = known[disturbance.name]
+        if _is_white(disturbance):
+            size = np.sqrt(np.pi * float(disturbance.density(np.ones(1))[0]))
+            E[:n, k], F[:, k] = size * plant.E[:, column], size * plant.F[:, column]
+            Fz[:, k] = size * plant.Fz[:, column]
+            continue
+        peak, damping, sigma = _oscillator(disturbance)
+        A[at, at + 1] = 1.0
+        A[at + 1, at : at + 2] = -(peak**2), -2.0 * damping * peak
+        E[at + 1, k] = np.sqrt(4.0 * damping * peak**3) * sigma
+        for state, name in ((at, disturbance.name), (at + 1, rate_of.get(disturbance.name))):
+            if name is not None:
+                A[:n, state] += plant.E[:, known[name]]
+                C[:, state] += plant.F[:, known[name]]
+                Cz[:, state] += plant.Fz[:, known[name]]
+        at += 2
+    return LinearPlant(
+        A=A,
+        B=np.vstack([plant.B, np.zeros((extra, len(plant.inputs)))]),
+        E=E,
+        C=C,
+        D=plant.D,
+        F=F,
+        Cz=Cz,
+        Dz=plant.Dz,
+        Fz=Fz,
+        inputs=plant.inputs,
+        disturbances=tuple(d.name for d in disturbances),
+        measurements=plant.measurements,
+        outputs=plant.outputs,
+    )
+
+
+def weighing(
+    C: FloatArray, D: FloatArray, weights: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return Q, R, S of the weighted variance of the outputs C x + D u."""
+    return C.T * weights @ C, D.T * weights @ D, C.T * weights @ D
+
+
+def designs(
+    plant: LinearPlant, minimise: Mapping[str, float], omega: FloatArray, count: int = 7
+) -> tuple[list[Regulator], list[Estimator]]:
+    """Return regulators and filters for a problem and for harder versions of it.
+
+    Parameters
+    ----------
+    plant
+        Shaken by white noises of intensity 1 (`whitened`).
+    minimise
+        Weights on the variances of performance outputs by name.
+    omega
+        Frequencies [rad/s], (k,), at which the loop may cross over.
+    count
+        How many harder versions there are of either.  The inputs are charged, and the
+        measurements disturbed, as much as the rest of the problem amounts to at one of the
+        frequencies: beyond it the loop has nothing to win.
+
+    Returns
+    -------
+    tuple
+        The first of either is that of the problem itself, if it has a solution.
+    """
+    weights = np.array([minimise.get(name, 0.0) for name in plant.outputs])
+    response = plant.response_at((1e-3 + 1j) * omega[:: max(1, omega.size // count)])
+    effort = np.einsum("kzu,z->ku", np.abs(response.zu) ** 2, weights)
+    heard = np.sum(np.abs(response.yw) ** 2, axis=2)
+    Q, R, S = weighing(plant.Cz, plant.Dz, weights)
+    W, V, U = _noises(plant, np.ones(len(plant.disturbances)))
+    regulators, filters = [], []
+    for k in range(-1, len(effort)):
+        # From the highest frequency, where the least is added, down.
+        charge = np.diag(effort[-1 - k] + 1e-9 * effort.max()) if k >= 0 else 0.0
+        noise = np.diag(heard[-1 - k] + 1e-9 * heard.max()) if k >= 0 else 0.0
+        with contextlib.suppress(SynthesisError):
+            regulators.append(regulator(plant, Q, R + charge, S))
+        with contextlib.suppress(SynthesisError):
+            filters.append(estimator(plant, W, V + noise, U))
+    return regulators, filters
+
+
+def _noises(plant: LinearPlant, intensity: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return W, V, U of independent white noises."""
+    return (
+        (plant.E * intensity) @ plant.E.T,
+        (plant.F * intensity) @ plant.F.T,
+        (plant.E * intensity) @ plant.F.T,
+    )
+
+
+def _riccati(
+    what: str, A: FloatArray, B: FloatArray, Q: FloatArray, R: FloatArray, S: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the solution X and the gain -R^-1 (B'X + S')."""
+    if np.linalg.cond(R) > 1e14:
+        free = "an input is free of charge" if what == "regulator" else "a measurement has no noise"
+        raise SynthesisError(f"LQG: the {what}'s weight is singular: {free}")
+    message = f"LQG: the {what}'s Riccati equation has no stabilising solution"
+    try:
+        X = solve_continuous_are(A, B, Q, R, s=S)
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise SynthesisError(message) from error
+    gain = -np.linalg.solve(R, B.T @ X + S.T)
+    # Far out of scale, or with an undamped mode that is not seen, it may not stabilise.
+    poles = np.linalg.eigvals(A + B @ gain)
+    if poles.real.max(initial=-1.0) > -1e-12 * np.abs(poles).max(initial=1.0):
+        raise SynthesisError(message)
+    return np.asarray(0.5 * (X + X.T)), np.asarray(gain, dtype=np.float64)
+
+
+def _balancing(heard: FloatArray, reached: FloatArray, order: int) -> tuple[FloatArray, FloatArray]:
+    """Return the projections, (order, n) and (n, order), on what two Gramians weigh most."""
+    roots = []
+    for matrix in (heard, reached):
+        size, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+        roots.append(vectors * np.sqrt(np.maximum(size, 0.0)))
+    left, sizes, right = np.linalg.svd(roots[0].T @ roots[1])
+    keep = max(1, min(order, int(np.sum(sizes > 1e-10 * sizes[0]))))
+    scale = 1.0 / np.sqrt(sizes[:keep] + 1e-300)
+    return (left[:, :keep] * scale).T @ roots[0].T, roots[1] @ (right[:keep].T * scale)
+
+
+def _is_white(disturbance: Disturbance) -> bool:
+    if disturbance.band is not None:
+        return False
+    density = disturbance.density(np.geomspace(1e-3, 1e3, 7))
+    return bool(np.all(density == density[0]))
+
+
+def _oscillator(disturbance: Disturbance) -> tuple[float, float, float]:
+    """Return peak frequency [rad/s], damping ratio and standard deviation of a spectrum."""
+    low, high = disturbance.band or (1e-3, 1e3)
+    omega = np.geomspace(max(low, 1e-4 * high), high, 400)
+    density = disturbance.density(omega)
+    k = int(np.argmax(density))
+    variance = float(np.trapezoid(density, omega))
+    # An oscillator's density at resonance is m0 / (pi damping peak).
+    damping = variance / (np.pi * omega[k] * max(float(density[k]), 1e-300))
+    return float(omega[k]), float(np.clip(damping, 0.01, 2.0)), float(np.sqrt(variance))

@@ -1,0 +1,286 @@
+r"""The nonlinear programme of gain synthesis, stated in CasADi and solved by IPOPT.
+
+.. math::
+
+    \min_{p,\,C} \tfrac12 \log \sum_z \lambda_z \sum_w \int |F_{zw}|^2 S_w \, d\omega
+    \quad\text{s.t. limits} \le 0,\; C = q \sqrt{8/\pi}\,\sigma_v
+
+The integrals are sums over quadrature nodes, so the spectrum may be a table and delays are
+exact; derivatives of both orders are CasADi's.
+
+A spectral integral is finite for an unstable loop too, and a margin on a grid can be jumped
+over.  So the objective carries a *guard*: it is not a number wherever a closed-loop pole lies
+in the right half plane (Pade models for the delays), and IPOPT's line search treats such a
+trial point as it treats a division by zero, by a shorter step.  Every iterate from a stable
+start is thus stable, for any order of the loop; inequalities on the characteristic
+polynomial (Lienard-Chipart), the usual way, lose their digits beyond order eight or so, and a
+rope brings twenty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+from typing_extensions import override
+
+from models.quadrature import Quadrature
+
+from .problem import Goal as Goal
+from .problem import Problem as Problem
+from .problem import Values
+from .symbols import Symbols as Symbols
+
+__all__ = ["Goal", "Pace", "Problem", "Programme", "Solved", "Symbols"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_ROOM = 12.0  # how far the logarithms of drag, sea and factors may move: e^12
+_PATIENCE = 60  # rejected trial points before a solve is given up
+
+
+class Pace(Enum):
+    """How IPOPT goes about a start, by its barrier.
+
+    From afar the adaptive barrier finds the way.  From the answer itself a large barrier would
+    carry it off, and from a point that breaks a limit a tiny one gets stuck on the wrong side.
+    """
+
+    FAR = {"ipopt.mu_strategy": "adaptive"}  # noqa: RUF012
+    NEAR = {"ipopt.mu_strategy": "monotone", "ipopt.mu_init": 1e-3}  # noqa: RUF012
+    THERE = {  # noqa: RUF012
+        "ipopt.mu_strategy": "monotone",
+        "ipopt.mu_init": 1e-5,
+        "ipopt.bound_push": 1e-6,
+        "ipopt.bound_frac": 1e-6,
+        "ipopt.slack_bound_push": 1e-6,
+        "ipopt.slack_bound_frac": 1e-6,
+    }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Solved:
+    """What a solve returned; nothing in it is verified yet.
+
+    `prices` is d log(cost) / d log(bound) by limit (the envelope theorem), for the goal COST.
+    """
+
+    values: FloatArray
+    coefficient: float | None
+    objective: float
+    extra: float
+    converged: bool
+    message: str
+    iterations: int
+    prices: dict[str, float]
+
+
+class _Guard(ca.Callback):
+    """Zero where the loop is stable, not a number elsewhere; its derivative is zero."""
+
+    def __init__(self, problem: Problem, size: int) -> None:
+        ca.Callback.__init__(self)
+        self._problem = problem
+        self._size = size
+        self._scales = np.array([p.scale for p in problem.law.parameters])
+        self._jacobian: ca.Function | None = None
+        self.rejected = 0
+        self.construct("guard", {})
+
+    @override
+    def get_n_in(self) -> int:
+        return 1
+
+    @override
+    def get_n_out(self) -> int:
+        return 1
+
+    @override
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:
+        del i
+        return ca.Sparsity.dense(self._size, 1)
+
+    @override
+    def eval(self, arg: Sequence[Any]) -> list[float]:
+        if self.rejected > _PATIENCE:
+            return [np.nan]  # ends the solve: its line search finds nothing stable any more
+        x = np.array(arg[0], dtype=np.float64).ravel()
+        if not np.all(np.isfinite(x)):
+            return [np.nan]
+        count = self._scales.size
+        coefficient = float(np.exp(x[count])) if self._problem.drag is not None else None
+        stable = self._problem.stable(x[:count] * self._scales, coefficient)
+        self.rejected += not stable
+        return [0.0 if stable else np.nan]
+
+    @override
+    def has_jacobian(self) -> bool:
+        return True
+
+    @override
+    def get_jacobian(
+        self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Mapping[str, Any]
+    ) -> ca.Function:
+        x, out = ca.MX.sym("x", self._size), ca.MX.sym("out", 1)
+        zero = ca.MX(ca.Sparsity(1, self._size))
+        self._jacobian = ca.Function(name, [x, out], [zero], inames, onames, opts)
+        return self._jacobian
+
+
+class Programme:
+    """A stated programme: built once for a set of nodes, solved from many starts."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        nodes: Quadrature,
+        omega: FloatArray,
+        goal: Goal = Goal.COST,
+        *,
+        reference: FloatArray,
+        relaxed: Sequence[str] = (),
+        tolerance: float = 1e-7,
+        max_iterations: int = 150,
+    ) -> None:
+        self.problem = problem
+        self._goal = goal
+        symbols = Symbols(problem, nodes, omega, goal)
+        self._bounds = np.array([limit.bound for limit in problem.limits], dtype=np.float64)
+        bounds = ca.MX.sym("bounds", self._bounds.size)
+        rows, self._slices, at = [], [], 0
+        for k, limit in enumerate(problem.limits):
+            bound = bounds[k]
+            if goal is Goal.RELAX and limit.name in relaxed:
+                bound = bound * ca.exp(symbols.extra)
+            row = limit.rows(symbols, bound)
+            if goal is Goal.FEASIBLE:
+                row = row - symbols.extra
+            rows.append(row)
+            self._slices.append(slice(at, at + row.shape[0]))
+            at += row.shape[0]
+        self._inequalities = at
+        rows.append(symbols.no_slow_pole(reference))
+        self._inequalities += 1
+        if problem.drag is not None:
+            rows.append(symbols.drag_balance())
+        constraints = ca.vertcat(*rows) if rows else ca.MX(0, 1)
+        cost = symbols.cost()
+        objective = cost
+        if goal is not Goal.COST:
+            objective = -symbols.extra if goal is Goal.SEA else symbols.extra
+        self._guard = _Guard(problem, symbols.x.shape[0])
+        self.evaluate = ca.Function("evaluate", [symbols.x, bounds], [cost, constraints])
+        self._statement: dict[str, Any] = {
+            "x": symbols.x,
+            "p": bounds,
+            "f": objective + self._guard(symbols.x),
+            "g": constraints,
+        }
+        self._options: dict[str, Any] = {
+            "print_time": False,
+            "show_eval_warnings": False,
+            "ipopt.print_level": 0,
+            "ipopt.sb": "yes",
+            "ipopt.tol": tolerance,
+            "ipopt.acceptable_tol": 10.0 * tolerance,
+            "ipopt.max_iter": max_iterations,
+        }
+        self._solvers: dict[Pace, Any] = {}
+
+    def _solver(self, pace: Pace) -> Any:
+        if pace not in self._solvers:
+            options = {**self._options, **pace.value}
+            self._solvers[pace] = ca.nlpsol("synthesis", "ipopt", self._statement, options)
+        return self._solvers[pace]
+
+    def pack(
+        self, values: Values, coefficient: float | None = None, extra: float | None = None
+    ) -> FloatArray:
+        """Return the programme's vector for given parameters."""
+        x = [v / p.scale for v, p in zip(values, self.problem.law.parameters, strict=True)]
+        if self.problem.drag is not None:
+            x.append(float(np.log(coefficient or self.problem.drag.reference)))
+        if self._goal is not Goal.COST:
+            x.append(0.0 if extra is None else extra)
+        return np.array(x)
+
+    def _tightened(self, tighten: Mapping[str, float]) -> FloatArray:
+        bounds = self._bounds.copy()
+        for k, limit in enumerate(self.problem.limits):
+            step = tighten.get(limit.name, 0.0)
+            bounds[k] *= 1.0 + step if limit.at_least else 1.0 - step
+        return bounds
+
+    def violations(self, x: FloatArray) -> tuple[float, dict[str, float]]:
+        """Return the log cost and the largest row of each limit at a vector."""
+        cost, rows = self.evaluate(x, self._bounds)
+        flat = np.array(rows, dtype=np.float64).ravel()
+        worst = {
+            limit.name: float(flat[part].max(initial=-np.inf))
+            for limit, part in zip(self.problem.limits, self._slices, strict=True)
+        }
+        return float(cost), worst
+
+    def solve(
+        self,
+        start: FloatArray,
+        reach: float | None = None,
+        tighten: Mapping[str, float] | None = None,
+        pace: Pace = Pace.FAR,
+    ) -> Solved:
+        """Return IPOPT's answer from a start.
+
+        Parameters
+        ----------
+        start
+            The programme's vector, see `pack`.
+        reach
+            How far, relatively, a parameter may move.
+        tighten
+            Relative tightening of bounds by name of the limit.
+        pace
+            How near the start is to the answer.
+        """
+        parameters = self.problem.law.parameters
+        self._guard.rejected = 0
+        low = [p.low / p.scale for p in parameters]
+        high = [p.high / p.scale for p in parameters]
+        if reach is not None:
+            near = start[: len(parameters)]
+            room = reach * np.maximum(np.abs(near), 1e-3 * np.abs(near).max(initial=1e-3))
+            low, high = list(np.maximum(low, near - room)), list(np.minimum(high, near + room))
+        free = start.size - len(parameters)
+        bottom = np.full(self._inequalities, -np.inf)
+        equalities = [0.0] if self.problem.drag is not None else []
+        solver = self._solver(pace)
+        answer = solver(
+            x0=start,
+            p=self._tightened(tighten or {}),
+            lbx=[*low, *(start[-free:] - _ROOM if free else [])],
+            ubx=[*high, *(start[-free:] + _ROOM if free else [])],
+            lbg=np.concatenate([bottom, equalities]),
+            ubg=np.concatenate([np.zeros(self._inequalities), equalities]),
+        )
+        stats = solver.stats()
+        x = np.array(answer["x"], dtype=np.float64).ravel()
+        lam = np.array(answer["lam_p"], dtype=np.float64).ravel()
+        count = len(parameters)
+        drag = self.problem.drag is not None
+        return Solved(
+            values=x[:count] * np.array([p.scale for p in parameters]),
+            coefficient=float(np.exp(x[count])) if drag else None,
+            objective=float(answer["f"]),
+            extra=float(x[-1]) if self._goal is not Goal.COST else 0.0,
+            converged=bool(stats["success"]),
+            message=str(stats["return_status"]).replace("_", " ").lower(),
+            iterations=int(stats["iter_count"]),
+            prices={
+                limit.name: float(lam[k] * limit.bound)
+                for k, limit in enumerate(self.problem.limits)
+            },
+        )

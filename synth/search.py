@@ -1,0 +1,322 @@
+"""The search: many starts on moderate nodes, the best answers polished on refined ones.
+
+    Problem -> starts -> IPOPT from each -> distinct answers -> exchange of nodes -> Found
+
+Between the first solve and the last the programme sees ever more of what it must not do:
+after each solve the places where a limit is pressed hardest become nodes (the exchange
+method of semi-infinite programming), until nothing is broken in between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .assess import Assessment
+from .nodes import cost_nodes, margin_nodes
+from .polish import KEPT, look, polish
+from .problem import Goal, Problem
+from .programme import Programme, Solved
+from .starts import candidates, pick_spread, stabilise
+
+__all__ = [
+    "Found",
+    "Progress",
+    "Start",
+    "coarse_programme",
+    "least_violation",
+    "resume",
+    "search",
+]
+
+FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+_AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
+_POLISHED = 3  # distinct answers that are polished at most
+_RESUMED = 6  # ends of an earlier search that a resumed one starts from
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Start:
+    """One start of the search: where it began, where it ended, and how.
+
+    `cost` is on the moderate nodes of the first pass, where a margin may leak between nodes.
+    """
+
+    begin: FloatArray
+    end: FloatArray
+    cost: float
+    converged: bool
+    stable: bool
+    message: str
+    iterations: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Found:
+    """What a search found: the best answer, a look at it, and every start.
+
+    `excess` is the largest relative excess over a limit; `solved` is None where nothing
+    stable was found at all.  `reference` are parameters of a briskly stable loop.
+    """
+
+    solved: Solved | None
+    view: Assessment | None
+    excess: float
+    starts: tuple[Start, ...] = ()
+    agreed: int = 0
+    reference: FloatArray | None = None
+
+
+def search(
+    problem: Problem,
+    starts: int,
+    seed: int,
+    guesses: Sequence[Sequence[float]] = (),
+    progress: Progress | None = None,
+) -> Found:
+    """Return the best answer of a multi-start search; see `synth.tune.tune`."""
+    begins = begin_points(problem, starts, seed, guesses)
+    if not begins:
+        return Found(solved=None, view=None, excess=np.inf)
+    reference = briskest(problem, begins)
+    return _from(problem, begins, reference, start_coefficient(problem), progress)
+
+
+def resume(
+    problem: Problem,
+    values: Sequence[float],
+    earlier: Found,
+    progress: Progress | None = None,
+) -> Found:
+    """Return the answer to a problem close to one that was solved, from that one's ends."""
+    ends = [np.array(values, dtype=np.float64)]
+    ends += [s.end for s in sorted(earlier.starts, key=lambda s: s.cost) if s.converged]
+    coefficient = earlier.solved.coefficient if earlier.solved is not None else None
+    stable = [end for end in ends if problem.stable(end, coefficient)]
+    if not stable:
+        return search(problem, max(1, len(earlier.starts)), 0, [], progress)
+    scales = np.array([p.scale for p in problem.law.parameters])
+    order = np.arange(len(stable), dtype=np.float64)
+    chosen = pick_spread(np.array(stable), order, scales, _RESUMED)
+    known = [] if earlier.reference is None else [earlier.reference]
+    reference = briskest(problem, [*known, *stable])
+    return _from(problem, [stable[i] for i in chosen], reference, coefficient, progress)
+
+
+def briskest(problem: Problem, points: Sequence[FloatArray]) -> FloatArray:
+    """Return the point whose loop settles fastest, to tell the sides of the stability boundary."""
+    return min(points, key=problem.abscissa)
+
+
+def _from(
+    problem: Problem,
+    begins: Sequence[FloatArray],
+    reference: FloatArray,
+    coefficient: float | None,
+    progress: Progress | None,
+) -> Found:
+    """Return the best answer from stable starts."""
+    tell = progress or (lambda stage, done, total: None)
+    programme = coarse_programme(problem, begins, reference)
+    records: list[Start] = []
+    first: list[Solved] = []
+    for k, begin in enumerate(begins):
+        tell("starts", k, len(begins))
+        solved = programme.solve(programme.pack(begin, coefficient))
+        stable = problem.stable(solved.values, solved.coefficient)
+        cost = float(np.exp(solved.objective)) if stable and solved.converged else np.inf
+        records.append(
+            Start(
+                begin=begin,
+                end=solved.values,
+                cost=cost,
+                converged=solved.converged,
+                stable=stable,
+                message=solved.message,
+                iterations=solved.iterations,
+            )
+        )
+        if solved.converged and stable:
+            first.append(solved)
+    tell("starts", len(begins), len(begins))
+    if not first:
+        solved = least_violation(problem, begins, reference)
+        view, excess = look(problem, solved)
+        return Found(
+            solved=solved,
+            view=view,
+            excess=max(excess, 1.0),
+            starts=tuple(records),
+            reference=reference,
+        )
+    return _polished(problem, first, reference, tuple(records), tell)
+
+
+def _polished(
+    problem: Problem,
+    first: Sequence[Solved],
+    reference: FloatArray,
+    records: tuple[Start, ...],
+    tell: Progress,
+) -> Found:
+    """Return the best of the distinct answers after polishing."""
+    pairs = _second_pass(problem, _distinct(first), reference)
+    distinct = _distinct(list(pairs))
+    best: tuple[Solved, Assessment, float] | None = None
+    origin = pairs[distinct[0]]
+    for k, solved in enumerate(distinct):
+        tell("polish", k, len(distinct))
+        if best is not None and best[2] <= KEPT and solved.objective > best[0].objective:
+            break  # polishing only adds nodes, that is constraints: it cannot get better
+        candidate = polish(problem, solved, reference)
+        rank = (candidate[2] > KEPT, candidate[0].objective)
+        if best is None or rank < (best[2] > KEPT, best[0].objective):
+            best, origin = candidate, pairs[solved]
+    tell("polish", len(distinct), len(distinct))
+    assert best is not None
+    agreed = sum(1 for s in first if abs(s.objective - origin.objective) <= _AGREE)
+    return Found(
+        solved=best[0],
+        view=best[1],
+        excess=best[2],
+        starts=records,
+        agreed=agreed,
+        reference=reference,
+    )
+
+
+def _second_pass(
+    problem: Problem, first: Sequence[Solved], reference: FloatArray
+) -> dict[Solved, Solved]:
+    """Return the answers again with nodes where any of them leaked through a limit.
+
+    From there each may move freely: what leaked badly often belongs in another basin.  Each
+    answer comes with the one it began from.
+    """
+    views = [look(problem, solved)[0] for solved in first]
+    critical = [limit.critical(view) for view in views for limit in problem.limits]
+    programme = Programme(
+        problem,
+        cost_nodes(problem, views, rtol=1e-6),
+        np.unique(np.concatenate([margin_nodes(problem, [v.poles for v in views], 40), *critical])),
+        reference=reference,
+        tolerance=1e-7,
+    )
+    again = {programme.solve(programme.pack(s.values, s.coefficient)): s for s in first}
+    sound = {
+        new: old
+        for new, old in again.items()
+        if new.converged and problem.stable(new.values, new.coefficient)
+    }
+    return sound or {solved: solved for solved in first}
+
+
+def coarse_programme(
+    problem: Problem,
+    begins: Sequence[FloatArray],
+    reference: FloatArray,
+    goal: Goal = Goal.COST,
+    **options: Any,
+) -> Programme:
+    """Return a programme on nodes that suit all the starts."""
+    views = [
+        Assessment(
+            problem.plant,
+            problem.law.controller([float(v) for v in begin]),
+            problem.disturbances,
+            drag=problem.drag,
+            coefficient=start_coefficient(problem),
+        )
+        for begin in begins
+    ]
+    return Programme(
+        problem,
+        cost_nodes(problem, views, rtol=1e-4),
+        margin_nodes(problem, [v.poles for v in views[:4]], 40),
+        goal,
+        reference=reference,
+        tolerance=1e-6,
+        **options,
+    )
+
+
+def least_violation(
+    problem: Problem, begins: Sequence[FloatArray], reference: FloatArray
+) -> Solved:
+    """Return the stable answer that breaks the limits least, for limits that exclude each other."""
+    programme = coarse_programme(problem, begins, reference, Goal.FEASIBLE)
+    found = []
+    for begin in begins[:_POLISHED]:
+        x = programme.pack(begin, start_coefficient(problem))
+        x[-1] = max([0.0, *programme.violations(x)[1].values()])
+        solved = programme.solve(x)
+        if problem.stable(solved.values, solved.coefficient):
+            found.append(solved)
+    if found:
+        return min(found, key=lambda s: s.objective)
+    return Solved(
+        values=begins[0],
+        coefficient=start_coefficient(problem),
+        objective=np.inf,
+        extra=0.0,
+        converged=False,
+        message="not solved",
+        iterations=0,
+        prices={limit.name: 0.0 for limit in problem.limits},
+    )
+
+
+def start_coefficient(problem: Problem) -> float | None:
+    """Return the drag coefficient that a search begins with [N s/m]."""
+    return None if problem.drag is None else problem.drag.reference
+
+
+def begin_points(
+    problem: Problem, starts: int, seed: int, guesses: Sequence[Sequence[float]]
+) -> list[FloatArray]:
+    """Return stable starting points: guesses, screened candidates, stabilised candidates."""
+    order = len(problem.rational.states)
+    points = candidates(problem, 1024 if order <= 12 else 512, seed)
+    if len(guesses):
+        points = np.vstack([np.array(guesses, dtype=np.float64), points])
+    abscissas = np.array([problem.abscissa(p) for p in points])
+    stable = np.flatnonzero(abscissas < -1e-9)
+    scales = np.array([p.scale for p in problem.law.parameters])
+    if stable.size < starts:
+        found = stabilise(problem, points, np.where(abscissas < 0, np.inf, abscissas), starts)
+        points = np.vstack([points[stable], *[f[None] for f in found]])
+    else:
+        points = points[stable]
+    if not len(points):
+        return []
+    merit = _merit(problem, points)
+    return [points[i] for i in pick_spread(points, merit, scales, starts)]
+
+
+def _merit(problem: Problem, points: FloatArray) -> FloatArray:
+    """Return log cost plus a penalty on broken limits, on nodes that suit the plant alone."""
+    sample = points[:: max(1, len(points) // 4)][:4]
+    programme = coarse_programme(problem, list(sample), briskest(problem, list(sample)))
+    merit = []
+    for point in points:
+        x = programme.pack(point, start_coefficient(problem))
+        cost, broken = programme.violations(x)
+        merit.append(cost + sum(np.log1p(max(0.0, row)) for row in broken.values()))
+    return np.asarray(np.nan_to_num(np.array(merit, dtype=np.float64), nan=np.inf))
+
+
+def _distinct(solved: Sequence[Solved]) -> list[Solved]:
+    """Return the best few answers whose costs differ."""
+    chosen: list[Solved] = []
+    for item in sorted(solved, key=lambda s: s.objective):
+        if all(abs(item.objective - other.objective) > _AGREE for other in chosen):
+            chosen.append(item)
+        if len(chosen) == _POLISHED:
+            break
+    return chosen
