@@ -16,7 +16,6 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,7 +50,7 @@ _BOTTOM, _TOP = 1e-3, 300.0  # of the sensitivity grid [rad/s]
 _LIVELY = (0.3, 60.0)  # where loops around a payload on a rope move
 _THIN = 15  # points per decade elsewhere
 _LIGHT = 0.05  # damping below which an open-loop resonance is narrower than that grid
-_ABOUT = np.linspace(-5.0, 5.0, 21)  # ... and gets points of its own, in units of its decay
+_ABOUT = np.linspace(-5.0, 5.0, 41)  # ... and gets points of its own, in units of its decay
 _VALLEYS = 3
 _STEPS = np.array([-0.5, 0.0, 0.5])  # from a pole's frequency, in units of its decay
 
@@ -167,7 +166,7 @@ class SampledLoop:
         )
 
     def objective(self, gains: FloatArray, max_sensitivity: float) -> FloatArray:
-        """Return log rms plus penalties of gains (3, m), or (3,) as a number, for a bound on M_s."""
+        """Return log rms plus penalties for a bound on M_s, of gains (3, m) or (3,)."""
         columns = gains.reshape(3, -1)
         log_rms, peaks, decay, slow = self.measure(columns)
         value = log_rms + _PENALTY * np.maximum(0.0, np.log(peaks / max_sensitivity))
@@ -330,9 +329,7 @@ class PythonControlLoop:
         self.system: control.StateSpace = plant.without_delays(PADE).to_control(pade_order=0)
         inputs, outputs = self.system.input_labels, self.system.output_labels
         measured = [f"measured_{n}" if n in plant.outputs else n for n in plant.measurements]
-        self._measured = [
-            outputs.index(measured[j].replace(".", "_")) for j in _columns(task)
-        ]
+        self._measured = [outputs.index(measured[j].replace(".", "_")) for j in _columns(task)]
         self._input = {name: inputs.index(name.replace(".", "_")) for name in plant.disturbances}
         self._output = {name: outputs.index(name.replace(".", "_")) for name in (PAYLOAD, VELOCITY)}
         poles = plant.poles()
@@ -347,8 +344,12 @@ class PythonControlLoop:
         if self.task.drag is not None:
             drag = self.task.drag
             c = scipy.optimize.newton(
-                lambda log_c: log_c
-                - np.log(drag.slope * self._sigma(gains, np.exp(log_c) - drag.reference, VELOCITY)),
+                lambda log_c: (
+                    log_c
+                    - np.log(
+                        drag.slope * self._sigma(gains, np.exp(log_c) - drag.reference, VELOCITY)
+                    )
+                ),
                 np.log(drag.reference),
                 tol=1e-6,
                 disp=False,
@@ -372,9 +373,7 @@ class PythonControlLoop:
         law = np.zeros((self.system.ninputs, self.system.noutputs))
         law[0, self._measured] = -gains
         law[self._input[FORCE], self._output[VELOCITY]] = -added
-        return self._control.feedback(
-            self.system, self._control.ss([], [], [], law), sign=1
-        )
+        return self._control.feedback(self.system, self._control.ss([], [], [], law), sign=1)
 
     def _motion(self, system: control.StateSpace, omega: FloatArray, output: str) -> ComplexArray:
         row = self._output[output]

@@ -25,6 +25,8 @@
 # payload $P$. $G = P/Y$ is the rope alone, $T = P/Z$ and $T_2 = X/Z$ are the closed loop.
 
 # %%
+"""Imports, a helper for tables, and the case."""
+
 import math
 import sys
 from pathlib import Path
@@ -43,6 +45,9 @@ from stillhook.cables import cable_study
 from stillhook.style import AFTER, BEFORE, DRUM, HOOK, REFERENCE
 from synth.controller import Controller, closed_loop_poles
 from synth.question import locked_response, pose
+
+sys.path.insert(0, str(Path.cwd().parent / "benchmarks"))
+import headline
 
 # %matplotlib inline
 plt.rcParams.update(
@@ -292,13 +297,14 @@ fig, axes = plt.subplots(1, 3, figsize=(11, 3.2))
 for omega, colour in ((0.5, AFTER), (0.944, BEFORE), (2.0, DRUM)):
     run = time_response(closed, {"hook.heave": Sine(omega=omega)}, duration=25.0, step=0.02)
     axes[0].plot(run.time, 1e3 * run["payload.displacement"], color=colour, label=f"{omega} rad/s")
-axes[0].set(title="Figure 31: Z = 1 m · sin ωt", xlabel="time [s]", ylabel="payload [mm]")
-axes[0].legend(loc="lower right")
-run = time_response(closed, {"drive.set_point": Step(size=gains["A"])}, duration=25.0, step=0.02)
+axes[0].set(title="Figure 31: Z = 1 m sin ωt", xlabel="time [s]", ylabel="payload [mm]")
+axes[0].set_ylim(-55, 35)
+axes[0].legend(loc="lower right", ncols=3, fontsize=8, columnspacing=1.0, handlelength=1.2)
+run = time_response(closed, {"drive.set_point": Step(size=gains["A"])}, duration=12.0, step=0.02)
 axes[1].plot(run.time, 1e3 * run["payload.displacement"], color=AFTER)
 axes[1].axhline(1e3 / gains["a2"], color=REFERENCE, lw=0.8, ls="--")
-axes[1].set(title="Figure 33: E_G = 1 V", xlabel="time [s]")
-run = time_response(closed, {"hook.heave": Step()}, duration=25.0, step=0.02)
+axes[1].set(title="Figure 33: $E_G$ steps by 1 V", xlabel="time [s]")
+run = time_response(closed, {"hook.heave": Step()}, duration=12.0, step=0.02)
 axes[2].plot(run.time, 1e3 * run["payload.displacement"], color=AFTER)
 axes[2].set(title="Z steps by 1 m", xlabel="time [s]")
 plt.show()
@@ -365,8 +371,8 @@ table(
 
 # %% [markdown]
 # With the thesis's own $C$ the tension before compensation would have a standard deviation above
-# the load itself: the rope would be slack half the time, and no linear model has anything to say
-# about that.
+# the load itself: the rope would be slack a sixth of the time, and no linear model has anything
+# to say about that.
 
 # %%
 print(
@@ -457,7 +463,7 @@ for ax, window in zip(axes, ((-14, 2, -5, 5), (-2.2, 1.2, -1.7, 1.7)), strict=Tr
     ax.plot(*(circle.real / 2 - 1, circle.imag / 2), color=BEFORE, lw=1.0, label="$M_s$ = 2")
     ax.plot(circle.real, circle.imag, color=HOOK, lw=0.8, ls=":", label="|L| = 1")
     ax.plot(-1, 0, "+", color=REFERENCE, ms=9)
-    ax.set(xlim=window[:2], ylim=window[2:], xlabel="Re L", ylabel="Im L")
+    ax.set(xlim=window[:2], ylim=window[2:], xlabel="Re L", ylabel="Im L", aspect="equal")
 axes[0].set_title("L crosses the axis at -10.9: less gain is instability")
 axes[1].set_title("... and passes -1 at a distance of 0.19")
 axes[1].legend(loc="upper right")
@@ -506,9 +512,9 @@ table(
 
 # %% [markdown]
 # **The rope is not one spring.** At 2000 m an axial wave takes 0.45 s from drum to payload, and
-# the second axial mode, 7.13 rad/s, lies on top of the crossover. With the rope as lumped masses
-# the thesis's closed loop is unstable. Everything its tables promise belongs to the one-spring
-# model.
+# the second axial mode, 7.13 rad/s, lies on top of the crossover. With the rope as 2, 5, 10 or 20
+# lumped masses the thesis's closed loop is unstable; the fastest growth tends to 4.66 1/s however
+# the rope is lumped. Everything its tables promise belongs to the one-spring model.
 
 # %%
 rope_case = sh.load_case("thesis-1975-rope")
@@ -547,9 +553,6 @@ table(["rope masses", "growth rate [1/s]", "at [rad/s]", "unstable poles"], rows
 # First what the thesis's own gains do:
 
 # %%
-sys.path.insert(0, str(Path.cwd().parent / "benchmarks"))
-import headline
-
 stored = headline.load()
 Markdown(headline.thesis_table(stored))
 

@@ -33,6 +33,7 @@ _HOME = {
     "evaluate_gains": "synth",
     "optimise_gains": "synth",
     "tune": "synth",
+    "cable_study": "stillhook.cables",
     "load_design": "stillhook.design_file",
     "save_design": "stillhook.design_file",
     "write_report": "stillhook.report",
@@ -48,6 +49,7 @@ __all__ = [
     "SynthesisError",
     "__version__",
     "bundled_cases",
+    "cable_study",
     "case_schema",
     "evaluate_gains",
     "load_case",
@@ -73,6 +75,7 @@ if TYPE_CHECKING:
     from synth import optimise_gains as optimise_gains
     from synth import tune as tune
 
+    from .cables import cable_study as cable_study
     from .design_file import load_design as load_design
     from .design_file import save_design as save_design
     from .report import write_report as write_report

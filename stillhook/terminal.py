@@ -146,15 +146,11 @@ def progress(*, shown: bool) -> Iterator[Progress]:
     )
     with Bars(*columns, console=out, transient=True) as bars:
         task = bars.add_task("building the plant", total=None)
-        current = ""
 
         def tell(stage: str, done: int, total: int) -> None:
-            nonlocal task, current
-            if stage != current:
-                bars.remove_task(task)
-                task = bars.add_task(_STAGES.get(stage, stage), total=total)
-                current = stage
-            bars.update(task, completed=done, total=total)
+            # One bar for all stages, so that its clock shows the whole time.
+            name = _STAGES.get(stage, stage)
+            bars.update(task, description=name, completed=done, total=total)
 
         yield tell
 

@@ -114,6 +114,14 @@ class Assessment:
         differences = return_differences(blocks, self._law(self.grid))
         return [np.asarray(d, dtype=np.complex128) - 1.0 for d in differences]
 
+    @cached_property
+    def _peaks(self) -> list[tuple[FloatArray, FloatArray]]:
+        """Places of the local minima of |1 + L| of each loop, and their values."""
+        return [
+            refine_minima(self._distance(i), self.grid, np.abs(1.0 + gain))
+            for i, gain in enumerate(self._grid_gain)
+        ]
+
     def loop_gain(self, omega: FloatArray, index: int = 0) -> ComplexArray:
         """Return L of the loop broken at input `index`, (k,)."""
         return self._loop(index)(np.asarray(omega, dtype=np.float64))
@@ -137,12 +145,16 @@ class Assessment:
         """Return the most probable maximum of `output` in `duration` [s], without its mean."""
         return peak_factor(self.mean_period(output), duration) * self.sigma(output)
 
+    def sensitivity_peaks(self, above: float) -> FloatArray:
+        """Return the frequencies of all peaks of |S| above a value [rad/s]."""
+        found = [at[least < 1.0 / above] for at, least in self._peaks]
+        return np.unique(np.concatenate(found))
+
     def sensitivity_region(self, above: float) -> FloatArray:
         """Return the peaks of |S| above a value, and the grid around them [rad/s]."""
         found = []
-        for i in range(len(self.plant.inputs)):
+        for i, (at, least) in enumerate(self._peaks):
             distance = np.abs(1.0 + self._grid_gain[i])
-            at, least = refine_minima(self._distance(i), self.grid, distance)
             region = self.grid[distance < 1.0 / above]
             found += [at[least < 1.0 / above], region[:: max(1, region.size // _MOST_NODES)]]
         return np.unique(np.concatenate(found))

@@ -63,6 +63,16 @@ class Limit(ABC):
         del loop
         return np.zeros(0)
 
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """Frequencies [rad/s] at which the limit begins or ends to hold."""
+        return ()
+
+    def worst(self, loop: Assessment) -> FloatArray:
+        """Return the frequencies [rad/s] at which the limit is broken, for good."""
+        del loop
+        return np.zeros(0)
+
     def use(self, value: float) -> float:
         """Return the share of the limit that `value` uses; above 1 it is broken."""
         if self.at_least:

@@ -32,6 +32,7 @@ FloatArray = npt.NDArray[np.float64]
 _RATIO = 1.4  # of the ends of one disc's diameter, where few discs do
 _MOST_DISCS = 12
 _FAR = 1e3  # a loop gain beyond which a gain margin of zero asks for nothing
+_OVERLAP = 0.2  # of neighbouring discs, in their widths
 _ARC = 4  # discs along the arc that a delay margin forbids
 _TINY = 1e-12
 _ABOUT = np.array([-0.05, -0.02, -0.01, -0.004, 0.0, 0.004, 0.01, 0.02, 0.05])
@@ -59,6 +60,10 @@ class MaxSensitivity(Limit):
     def critical(self, loop: Assessment) -> FloatArray:
         return loop.sensitivity_region(0.8 * self.bound)
 
+    @override
+    def worst(self, loop: Assessment) -> FloatArray:
+        return loop.sensitivity_peaks(self.bound)
+
 
 @dataclass(frozen=True, kw_only=True)
 class GainMargin(Limit):
@@ -74,7 +79,8 @@ class GainMargin(Limit):
     def rows(self, symbols: Symbols, bound: Any) -> Any:
         # The curve keeps off the segment [-1, -1/bound] of the real axis.
         reach = symbols.module_margin
-        return _off_segment(symbols, 1.0 / bound, 1.0 - reach, self.bound * (1.0 - reach))
+        ratio = self.bound * (1.0 - reach)
+        return _off_segment(symbols, 1.0 - reach, 1.0 / bound, ratio)
 
     @override
     def measure(self, loop: Assessment) -> float:
@@ -134,11 +140,13 @@ class DelayMargin(Limit):
         covered = 2.0 * np.arcsin(0.5 * symbols.module_margin)
         at = np.flatnonzero(symbols.omega_values * self.bound > covered).tolist()
         turn = ca.fmin(symbols.omega[at] * bound, 2.0 * np.pi)
+        width = (turn - covered) / _ARC
         rows = []
         for k in range(_ARC):
-            angle = np.pi + covered + (turn - covered) * ((k + 0.5) / _ARC)
+            # Half a width and a tenth of overlap; the last disc ends where the arc does.
+            angle = np.pi + covered + width * (k + 0.5 - 0.5 * _OVERLAP)
             centre = Phasor(ca.cos(angle), ca.sin(angle))
-            radius = 2.0 * ca.sin(0.25 * (turn - covered) / _ARC)
+            radius = 2.0 * ca.sin(0.25 * width * (1.0 + _OVERLAP))
             for d in symbols.differences:
                 loop = d - 1.0
                 rows.append(_off_disc(Phasor(loop.re[at], loop.im[at]), centre, radius))
@@ -159,6 +167,11 @@ class RollOff(Limit):
 
     above: float
     name: str = "roll_off"
+
+    @property
+    @override
+    def edges(self) -> tuple[float, ...]:
+        return (self.above,)
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
@@ -188,6 +201,11 @@ class LowFrequency(Limit):
     below: float
     name: str = "low_frequency"
 
+    @property
+    @override
+    def edges(self) -> tuple[float, ...]:
+        return (self.below,)
+
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
         at = np.flatnonzero(symbols.omega_values <= self.below).tolist()
@@ -209,20 +227,22 @@ def _around(omega: FloatArray) -> FloatArray:
     return np.outer(omega, 1.0 + _ABOUT).ravel()
 
 
-def _off_segment(symbols: Symbols, near: Any, far: Any, ratio: float) -> Any:
-    """Return rows that keep every loop off [-far, -near] of the real axis.
+def _off_segment(symbols: Symbols, start: Any, end: Any, ratio: float) -> Any:
+    """Return rows that keep every loop off the real axis from -start to -end.
 
-    By a chain of discs that have the segment for their diameters: their ends are exact, and
-    unlike the segment itself they are wide enough for nodes to see.  `ratio` is far over near
-    in numbers; where it is below one, the disc of a limit on the sensitivity covers it all.
+    By a chain of overlapping discs centred on the axis: the end is exact, and unlike the
+    segment itself they are wide enough for nodes to see.  `ratio`, above one, is that of the
+    two ends in numbers; where it is not, the disc of a limit on the sensitivity covers all.
     """
     if ratio <= 1.0:
         return ca.MX(0, 1)
     count = min(_MOST_DISCS, max(1, int(np.ceil(np.log(ratio) / np.log(_RATIO)))))
     rows = []
     for k in range(count):
-        left, right = near * (far / near) ** (k / count), near * (far / near) ** ((k + 1) / count)
-        centre, radius = Phasor(-0.5 * (left + right), 0.0), 0.5 * (right - left)
+        first = start * (end / start) ** (k / count)
+        last = start * (end / start) ** ((k + 1) / count)
+        first = first - _OVERLAP * (last - first)  # into the disc before
+        centre, radius = Phasor(-0.5 * (first + last), 0.0), 0.5 * (last - first)
         rows += [_off_disc(d - 1.0, centre, radius) for d in symbols.differences]
     return ca.vertcat(*rows)
 

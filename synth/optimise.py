@@ -63,12 +63,13 @@ def optimise_gains(
     guesses = _guesses(question)
     tuning = tuning_of(question.problem, search(question.problem, starts, seed, guesses, progress))
     while (wanted := _masses_wanted(question, tuning)) > question.masses:
-        # The rope turned out to need more masses: the search is done, its ends are the guesses.
+        # The rope turned out to need more masses: the ends of the search are the guesses.
         question = with_masses(question, wanted)
         values = list(tuning.parameters.values())
-        again = tuning_of(
-            question.problem, resume(question.problem, values, tuning.found, progress)
-        )
+        problem = question.problem
+        again = tuning_of(problem, resume(problem, values, tuning.found, progress))
+        if not again.ok and tuning.ok:
+            again = tuning_of(problem, search(problem, starts, seed, [values], progress))
         tuning = replace(again, starts=tuning.starts, agreed=tuning.agreed)
     if tuning.ok:
         return _verified(question, _design(question, tuning, tuning.status), progress)
@@ -244,6 +245,8 @@ def _verified(question: Question, design: GainDesign, progress: Progress | None)
     if progress is not None:
         progress("verify", 1, 1)
     status = design.status + _in_small_motion(question, design.gains)
+    if design.payload_rms > design.payload_rms_before:
+        status += "; with the drum held the payload moves less"
     if not checked.ok:
         status = f"not verified: {checked.status}"
     return replace(design, ok=design.ok and checked.ok, status=status, verification=checked)

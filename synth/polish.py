@@ -17,12 +17,13 @@ from .nodes import cost_nodes, margin_nodes
 from .problem import Goal, Problem
 from .programme import Pace, Programme, Solved
 
-__all__ = ["KEPT", "look", "polish", "view_of"]
+__all__ = ["KEPT", "look", "polish", "thinned", "view_of"]
 
 FloatArray = npt.NDArray[np.float64]
 
 KEPT = 1e-5  # a limit counts as kept up to this relative excess
-_ROUNDS = 8  # of the exchange of nodes
+_MOST_CRITICAL = 300  # frequencies that one look adds
+_ROUNDS = 12  # of the exchange of nodes
 _REACH = 0.3  # how far, relatively, a round of the exchange may move a parameter
 _FAR_REACH = 3.0  # ... where it must leave the neighbourhood to keep the limits
 _CLOSE = 3e-2  # relative excess below which a start counts as the answer itself
@@ -41,13 +42,14 @@ def polish(
 
     Also returned: the look at it, and the largest relative excess over a limit.
     """
-    before = np.zeros(0)
+    before, broken = np.zeros(0), np.zeros(0)
     view, excess = look(problem, solved, goal, relaxed)
     best = (excess > KEPT, solved.objective, solved, view, excess)
     for _ in range(_ROUNDS):
-        # The last round's nodes stay for one more, lest two rounds undo each other.
-        critical = np.concatenate([[], *(limit.critical(view) for limit in problem.limits)])
-        held, before = np.concatenate([before, critical]), critical
+        # Where a limit was broken stays a node; what was merely close stays for one more round.
+        critical = thinned([limit.critical(view) for limit in problem.limits])
+        broken = np.concatenate([broken, *(limit.worst(view) for limit in problem.limits)])
+        held, before = np.concatenate([before, critical, broken]), critical
         programme = Programme(
             problem,
             cost_nodes(problem, [view]),
@@ -69,6 +71,12 @@ def polish(
         if excess <= 0.5 * KEPT and moved < _SETTLED:
             break
     return best[2:] if not best[0] else _tightened(problem, best[2:], programme, goal, relaxed)
+
+
+def thinned(critical: Sequence[FloatArray]) -> FloatArray:
+    """Return all critical frequencies, or an even choice where there are very many."""
+    every = np.unique(np.concatenate([np.zeros(0), *critical]))
+    return np.asarray(every[:: 1 + every.size // _MOST_CRITICAL])
 
 
 def _any_pace(programme: Programme, start: FloatArray, excess: float) -> Solved | None:
@@ -104,7 +112,7 @@ def _tightened(
         for limit in problem.limits:
             over = limit.use(limit.measure(view)) - 1.0
             if over > 0.5 * KEPT and limit.name not in relaxed:
-                tighten[limit.name] = tighten.get(limit.name, 0.0) + 1.5 * over
+                tighten[limit.name] = tighten.get(limit.name, 0.0) + 1.1 * over
         start = programme.pack(solved.values, solved.coefficient, solved.extra)
         again = programme.solve(start, _REACH, tighten, Pace.NEAR)
         if not (again.converged and problem.stable(again.values, again.coefficient)):

@@ -18,9 +18,9 @@ import numpy.typing as npt
 
 from .assess import Assessment
 from .nodes import cost_nodes, margin_nodes
-from .polish import KEPT, look, polish
+from .polish import KEPT, look, polish, thinned
 from .problem import Goal, Problem
-from .programme import Programme, Solved
+from .programme import Pace, Programme, Solved
 from .starts import candidates, pick_spread, stabilise
 
 __all__ = [
@@ -37,7 +37,10 @@ FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 _AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
-_POLISHED = 3  # distinct answers that are polished at most
+_POLISHED = 6  # distinct answers that are polished at most
+_WORST = 20.0  # what one broken limit may add to the merit of a candidate
+_RESERVE = 16  # further starts for a search of which none arrived
+_BASIN = 1.0  # how far, relatively, a parameter may move within its basin
 _RESUMED = 6  # ends of an earlier search that a resumed one starts from
 
 
@@ -81,11 +84,11 @@ def search(
     progress: Progress | None = None,
 ) -> Found:
     """Return the best answer of a multi-start search; see `synth.tune.tune`."""
-    begins = begin_points(problem, starts, seed, guesses)
+    begins = begin_points(problem, starts + _RESERVE, seed, guesses)
     if not begins:
         return Found(solved=None, view=None, excess=np.inf)
     reference = briskest(problem, begins)
-    return _from(problem, begins, reference, start_coefficient(problem), progress)
+    return _from(problem, begins, reference, start_coefficient(problem), progress, starts)
 
 
 def resume(
@@ -120,14 +123,18 @@ def _from(
     reference: FloatArray,
     coefficient: float | None,
     progress: Progress | None,
+    wanted: int | None = None,
 ) -> Found:
-    """Return the best answer from stable starts."""
+    """Return the best answer from stable starts, of which `wanted` are used if any arrives."""
     tell = progress or (lambda stage, done, total: None)
-    programme = coarse_programme(problem, begins, reference)
+    programme = coarse_programme(problem, begins[:wanted], reference)
     records: list[Start] = []
     first: list[Solved] = []
+    count = len(begins) if wanted is None else min(wanted, len(begins))
     for k, begin in enumerate(begins):
-        tell("starts", k, len(begins))
+        if k >= count and first:
+            break
+        tell("starts", min(k, count - 1), count)
         solved = programme.solve(programme.pack(begin, coefficient))
         stable = problem.stable(solved.values, solved.coefficient)
         cost = float(np.exp(solved.objective)) if stable and solved.converged else np.inf
@@ -144,7 +151,7 @@ def _from(
         )
         if solved.converged and stable:
             first.append(solved)
-    tell("starts", len(begins), len(begins))
+    tell("starts", count, count)
     if not first:
         solved = least_violation(problem, begins, reference)
         view, excess = look(problem, solved)
@@ -196,7 +203,7 @@ def _second_pass(
 ) -> dict[Solved, Solved]:
     """Return the answers again with nodes where any of them leaked through a limit.
 
-    From there each may move freely: what leaked badly often belongs in another basin.  Each
+    Each stays in its basin if the limits can be kept there, else it may move freely.  Each
     answer comes with the one it began from.
     """
     views = [look(problem, solved)[0] for solved in first]
@@ -204,16 +211,18 @@ def _second_pass(
     programme = Programme(
         problem,
         cost_nodes(problem, views, rtol=1e-6),
-        np.unique(np.concatenate([margin_nodes(problem, [v.poles for v in views], 40), *critical])),
+        np.union1d(margin_nodes(problem, [v.poles for v in views], 40), thinned(critical)),
         reference=reference,
         tolerance=1e-7,
     )
-    again = {programme.solve(programme.pack(s.values, s.coefficient)): s for s in first}
-    sound = {
-        new: old
-        for new, old in again.items()
-        if new.converged and problem.stable(new.values, new.coefficient)
-    }
+    sound: dict[Solved, Solved] = {}
+    for old in first:
+        start = programme.pack(old.values, old.coefficient)
+        for reach, pace in ((_BASIN, Pace.NEAR), (None, Pace.FAR)):
+            new = programme.solve(start, reach, pace=pace)
+            if new.converged and problem.stable(new.values, new.coefficient):
+                sound[new] = old
+                break
     return sound or {solved: solved for solved in first}
 
 
@@ -252,7 +261,7 @@ def least_violation(
     """Return the stable answer that breaks the limits least, for limits that exclude each other."""
     programme = coarse_programme(problem, begins, reference, Goal.FEASIBLE)
     found = []
-    for begin in begins[:_POLISHED]:
+    for begin in begins[:3]:
         x = programme.pack(begin, start_coefficient(problem))
         x[-1] = max([0.0, *programme.violations(x)[1].values()])
         solved = programme.solve(x)
@@ -307,7 +316,8 @@ def _merit(problem: Problem, points: FloatArray) -> FloatArray:
     for point in points:
         x = programme.pack(point, start_coefficient(problem))
         cost, broken = programme.violations(x)
-        merit.append(cost + sum(np.log1p(max(0.0, row)) for row in broken.values()))
+        # Rows are logarithms as the cost is: a margin broken tenfold outweighs a tenfold gain.
+        merit.append(cost + sum(min(_WORST, max(0.0, row)) for row in broken.values()))
     return np.asarray(np.nan_to_num(np.array(merit, dtype=np.float64), nan=np.inf))
 
 

@@ -279,7 +279,7 @@ def lively(
 
 
 def _smooth(values: ComplexArray) -> npt.NDArray[np.bool_]:
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         step = np.log(values[1:] / values[:-1])
     return np.asarray((np.abs(step.imag) <= _TURN) & (np.abs(step.real) <= _GROWTH))
 

@@ -127,9 +127,7 @@ def test_bad_input(case):
 
 def test_a_payload_too_heavy_for_the_motor_is_remarked_on(case):
     with (
-        pytest.warns(
-            PhysicsWarning, match="torque_continuous: .* is below the static"
-        ),
+        pytest.warns(PhysicsWarning, match="torque_continuous: .* is below the static"),
         pytest.warns(PhysicsWarning, match="current_continuous: .* is below"),
     ):
         cable_study(case, payloads=[60e3])

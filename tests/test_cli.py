@@ -166,6 +166,23 @@ def test_the_thesis_winch_on_a_rope_is_not_feasible(run):
     assert "not feasible at H_s 2.44 m" in ending.out
 
 
+@pytest.mark.slow
+def test_readme_shows_the_real_demo(run):
+    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    shown = readme.partition("```text\n")[2].partition("```")[0]
+    ending = run("optimise", "subsea-crane")
+    assert ending.status == 0
+    real = ending.out.partition("\nWritten to")[0]
+    # How many starts agree may hang on the processor's last bit; what they agree on does not.
+    for text in (shown, real):
+        assert "starts agree" in text
+    lines = [
+        [line.rstrip() for line in text.strip().splitlines() if "starts agree" not in line]
+        for text in (shown, real)
+    ]
+    assert lines[0] == lines[1]
+
+
 # evaluate
 
 

@@ -182,9 +182,7 @@ def test_figures_leave_matplotlib_as_it_was_and_need_no_pyplot():
     before = dict(mpl.rcParams)
     picture(limits(thesis_design()), "png")
     assert dict(mpl.rcParams) == before
-    script = (
-        "import sys, stillhook.figures; print([m for m in sys.modules if 'matplot' in m])"
-    )
+    script = "import sys, stillhook.figures; print([m for m in sys.modules if 'matplot' in m])"
     run = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True
     )

@@ -348,7 +348,7 @@ def test_rope_tension(question, loop, hook, case):
         return math.sqrt(m0), math.sqrt(2.0 * math.log(cycles) * m0)
 
     # Before, with the thesis's C: a standard deviation above the load itself; the rope would be
-    # slack most of the time, and a linear model has nothing to say.
+    # slack a sixth of the time, and a linear model has nothing to say.
     rms, _ = dynamic(question)
     assert rms > static
     moved = case.rope.stiffness * question.payload_rms_before  # the payload's far above the hook's
