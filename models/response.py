@@ -181,9 +181,7 @@ def state_space_response(plant: LinearPlant, s: npt.ArrayLike) -> PlantResponse:
     )
 
 
-def _back_substituted(
-    T: ComplexArray, right: ComplexArray, s: ComplexArray
-) -> ComplexArray | None:
+def _back_substituted(T: ComplexArray, right: ComplexArray, s: ComplexArray) -> ComplexArray | None:
     """Solve (s I - T) x = right for every point s, (k, n, columns); None at an eigenvalue."""
     n = len(T)
     x = np.empty((n, right.shape[0], right.shape[2]), dtype=np.complex128)
@@ -196,9 +194,7 @@ def _back_substituted(
     return x.transpose(1, 0, 2)
 
 
-def _fold(
-    columns: FloatArray | ComplexArray, nu: int, nw: int, s: ComplexArray
-) -> ComplexArray:
+def _fold(columns: FloatArray | ComplexArray, nu: int, nw: int, s: ComplexArray) -> ComplexArray:
     """Return [inputs, disturbances + s rates] for every point s, (k, rows, nu + nw)."""
     folded: ComplexArray = np.repeat(
         columns[None, :, : nu + nw].astype(np.complex128), len(s), axis=0

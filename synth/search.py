@@ -10,7 +10,7 @@ method of semi-infinite programming), until nothing is broken in between.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -109,7 +109,17 @@ def resume(
     chosen = pick_spread(np.array(stable), order, scales, _RESUMED)
     known = [] if earlier.reference is None else [earlier.reference]
     reference = briskest(problem, [*known, *stable])
-    return _from(problem, [stable[i] for i in chosen], reference, coefficient, progress)
+    found = _from(problem, [stable[i] for i in chosen], reference, coefficient, progress)
+    if earlier.solved is None or not problem.stable(earlier.solved.values, coefficient):
+        return found
+    # The earlier answer itself, without leaving its neighbourhood.
+    solved, view, excess = polish(problem, earlier.solved, reference)
+    if solved is earlier.solved or excess > KEPT:
+        return found
+    rival = found.solved
+    if rival is not None and found.excess <= KEPT and rival.objective <= solved.objective:
+        return found
+    return replace(found, solved=solved, view=view, excess=excess)
 
 
 def briskest(problem: Problem, points: Sequence[FloatArray]) -> FloatArray:
