@@ -6,6 +6,9 @@ PYTHON ?= python3.11 python3 python3.12 python3.13
 # Two workers: what the smallest machine that the tests run on can use.
 PYTEST_ARGS ?= -n 2
 
+# One BLAS thread a process: two workers with two threads each only get in each other's way.
+export OPENBLAS_NUM_THREADS ?= 1
+
 VENV := .venv
 PY := $(VENV)/bin/python
 PIP_INSTALL := $(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt

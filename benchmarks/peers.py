@@ -460,13 +460,22 @@ def slsqp(loop: PythonControlLoop, start: FloatArray, *, iterations: int = 100) 
         return np.append(np.log(bound * distance), further)
 
     begin = time.perf_counter()
-    with np.errstate(all="ignore"):  # of trial points far outside
-        found = scipy.optimize.minimize(
-            lambda x: at(x)[0],
-            start / scale,
-            method="SLSQP",
-            constraints={"type": "ineq", "fun": rows},
-            options={"maxiter": iterations, "ftol": 1e-8},
+    try:
+        with np.errstate(all="ignore"):  # of trial points far outside
+            found = scipy.optimize.minimize(
+                lambda x: at(x)[0],
+                start / scale,
+                method="SLSQP",
+                constraints={"type": "ineq", "fun": rows},
+                options={"maxiter": iterations, "ftol": 1e-8},
+            )
+    except (ValueError, RuntimeError, np.linalg.LinAlgError):
+        # It strayed to where python-control or the drag has no answer: a start that failed.
+        return Answer(
+            gains=np.asarray(start, dtype=np.float64),
+            seconds=time.perf_counter() - begin,
+            evaluations=len(known),
+            objective=np.inf,
         )
     return Answer(
         gains=np.asarray(found.x * scale, dtype=np.float64),
