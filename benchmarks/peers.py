@@ -226,8 +226,11 @@ class SampledLoop:
         plant = self._rational
         matrices = plant.A - np.einsum("i,jm,jk->mik", plant.B[:, 0], gains, self._fed_back)
         if self.task.drag is not None:
-            push = np.outer(plant.E[:, self._force], plant.Cz[self._velocity])
-            matrices = matrices - added[:, None, None] * push
+            # What the drag does to the payload, and what of it the accelerometer feels at once.
+            felt = plant.F[_columns(self.task), self._force] @ gains
+            push = plant.E[:, self._force] - felt[:, None] * plant.B[:, 0]
+            velocity = plant.Cz[self._velocity]
+            matrices = matrices - (added[:, None] * push)[:, :, None] * velocity
         return np.asarray(np.linalg.eigvals(matrices), dtype=np.complex128)
 
     def _peaks(self, gains: FloatArray, added: FloatArray, poles: ComplexArray) -> FloatArray:
@@ -417,7 +420,7 @@ def evolve(
     begin = time.perf_counter()
     found = scipy.optimize.differential_evolution(
         objective,
-        [(-half, half) for half in loop.task.box],
+        scipy.optimize.Bounds(-np.array(loop.task.box), np.array(loop.task.box)),
         rng=seed,
         vectorized=vectorised,
         updating="deferred" if vectorised else "immediate",
@@ -459,10 +462,11 @@ def slsqp(loop: PythonControlLoop, start: FloatArray, *, iterations: int = 100) 
         further = [-decay] if low is None else [-decay, np.log(low.bound / slow)]
         return np.append(np.log(bound * distance), further)
 
+    minimise: Any = scipy.optimize.minimize  # its overloads tell no lambda from another
     begin = time.perf_counter()
     try:
         with np.errstate(all="ignore"):  # of trial points far outside
-            found = scipy.optimize.minimize(
+            found = minimise(
                 lambda x: at(x)[0],
                 start / scale,
                 method="SLSQP",

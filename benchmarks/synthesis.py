@@ -272,16 +272,18 @@ def quality_table(rows: Sequence[Row]) -> list[list[str]]:
 
 
 def time_table(rows: Sequence[Row]) -> list[list[str]]:
-    """Return the table of times [s] and ratios, its head first."""
-    head = ["question", "ours", "check", "DE, arrays", "ratio", "DE, one by one", "ratio"]
-    head += ["SLSQP", "ratio"]
+    """Return the table of times [s] and of their ratios to ours, its head first."""
+    head = ["question", "ours", "check", "DE, one seed", "DE, all seeds", "over ours"]
+    head += ["DE, one by one", "over ours", "SLSQP", "over ours"]
     body = []
     for row in rows:
         cells = [row.name, f"{row.seconds:.2f}", f"{row.verification:.2f}"]
+        cells.append(f"{row.evolution / row.seeds:.2f}")
         for seconds in (row.evolution, row.single, row.slsqp):
             known = np.isfinite(seconds) and seconds > 0.0
+            ratio = seconds / row.seconds
             cells.append(f"{seconds:.1f}" if known else "")
-            cells.append(f"{seconds / row.seconds:.0f}" if known else "")
+            cells.append(f"{ratio:.{0 if ratio >= 9.95 else 1}f}" if known else "")
         body.append(cells)
     return [head, *body]
 

@@ -1,27 +1,13 @@
-r"""A free controller of low order, for any number of inputs and measurements.
+"""A free controller of low order, for any number of inputs and measurements.
 
-Parallel second-order blocks (and one of first order if the order is odd), each in observable
-canonical form as seen from one of the inputs, which leaves no redundant scale:
-
-.. math::
-
-    A_k = \begin{bmatrix} -\alpha_1 & 1 \\ -\alpha_0 & 0 \end{bmatrix},\quad
-    B_k \text{ free},\quad C_k \text{ free but for one row, } [1\ 0]
-
-so n (nu + ny) numbers describe order n, the least there is (plus nu ny for a direct term).  The
-row that is fixed alternates between the inputs: two channels that have nothing to do with each
-other, each with its own controller, are then an ordinary point.  Complex and real
-poles meet within a block without a singularity; only a pole that repeats across blocks is out
-of reach, which nothing that is optimised asks for.
-
-Random controllers of this kind are seldom stable in a loop.  Candidates are LQG designs
-(`synth.lqg`) for weights and noises of many sizes, reduced and brought to this form.
+Its parameters are those of `synth.canonical`: n (nu + ny) numbers for order n, plus nu ny for a
+direct term.  Random controllers of this kind are seldom stable in a loop, so the candidates are
+LQG designs (`synth.lqg`) for weights and noises of many sizes, reduced to the order.
 """
 
 from __future__ import annotations
 
 import contextlib
-import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -29,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag
-from scipy.optimize import linear_sum_assignment
 
 from models.checks import InputError, SynthesisError
 from models.linear import LinearPlant
 
+from .canonical import BlockForm
 from .controller import Controller
 from .lqg import (
     Estimator,
@@ -44,9 +30,9 @@ from .lqg import (
     reduced,
     regulator,
     weighing,
-    whitened,
 )
 from .structure import Bounds, Law, Parameter, Structure, check_bounds, gain_scales, pace
+from .whitened import whitened
 
 if TYPE_CHECKING:
     from .problem import Problem
@@ -58,12 +44,14 @@ ComplexArray = npt.NDArray[np.complex128]
 
 _PADE = 4  # of the delays, in the designs that candidates are made of
 _SIDE = 12  # so many regulators times so many filters
-_NEAR = 1e-6  # poles closer than this, relatively, are pulled apart
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, init=False)
 class LowOrder(Structure):
     """A free controller x' = A x + B y, u = C x + D y of order n.
+
+    Noise on every measurement and a weight on every input (or a limit that does as much) belong
+    to the question: without them the best controller has an infinite gain.
 
     Parameters
     ----------
@@ -104,59 +92,29 @@ class LowOrder(Structure):
         return _LowOrderLaw(plant, self)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Block:
-    """Where the numbers of one block stand among the parameters, and which row of C is fixed."""
-
-    size: int
-    row: int
-    alpha: slice  # alpha1, alpha0; alpha0 alone for a block of first order
-    B: slice  # size rows of ny
-    C: slice  # nu - 1 rows of `size`
-
-    def matrices(self, values: Any, nu: int, ny: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return A, B, C of the block."""
-        A = np.zeros((self.size, self.size))
-        A[:, 0] = -np.asarray(values[self.alpha])
-        if self.size == 2:
-            A[0, 1] = 1.0
-        B = np.reshape(values[self.B], (self.size, ny))
-        free = np.reshape(values[self.C], (nu - 1, self.size))
-        return A, B, np.insert(free, self.row, np.eye(self.size)[0], axis=0)
-
-
 class _LowOrderLaw(Law):
     """The structure's law."""
 
     def __init__(self, plant: LinearPlant, structure: LowOrder) -> None:
-        self._plant = plant
-        self._structure = structure
-        self._nu, self._ny = nu, ny = len(plant.inputs), len(plant.measurements)
+        nu, ny = len(plant.inputs), len(plant.measurements)
         if not (nu and ny):
             raise InputError("LowOrder: the plant must have an input and a measurement")
-        self._blocks: list[_Block] = []
-        at = 0
-        for k in range((structure.order + 1) // 2):
-            size = min(2, structure.order - 2 * k)
-            ends = np.cumsum([at, size, size * ny, (nu - 1) * size]).tolist()
-            slices = [slice(a, b) for a, b in itertools.pairwise(ends)]
-            self._blocks.append(
-                _Block(size=size, row=k % nu, alpha=slices[0], B=slices[1], C=slices[2])
-            )
-            at = ends[-1]
-        self._direct = slice(at, at + nu * ny) if structure.proper else slice(at, at)
+        self._plant = plant
+        self._structure = structure
+        self._form = BlockForm(structure.order, nu, ny)
+        self._direct = slice(self._form.count, None) if structure.proper else slice(0, 0)
         self.parameters = tuple(self._named_parameters())
         check_bounds("LowOrder", structure.bounds, [p.name for p in self.parameters])
         self.dimensions = 4 + len(self.parameters)
 
     def _named_parameters(self) -> Iterable[Parameter]:
-        plant, nu, ny = self._plant, self._nu, self._ny
+        plant, form = self._plant, self._form
         middle = pace(plant)
-        entries = [(i, j) for i in range(nu) for j in range(ny)]
-        gains = np.reshape(gain_scales(plant, entries), (nu, ny))
+        entries = [(i, j) for i in range(form.nu) for j in range(form.ny)]
+        gains = np.reshape(gain_scales(plant, entries), (form.nu, form.ny))
         # The share of each input in a loop gain of one; an input's size against another's.
         inputs = np.exp(np.log(gains).mean(axis=1))
-        for k, block in enumerate(self._blocks, start=1):
+        for k, block in enumerate(form.blocks, start=1):
             powers = [middle ** (i + 1) for i in range(block.size)]
             alphas = ["alpha1", "alpha0"] if block.size == 2 else ["alpha0"]
             for name, scale in zip(alphas, powers, strict=True):
@@ -180,113 +138,53 @@ class _LowOrderLaw(Law):
         return Parameter(name=name, scale=float(scale), low=float(low), high=float(high))
 
     def response(self, values: Sequence[Any], s: Any) -> list[list[Any]]:
-        nu, ny = self._nu, self._ny
-        result: list[list[Any]] = [[0.0] * ny for _ in range(nu)]
-        for block in self._blocks:
-            alpha, B = values[block.alpha], values[block.B]
-            free = iter(values[block.C])
-            # The block's states, each as a response to every measurement.
-            if block.size == 2:
-                below = s * (s + alpha[0]) + alpha[1]
-                # The first state is the output that is fixed, the second (s + alpha1) it - B1.
-                first = [(s * B[j] + B[ny + j]) / below for j in range(ny)]
-                second = [(s + alpha[0]) * first[j] - B[j] for j in range(ny)] if nu > 1 else []
-                states = [first, second]
-            else:
-                states = [[B[j] / (s + alpha[0]) for j in range(ny)]]
-            for i in range(nu):
-                weights = [1.0] if i == block.row else [next(free) for _ in range(block.size)]
-                for weight, state in zip(weights, states, strict=False):
-                    for j in range(ny):
-                        result[i][j] = state[j] * weight + result[i][j]
-        if self._structure.proper:
-            D = values[self._direct]
-            for i in range(nu):
-                for j in range(ny):
-                    result[i][j] = result[i][j] + D[i * ny + j]
+        result = self._form.response(values, s)
+        for k, gain in enumerate(values[self._direct]):
+            i, j = divmod(k, self._form.ny)
+            result[i][j] = result[i][j] + gain
         return result
-
-    def controller(self, values: Sequence[float]) -> Controller:
-        nu, ny = self._nu, self._ny
-        numbers = np.asarray(values, dtype=np.float64)
-        parts = [block.matrices(numbers, nu, ny) for block in self._blocks]
-        D = np.zeros((nu, ny))
-        if self._structure.proper:
-            D = np.reshape(numbers[self._direct], (nu, ny))
-        return Controller(
-            A=block_diag(*[A for A, _, _ in parts]),
-            B=np.vstack([B for _, B, _ in parts]),
-            C=np.hstack([C for _, _, C in parts]),
-            D=D,
-            measurements=self._plant.measurements,
-            inputs=self._plant.inputs,
-        )
 
     def characteristic(self, values: Sequence[Any], s: Any) -> Any:
-        result: Any = 1.0
-        for block in self._blocks:
-            alpha = values[block.alpha]
-            result = result * (s * (s + alpha[0]) + alpha[1] if block.size == 2 else s + alpha[0])
-        return result
+        return self._form.characteristic(values, s)
+
+    def controller(self, values: Sequence[float]) -> Controller:
+        A, B, C, D = self._matrices(values)
+        names = self._plant.measurements, self._plant.inputs
+        return Controller(A=A, B=B, C=C, D=D, measurements=names[0], inputs=names[1])
+
+    def closed_loop_matrix(self, plant: LinearPlant, values: Sequence[float]) -> FloatArray:
+        # The optimiser asks for this at every step: no checks, no objects.
+        A, B, C, D = self._matrices(values)
+        n, m = len(plant.A), len(plant.A) + len(A)
+        loop = np.zeros((m, m))
+        on_plant, on_states = D @ plant.C, C  # u = on_plant x + on_states xk
+        if np.any(D) and np.any(plant.D):
+            inverse = np.linalg.inv(np.eye(len(D)) - D @ plant.D)
+            on_plant, on_states = inverse @ on_plant, inverse @ on_states
+        loop[:n, :n] = plant.A + plant.B @ on_plant
+        loop[:n, n:] = plant.B @ on_states
+        loop[n:, :n] = B @ (plant.C + plant.D @ on_plant)
+        loop[n:, n:] = A + B @ plant.D @ on_states
+        return loop
+
+    def _matrices(
+        self, values: Sequence[float]
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        numbers = np.asarray(values, dtype=np.float64)
+        D = np.zeros((self._form.nu, self._form.ny))
+        D.flat[: numbers[self._direct].size] = numbers[self._direct]
+        return *self._form.matrices(numbers), D
 
     def values(self, controller: Controller) -> FloatArray:
-        """Return the parameters of a controller, whose order may be lower than the law's.
-
-        Poles that repeat are pulled apart a little, and a mode that the input of its block's
-        fixed row does not hear is lent a whisper of it.
-        """
+        """Return the parameters of a controller, whose order may be lower than the law's."""
         missing = self._structure.order - len(controller.A)
         A, B, C = controller.A, controller.B, controller.C
         if missing > 0:
             A = block_diag(A, -np.diag(pace(self._plant) * (1.0 + 0.3 * np.arange(missing))))
-            B = np.vstack([B, np.zeros((missing, self._ny))])
-            C = np.hstack([C, np.ones((self._nu, missing))])
-        poles, into, out = _modes(A, B, C)
-        result = np.empty(len(self.parameters))
-        for block, at in zip(self._blocks, self._assigned(poles, out), strict=True):
-            self._fill(result, block, poles[at], into[at], out[:, at])
-        if self._structure.proper:
-            result[self._direct] = controller.D.ravel()
-        return result
-
-    def _assigned(self, poles: ComplexArray, C: ComplexArray) -> list[list[int]]:
-        """Return the modes of each block, such that each is well heard through its fixed row."""
-        groups = [[int(i), int(i) + 1] for i in np.flatnonzero(poles.imag > 0.0)]
-        real = [int(i) for i in np.flatnonzero(poles.imag == 0.0)]
-        real.sort(key=lambda i: poles[i].real)
-        single = [[real.pop(0)]] if len(real) % 2 else []  # the fastest one
-        groups += [real[i : i + 2] for i in range(0, len(real), 2)]
-        pairs = len(groups)
-        heard = np.abs(C) / np.maximum(np.linalg.norm(C, axis=0), 1e-300)
-        rows = [block.row for block in self._blocks[:pairs]]
-        price = [[-np.log(heard[row, g].min() + 1e-12) for row in rows] for g in groups]
-        result = groups + single
-        if pairs:
-            for g, b in zip(*linear_sum_assignment(price), strict=True):
-                result[b] = groups[g]
-        return result
-
-    def _fill(
-        self,
-        result: FloatArray,
-        block: _Block,
-        poles: ComplexArray,
-        B: ComplexArray,
-        C: ComplexArray,
-    ) -> None:
-        """Write one block's parameters: its modes in observable canonical form."""
-        fixed = C[block.row].copy()
-        faint = np.abs(fixed) < 1e-6 * np.linalg.norm(C, axis=0)
-        fixed[faint] = 1e-6 * np.linalg.norm(C, axis=0)[faint] + 1e-300
-        if block.size == 2:
-            alpha = np.array([-(poles[0] + poles[1]), poles[0] * poles[1]])
-            to_canonical = np.array([fixed, fixed * poles]) + np.outer([0.0, alpha[0]], fixed)
-        else:
-            alpha, to_canonical = -poles, np.diag(fixed)
-        others = np.delete(C, block.row, axis=0)
-        result[block.alpha] = alpha.real
-        result[block.B] = (to_canonical @ B).real.ravel()
-        result[block.C] = np.linalg.solve(to_canonical.T, others.T).T.real.ravel()
+            B = np.vstack([B, np.zeros((missing, self._form.ny))])
+            C = np.hstack([C, np.ones((self._form.nu, missing))])
+        direct = controller.D.ravel() if self._structure.proper else np.zeros(0)
+        return np.concatenate([self._form.values(A, B, C), direct])
 
     def guesses(self, problem: Problem, omega: FloatArray) -> FloatArray:
         """Return LQG designs for the problem's own weights and spectra.
@@ -297,12 +195,16 @@ class _LowOrderLaw(Law):
         """
         plant = whitened(self._plant.without_delays(_PADE), problem.disturbances)
         regulators, filters = designs(plant, problem.minimise, omega)
-        full = np.ones((self._nu, self._ny), dtype=np.bool_)
+        full = np.ones((self._form.nu, self._form.ny), dtype=np.bool_)
+        gains = [projected(plant, design, full) for design in regulators]
         fast = [
-            self.values(self._swift(projected(plant, design, full), share * float(omega[-1])))
-            for design in regulators
+            self.values(self._swift(gain, share * float(omega[-1])))
+            for gain in gains
             for share in (0.03, 0.3, 3.0)
         ]
+        if self._structure.proper:
+            names = plant.measurements, plant.inputs
+            fast += [self.values(Controller.static(gain, *names)) for gain in gains]
         found = self._family(plant, regulators, filters)
         return self._clipped(np.vstack([found, *fast]))
 
@@ -311,12 +213,13 @@ class _LowOrderLaw(Law):
         sizes = np.abs(yu) ** 2 + 1e-12 * np.max(np.abs(yu) ** 2, axis=0) + 1e-300
         at = np.minimum((points[:, :2] * omega.size).astype(int), omega.size - 1)
         tilt = 10.0 ** (2.0 * points[:, 2:4] - 1.0)
+        uneven = np.linspace(-1.0, 1.0, self._form.ny)
         regulators, filters = [], []
         for k in range(min(_SIDE, len(points))):
             # Bandwidths are drawn: with such weights the loop crosses over near that frequency.
-            weights = tilt[k, 0] ** np.linspace(-1.0, 1.0, self._ny) / sizes[at[k, 0]].mean(axis=1)
+            weights = tilt[k, 0] ** uneven / sizes[at[k, 0]].mean(axis=1)
             effort = weights @ sizes[at[k, 0]]
-            noise = tilt[k, 1] ** np.linspace(-1.0, 1.0, self._ny) * sizes[at[k, 1]].sum(axis=1)
+            noise = tilt[k, 1] ** uneven * sizes[at[k, 1]].sum(axis=1)
             with contextlib.suppress(SynthesisError):
                 Q, R, S = weighing(plant.C, plant.D, weights)
                 regulators.append(regulator(plant, Q, R + np.diag(effort), S))
@@ -367,21 +270,3 @@ class _LowOrderLaw(Law):
         low = [p.low for p in self.parameters]
         high = [p.high for p in self.parameters]
         return np.asarray(np.clip(values, low, high), dtype=np.float64)
-
-
-def _modes(
-    A: FloatArray, B: FloatArray, C: FloatArray
-) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Return poles, inputs and outputs of the modes, conjugates next to each other."""
-    size = float(np.linalg.norm(A, 2)) or 1.0
-    for nudge in (0.0, 1e-6, 1e-5, 1e-4, 1e-3):
-        # A repeated pole has no modes of its own: pull it apart by an uneven nudge.
-        uneven = np.diag(np.linspace(-1.0, 1.0, len(A)) if len(A) > 1 else [1.0])
-        poles, vectors = np.linalg.eig(A + nudge * size * uneven)
-        gaps = np.abs(poles[:, None] - poles) + size * np.eye(len(A))
-        if gaps.min() > _NEAR * size and np.linalg.cond(vectors) < 1e10:
-            break
-    poles = poles.astype(np.complex128)
-    order = np.lexsort((-poles.imag, np.abs(poles.imag), poles.real))
-    poles, vectors = poles[order], vectors[:, order]
-    return poles, np.linalg.solve(vectors, B.astype(np.complex128)), C @ vectors

@@ -24,7 +24,8 @@ from models.linear import LinearPlant
 from models.signals import pick
 
 from .controller import Controller, closed_loop_matrix
-from .lqg import designs, projected, whitened
+from .lqg import designs, projected
+from .whitened import whitened
 
 if TYPE_CHECKING:
     from .problem import Problem

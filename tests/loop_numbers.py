@@ -164,23 +164,22 @@ def loop_response(
 ) -> Callable[[FloatArray], ComplexArray]:
     """The loop gain L at one input, all other loops closed, delays exact."""
 
+    def transfer(A: FloatArray, B: FloatArray, C: FloatArray, s: ComplexArray) -> ComplexArray:
+        inner = np.linalg.solve(s * np.eye(len(A)) - A, np.broadcast_to(B, (len(s), *B.shape)))
+        return np.asarray(C @ inner)
+
     def loop(omega: FloatArray) -> ComplexArray:
-        found = []
-        for w in np.atleast_1d(omega):
-            s = 1j * w
-            G = plant.C @ np.linalg.solve(s * np.eye(len(plant.A)) - plant.A, plant.B) + plant.D
-            G = np.exp(-s * np.array(plant.delays))[:, None] * G
-            K = np.array(controller.D, dtype=complex)
-            if len(controller.A):
-                K += controller.C @ np.linalg.solve(
-                    s * np.eye(len(controller.A)) - controller.A, controller.B
-                )
-            L = -K @ G
-            others = [i for i in range(len(L)) if i != broken]
-            rest = np.eye(len(others)) + L[np.ix_(others, others)]
-            turn = L[broken, others] @ np.linalg.solve(rest, L[others, broken])
-            found.append(L[broken, broken] - turn)
-        return np.array(found)
+        s = 1j * np.reshape(omega, (-1, 1, 1))
+        G = transfer(plant.A, plant.B, plant.C, s) + plant.D
+        G = np.exp(-s * np.reshape(plant.delays, (1, -1, 1))) * G
+        K = np.broadcast_to(controller.D, (len(s), *controller.D.shape)).astype(complex)
+        if len(controller.A):
+            K = K + transfer(controller.A, controller.B, controller.C, s)
+        L = -K @ G
+        others = [i for i in range(L.shape[1]) if i != broken]
+        rest = np.eye(len(others)) + L[:, others][:, :, others]
+        turn = L[:, [broken]][:, :, others] @ np.linalg.solve(rest, L[:, others][:, :, [broken]])
+        return np.asarray(L[:, broken, broken] - turn[:, 0, 0])
 
     return loop
 

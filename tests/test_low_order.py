@@ -25,11 +25,12 @@ from models.linear import LinearPlant
 from synth.controller import Controller
 from synth.disturbance import Disturbance, White, disturbances
 from synth.low_order import LowOrder
-from synth.lqg import designs, lqg, reduced, regulator, weighing, whitened
+from synth.lqg import designs, lqg, reduced, regulator, weighing
 from synth.phasor import Phasor
 from synth.problem import Problem
 from synth.starts import candidates, crossover_grid
 from synth.structure import Law
+from synth.whitened import whitened
 
 WHITE = {"f": White(1.0), "n": White(0.01)}
 WEIGHTS = {"x": 1.0, "effort": 0.1}
