@@ -77,4 +77,6 @@ class Limit(ABC):
         """Return the share of the limit that `value` uses; above 1 it is broken."""
         if self.at_least:
             return self.bound / value if value > 0.0 else np.inf
-        return value / self.bound if self.bound else np.inf
+        if self.bound == 0.0:
+            return 0.0 if value <= 0.0 else np.inf
+        return value / self.bound

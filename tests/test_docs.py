@@ -20,9 +20,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PAGES = [
-    path for path in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))] if path.exists()
-]
+DOCS = sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "examples").glob("*.md")])
+PAGES = [path for path in [ROOT / "README.md", *DOCS] if path.exists()]
 FENCE = re.compile(r"^(?P<fence>```+)(?P<language>[^`\s]*)[^`]*$")
 REMARK = re.compile(r"^<!-- (?P<what>not run|exit status): (?P<value>.+?) -->$")
 LINK = re.compile(r"!?\[[^\]]*\]\((?P<target>[^)\s]+)\)")
