@@ -440,7 +440,13 @@ def evolve(
     )
 
 
-def slsqp(loop: PythonControlLoop, start: FloatArray, *, iterations: int = 100) -> Answer:
+def slsqp(
+    loop: PythonControlLoop,
+    start: FloatArray,
+    *,
+    iterations: int = 100,
+    max_sensitivity: float | None = None,
+) -> Answer:
     """Return SciPy's SLSQP from starting gains, gradients by differences.
 
     |1 + L| at every frequency of the grid, the slow motion and the spectral abscissa are
@@ -455,7 +461,8 @@ def slsqp(loop: PythonControlLoop, start: FloatArray, *, iterations: int = 100) 
             known[key] = loop.measure(np.asarray(x) * scale)
         return known[key]
 
-    bound, low = loop.task.max_sensitivity, loop.task.low_frequency
+    bound = loop.task.max_sensitivity if max_sensitivity is None else max_sensitivity
+    low = loop.task.low_frequency
 
     def rows(x: FloatArray) -> FloatArray:
         _, distance, decay, slow = at(x)
