@@ -11,6 +11,8 @@ from .section import Section, problems
 
 __all__ = ["GainBounds", "Gains", "Limits", "LowFrequencyLimit"]
 
+_Length = Annotated[float, Quantity("length", -12000.0, 12000.0)]
+
 
 class LowFrequencyLimit(Section):
     """How still the payload must be held in slow motion of the hook (swell, tide)."""
@@ -45,13 +47,27 @@ class Limits(Section):
     """Smallest rope tension, so that the rope does not go slack."""
     rope_tension_peak: Annotated[float, Quantity("force", 0.0, 1e9, open_low=True)] | None = None
     """Largest rope tension, such as the breaking load over a safety factor."""
+    stroke: tuple[_Length, _Length] | None = None
+    """Lowest and highest haul of the drum while it holds the load; negative is paid out. It is
+    for the simulation: a design does not know it."""
 
     @model_validator(mode="after")
     def _check(self) -> Limits:
+        found = []
         low, high = self.minimum_tension, self.rope_tension_peak
         if low is not None and high is not None and low >= high:
             text = f"must be below rope_tension_peak, {high:g} N, got {low:g} N"
-            raise problems(("minimum_tension", text))
+            found.append(("minimum_tension", text))
+        if self.stroke is not None:
+            lowest, highest = self.stroke
+            if not (lowest <= 0.0 <= highest and lowest < highest):
+                text = (
+                    "must be [low, high] with low < high and 0 within, "
+                    f"got [{lowest:g}, {highest:g}] m"
+                )
+                found.append(("stroke", text))
+        if found:
+            raise problems(*found)
         return self
 
 

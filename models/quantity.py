@@ -85,7 +85,7 @@ class Quantity:
         below = number < self.high if self.open_high else number <= self.high
         whole = self.kind != "count" or number == math.floor(number)
         if not (above and below and whole):
-            si = f" ({number:g} {self.shown_unit})" if isinstance(value, str) else ""
+            si = f" ({f'{number:g} {self.shown_unit}'.rstrip()})" if isinstance(value, str) else ""
             raise InputError(f"must be {self.wanted}, got {value!r}{si}")
         return int(number) if self.kind == "count" else number
 
@@ -128,7 +128,8 @@ def _pattern(kind: str) -> str:
     """Return a regular expression for the texts that a kind accepts."""
     units = []
     for name in units_of(kind):
-        unit = re.sub(r"(?<=[A-Za-z])([23])", r"(?:\\^|\\*\\*)?\1", name)
+        escaped = name.replace("(", r"\(").replace(")", r"\)")
+        unit = re.sub(r"(?<=[A-Za-z])([23])", r"(?:\\^|\\*\\*)?\1", escaped)
         units.append(unit.replace(" ", "[ .*]"))
     optional = "?" if not KINDS[kind].unit else ""
     number = r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?"

@@ -86,6 +86,8 @@ KINDS: Mapping[str, Kind] = {
     "speed": _kind("a speed", "m/s", {
         "m/s": 1.0, "mm/s": 1e-3, "m/min": 1.0 / 60.0, "km/h": 1.0 / 3.6, "ft/s": _FOOT,
         "knots": _KNOT, "knot": _KNOT, "kn": _KNOT, "kt": _KNOT}),
+    "acceleration": _kind("an acceleration", "m/s2", {
+        "m/s2": 1.0, "mm/s2": 1e-3, "mg": 1e-3 * _G, "ug": 1e-6 * _G, "ft/s2": _FOOT}),
     "angle": _kind("an angle", "rad", {"rad": 1.0, "mrad": 1e-3, "deg": _DEG}),
     "torque": _kind("a torque", "N m", {
         "N m": 1.0, "kN m": 1e3, "MN m": 1e6, "kgf m": _G, "lbf ft": _LBF * _FOOT}),
@@ -104,6 +106,15 @@ KINDS: Mapping[str, Kind] = {
     "torque constant": _kind("a torque constant", "N m/A", {"N m/A": 1.0, "kN m/A": 1e3}),
     "back-EMF constant": _kind("a back-EMF constant", "V s/rad", {
         "V s/rad": 1.0, "V s": 1.0, "V/rpm": 1.0 / _RPM}),
+    "temperature difference": _kind("a temperature difference", "K", {"K": 1.0, "degC": 1.0}),
+    # Amplitude spectral densities: the square root of a one-sided variance density per hertz.
+    "acceleration noise": _kind("an acceleration noise density", "m/s2/sqrt(Hz)", {
+        "m/s2/sqrt(Hz)": 1.0, "mm/s2/sqrt(Hz)": 1e-3, "mg/sqrt(Hz)": 1e-3 * _G,
+        "ug/sqrt(Hz)": 1e-6 * _G}),
+    "velocity noise": _kind("a velocity noise density", "m/s/sqrt(Hz)", {
+        "m/s/sqrt(Hz)": 1.0, "mm/s/sqrt(Hz)": 1e-3, "um/s/sqrt(Hz)": 1e-6}),
+    "displacement noise": _kind("a displacement noise density", "m/sqrt(Hz)", {
+        "m/sqrt(Hz)": 1.0, "mm/sqrt(Hz)": 1e-3, "um/sqrt(Hz)": 1e-6}),
 }  # fmt: skip
 
 # Spellings that different people read differently, and what to write instead.

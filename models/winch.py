@@ -17,7 +17,7 @@ from .drum import Drum
 from .quantity import Quantity
 from .section import Section, problems
 
-__all__ = ["ACMotor", "DCMotor", "Drive", "Gearbox", "Motor", "Winch"]
+__all__ = ["ACMotor", "Brake", "DCMotor", "Drive", "Gearbox", "Motor", "Winch"]
 
 
 class Gearbox(Section):
@@ -48,6 +48,17 @@ class DCMotor(Section):
     """Moment of inertia of the rotor."""
     viscous_friction: Annotated[float, Quantity("rotary damping", 0.0, 1e5)] = 0.0
     """Viscous friction of the drive train at the motor's shaft."""
+    coulomb_friction: Annotated[float, Quantity("torque", 0.0, 1e6)] = 0.0
+    """Dry friction of the drive train at the motor's shaft, the same at every speed; for the
+    simulation only."""
+    friction_speed: Annotated[float, Quantity("angular speed", 0.0, 1000.0, open_low=True)] = 1.0
+    """Speed over which dry friction changes its sign, as tanh(speed/friction_speed)."""
+    thermal_time_constant: Annotated[float, Quantity("time", 0.0, 1e6, open_low=True)] = 1800.0
+    """Time constant of the motor's temperature (first order, driven by the torque squared)."""
+    temperature_rise: Annotated[
+        float, Quantity("temperature difference", 0.0, 1000.0, open_low=True)
+    ] = 80.0
+    """Temperature rise after hours at the continuous torque."""
 
 
 class ACMotor(Section):
@@ -72,6 +83,17 @@ class ACMotor(Section):
     """Speed above which the torque falls as 1/speed (constant power)."""
     maximum_speed: Annotated[float, Quantity("angular speed", 0.0, 5000.0, open_low=True)]
     """Highest speed of the motor."""
+    coulomb_friction: Annotated[float, Quantity("torque", 0.0, 1e6)] = 0.0
+    """Dry friction of the drive train at the motor's shaft, the same at every speed; for the
+    simulation only."""
+    friction_speed: Annotated[float, Quantity("angular speed", 0.0, 1000.0, open_low=True)] = 1.0
+    """Speed over which dry friction changes its sign, as tanh(speed/friction_speed)."""
+    thermal_time_constant: Annotated[float, Quantity("time", 0.0, 1e6, open_low=True)] = 1800.0
+    """Time constant of the motor's temperature (first order, driven by the torque squared)."""
+    temperature_rise: Annotated[
+        float, Quantity("temperature difference", 0.0, 1000.0, open_low=True)
+    ] = 80.0
+    """Temperature rise after hours at the continuous torque."""
 
     @model_validator(mode="after")
     def _check(self) -> ACMotor:
@@ -124,6 +146,15 @@ class Drive(Section):
         return self
 
 
+class Brake(Section):
+    """The holding brake at the motor's shaft."""
+
+    torque: Annotated[float, Quantity("torque", 0.0, 1e9, open_low=True)] | None = None
+    """Torque at which the closed brake slips; by default it holds whatever comes."""
+    closing_time: Annotated[float, Quantity("time", 0.0, 60.0)] = 0.3
+    """Time from the order to close until the brake holds."""
+
+
 class Winch(Section):
     """Drum, gearbox, motor and drive."""
 
@@ -135,6 +166,8 @@ class Winch(Section):
     """The motor: `type: dc` or `type: ac`."""
     drive: Drive
     """Limits of motor and inverter."""
+    brake: Brake | None = None
+    """The holding brake; by default one that holds whatever comes."""
 
     @model_validator(mode="after")
     def _check(self) -> Winch:

@@ -143,7 +143,8 @@ WRONG = {
     "unknown key in a motor": (
         ("type: ac", "type: ac\n    resistance: 3"),
         "my.yaml:32: winch.motor.resistance: unknown key; known here: type, torque_bandwidth, "
-        "inertia, viscous_friction, speed_gain, base_speed, maximum_speed",
+        "inertia, viscous_friction, speed_gain, base_speed, maximum_speed, coulomb_friction, "
+        "friction_speed, thermal_time_constant, temperature_rise",
     ),
     "missing field": (
         ("  length: 1000 m\n", ""),
@@ -258,6 +259,19 @@ WRONG = {
         ("sea:", "limits:\n  minimum_tension: 430 kN\nsea:"),
         "my.yaml:4: limits.minimum_tension: must be at most the static tension at the payload, "
         "421.7 kN, got 430 kN",
+    ),
+    "stroke without the place where the load hangs": (
+        ("sea:", "limits:\n  stroke: [1 m, 3 m]\nsea:"),
+        "my.yaml:4: limits.stroke: must be [low, high] with low < high and 0 within, got [1, 3] m",
+    ),
+    "every message lost": (
+        ("sea:", "sensors:\n  telemetry:\n    dropout: 100 %\nsea:"),
+        "my.yaml:5: sensors.telemetry.dropout: must be a ratio in [0, 1), got '100 %' (1)",
+    ),
+    "noise as if it were no density": (
+        ("sea:", "sensors:\n  payload:\n    velocity_noise: 1 mm/s\nsea:"),
+        "my.yaml:5: sensors.payload.velocity_noise: must be a velocity noise density in "
+        "[0, 10] m/s/sqrt(Hz), got '1 mm/s', which is a speed",
     ),
     "sensitivity that no loop has": (
         ("sea:", "limits:\n  max_sensitivity: 0.9\nsea:"),

@@ -115,6 +115,12 @@ class TestSchema:
         jsonschema.Draft202012Validator(area).validate(text)
         assert Quantity("area", 0.0, 1e4).read(text) > 0
 
+    @pytest.mark.parametrize("text", ["0.2 mg/sqrt(Hz)", "1e-3 m/s^2/sqrt(Hz)"])
+    def test_accepts_noise_densities(self, text):
+        field = case_schema()["$defs"]["PayloadSensor"]["properties"]["acceleration_noise"]
+        jsonschema.Draft202012Validator(field).validate(text)
+        assert Quantity("acceleration noise", 0.0, 10.0).read(text) > 0
+
     def test_descriptions_carry_the_unit(self):
         rope = case_schema()["$defs"]["Rope"]["properties"]
         assert rope["diameter"]["description"] == "Nominal diameter. Must be in [0.005, 0.3] m."

@@ -387,3 +387,7 @@ class TestOtherSections:
         assert sensors.payload.bandwidth == "perfect"
         assert sensors.telemetry.delay == 0.0
         assert sensors.mru is None
+        for section in (sensors.payload, sensors.telemetry):
+            numbers = [value for value in dict(section).values() if isinstance(value, float)]
+            assert len(numbers) >= 4
+            assert set(numbers) == {0.0}
