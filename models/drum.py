@@ -145,20 +145,41 @@ class Drum(Section):
         """
         if self.radius is not None:
             return self.radius
-        layers = self.layers or (self.geometry.table(rope_diameter) if self.geometry else ())
+        lays, total = self.lays(rope_diameter), self.total(rope_diameter)
+        if paid_out > total:
+            raise InputError(
+                f"the drum holds {total:.4g} m of rope, less than the {paid_out:g} m paid out"
+            )
+        return next((radius for start, radius in lays if paid_out >= start), lays[-1][1])
+
+    def total(self, rope_diameter: float) -> float:
+        """Return the rope on the drum when none is paid out [m]; infinite where not known."""
+        if self.rope_on_drum_total is not None:
+            return self.rope_on_drum_total
+        layers = self._table(rope_diameter)
+        return layers[-1].rope_on_drum if layers else math.inf
+
+    def lays(self, rope_diameter: float) -> tuple[tuple[float, float], ...]:
+        """Return (rope paid out from which a radius holds, that radius) [m], innermost first.
+
+        The innermost layer holds from there to the end of the rope, every other one to the
+        start of the one before it.
+
+        Raises
+        ------
+        InputError
+            If more rope is on the drum than its layers hold.
+        """
+        if self.radius is not None:
+            return ((0.0, self.radius),)
+        layers, total = self._table(rope_diameter), self.total(rope_diameter)
         capacity = layers[-1].rope_on_drum
-        total = capacity if self.rope_on_drum_total is None else self.rope_on_drum_total
         if total > capacity * (1.0 + 1e-9):
             raise InputError(
                 f"rope_on_drum_total must be at most what {len(layers)} layers hold, "
                 f"{capacity:.4g} m, got {total:g} m"
             )
-        left = total - paid_out
-        if left < 0.0:
-            raise InputError(
-                f"the drum holds {total:.4g} m of rope, less than the {paid_out:g} m paid out"
-            )
-        for layer in layers:
-            if left <= layer.rope_on_drum:
-                return layer.pitch_diameter / 2.0
-        return layers[-1].pitch_diameter / 2.0
+        return tuple((total - layer.rope_on_drum, layer.pitch_diameter / 2.0) for layer in layers)
+
+    def _table(self, rope_diameter: float) -> tuple[DrumLayer, ...]:
+        return self.layers or (self.geometry.table(rope_diameter) if self.geometry else ())

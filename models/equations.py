@@ -3,6 +3,10 @@
 From the drum down: motor, gear and drum; the rope as springs with masses between them; the
 payload with its drag; the sensors' low-pass filters.  `models.plant` describes signs and
 coordinates, wraps these functions and linearises them; nothing else should need this file.
+
+What a simulation has and a design has not comes in by arguments, and without them the equations
+are those of the design: limits of the drive (`models.drive`), rope that grows and layers of the
+drum (`models.payout`), and what acts on the payload from outside (`models.surroundings`).
 """
 
 from __future__ import annotations
@@ -14,9 +18,13 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 
+from .drive import DriveLimits, motor_equations
+
 if TYPE_CHECKING:
+    from .payout import DrumTravel
     from .plant_data import PlantData
     from .rope import RopeLumps
+    from .surroundings import Surroundings
 
 __all__ = [
     "DISTURBANCES",
@@ -32,6 +40,7 @@ INPUTS = ("drive.command",)
 DISTURBANCES = ("hook.heave", "hook.heave_rate", "payload.force", "drive.set_point")
 MEASUREMENTS = ("payload.acceleration", "payload.velocity", "payload.displacement")
 RATES = {"hook.heave_rate": "hook.heave"}
+MOTION = ("displacement", "velocity", "acceleration")  # of whatever else moves: deck, surface
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,8 +49,8 @@ class Equations:
 
     Parameters
     ----------
-    states, outputs
-        Names of the entries of x and z.
+    states, disturbances, outputs
+        Names of the entries of x, w and z.
     parameters
         Names and values of the entries of p.
     function
@@ -53,6 +62,7 @@ class Equations:
     """
 
     states: tuple[str, ...]
+    disturbances: tuple[str, ...]
     outputs: tuple[str, ...]
     parameters: Mapping[str, float]
     function: ca.Function
@@ -60,10 +70,34 @@ class Equations:
     units: Mapping[str, str]
 
 
-def build_equations(data: PlantData, lumps: RopeLumps) -> Equations:
-    """Return the equations for a lumping of the rope; the data decide which states exist."""
+def build_equations(
+    data: PlantData,
+    lumps: RopeLumps,
+    *,
+    limits: DriveLimits | None = None,
+    travel: DrumTravel | None = None,
+    surroundings: Surroundings | None = None,
+) -> Equations:
+    """Return the equations for a lumping of the rope; the data decide which states exist.
+
+    Parameters
+    ----------
+    data, lumps
+        The plant's numbers, and lengths of the rope's springs and masses.
+    limits
+        Limits of the drive; None for a motor without any.
+    travel
+        Layers of the drum, for a rope that gets longer and shorter; None for a rope of one
+        length on a drum of one radius.
+    surroundings
+        What acts on the payload besides still water.
+    """
     n = len(lumps.masses)
     parameters = _parameter_values(data)
+    if limits is not None:
+        parameters |= limits.parameters
+    if surroundings is not None:
+        parameters |= surroundings.parameters
     symbols = ca.SX.sym("p", len(parameters))
     p = {name: symbols[i] for i, name in enumerate(parameters)}
 
@@ -71,12 +105,20 @@ def build_equations(data: PlantData, lumps: RopeLumps) -> Equations:
     x = ca.SX.sym("x", len(states))
     x_of = {name: x[i] for i, name in enumerate(states)}
     u = ca.SX.sym("u", len(INPUTS))
-    w = ca.SX.sym("w", len(DISTURBANCES))
-    heave, heave_rate, force, set_point = ca.vertsplit(w)
+    moving = () if surroundings is None else surroundings.motions
+    disturbances = DISTURBANCES + tuple(f"{name}.{end}" for name in moving for end in MOTION)
+    w = ca.SX.sym("w", len(disturbances))
+    heave, heave_rate, force, set_point, *others = ca.vertsplit(w)
 
     speed = x_of["motor.speed"]
-    r_over_n = p["winch.drum_radius"] / p["winch.gear_ratio"]
-    haul, haul_rate = r_over_n * x_of["motor.angle"], r_over_n * speed
+    radius, ratio = p["winch.drum_radius"], p["winch.gear_ratio"]
+    length: ca.SX = p["rope.length"]
+    haul = radius / ratio * x_of["motor.angle"]
+    if travel is not None:
+        haul, radius = travel.haul(x_of["motor.angle"], radius, ratio)
+        length = length - haul
+    r_over_n = radius / ratio
+    haul_rate = r_over_n * speed
     command = u[0] + set_point
     xdot: dict[str, ca.SX] = {"motor.angle": speed}
 
@@ -86,37 +128,47 @@ def build_equations(data: PlantData, lumps: RopeLumps) -> Equations:
     hanging = _hanging_weights(lumps, p)
     tension = []
     for j in range(n):
-        k = p["rope.axial_stiffness"] / (p["rope.length"] * lumps.springs[j])
+        k = p["rope.axial_stiffness"] / (length * lumps.springs[j])
         stretch = position[j] - position[j + 1]
         rate = velocity[j] - velocity[j + 1]
-        whole = hanging[j] + k * (stretch + p["rope.damping_time"] * rate)
+        # A rope that has grown has the stretch of the static rope at its new stiffness.
+        at_rest = hanging[j] if travel is None else hanging[j] * p["rope.length"] / length
+        whole = at_rest + k * (stretch + p["rope.damping_time"] * rate)
         tension.append(ca.fmax(0, whole))
-    top = tension[0] + p["rope.submerged_weight_per_length"] * p["rope.length"] * lumps.at_drum
+    top = tension[0] + p["rope.submerged_weight_per_length"] * length * lumps.at_drum
     acceleration = ca.SX(0)
+    outside: Mapping[str, ca.SX] = {}
     for j, (shift, move) in enumerate(zip(displacement_names(n), _velocities(n), strict=True)):
-        share = p["rope.length"] * lumps.masses[j]
+        share = length * lumps.masses[j]
         weight = p["rope.submerged_weight_per_length"] * share
         mass = p["rope.mass_per_length"] * share
         below = tension[j + 1] if j + 1 < n else ca.SX(0)
         other = ca.SX(0)
         if j + 1 == n:
-            v = velocity[-1]
+            v, quadratic = velocity[-1], p["payload.quadratic_drag"]
             mass += p["payload.virtual_mass"]
             weight += p["payload.submerged_weight"]
-            drag = p["payload.quadratic_drag"] * ca.fabs(v) * v + p["payload.linear_drag"] * v
-            other = force - drag
+            if surroundings is not None:
+                triples = zip(others[0::3], others[1::3], others[2::3], strict=True)
+                motions = dict(zip(moving, triples, strict=True))
+                around = surroundings.build(position[-1], velocity[-1], motions, p)
+                v, quadratic = around.relative_velocity, quadratic * around.drag_factor
+                mass += around.virtual_mass_change
+                force, outside = force + around.force, around.outputs
+            other = force - quadratic * ca.fabs(v) * v - p["payload.linear_drag"] * v
         acceleration = (tension[j] - below - weight + other) / mass
         xdot[shift] = velocity[j + 1]
         xdot[move] = acceleration
 
-    torque, current, motor_dot = _motor(data, p, x_of, command)
-    xdot |= motor_dot
+    motor = motor_equations(data, p, x_of, command)
+    xdot |= motor.derivative
     direction = p["winch.gear_direction"] + ca.tanh(p["winch.gear_switching"] * speed)
     eta = p["winch.gear_efficiency"]
     gear = 0.5 * ((1 + direction) / eta + (1 - direction) * eta)
-    xdot["motor.speed"] = (
-        torque - p["winch.viscous_friction"] * speed - gear * r_over_n * top
-    ) / p["winch.inertia"]
+    friction = p["winch.viscous_friction"] * speed
+    if data.coulomb_friction > 0.0:
+        friction += p["winch.coulomb_friction"] * ca.tanh(speed / data.friction_speed)
+    xdot["motor.speed"] = (motor.torque - friction - gear * r_over_n * top) / p["winch.inertia"]
 
     measured = (acceleration, velocity[-1], position[-1])
     for stage in ("sensor", "telemetry"):
@@ -129,46 +181,41 @@ def build_equations(data: PlantData, lumps: RopeLumps) -> Equations:
         "payload.velocity": velocity[-1],
         "payload.acceleration": acceleration,
         "drum.haul": haul,
-        "motor.torque": torque,
+        "motor.torque": motor.torque,
         "motor.speed": speed,
-        "motor.current": current,
+        "motor.current": motor.current,
         "rope.tension": top,
     }
     if data.motor == "dc":
-        z["motor.voltage"] = command
+        z["motor.voltage"] = motor.applied
+    if limits is not None or travel is not None or surroundings is not None:  # a simulation
+        slackest = tension[0]
+        for other_tension in tension[1:]:
+            slackest = ca.fmin(slackest, other_tension)
+        z |= {
+            "rope.lower_tension": tension[-1],
+            "rope.minimum_tension": slackest,
+            "rope.length": length,
+            "drive.applied": motor.applied,
+            **outside,
+        }
     y_out, z_out = ca.vertcat(*measured), ca.vertcat(*z.values())
     rhs = ca.vertcat(*(xdot[name] for name in states))
     arguments = [x, u, w, symbols]
     derivatives = [ca.jacobian(f, v) for f in (rhs, y_out, z_out) for v in (x, u, w)]
     signatures = ["x", "u", "w", "p"], ["xdot", "y", "z"]
+    units = _units(data, states, disturbances, tuple(z))
+    if surroundings is not None:
+        units |= {name: unit for name, unit in surroundings.output_units.items() if name in z}
     return Equations(
         states=states,
+        disturbances=disturbances,
         outputs=tuple(z),
         parameters=parameters,
         function=ca.Function("plant", arguments, [rhs, y_out, z_out], *signatures),
         jacobians=ca.Function("plant_jacobians", arguments, derivatives),
-        units=_units(data, states, tuple(z)),
+        units=units,
     )
-
-
-def _motor(
-    data: PlantData, p: Mapping[str, ca.SX], x: Mapping[str, ca.SX], command: ca.SX
-) -> tuple[ca.SX, ca.SX, dict[str, ca.SX]]:
-    """Return torque [N m], current [A] and the derivative of the motor's own state."""
-    speed = x["motor.speed"]
-    if data.motor == "dc":
-        driving = command - p["motor.back_emf_constant"] * speed
-        if data.inductance > 0.0:
-            current = x["motor.current"]
-            rate = (driving - p["motor.resistance"] * current) / p["motor.inductance"]
-            return p["motor.torque_constant"] * current, current, {"motor.current": rate}
-        current = driving / p["motor.resistance"]
-        return p["motor.torque_constant"] * current, current, {}
-    demand = p["motor.speed_gain"] * (command - speed) if data.speed_gain > 0.0 else command
-    if math.isinf(data.torque_bandwidth):
-        return demand, demand, {}
-    torque = x["motor.torque"]
-    return torque, torque, {"motor.torque": p["motor.torque_bandwidth"] * (demand - torque)}
 
 
 def _butterworth(
@@ -228,6 +275,9 @@ def _parameter_values(data: PlantData) -> dict[str, float]:
         "winch.inertia": data.inertia,
         "winch.viscous_friction": data.viscous_friction,
     }
+    if data.coulomb_friction > 0.0:
+        # Zero here: its slope at rest, T_c/omega_f, is no friction of a drum that moves.
+        values["winch.coulomb_friction"] = 0.0
     if data.motor == "dc":
         values |= {
             "motor.resistance": data.resistance,
@@ -254,7 +304,12 @@ def _hanging_weights(lumps: RopeLumps, p: Mapping[str, ca.SX]) -> list[ca.SX]:
     return [p["payload.submerged_weight"] + rope * float(part) for part in lumps.hanging]
 
 
-def _units(data: PlantData, states: tuple[str, ...], outputs: tuple[str, ...]) -> dict[str, str]:
+def _units(
+    data: PlantData,
+    states: tuple[str, ...],
+    disturbances: tuple[str, ...],
+    outputs: tuple[str, ...],
+) -> dict[str, str]:
     by_ending = {
         "displacement": "m",
         "velocity": "m/s",
@@ -264,6 +319,9 @@ def _units(data: PlantData, states: tuple[str, ...], outputs: tuple[str, ...]) -
         "heave_rate": "m/s",
         "force": "N",
         "tension": "N",
+        "lower_tension": "N",
+        "minimum_tension": "N",
+        "length": "m",
         "angle": "rad",
         "speed": "rad/s",
         "torque": "N m",
@@ -271,6 +329,6 @@ def _units(data: PlantData, states: tuple[str, ...], outputs: tuple[str, ...]) -
         "voltage": "V",
     }
     command = "V" if data.motor == "dc" else "rad/s" if data.speed_gain > 0.0 else "N m"
-    by_ending |= {"command": command, "set_point": command}
-    names = {*states, *INPUTS, *DISTURBANCES, *MEASUREMENTS, *outputs}
-    return {name: by_ending[name.rsplit(".", 1)[-1]] for name in sorted(names)}
+    by_ending |= {"command": command, "set_point": command, "applied": command}
+    names = {*states, *INPUTS, *disturbances, *MEASUREMENTS, *outputs}
+    return {name: by_ending.get(name.rsplit(".", 1)[-1], "-") for name in sorted(names)}

@@ -11,13 +11,15 @@ when its tension would fall below zero, and the motor holds the static load.
 
 `build_plant` makes it from a case; `Plant.operating_point` solves for rest,
 `Plant.linearise` differentiates there and gives the `LinearPlant` that synthesis works on.
-Limits of the drive are no part of it: they are data of the case, for whoever needs them.
+Limits of the drive, a rope that grows, a seabed or a deck are no part of it unless asked for:
+`build_plant` takes them for the simulation and for nonlinear prediction.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import casadi as ca
@@ -26,7 +28,6 @@ import numpy.typing as npt
 
 from .checks import SolverError, check_range, read_only
 from .equations import (
-    DISTURBANCES,
     INPUTS,
     MEASUREMENTS,
     RATES,
@@ -40,10 +41,18 @@ from .signals import pick
 
 if TYPE_CHECKING:
     from .case import Case
+    from .drive import DriveLimits
+    from .payout import DrumTravel
+    from .surroundings import Surroundings
 
-__all__ = ["OperatingPoint", "Plant", "build_plant"]
+__all__ = ["MEAN_LOSSES", "OperatingPoint", "Plant", "build_plant"]
 
 FloatArray = npt.NDArray[np.float64]
+
+#: Parameters of a load that truly hangs at rest, neither hauled nor lowered: the gear has the mean
+#: of its two losses.  It is where a simulation starts and what a controller's command begins from;
+#: the torque to set against a rating is that of hauling, without them.
+MEAN_LOSSES: Mapping[str, float] = MappingProxyType({"winch.gear_direction": 0.0})
 
 RESIDUAL_TOLERANCE = 1e-9  # of the terms that cancel at rest [-]
 _QUIET = {"error_on_fail": False, "show_eval_warnings": False}  # we look at the residual
@@ -234,7 +243,7 @@ class Plant:
         """
         check_range("plant", "drag", drag, low=0.0, unit="N s/m")
         changes = {**(parameters or {}), "payload.linear_drag": drag}
-        rest = self.operating_point({**changes, "winch.gear_direction": 0.0})
+        rest = self.operating_point({**changes, **MEAN_LOSSES})
         hauling = self.operating_point(changes)
         w = np.zeros(len(self.disturbances))
         blocks = [np.asarray(b) for b in self.jacobians(rest.x, rest.u, w, rest.p)]
@@ -275,7 +284,14 @@ class Plant:
         )
 
 
-def build_plant(source: Case | PlantData, masses: int | None = None) -> Plant:
+def build_plant(
+    source: Case | PlantData,
+    masses: int | None = None,
+    *,
+    limits: DriveLimits | None = None,
+    travel: DrumTravel | None = None,
+    surroundings: Surroundings | None = None,
+) -> Plant:
     """Return the symbolic plant of a case.
 
     Parameters
@@ -285,6 +301,13 @@ def build_plant(source: Case | PlantData, masses: int | None = None) -> Plant:
     masses
         Masses along the rope, 1 to 40; by default those of the case, and where it says
         ``auto`` as many as hold the axial modes below 40 rad/s.
+    limits
+        Limits of the drive; by default the motor has none.
+    travel
+        Layers of the drum, for a rope that is paid out and hauled in by much; by default the
+        rope keeps its length and the drum its radius.
+    surroundings
+        Seabed, deck or water surface; by default the payload hangs in still water.
 
     Raises
     ------
@@ -293,13 +316,15 @@ def build_plant(source: Case | PlantData, masses: int | None = None) -> Plant:
     """
     data = as_plant_data(source)
     lumps = lump_rope(data.chosen_masses(masses), data.lumping)
-    equations = build_equations(data, lumps)
+    equations = build_equations(
+        data, lumps, limits=limits, travel=travel, surroundings=surroundings
+    )
     return Plant(
         data=data,
         lumps=lumps,
         states=equations.states,
         inputs=INPUTS,
-        disturbances=DISTURBANCES,
+        disturbances=equations.disturbances,
         measurements=MEASUREMENTS,
         outputs=equations.outputs,
         parameters=equations.parameters,

@@ -31,6 +31,7 @@ _POSITIVE = {
     "drum_radius": "m",
     "gear_ratio": "-",
     "inertia": "kg m2",
+    "friction_speed": "rad/s",
     "torque_constant": "N m/A",
 }
 _NOT_NEGATIVE = {
@@ -38,6 +39,7 @@ _NOT_NEGATIVE = {
     "rope_weight": "N/m",
     "quadratic_drag": "N s2/m2",
     "viscous_friction": "N m s/rad",
+    "coulomb_friction": "N m",
     "back_emf_constant": "V s/rad",
     "inductance": "H",
     "speed_gain": "N m s/rad",
@@ -70,6 +72,9 @@ class PlantData:
         r to the rope's centre [m], n motor over drum [-], eta in (0, 1] [-].
     inertia, viscous_friction
         I [kg m2] and B [N m s/rad], everything referred to the motor shaft.
+    coulomb_friction, friction_speed
+        Dry friction T_c [N m] at the motor shaft, T_c tanh(speed / friction_speed [rad/s]).  A
+        linear plant leaves it out.
     motor
         ``dc``: command is the armature voltage.  ``ac``: command is the speed reference
         [rad/s] if `speed_gain` is above zero, else the torque demand [N m].
@@ -105,6 +110,8 @@ class PlantData:
     gear_efficiency: float = 1.0
     inertia: float
     viscous_friction: float = 0.0
+    coulomb_friction: float = 0.0
+    friction_speed: float = 1.0
     motor: str = "dc"
     resistance: float = math.nan
     torque_constant: float = 1.0
@@ -215,6 +222,8 @@ class PlantData:
             gear_efficiency=winch.gearbox.efficiency,
             inertia=winch.inertia,
             viscous_friction=winch.viscous_friction,
+            coulomb_friction=getattr(motor, "coulomb_friction", 0.0),
+            friction_speed=getattr(motor, "friction_speed", 1.0),
             motor=motor.type,
             resistance=dc.resistance if dc else math.nan,
             torque_constant=dc.torque_constant if dc else 1.0,
