@@ -1,0 +1,80 @@
+"""Random numbers that can be read from anywhere in a run.
+
+What disturbs a simulation is drawn before it: noise, lost messages, errors of the reference unit.
+A day at 10 ms has millions of samples, so the numbers come in blocks of a fixed size, each with a
+seed of its own, and any stretch of them is the same however the run is cut into chunks.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from .checks import InputError
+
+__all__ = ["MRU_ERROR", "SENSOR_NOISE", "TELEMETRY", "check_seed", "draw"]
+
+FloatArray = npt.NDArray[np.float64]
+Law = Literal["normal", "uniform"]
+
+SENSOR_NOISE, TELEMETRY, MRU_ERROR = 1, 2, 3  # purposes: second entry of the seed
+
+_BLOCK = 65536
+
+
+def check_seed(owner: str, seed: int) -> int:
+    """Return the seed if it is a whole number of at least 0.
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"{owner}: seed must be a whole number of at least 0, got {seed!r}")
+    return int(seed)
+
+
+def draw(
+    seed: int, purpose: int, start: int, count: int, columns: int, law: Law = "normal"
+) -> FloatArray:
+    """Return rows `start` to `start + count` of an endless table of independent numbers.
+
+    Parameters
+    ----------
+    seed
+        Seed of the run, not negative.
+    purpose
+        What the numbers are for; each purpose has a table of its own.
+    start, count
+        First row, not negative, and number of rows.
+    columns
+        Width of the table.
+    law
+        ``normal``: mean 0 and variance 1; ``uniform``: in [0, 1).
+
+    Returns
+    -------
+    ndarray
+        (count, columns).
+    """
+    table = np.empty((count, columns))
+    for block in range(start // _BLOCK, -(-(start + count) // _BLOCK)):
+        first = block * _BLOCK
+        low, high = max(start, first), min(start + count, first + _BLOCK)
+        rows = _block(seed, purpose, block, columns, law)[low - first : high - first]
+        table[low - start : high - start] = rows
+    return table
+
+
+@lru_cache(maxsize=6)
+def _block(seed: int, purpose: int, block: int, columns: int, law: Law) -> FloatArray:
+    # numpy fills short seeds up with zeros: [seed, purpose, 0] would be [seed, purpose] again.
+    generator = np.random.default_rng(np.random.SeedSequence([seed, purpose, block + 1]))
+    size = (_BLOCK, columns)
+    table = generator.standard_normal(size) if law == "normal" else generator.random(size)
+    table.setflags(write=False)
+    return table
