@@ -38,7 +38,7 @@ def crane():
 
 class TestBundled:
     def test_names_and_descriptions(self):
-        assert NAMES == ["subsea-crane", "thesis-1975", "thesis-1975-rope"]
+        assert NAMES == ["landing", "subsea-crane", "thesis-1975", "thesis-1975-rope"]
         assert all(20 < len(text) < 110 and "\n" not in text for _, text in bundled_cases())
 
     @pytest.mark.parametrize("name", NAMES)

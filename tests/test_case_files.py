@@ -22,8 +22,8 @@ class TestFiles:
         with pytest.raises(InputError) as caught:
             load_case(tmp_path / "my.yaml")
         assert str(caught.value) == (
-            f"{tmp_path}/my.yaml: no such case file or bundled case; bundled cases: subsea-crane, "
-            "thesis-1975, thesis-1975-rope"
+            f"{tmp_path}/my.yaml: no such case file or bundled case; bundled cases: landing, "
+            "subsea-crane, thesis-1975, thesis-1975-rope"
         )
 
     def test_mistyped_name(self):
