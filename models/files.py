@@ -4,17 +4,62 @@ from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 from .checks import InputError
 
-__all__ = ["write_text_atomically"]
+__all__ = ["reason", "replace_atomically", "write_text_atomically"]
+
+
+def replace_atomically(path: str | Path, write: Callable[[Path], object]) -> Path:
+    """Let `write` write a file under a temporary name beside it, then rename.
+
+    An interrupted run, or a full disk, leaves the old file or the new one, and nothing between.
+
+    Parameters
+    ----------
+    path
+        The file to write; its folder must exist.
+    write
+        Called once with the temporary path, which it has to write and close.
+
+    Returns
+    -------
+    Path
+        The file written.
+
+    Raises
+    ------
+    InputError
+        If the folder does not exist, cannot be written to, or is full.
+    """
+    target = Path(path)
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    try:
+        write(temporary)
+        os.replace(temporary, target)
+    except OSError as error:
+        raise InputError(f"{target}: cannot be written: {reason(error)}") from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+    return target
+
+
+def reason(error: OSError) -> str:
+    """Return what the system says, whatever a library between us and it made of that.
+
+    Examples
+    --------
+    >>> reason(OSError(28, "Error writing bytes to file. Detail: [errno 28] ..."))
+    'No space left on device'
+    """
+    return str(error) if error.errno is None else os.strerror(error.errno)
 
 
 def write_text_atomically(path: str | Path, text: str) -> Path:
     """Write a text file under a temporary name beside it, then rename.
-
-    An interrupted run leaves the old file or the new one, and nothing between.
 
     Parameters
     ----------
@@ -31,16 +76,8 @@ def write_text_atomically(path: str | Path, text: str) -> Path:
     Raises
     ------
     InputError
-        If the folder does not exist or cannot be written to.
+        If the folder does not exist, cannot be written to, or is full.
     """
-    target = Path(path)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
-        os.replace(temporary, target)
-    except OSError as error:
-        raise InputError(f"{target}: cannot be written: {error.strerror or error}") from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
-    return target
+    return replace_atomically(
+        path, lambda place: place.write_text(text, encoding="utf-8", newline="\n")
+    )
