@@ -16,6 +16,7 @@ from models import Case, InputError, PhysicsWarning, build_plant, load_case
 from models.control import MEASURED, Measurement
 from models.drive import DriveLimits
 from models.excitation import SineMotion, StillMotion
+from models.rope import fixed_top_modes
 from models.run import Run
 from models.scenario import Scenario
 from models.schedule import Move, Profile
@@ -458,3 +459,59 @@ def test_a_prepared_simulation_is_used_for_many_seeds_without_change() -> None:
     again = _runs(replace(simulation), range(3), 30.0)
     for a, b in zip(first, again, strict=True):
         np.testing.assert_array_equal(a.values, b.values)
+
+
+@pytest.mark.parametrize("masses", [1, 5, 20])
+def test_a_load_left_to_itself_swings_at_the_exact_first_mode(masses: int) -> None:
+    # nu tan nu = eps (models.rope): a drum that is stopped leaves the load swinging on the rope.
+    case = crane()
+    stop = Scenario(
+        name="stop",
+        description="lower a little, then the brake trips",
+        duration=120.0,
+        profile=Profile(moves=(Move(start=1.0, distance=-0.9, speed=0.5, acceleration=0.5),)),
+        brake_trips=((2.0, 1000.0),),
+    )
+    run = simulate(
+        case,
+        feedback(case, CRANE, 0.02),
+        scenario=stop,
+        hook=StillMotion(),
+        masses=masses,
+        parameters={"payload.quadratic_drag": 0.0},
+        store_step=0.02,
+    )
+    late = run.time > 20.0
+    swing = run["payload.displacement"][late] - run["payload.displacement"][late].mean()
+    up = np.flatnonzero((swing[:-1] < 0.0) & (swing[1:] >= 0.0))
+    crossings = run.time[late][up] - 0.02 * swing[up] / (swing[up + 1] - swing[up])
+    period = np.diff(crossings).mean()
+    rope, load = case.rope, case.payload.virtual_mass
+    exact = fixed_top_modes(rope.ea, rope.length, rope.mass_per_length, load, 1)[0]
+    # one mass with a third of the rope meets the mode within a per cent (DNV-RP-N103)
+    assert 2.0 * math.pi / period == pytest.approx(exact, rel=1e-2 if masses == 1 else 2e-3)
+
+
+def test_energy_is_neither_made_nor_lost_by_a_swinging_load() -> None:
+    # Brake on, no drag, no damping of the rope: amplitude after a hundred swings as at the start.
+    case = crane(**{"rope.damping_ratio": 0.0})
+    stop = Scenario(
+        name="stop",
+        description="lower a little, then the brake trips",
+        duration=500.0,
+        profile=Profile(moves=(Move(start=1.0, distance=-0.9, speed=0.5, acceleration=0.5),)),
+        brake_trips=((2.0, 1000.0),),
+    )
+    run = simulate(
+        case,
+        feedback(case, CRANE, 0.02),
+        scenario=stop,
+        hook=StillMotion(),
+        masses=1,
+        parameters={"payload.quadratic_drag": 0.0},
+        store_step=0.02,
+    )
+    swing = run["payload.displacement"] - run["payload.displacement"][run.time > 20.0].mean()
+    first = np.abs(swing[(run.time > 20.0) & (run.time < 60.0)]).max()
+    last = np.abs(swing[run.time > 460.0]).max()
+    assert last == pytest.approx(first, rel=1e-4)
