@@ -36,8 +36,9 @@ lint: $(VENV)/.installed-dev  ## ruff, mypy --strict and the import contract
 	$(PY) -m mypy --strict
 	$(VENV)/bin/lint-imports
 
-bench: $(VENV)/.installed-dev  ## how good and how fast the gain synthesis is
+bench: $(VENV)/.installed-dev  ## how good and how fast the gain synthesis and the simulation are
 	$(PY) benchmarks/synthesis.py
+	$(PY) benchmarks/simulation.py
 
 docs: $(VENV)/.installed-docs  ## the documentation, into docs/_build/html
 	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html

@@ -34,6 +34,7 @@ __all__ = [
     "Equations",
     "build_equations",
     "displacement_names",
+    "parameter_values",
 ]
 
 INPUTS = ("drive.command",)
@@ -93,7 +94,7 @@ def build_equations(
         What acts on the payload besides still water.
     """
     n = len(lumps.masses)
-    parameters = _parameter_values(data)
+    parameters = parameter_values(data)
     if limits is not None:
         parameters |= limits.parameters
     if surroundings is not None:
@@ -256,7 +257,8 @@ def _state_names(data: PlantData, n: int) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _parameter_values(data: PlantData) -> dict[str, float]:
+def parameter_values(data: PlantData) -> dict[str, float]:
+    """Return the plant's parameters p by name, in their order."""
     values = {
         "rope.axial_stiffness": data.axial_stiffness,
         "rope.length": data.rope_length,

@@ -38,6 +38,9 @@ FloatArray = npt.NDArray[np.float64]
 
 _MOTIONS = ("displacement", "velocity", "acceleration")
 
+# A Fourier transform whose length has a larger prime factor takes up to twenty times as long.
+_LARGEST_FACTOR = 300
+
 # Above this share of the displacement variance from outside the RAO's table the user is told.
 _SHARE_TO_WARN = 0.05
 
@@ -227,7 +230,7 @@ class HookMotion:
             raise InputError(f"hook record: seed must be at least 0, got {seed!r}")
         # Twice the length, so that it does not repeat; 200 lines below the peak resolve its shape.
         wanted = max(2.0 * duration, 200.0 * 2.0 * math.pi / self.sea.peak_frequency)
-        steps = math.ceil(10.0 * math.ceil(wanted / 10.0) / step - 1e-6)
+        steps = math.ceil(10.0 * _transformable(math.ceil(wanted / 10.0)) / step - 1e-6)
         # The transform's own step has to resolve the band's upper end.
         finer = math.floor(self.band[1] * step / math.pi) + 1
         spacing = 2.0 * math.pi / (steps * step)
@@ -240,9 +243,10 @@ class HookMotion:
 
         def series(derivative: int) -> FloatArray:
             size = steps * finer
-            half = np.zeros(size // 2 + 1, dtype=np.complex128)
-            half[1 : lines + 1] = 0.5 * size * heave * (1j * omega) ** derivative
-            return np.fft.irfft(half, size)[: count * finer : finer]
+            half = np.zeros(lines + 1, dtype=np.complex128)  # above the band there is nothing
+            half[1:] = 0.5 * size * heave * (1j * omega) ** derivative
+            # A copy, so that the rest of the period is not kept.
+            return np.fft.irfft(half, size)[: count * finer : finer].copy()
 
         return HookRecord(
             time=step * np.arange(float(count)),
@@ -255,3 +259,15 @@ class HookMotion:
     def _density(self, omega: npt.ArrayLike, derivative: int) -> FloatArray:
         frequency = np.asarray(omega, dtype=np.float64)
         return frequency ** (2 * derivative) * self.density(frequency)
+
+
+def _transformable(length: int) -> int:
+    """Return the next length, itself included, that has no prime factor above the largest."""
+    while True:
+        rest = length
+        for factor in range(2, _LARGEST_FACTOR + 1):
+            while rest % factor == 0:
+                rest //= factor
+        if rest == 1:
+            return length
+        length += 1

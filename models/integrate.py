@@ -227,7 +227,8 @@ def choose_step(
 
 def _substeps(step: float, sample_time: float, longest: float, fastest: float) -> int:
     check_range("integration", "step", step, low=0.0, unit="s", open_low=True)
-    why = f"the plant's fastest mode, at {fastest:.4g} rad/s," if fastest else "the sample time"
+    bound = longest < sample_time
+    why = f"the plant's fastest mode, at {fastest:.4g} rad/s," if bound else "the sample time"
     if step > longest * (1.0 + _ROUNDING):
         raise InputError(
             f"integration: step must be at most {longest:.4g} s, which {why} allows, got {step!r}"

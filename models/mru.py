@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -240,8 +240,13 @@ class MruModel:
         InputError
             If the two have different lengths, are empty or not finite.
         """
-        true = np.column_stack(_motions(displacement, velocity))
-        n, start = len(true), state.sample
+        z, v = _motions(displacement, velocity)
+        n, start = len(z), state.sample
+        if self.mru is None and not self.outages:
+            shown_as_it_is = MruBlock(heave=z, heave_rate=v, valid=np.ones(n))
+            last = read_only([z[-1], v[-1]])
+            return shown_as_it_is, replace(state, sample=start + n, last=last, held=last)
+        true = np.column_stack((z, v))
         mode, error_mode = state.filter, state.error
         shown = true
         if self._corner is not None:

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from .excitation import Motion, MotionBlock
 from .mru import MruModel, MruState
 from .schedule import Schedule
-from .sensing import SensorModel
+from .sensing import NOISE, SensorModel
 from .telemetry import TelemetrySchedule
 
 __all__ = ["FLAGS", "RowMaker"]
@@ -68,22 +68,24 @@ class RowMaker:
     def block(self, start: int, count: int, mru: MruState) -> tuple[FloatArray, MruState]:
         """Return the rows of the samples from `start` on (count, columns), and the MRU's state."""
         n = self.substeps
-        columns = 3 * len(self.motions) * (n + 1)
-        noise = self.sensors.noise(self.seed, start, count)
         moved = [_moved(motion, start * n, count * n + 1) for motion in self.motions]
-        heave, rate, _ = moved[0]
-        shown, mru = self.mru.block(mru, heave[: count * n : n], rate[: count * n : n])
-        planned = self.schedule.block(start, count)
-        sensed = self.sensors.rows(
-            noise, self.telemetry.block(start, count), shown, planned.reference
-        )
-        rows = np.empty((count, columns + sensed.shape[1] + len(FLAGS)))
+        columns = 3 * len(moved) * (n + 1)
+        rows = np.empty((count, columns + len(self.sensors.row) + len(FLAGS)))
         for j in range(n + 1):
             for i, ends in enumerate(moved):
                 for k, values in enumerate(ends):
                     column = 3 * (len(moved) * j + i) + k
                     rows[:, column] = values[j : j + (count - 1) * n + 1 : n]
-        rows[:, columns : -len(FLAGS)] = sensed
+        heave, rate, _ = moved[0]
+        shown, mru = self.mru.block(mru, heave[: count * n : n], rate[: count * n : n])
+        planned = self.schedule.block(start, count)
+        self.sensors.rows(
+            self._noise(start, count),
+            self.telemetry.block(start, count),
+            shown,
+            planned.reference,
+            out=rows[:, columns : -len(FLAGS)],
+        )
         rows[:, -2] = planned.engage
         rows[:, -1] = self._brake(planned.brake, start)
         return rows, mru
@@ -105,6 +107,12 @@ class RowMaker:
         late = time > 0.0
         rows[late, -2] = 0.0
         rows[late, -1] = np.maximum(rows[late, -1], closed[late])
+
+    def _noise(self, start: int, count: int) -> FloatArray:
+        """Return the sensors' noise; numbers that nobody reads are not drawn."""
+        if not self.sensors.noisy:
+            return np.zeros((count, len(NOISE)))
+        return self.sensors.noise(self.seed, start, count)
 
     def _brake(self, wanted: FloatArray, start: int) -> FloatArray:
         """Return how far the brake is closed, following the order at a limited rate."""

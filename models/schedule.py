@@ -231,10 +231,13 @@ def events(scenario: Scenario) -> tuple[tuple[float, str, str], ...]:
         found += [(start, kind, f"{what} until {end:g} s") for start, end in periods]
     for move in scenario.profile.moves:
         verb = "raise" if move.distance > 0.0 else "lower"
-        text = f"{verb} by {abs(move.distance):g} m at {move.speed:g} m/s"
+        text = f"{verb} by {abs(move.distance):g} m at {move.speed:.3g} m/s"
         found.append((move.start, "reference", text))
     for time, changes in scenario.parameter_changes.items():
-        parts = [f"{k} {'as before' if v is None else f'{v:g}'}" for k, v in changes.items()]
+        parts = [
+            f"{name} is {'as before' if value is None else f'{value:.4g} from now on'}"
+            for name, value in changes.items()
+        ]
         found.append((time, "parameter", ", ".join(parts)))
     return tuple(sorted(found))
 

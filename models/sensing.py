@@ -144,6 +144,12 @@ class SensorModel:
         """Return the vector of `RAW` from the plant's signals by name."""
         return ca.vertcat(*(signals[name] for name in RAW))
 
+    @cached_property
+    def noisy(self) -> bool:
+        """Whether any sensor has noise; else that of `noise` plays no part."""
+        weighed = self.load_cell is not None and self.load_cell.noise_fraction > 0.0
+        return weighed or any(self.noise_rms(name) > 0.0 for name in _SENT)
+
     @staticmethod
     def noise(seed: int, start: int, count: int) -> FloatArray:
         """Return the noise of the samples from `start` on (count, 4), the columns of `NOISE`."""
@@ -155,6 +161,7 @@ class SensorModel:
         telemetry: TelemetryBlock,
         mru: MruBlock,
         references: npt.ArrayLike = 0.0,
+        out: FloatArray | None = None,
     ) -> FloatArray:
         """Return the rows of a stretch of samples (n, len(row)).
 
@@ -164,6 +171,8 @@ class SensorModel:
             What was drawn for these samples.
         references
             Displacement, velocity and acceleration asked of the payload (n, 3).
+        out
+            Where to write the rows (n, len(row)); by default into a new array.
 
         Raises
         ------
@@ -177,18 +186,16 @@ class SensorModel:
                 raise InputError(
                     f"sensors: {name} must have {n} samples as noise has, got {length}"
                 )
-        return np.column_stack(
-            (
-                noise,
-                telemetry.weights,
-                telemetry.fresh,
-                telemetry.age,
-                mru.heave,
-                mru.heave_rate,
-                mru.valid,
-                np.broadcast_to(np.asarray(references, dtype=np.float64), (n, len(_REFERENCE))),
-            )
-        )
+        table = np.empty((n, len(self.row))) if out is None else out
+        ages = len(NOISE) + len(self.lags)
+        table[:, : len(NOISE)] = noise
+        table[:, len(NOISE) : ages] = telemetry.weights
+        # Column by column: it takes half the time of stacking them first.
+        columns = (telemetry.fresh, telemetry.age, mru.heave, mru.heave_rate, mru.valid)
+        for at, values in enumerate(columns, ages):
+            table[:, at] = values
+        table[:, -len(_REFERENCE) :] = references
+        return table
 
     def initial(self, raw: npt.ArrayLike) -> FloatArray:
         """Return the state of sensors that have long seen the plant at rest.

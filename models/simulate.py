@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .checks import check_range
+from .control import holds_brake
 from .draws import check_seed
 from .run import Event, Run, Timings
 from .run_statistics import Accumulator
@@ -90,9 +91,9 @@ def simulate(
     parameters
         Values of plant parameters by name, such as ``{"payload.quadratic_drag": 0.0}``.
     settle
-        Time from which statistics count [s]; by default the scenario's warm-up and ramp, or the
-        30 s in which the hook's motion grows, and ten peak periods of the sea; at most a tenth
-        of the run.
+        Time from which statistics count [s]; by default the scenario's own, or the 30 s in which
+        the hook's motion grows and ten peak periods of the sea; at most a tenth of the run, but
+        not before a controller that warms up is engaged.
     store_step
         Time between stored samples [s]; by default such that at most 40 000 are kept.
     lock_limit
@@ -163,10 +164,13 @@ def run_simulation(
     check_range(owner, "duration", wanted, low=dt, unit="s")
     samples = simulation.samples(wanted)
     if settle is None:
-        waves = 10.0 * case.sea.spectral_peak_period
-        settle = min(scenario.warm_up + scenario.ramp + simulation.ease + waves, 0.1 * wanted)
+        waves = simulation.ease + 10.0 * case.sea.spectral_peak_period
+        settle = min(max(scenario.settle, waves), 0.1 * wanted)
+        # not before the controller is at work, however short the run
+        settle = max(settle, min(scenario.warm_up + scenario.ramp, 0.5 * wanted))
     static = simulation.rest.outputs
-    levels = {name: static[name] for name in ("motor.torque", "rope.tension")}
+    torque = 0.0 if holds_brake(simulation.controller) else static["motor.torque"]
+    levels = {"motor.torque": torque, "rope.tension": static["rope.tension"]}
     accumulator = Accumulator(
         loop.signals,
         dt,
@@ -285,6 +289,8 @@ def _parameters(simulation: Simulation, row: int) -> FloatArray:
 
 def _finite(log: FloatArray) -> int:
     """Return how many rows come before the first that is not finite."""
+    if math.isfinite(log.sum()):  # one pass, and the usual case
+        return len(log)
     bad = ~np.isfinite(log.sum(axis=1))
     return int(np.argmax(bad)) if bad.any() else len(log)
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -109,7 +108,7 @@ class Simulation:
         h = loop.step.step
         length = (self.samples(duration) - 1) * loop.sample_time
         sources = [self.hook, *(scenario.motions[name] for name in loop.motions[1:])]
-        rms, frequency = self._heave
+        rms, frequency = self._heave(duration)
         brake = case.winch.brake
         return RowMaker(
             motions=tuple(source.motion(length, h, seed).eased(self.ease) for source in sources),
@@ -166,15 +165,14 @@ class Simulation:
                 state[at] += v
         return state
 
-    @cached_property
-    def _heave(self) -> tuple[float, float]:
-        """Standard deviation [m] and mean frequency [rad/s] of the hook's heave."""
+    def _heave(self, duration: float) -> tuple[float, float]:
+        """Return standard deviation [m] and mean frequency [rad/s] of the hook's heave."""
         if isinstance(self.hook, SpectrumMotion):
             hook = self.hook.hook
             rms = hook.displacement.rms
             return rms, hook.velocity.rms / rms
-        duration, step = _HEAVE_SAMPLE
-        motion = self.hook.motion(min(duration, self.scenario.duration), step, 0)
+        longest, step = _HEAVE_SAMPLE
+        motion = self.hook.motion(min(longest, duration), min(step, duration), 0)
         z, v, _ = motion.block(0, motion.rows)
         rms, rate = float(z.std()), float(v.std())
         return (rms, rate / rms) if rms > 0.0 and rate > 0.0 else (0.0, 1.0)

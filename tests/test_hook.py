@@ -237,6 +237,31 @@ def test_a_short_record_is_the_beginning_of_a_longer_one():
     np.testing.assert_array_equal(short.displacement, longer.displacement[: short.time.size])
 
 
+@pytest.mark.parametrize("duration", [9990.0, 10800.0, 10800.02, 10805.0, 13010.0])
+def test_the_fourier_transforms_have_no_large_prime_factor(duration, monkeypatch):
+    lengths = []
+    transform = np.fft.irfft
+
+    def irfft(values, n):
+        lengths.append(n)
+        return transform(values, n)
+
+    monkeypatch.setattr(np.fft, "irfft", irfft)
+    record = thesis_motion(beyond="zero").record(duration, step=0.5, seed=2)
+    assert record.duration == pytest.approx(duration, abs=0.5)
+    assert len(lengths) == 3
+    for length in lengths:
+        # The transform's own step is 0.05 s: 200 to ten seconds, of which there is a whole number.
+        assert length % 200 == 0
+        tens = length // 200
+        assert 2.0 * duration <= 10.0 * tens < 2.01 * duration
+        assert max(k for k in range(2, tens + 1) if tens % k == 0 and is_prime(k)) <= 300
+
+
+def is_prime(number):
+    return all(number % k for k in range(2, math.isqrt(number) + 1))
+
+
 @pytest.mark.parametrize("step", [0.2, 0.1, 0.025])
 def test_the_same_seed_gives_the_same_motion_at_every_step(step):
     motion = thesis_motion()

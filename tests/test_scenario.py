@@ -208,8 +208,8 @@ class TestScenario:
             (2.0, "brake", "the brake trips until 3 s"),
             (4.0, "telemetry", "the link from the payload is lost until 5 s"),
             (6.0, "reference", "lower by 2 m at 0.5 m/s"),
-            (7.0, "parameter", "drive.power_limit 1000"),
-            (8.0, "parameter", "drive.power_limit as before"),
+            (7.0, "parameter", "drive.power_limit is 1000 from now on"),
+            (8.0, "parameter", "drive.power_limit is as before"),
             (9.0, "disengaged", "the controller ramps out"),
         )
 
