@@ -29,24 +29,51 @@ _HOME = {
     "bundled_cases": "models",
     "case_schema": "models",
     "load_case": "models",
+    "RecordMotion": "models.record_file",
+    "SineMotion": "models.excitation",
+    "SixDofMotion": "models.six_dof",
+    "Run": "models.run",
+    "Scenario": "models.scenario",
     "GainDesign": "synth",
     "evaluate_gains": "synth",
     "optimise_gains": "synth",
     "tune": "synth",
+    "StructureDesign": "synth.structure_design",
+    "optimise_structure": "synth.structure_design",
+    "BrakeOn": "synth.brake_on",
+    "ConstantTension": "synth.constant_tension",
+    "LinearFeedback": "synth.linear_feedback",
+    "VelocityFeedForward": "synth.feed_forward",
+    "Runs": "stillhook.runs",
+    "simulate": "stillhook.simulation",
+    "write_runs": "stillhook.run_report",
     "cable_study": "stillhook.cables",
     "load_design": "stillhook.design_file",
+    "load_structure": "stillhook.structure_file",
+    "save_structure": "stillhook.structure_file",
     "save_design": "stillhook.design_file",
     "write_report": "stillhook.report",
 }
 
 __all__ = [
+    "BrakeOn",
     "Case",
+    "ConstantTension",
     "GainDesign",
     "InputError",
+    "LinearFeedback",
     "PhysicsWarning",
+    "RecordMotion",
+    "Run",
+    "Runs",
+    "Scenario",
+    "SineMotion",
+    "SixDofMotion",
     "SolverError",
     "StillhookError",
+    "StructureDesign",
     "SynthesisError",
+    "VelocityFeedForward",
     "__version__",
     "bundled_cases",
     "cable_study",
@@ -54,10 +81,15 @@ __all__ = [
     "evaluate_gains",
     "load_case",
     "load_design",
+    "load_structure",
     "optimise_gains",
+    "optimise_structure",
     "save_design",
+    "save_structure",
+    "simulate",
     "tune",
     "write_report",
+    "write_runs",
 ]
 
 if TYPE_CHECKING:
@@ -70,15 +102,31 @@ if TYPE_CHECKING:
     from models import bundled_cases as bundled_cases
     from models import case_schema as case_schema
     from models import load_case as load_case
+    from models.excitation import SineMotion as SineMotion
+    from models.record_file import RecordMotion as RecordMotion
+    from models.run import Run as Run
+    from models.scenario import Scenario as Scenario
+    from models.six_dof import SixDofMotion as SixDofMotion
     from synth import GainDesign as GainDesign
     from synth import evaluate_gains as evaluate_gains
     from synth import optimise_gains as optimise_gains
     from synth import tune as tune
+    from synth.brake_on import BrakeOn as BrakeOn
+    from synth.constant_tension import ConstantTension as ConstantTension
+    from synth.feed_forward import VelocityFeedForward as VelocityFeedForward
+    from synth.linear_feedback import LinearFeedback as LinearFeedback
+    from synth.structure_design import StructureDesign as StructureDesign
+    from synth.structure_design import optimise_structure as optimise_structure
 
     from .cables import cable_study as cable_study
     from .design_file import load_design as load_design
     from .design_file import save_design as save_design
     from .report import write_report as write_report
+    from .run_report import write_runs as write_runs
+    from .runs import Runs as Runs
+    from .simulation import simulate as simulate
+    from .structure_file import load_structure as load_structure
+    from .structure_file import save_structure as save_structure
 
 
 def __getattr__(name: str) -> Any:

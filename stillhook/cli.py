@@ -3,8 +3,8 @@
     arguments -> parser -> one module of `stillhook.commands` -> exit status
 
 Exit status: 0 all is well; 1 the design is not ok (unstable, infeasible, a limit broken, not
-verified); 2 bad input; 3 an error in Stillhook itself; 130 interrupted.  The commands are
-imported when they run, so that ``stillhook --help`` imports nothing heavy.
+verified), or a run diverged; 2 bad input; 3 an error in Stillhook itself; 130 interrupted.  The
+commands are imported when they run, so that ``stillhook --help`` imports nothing heavy.
 """
 
 from __future__ import annotations
@@ -29,12 +29,13 @@ OK, NOT_OK, BAD_INPUT, OUR_FAULT, INTERRUPTED = 0, 1, 2, 3, 130
 _CASE = "a bundled case (see `stillhook cases`) or a case file (.yaml, .json, .toml)"
 _EPILOG = """\
 exit status: 0 all is well; 1 the design is not ok: unstable, infeasible, a
-limit broken, not verified; 2 bad input; 3 an error in Stillhook itself;
-130 interrupted
+limit broken, not verified; or a run diverged; 2 bad input; 3 an error in
+Stillhook itself; 130 interrupted
 
 to begin with:
   stillhook cases                     what comes with the toolkit
   stillhook optimise subsea-crane     the gains of a winch that can do its job
+  stillhook simulate thesis-1975      a controller in the time domain
   stillhook new my.yaml               a commented case file of your own
 """
 
@@ -42,6 +43,7 @@ to begin with:
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     from . import __version__
+    from .commands.simulate_arguments import add_simulate_arguments
 
     raw = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(
@@ -91,6 +93,31 @@ def build_parser() -> argparse.ArgumentParser:
         "--seed", type=int, default=0, metavar="N", help="seed of the starts (default: 0)"
     )
     optimise.add_argument("--quiet", action="store_true", help="print the verdict only")
+    optimise.add_argument(
+        "--structure",
+        metavar="NAME",
+        help="another structure than the three gains of payload feedback, such as combined; "
+        "`stillhook structures CASE` compares them",
+    )
+
+    structures = command("structures", "structures", "compare controller structures on a case")
+    case(structures)
+    structures.add_argument(
+        "--structures",
+        metavar="A,B,..",
+        help="which (default: all): payload-feedback, payload-feedback-rolloff, -lead, -notch, "
+        "-integral, drum-feedback, feed-forward, combined, constant-tension, low-order-N",
+    )
+    structures.add_argument(
+        "--out", metavar="DIR", help="folder for the results (default: out/<name of the case>)"
+    )
+    structures.add_argument(
+        "--starts", type=int, default=8, metavar="N", help="starts of each search (default: 8)"
+    )
+    structures.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="seed of the starts (default: 0)"
+    )
+    structures.add_argument("--quiet", action="store_true", help="print the verdicts only")
 
     evaluate = command("evaluate", "evaluate", "say what given gains do")
     case(evaluate)
@@ -101,6 +128,15 @@ def build_parser() -> argparse.ArgumentParser:
     )
     evaluate.add_argument("--out", metavar="DIR", help="folder for the results (default: none)")
     evaluate.add_argument("--quiet", action="store_true", help="print the verdict only")
+
+    simulate = command("simulate", "simulate", "simulate controllers in a sea, limits and all")
+    case(simulate)
+    add_simulate_arguments(simulate)
+
+    scenarios = command("scenarios", "scenarios", "list the operations and the controllers")
+    scenarios.add_argument(
+        "name", metavar="NAME", nargs="?", help="an operation, to see its options"
+    )
 
     case(command("check", "check", "read a case, and show what follows from it"))
 
@@ -161,7 +197,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    module = import_module(f".commands.{arguments.module}", __package__)
+    structured = getattr(arguments, "structure", None) is not None
+    name = "structures" if structured else arguments.module
+    module = import_module(f".commands.{name}", __package__)
     with warnings.catch_warnings():  # what a command sets about warnings ends with it
         status: int = module.run(arguments)
     return status
