@@ -25,7 +25,8 @@ included.
 
 What comes up from the payload may stop coming.  Values older than `hold_for` fade out, until
 after another second only the static command and the reference are left: a voltage that goes
-on from an old measurement would drive the drum away.
+on from an old measurement would drive the drum away.  So would the last heave rate of a motion
+reference unit that is lost; it counts as nothing.
 """
 
 from __future__ import annotations
@@ -58,7 +59,8 @@ FloatArray = npt.NDArray[np.float64]
 
 _OWNER = "linear feedback"
 PAYLOAD = ("payload.acceleration", "payload.velocity", "payload.displacement")
-HEARD = (*PAYLOAD, "drum.haul", "motor.speed", "motor.torque", "rope.tension")
+HOOK = ("mru.heave", "mru.heave_rate")
+HEARD = (*PAYLOAD, *HOOK, "drum.haul", "motor.speed", "motor.torque", "rope.tension")
 FADE = 1.0  # in which an old measurement loses its weight [s]
 
 
@@ -224,10 +226,12 @@ class LinearFeedback(RecursiveController):
             **static,
         }
         wanted |= {name: m[name.replace("payload", "reference")] for name in PAYLOAD}
+        # A reference unit that is lost shows its last values: a heave rate that goes on for ever.
+        trust = {**dict.fromkeys(PAYLOAD, fresh), **dict.fromkeys(HOOK, m["mru.valid"])}
         rows = []
         for name in self.controller.measurements:
-            deviation = m[name] - wanted[name]
-            rows.append(fresh * deviation if name in PAYLOAD else deviation)
+            deviation = m[name] - wanted.get(name, 0.0)
+            rows.append(trust[name] * deviation if name in trust else deviation)
         return ca.vertcat(*rows)
 
 
