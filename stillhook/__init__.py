@@ -34,12 +34,18 @@ _HOME = {
     "SixDofMotion": "models.six_dof",
     "Run": "models.run",
     "Scenario": "models.scenario",
+    "Bound": "synth.bound",
+    "bound_for": "synth.bound_case",
     "GainDesign": "synth",
     "evaluate_gains": "synth",
+    "Family": "synth.family",
+    "optimise_robust": "synth.robust",
+    "pareto_front": "synth.pareto",
+    "schedule_gains": "synth.schedule",
     "optimise_gains": "synth",
     "tune": "synth",
     "StructureDesign": "synth.structure_design",
-    "optimise_structure": "synth.structure_design",
+    "optimise_structure": "synth.structure_search",
     "BrakeOn": "synth.brake_on",
     "ConstantTension": "synth.constant_tension",
     "LinearFeedback": "synth.linear_feedback",
@@ -56,9 +62,11 @@ _HOME = {
 }
 
 __all__ = [
+    "Bound",
     "BrakeOn",
     "Case",
     "ConstantTension",
+    "Family",
     "GainDesign",
     "InputError",
     "LinearFeedback",
@@ -75,6 +83,7 @@ __all__ = [
     "SynthesisError",
     "VelocityFeedForward",
     "__version__",
+    "bound_for",
     "bundled_cases",
     "cable_study",
     "case_schema",
@@ -83,7 +92,9 @@ __all__ = [
     "load_design",
     "load_structure",
     "optimise_gains",
+    "optimise_robust",
     "optimise_structure",
+    "pareto_front",
     "save_design",
     "save_structure",
     "simulate",
@@ -111,12 +122,18 @@ if TYPE_CHECKING:
     from synth import evaluate_gains as evaluate_gains
     from synth import optimise_gains as optimise_gains
     from synth import tune as tune
+    from synth.bound import Bound as Bound
+    from synth.bound_case import bound_for as bound_for
     from synth.brake_on import BrakeOn as BrakeOn
     from synth.constant_tension import ConstantTension as ConstantTension
+    from synth.family import Family as Family
     from synth.feed_forward import VelocityFeedForward as VelocityFeedForward
     from synth.linear_feedback import LinearFeedback as LinearFeedback
+    from synth.pareto import pareto_front as pareto_front
+    from synth.robust import optimise_robust as optimise_robust
+    from synth.schedule import schedule_gains as schedule_gains
     from synth.structure_design import StructureDesign as StructureDesign
-    from synth.structure_design import optimise_structure as optimise_structure
+    from synth.structure_search import optimise_structure as optimise_structure
 
     from .cables import cable_study as cable_study
     from .design_file import load_design as load_design

@@ -43,6 +43,7 @@ to begin with:
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     from . import __version__
+    from .commands.robust_arguments import add_pareto_arguments, add_robust_arguments
     from .commands.simulate_arguments import add_simulate_arguments
 
     raw = argparse.RawDescriptionHelpFormatter
@@ -129,6 +130,14 @@ def build_parser() -> argparse.ArgumentParser:
     evaluate.add_argument("--out", metavar="DIR", help="folder for the results (default: none)")
     evaluate.add_argument("--quiet", action="store_true", help="print the verdict only")
 
+    robust = command("robust", "robust", "find one set of gains for many depths, loads and seas")
+    case(robust)
+    add_robust_arguments(robust)
+
+    pareto = command("pareto", "pareto", "draw what stillness costs: torque, margin or delay")
+    case(pareto)
+    add_pareto_arguments(pareto)
+
     simulate = command("simulate", "simulate", "simulate controllers in a sea, limits and all")
     case(simulate)
     add_simulate_arguments(simulate)
@@ -137,6 +146,23 @@ def build_parser() -> argparse.ArgumentParser:
     scenarios.add_argument(
         "name", metavar="NAME", nargs="?", help="an operation, to see its options"
     )
+
+    bound = command("bound", "bound", "say what no linear controller can do better than")
+    case(bound)
+    bound.add_argument(
+        "--sensors",
+        metavar="A,B,..",
+        help="what a controller may hear, as in payload.displacement,mru.heave (default: all)",
+    )
+    bound.add_argument("--masses", type=int, metavar="N", help="masses along the rope")
+    bound.add_argument(
+        "--faint",
+        type=float,
+        default=1e-3,
+        metavar="R",
+        help="noise of a sensor that the case calls exact, over the hook's rms (default: 0.001)",
+    )
+    bound.add_argument("--quiet", action="store_true", help="print the bound only")
 
     case(command("check", "check", "read a case, and show what follows from it"))
 

@@ -1,0 +1,222 @@
+"""Optimise a named structure on a case.
+
+    StructureQuestion -> simpler structure within -> search -> (drive too small? say so)
+                      -> StructureDesign -> verified, on twice the rope masses too
+
+A design that fails its independent check is not ok, whatever the search said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from models.case import Case
+from models.checks import check_range
+from models.rope import MAX_MASSES
+
+from .assess import Assessment
+from .limits import Limit
+from .problem import Problem
+from .question import PAYLOAD
+from .search import Progress, begin_points, briskest, least_violation, search
+from .structure_design import StructureDesign
+from .structure_question import StructureQuestion, pose_structure
+from .threads import one_thread
+from .tune import LimitUse, Tuning, limit_uses, tuning_of
+from .winch_structures import LowOrderFeedback
+
+__all__ = ["optimise_structure"]
+
+_HARDLY = 1e-2  # largest row of a limit that a search may still mend
+_ROUNDS = 3  # of a search that did not arrive
+_ENDS = 4  # ends of a search that the next one begins from
+
+
+@one_thread()
+def optimise_structure(
+    case: Case,
+    name: str,
+    starts: int = 16,
+    seed: int = 0,
+    *,
+    progress: Progress | None = None,
+) -> StructureDesign:
+    """Return the best controller of a structure for a case.
+
+    The search first looks for the least motion within the limits of the loop.  If the drive
+    cannot follow that, it looks again within the drive's limits too; if they cannot be kept at
+    all, the first answer is returned, not ok, and the status says what the drive would need.
+
+    Parameters
+    ----------
+    case
+        The case.
+    name
+        Name of the structure, see `synth.winch_structures.structure_names`.
+    starts
+        Starts of the search.
+    seed
+        Seed of the starts.
+    progress
+        Called as progress(stage, done, total).
+
+    Raises
+    ------
+    InputError
+        If there is no such structure, or a limit lies below the static load.
+    """
+    check_range("optimise_structure", "starts", starts, low=1)
+    posed = pose_structure(case, name)
+    guesses = _seeds(posed, int(starts), seed, progress)
+    design, values = _searched(posed, int(starts), seed, guesses, progress)
+    most = 1 if posed.question.data.lumping == "thesis" else MAX_MASSES
+    while design.ok and 2 * design.masses <= most and not design.verify().ok:
+        # It stands on its own rope only: once more on twice the masses.
+        posed = pose_structure(case, name, 2 * design.masses)
+        design, values = _searched(posed, int(starts), seed, [values], progress)
+    return _verified(design, progress)
+
+
+def _seeds(
+    posed: StructureQuestion, starts: int, seed: int, progress: Progress | None
+) -> list[list[float]]:
+    """Return parameter vectors to begin with: the best of a simpler structure within this one.
+
+    Payload feedback behind filters holds that without; a free controller of order two or more
+    holds that behind a roll-off (with perfect sensors its own candidates, LQG designs, want
+    infinite gains).
+    """
+    structure = posed.structure
+    if isinstance(structure, LowOrderFeedback):
+        within = "payload-feedback-rolloff" if structure.order >= 2 else None
+    else:
+        plain = structure.hears_payload and not structure.drum and structure.filters
+        within = "payload-feedback" if plain else None
+    if within is None:
+        return []
+    simple = pose_structure(posed.question.case, within, posed.question.masses)
+    few = min(starts, _ENDS)
+    guesses = _seeds(simple, few, seed, progress)
+    problem = simple.problem(simple.limits)
+    found = tuning_of(problem, search(problem, few, seed, guesses, progress))
+    if found.controller is None:
+        return []
+    if isinstance(structure, LowOrderFeedback):
+        return [structure.start(posed.law, found.parameters, found.controller)]
+    return [structure.plain_start(posed.law, found.parameters)]
+
+
+def _searched(
+    posed: StructureQuestion,
+    starts: int,
+    seed: int,
+    guesses: Sequence[Sequence[float]],
+    progress: Progress | None,
+) -> tuple[StructureDesign, list[float]]:
+    """Return the best design within the limits, or within those that can be kept."""
+    problem = posed.problem(posed.limits)
+    free = _patient(problem, starts, seed, guesses, progress)
+    values = list(free.parameters.values())
+    if not posed.drive or not free.ok or free.assessment is None:
+        return _design(posed, free, drive_kept=not posed.drive), values
+    broken = _broken(posed.drive, free.assessment)
+    full = posed.problem((*posed.limits, *posed.drive))
+    near = _within(full, values, seed) if broken else values
+    if near is not None:
+        known = [near, values]
+        tuned = tuning_of(full, search(full, starts if broken else 1, seed, known, progress))
+        if tuned.ok:
+            return _design(posed, tuned, drive_kept=True), list(tuned.parameters.values())
+    needs = [f"{u.name} {u.value:.4g} {u.unit} instead of {u.bound:.4g}" for u in broken]
+    status = f"the drive is too small: without its limits the best takes {', '.join(needs)}"
+    if not broken:
+        status = "the search within the drive's limits did not arrive"
+    return replace(_design(posed, free, drive_kept=False), ok=False, status=status), values
+
+
+def _within(problem: Problem, values: Sequence[float], seed: int) -> list[float] | None:
+    """Return parameters that keep all limits, as near as a few starts come; None if none does."""
+    begins = begin_points(problem, 3, seed, [values])
+    if not begins:
+        return None
+    least = least_violation(problem, begins, briskest(problem, begins))
+    return [float(v) for v in least.values] if least.objective < _HARDLY else None
+
+
+def _patient(
+    problem: Problem,
+    starts: int,
+    seed: int,
+    guesses: Sequence[Sequence[float]],
+    progress: Progress | None,
+) -> Tuning:
+    """Return the answer of a search that goes on from where it ended if no start arrived.
+
+    With ten parameters or more a solve may need more iterations than it is given.
+    """
+    tuning = tuning_of(problem, search(problem, starts, seed, guesses, progress))
+    for _ in range(_ROUNDS):
+        if tuning.ok:
+            break
+        ends = [s.end for s in tuning.starts if s.stable and s.message.startswith("maximum")]
+        if not ends:
+            break
+        again = [*([float(v) for v in end] for end in ends[:_ENDS]), *guesses]
+        tuning = tuning_of(problem, search(problem, min(starts, _ENDS), seed, again, progress))
+    return tuning
+
+
+def _broken(limits: Sequence[Limit], view: Assessment) -> list[LimitUse]:
+    return [use for use in limit_uses(limits, view, {}).values() if not use.kept]
+
+
+def _design(posed: StructureQuestion, tuning: Tuning, *, drive_kept: bool) -> StructureDesign:
+    question, view = posed.question, tuning.assessment
+    limits: dict[str, LimitUse] = dict(tuning.limits)
+    parts: dict[str, float] = {}
+    if view is not None:
+        others = (*posed.reported, *(() if drive_kept else posed.drive))
+        limits |= limit_uses(others, view, {}, enforced=False)
+        for disturbance in tuning.problem.disturbances:
+            alone = Assessment(
+                view.plant, view.controller, [disturbance]
+            )  # its drag is in the plant already
+            parts[disturbance.name] = alone.sigma(PAYLOAD)
+    fixed = question.case.payload.fixed_drag
+    drag = question.drag_before
+    if view is not None:
+        drag = view.coefficient if question.drag is not None else float(fixed or 0.0)
+    return StructureDesign(
+        case=question.case,
+        structure=posed.structure.name,
+        ok=tuning.ok,
+        status=tuning.status,
+        parameters=dict(tuning.parameters),
+        units={p.name: p.unit for p in posed.law.parameters},
+        payload_rms=tuning.cost,
+        payload_rms_before=question.payload_rms_before,
+        hook_rms=float(question.hook.displacement.rms),
+        parts=parts,
+        margins=tuning.margins,
+        limits=limits,
+        drag=drag,
+        drag_before=question.drag_before,
+        masses=question.masses,
+        starts=len(tuning.starts),
+        agreed=tuning.agreed,
+        drive_kept=drive_kept,
+    )
+
+
+def _verified(design: StructureDesign, progress: Progress | None) -> StructureDesign:
+    """Return the design with its independent check; one that fails it is not ok."""
+    if not design.parameters or design.margins is None:
+        return design
+    if progress is not None:
+        progress("verify", 0, 1)
+    checked = design.verify()
+    if progress is not None:
+        progress("verify", 1, 1)
+    status = design.status if checked.ok else f"not verified: {checked.status}"
+    return replace(design, ok=design.ok and checked.ok, status=status, verification=checked)
