@@ -122,6 +122,11 @@ class Assessment:
             for i, gain in enumerate(self._grid_gain)
         ]
 
+    @property
+    def max_sensitivity(self) -> float:
+        """M_s of the worst loop, as in `margins` but without the crossings."""
+        return float(1.0 / min(least.min() for _, least in self._peaks))
+
     def loop_gain(self, omega: FloatArray, index: int = 0) -> ComplexArray:
         """Return L of the loop broken at input `index`, (k,)."""
         return self._loop(index)(np.asarray(omega, dtype=np.float64))

@@ -54,7 +54,7 @@ class MaxSensitivity(Limit):
 
     @override
     def measure(self, loop: Assessment) -> float:
-        return loop.margins.max_sensitivity
+        return loop.max_sensitivity
 
     @override
     def critical(self, loop: Assessment) -> FloatArray:

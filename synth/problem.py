@@ -58,6 +58,11 @@ class Problem:
         sizes = np.abs(self.plant.poles())
         return -_SLOW * float(sizes[sizes > 1e-6 * sizes.max(initial=1.0)].min(initial=1.0))
 
+    def growth(self, values: Values) -> float:
+        """Return the largest real part of a closed-loop pole [1/s], drag as the plant holds it."""
+        matrix = self.law.closed_loop_matrix(self.rational, [float(v) for v in values])
+        return float(np.linalg.eigvals(matrix).real.max(initial=-np.inf))
+
     def abscissa(self, values: Values, coefficient: float | None = None) -> float:
         """Return the largest real part of a closed-loop pole over the size of the largest."""
         plant = self.rational

@@ -19,7 +19,7 @@ rope brings twenty.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -36,7 +36,16 @@ from .problem import Problem as Problem
 from .problem import Values
 from .symbols import Symbols as Symbols
 
-__all__ = ["Goal", "Pace", "Problem", "Programme", "Solved", "Symbols"]
+__all__ = [
+    "Goal",
+    "Guard",
+    "Pace",
+    "Problem",
+    "Programme",
+    "Solved",
+    "Symbols",
+    "solver_options",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -80,14 +89,21 @@ class Solved:
     prices: dict[str, float]
 
 
-class _Guard(ca.Callback):
-    """Zero where the loop is stable, not a number elsewhere; its derivative is zero."""
+class Guard(ca.Callback):
+    """Zero where the loop is stable, not a number elsewhere; its derivative is zero.
 
-    def __init__(self, problem: Problem, size: int) -> None:
+    Parameters
+    ----------
+    stable
+        Says of the programme's vector, (size,), whether the loop (or every loop) is stable.
+    size
+        Length of that vector.
+    """
+
+    def __init__(self, stable: Callable[[FloatArray], bool], size: int) -> None:
         ca.Callback.__init__(self)
-        self._problem = problem
+        self._stable = stable
         self._size = size
-        self._scales = np.array([p.scale for p in problem.law.parameters])
         self._jacobian: ca.Function | None = None
         self.rejected = 0
         self.construct("guard", {})
@@ -112,9 +128,7 @@ class _Guard(ca.Callback):
         x = np.array(arg[0], dtype=np.float64).ravel()
         if not np.all(np.isfinite(x)):
             return [np.nan]
-        count = self._scales.size
-        coefficient = float(np.exp(x[count])) if self._problem.drag is not None else None
-        stable = self._problem.stable(x[:count] * self._scales, coefficient)
+        stable = self._stable(x)
         self.rejected += not stable
         return [0.0 if stable else np.nan]
 
@@ -130,6 +144,19 @@ class _Guard(ca.Callback):
         zero = ca.MX(ca.Sparsity(1, self._size))
         self._jacobian = ca.Function(name, [x, out], [zero], inames, onames, opts)
         return self._jacobian
+
+
+def solver_options(tolerance: float, max_iterations: int) -> dict[str, Any]:
+    """Return the options of IPOPT that every programme here shares."""
+    return {
+        "print_time": False,
+        "show_eval_warnings": False,
+        "ipopt.print_level": 0,
+        "ipopt.sb": "yes",
+        "ipopt.tol": tolerance,
+        "ipopt.acceptable_tol": 10.0 * tolerance,
+        "ipopt.max_iter": max_iterations,
+    }
 
 
 class Programme:
@@ -173,7 +200,7 @@ class Programme:
         objective = cost
         if goal is not Goal.COST:
             objective = -symbols.extra if goal is Goal.SEA else symbols.extra
-        self._guard = _Guard(problem, symbols.x.shape[0])
+        self._guard = Guard(self._stable, symbols.x.shape[0])
         self.evaluate = ca.Function("evaluate", [symbols.x, bounds], [cost, constraints])
         self._statement: dict[str, Any] = {
             "x": symbols.x,
@@ -181,16 +208,16 @@ class Programme:
             "f": objective + self._guard(symbols.x),
             "g": constraints,
         }
-        self._options: dict[str, Any] = {
-            "print_time": False,
-            "show_eval_warnings": False,
-            "ipopt.print_level": 0,
-            "ipopt.sb": "yes",
-            "ipopt.tol": tolerance,
-            "ipopt.acceptable_tol": 10.0 * tolerance,
-            "ipopt.max_iter": max_iterations,
-        }
+        self._options = solver_options(tolerance, max_iterations)
         self._solvers: dict[Pace, Any] = {}
+
+    def _stable(self, x: FloatArray) -> bool:
+        """Return whether the loop of the programme's vector is stable."""
+        parameters = self.problem.law.parameters
+        count = len(parameters)
+        coefficient = float(np.exp(x[count])) if self.problem.drag is not None else None
+        scales = np.array([p.scale for p in parameters])
+        return self.problem.stable(x[:count] * scales, coefficient)
 
     def _solver(self, pace: Pace) -> Any:
         if pace not in self._solvers:

@@ -91,8 +91,7 @@ def stabilise(
         def abscissa(y: FloatArray, begin: FloatArray = begin) -> float:
             # In the plant's own time: relative to the fastest pole it is 1, and flat, for a
             # pole that just grows.  The rest keeps the simplex from wandering off.
-            matrix = problem.law.closed_loop_matrix(problem.rational, values_at(y))
-            largest = float(np.linalg.eigvals(matrix).real.max())
+            largest = problem.growth(values_at(y))
             return largest / middle + _LEASH * float(np.sum((y - begin) ** 2))
 
         answer = minimize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from copy import copy
 from typing import Any
 
 import casadi as ca
@@ -27,15 +29,35 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class Symbols:
-    """What the limits see of a programme: symbolic loop, moments and responses."""
+    """What the limits see of a programme: symbolic loop, moments and responses.
 
-    def __init__(self, problem: Problem, nodes: Quadrature, omega: FloatArray, goal: Goal) -> None:
+    Parameters
+    ----------
+    problem, nodes, omega, goal
+        The problem, where its spectra are integrated and its margins held [rad/s], and what
+        is looked for.
+    shared
+        (x, parameter values, log of the drag or None) of a programme of several loops, each
+        with symbols of its own; by default the symbols make their own.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        nodes: Quadrature,
+        omega: FloatArray,
+        goal: Goal,
+        shared: tuple[Any, Sequence[Any], Any] | None = None,
+    ) -> None:
         law, scales = problem.law, [p.scale for p in problem.law.parameters]
         count = len(scales)
         has_drag, has_extra = problem.drag is not None, goal is not Goal.COST
-        self.x = ca.MX.sym("x", count + has_drag + has_extra)
-        self.values = [self.x[i] * scales[i] for i in range(count)]
-        self.log_drag: Any = self.x[count] if has_drag else None
+        if shared is None:
+            x = ca.MX.sym("x", count + has_drag + has_extra)
+            shared = x, [x[i] * scales[i] for i in range(count)], x[count] if has_drag else None
+        self.x: Any = shared[0]
+        self.values: list[Any] = list(shared[1])
+        self.log_drag: Any = shared[2]
         self.extra: Any = self.x[count + has_drag] if has_extra else None
         self.amplitude: Any = 1.0
         if self.extra is not None and goal is Goal.SEA:
@@ -58,10 +80,19 @@ class Symbols:
             _as_vector(d, omega.size)
             for d in return_differences(self._margin_blocks, self._margin_law)
         ]
-        self._densities = {
-            d.name: d.density(nodes.omega) * nodes.weights for d in problem.disturbances
-        }
+        self._shake(problem)
+
+    def _shake(self, problem: Problem) -> None:
+        omega, weights = self._nodes.omega, self._nodes.weights
+        self._densities = {d.name: d.density(omega) * weights for d in problem.disturbances}
         self._moments: dict[tuple[str, int], Any] = {}
+
+    def under(self, problem: Problem) -> Symbols:
+        """Return the same loop shaken by the disturbances of another problem."""
+        other = copy(self)
+        other._problem = problem
+        other._shake(problem)
+        return other
 
     @property
     def module_margin(self) -> float:
