@@ -5,15 +5,11 @@ three times, for the optimiser (`response`, numbers or symbols), for the guard o
 (`characteristic`, the monic denominator) and for everything that runs or checks the controller
 (`matrices`, a state-space form).
 
-===============  =================================================  =====================
-section          transfer function                                  static gain
-===============  =================================================  =====================
-`RollOff`        w^2 / (s^2 + 2 z w s + w^2)                        1
-`LeadLag`        (1 + s/w_z) / (1 + s/w_p)                          1
-`Notch`          (s^2 + 2 b d w s + w^2) / (s^2 + 2 b w s + w^2)    1
-`Integral`       (s + w) / s                                        infinite
-`LeadTime`       (1 + tau s) / (1 + s/w)                            1
-===============  =================================================  =====================
+* `RollOff`: w^2 / (s^2 + 2 z w s + w^2), static gain 1
+* `LeadLag`: (1 + s/w_z) / (1 + s/w_p), static gain 1
+* `Notch`: (s^2 + 2 b d w s + w^2) / (s^2 + 2 b w s + w^2), static gain 1
+* `Integral`: (s + w) / s, static gain infinite
+* `LeadTime`: (1 + tau s) / (1 + s/w), static gain 1
 """
 
 from __future__ import annotations
