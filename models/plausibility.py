@@ -66,6 +66,13 @@ def remarks(case: Case) -> list[Finding]:
                 f"{back_emf:.4g} V: the motor cannot reach it"
             )
             found.append(("winch.drive.voltage", text))
+    brake = case.winch.brake
+    if brake is not None and brake.torque is not None and brake.torque < case.static_torque:
+        text = (
+            f"{brake.torque / 1e3:.4g} kN m is below the static torque at the motor, "
+            f"{case.static_torque / 1e3:.4g} kN m: the brake slips under the load"
+        )
+        found.append(("winch.brake.torque", text))
     if case.limits.drive == "report":
         found += [(at, f"{rating} is below {load}") for at, load, rating in _overloads(case)]
     return found
