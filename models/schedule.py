@@ -134,18 +134,12 @@ class ScheduleBlock:
         Share of the controller's command that reaches the drive, beyond the static hold (n,) [-].
     brake
         1 while the brake is on (n,).
-    telemetry, sensor, mru
-        1 while the link from the payload, the payload's sensor and the motion reference unit
-        work, 0 while they do not (n,).
     """
 
     time: FloatArray
     reference: FloatArray
     engage: FloatArray
     brake: FloatArray
-    telemetry: FloatArray
-    sensor: FloatArray
-    mru: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,9 +182,6 @@ class Schedule:
             reference=scenario.profile.at(time),
             engage=np.where(braked, 0.0, engage),
             brake=braked.astype(np.float64),
-            telemetry=_outside(clock, scenario.telemetry_outages),
-            sensor=_outside(clock, scenario.sensor_failures),
-            mru=_outside(clock, scenario.mru_outages),
         )
 
     @property

@@ -1,4 +1,4 @@
-"""The figure of a Pareto front: what stillness costs, and where more buys little."""
+"""The figure of a Pareto front: what stillness costs, and where that turns most."""
 
 from __future__ import annotations
 

@@ -23,6 +23,7 @@ from models.linear import LinearPlant
 
 from .controller import Controller
 from .disturbance import White
+from .riccati import balanced_truncation
 
 __all__ = [
     "LQG",
@@ -181,7 +182,9 @@ def reduced(plant: LinearPlant, feedback: Regulator, kalman: Estimator, order: i
         loop = plant.A + plant.B @ K
         reached = solve_continuous_lyapunov(loop, -L @ kalman.V @ L.T)
         heard = solve_continuous_lyapunov(loop.T, -K.T @ feedback.R @ K)
-        left, right = _balancing(np.asarray(heard, float), np.asarray(reached, float), order)
+        left, right = balanced_truncation(
+            np.asarray(heard, float), np.asarray(reached, float), order
+        )
         A, B, C = left @ A @ right, left @ B, C @ right
     return Controller(
         A=A,
@@ -268,15 +271,3 @@ def _riccati(
     if poles.real.max(initial=-1.0) > -1e-12 * np.abs(poles).max(initial=1.0):
         raise SynthesisError(message)
     return np.asarray(0.5 * (X + X.T)), np.asarray(gain, dtype=np.float64)
-
-
-def _balancing(heard: FloatArray, reached: FloatArray, order: int) -> tuple[FloatArray, FloatArray]:
-    """Return the projections, (order, n) and (n, order), on what two Gramians weigh most."""
-    roots = []
-    for matrix in (heard, reached):
-        size, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
-        roots.append(vectors * np.sqrt(np.maximum(size, 0.0)))
-    left, sizes, right = np.linalg.svd(roots[0].T @ roots[1])
-    keep = max(1, min(order, int(np.sum(sizes > 1e-10 * sizes[0]))))
-    scale = 1.0 / np.sqrt(sizes[:keep] + 1e-300)
-    return (left[:, :keep] * scale).T @ roots[0].T, roots[1] @ (right[:keep].T * scale)

@@ -84,7 +84,7 @@ class ParetoFront:
 
     @property
     def knee(self) -> ParetoPoint:
-        """The point farthest from the chord, on logarithmic axes: where more buys least."""
+        """The point farthest from the chord, on logarithmic axes: where it turns most."""
         x = np.log([max(p.bound, 1e-12) for p in self.points])
         y = np.log([p.payload_rms for p in self.points])
         if len(x) < 3 or x[-1] == x[0] or y[-1] == y[0]:

@@ -17,9 +17,10 @@ from models.scenario import Scenario
 from models.scenarios import scenario_named, scenario_names, scenario_options
 from models.schedule import Move, Profile, Schedule
 from models.surroundings import Deck, Seabed, Surroundings
+from models.telemetry import during
 
 CASES = ("thesis-1975", "thesis-1975-rope", "subsea-crane", "landing")
-COLUMNS = ("time", "reference", "engage", "brake", "telemetry", "sensor", "mru")
+COLUMNS = ("time", "reference", "engage", "brake")
 
 
 @pytest.fixture(scope="module")
@@ -155,11 +156,16 @@ class TestSchedule:
     @pytest.mark.parametrize("sample_time", [0.1, 0.05, 0.02])
     def test_what_fails_fails_from_the_first_sample_to_the_last(self, sample_time):
         # Multiples of these are not exact in binary; no sample may slip over an edge.
-        rows = BUSY.schedule(sample_time).block(0, round(100.0 / sample_time))
+        samples = np.arange(round(100.0 / sample_time))
         per_second = round(1.0 / sample_time)
-        for name, lost in (("telemetry", 10), ("sensor", 2), ("mru", 10)):
-            assert np.sum(getattr(rows, name) == 0.0) == lost * per_second
-        assert np.flatnonzero(rows.telemetry == 0.0)[0] == 10 * per_second
+        for intervals, lost in (
+            (BUSY.telemetry_outages, 10),
+            (BUSY.sensor_failures, 2),
+            (BUSY.mru_outages, 10),
+        ):
+            assert np.sum(during(intervals, samples, sample_time)) == lost * per_second
+        gone = during(BUSY.telemetry_outages, samples, sample_time)
+        assert np.flatnonzero(gone)[0] == 10 * per_second
 
     def test_the_reference_is_the_profile(self):
         rows = BUSY.schedule(0.25).block(60, 100)

@@ -108,4 +108,4 @@ def _show(front: ParetoFront) -> None:
             *(number(point.parameters[name]) for name in names),
         )
     _put(table, out)
-    out.print("  * the knee: beyond it more buys little")
+    out.print("  * the knee: here the front turns most")
