@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from models.checks import InputError, check_range
 from models.linear import LinearPlant
+from models.shaping import ShapingFilter
 from models.signals import pick
 
 from .bound_dual import Dual, DualPoint
@@ -31,7 +32,6 @@ from .controller import Controller
 from .disturbance import Disturbance, White, disturbances
 from .lqg import reduced
 from .shaped import shaped, with_input_outputs
-from .shaping import ShapingFilter
 from .spectral_factor import SpectralFactor, spectral_factor
 from .threads import one_thread
 

@@ -21,12 +21,12 @@ from models.checks import InputError, check_range
 from models.hook import HookMotion
 from models.linear import LinearPlant
 from models.plant_data import PlantData
+from models.sensed_plant import sensed_plant, sensed_spectra
 
 from .bound import Bound, lqg_bound
 from .disturbance import White
 from .limits import Limit
 from .question import PAYLOAD, pose
-from .sensed_plant import sensed_plant, sensed_spectra
 from .signal_limits import Continuous, Least, Peak, Rms
 
 __all__ = ["bound_for", "faint_noise", "rms_limits"]
@@ -60,9 +60,9 @@ def bound_for(
     drag
         Linear drag coefficient [N s/m], such as a design's; by default that with the drum held.
     measurements
-        What the controller hears (`synth.sensed_plant.MEASURED`); by default everything.
+        What the controller hears (`models.sensed_plant.MEASURED`); by default everything.
     spectra
-        Further disturbances, or others than the case's (`synth.sensed_plant.sensed_spectra`).
+        Further disturbances, or others than the case's (`models.sensed_plant.sensed_spectra`).
     periods
         Mean period T_z of signals by name [s], such as a design's; by default twice the hook's.
         The longer, the smaller the k of peak limits and the lower the bound.

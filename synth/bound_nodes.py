@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from models.linear import LinearPlant
+from models.shaping import ShapingFilter
 
 from .bound_dual import Dual, DualPoint
 from .bound_truth import Truth, frequencies, optimal_response
 from .disturbance import Disturbance
-from .shaping import ShapingFilter
 from .spectral_factor import SpectralFactor
 
 __all__ = ["densities", "refitted", "truth_of"]

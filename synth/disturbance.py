@@ -14,34 +14,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from models.checks import InputError, check_ascending, check_finite, check_range
+from models.checks import InputError, check_ascending, check_finite
+from models.white import White
 
 __all__ = ["Disturbance", "White", "disturbances"]
 
 FloatArray = npt.NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class White:
-    """White noise of E[w(t) w(t+s)] = intensity * delta(s).
-
-    Its one-sided density is intensity/pi per rad/s: twice the two-sided density
-    intensity/(2 pi), so that a filter h has the output variance intensity * integral h(t)^2.
-
-    Parameters
-    ----------
-    intensity
-        [unit of w, squared, times s].
-    """
-
-    intensity: float = 1.0
-
-    def __post_init__(self) -> None:
-        check_range("White", "intensity", self.intensity, low=0.0)
-
-    def density(self, omega: npt.ArrayLike) -> FloatArray:
-        """Return the one-sided density per rad/s at `omega`."""
-        return np.full(np.shape(omega), self.intensity / np.pi)
 
 
 @dataclass(frozen=True, kw_only=True)

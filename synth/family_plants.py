@@ -124,7 +124,7 @@ class FamilyPlants:
         masses = self.masses or self.most_masses
         if not self._sensed:
             return stacked_members(self.family, members, masses)
-        from .sensed_plant import sensed_plant
+        from models.sensed_plant import sensed_plant
 
         case = self.family.case
         fixed = case.payload.fixed_drag
@@ -170,7 +170,7 @@ class FamilyPlants:
         if key not in self._plants:
             self._plants[key] = question.plant
             if self._sensed:
-                from .sensed_plant import sensed_plant
+                from models.sensed_plant import sensed_plant
 
                 self._plants[key] = sensed_plant(
                     question.case, masses=question.masses, drag=question.drag_before
@@ -181,6 +181,6 @@ class FamilyPlants:
         question = self.question(member)
         if not self._sensed:
             return {HOOK: question.hook}
-        from .sensed_plant import sensed_spectra
+        from models.sensed_plant import sensed_spectra
 
         return dict(sensed_spectra(question.case, question.hook))

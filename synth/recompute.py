@@ -19,10 +19,10 @@ import scipy.linalg
 from models.checks import SolverError
 from models.linear import LinearPlant
 from models.response import PlantResponse
+from models.shaping import ShapingFilter
 
 from .controller import Controller
 from .integrals import integrate, panels
-from .shaping import ShapingFilter
 from .winding import Function
 
 __all__ = [

@@ -15,8 +15,7 @@ import numpy.typing as npt
 
 from models.checks import InputError
 from models.linear import LinearPlant
-
-from .shaping import ShapingFilter
+from models.shaping import ShapingFilter
 
 __all__ = ["shaped", "with_input_outputs"]
 

@@ -26,9 +26,9 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from models.checks import InputError, SolverError, check_range
+from models.shaping import ShapingFilter
 
 from .disturbance import Disturbance
-from .shaping import ShapingFilter
 
 __all__ = ["SpectralFactor", "fit_spectral_factor", "spectral_factor"]
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from models.linear import LinearPlant
 from models.rope import MAX_MASSES
+from models.sensed_plant import sensed_plant
 
 from .margin_limits import MaxSensitivity
 from .question import PAYLOAD
@@ -23,7 +24,6 @@ from .recheck import (
     winding_of_plant,
 )
 from .recompute import LawMatrices, Loop, Source, moments
-from .sensed_plant import sensed_plant
 from .threads import one_thread
 from .verification import Check, Verification, agreement, bounded
 from .verify_tuning import verify_tuning

@@ -17,6 +17,7 @@ import numpy as np
 
 from models.case import Case
 from models.linear import LinearPlant
+from models.sensed_plant import SAMPLE_TIME, sensed_plant, sensed_spectra
 
 from .case_limits import drive_limits
 from .disturbance import White, disturbances
@@ -24,7 +25,6 @@ from .limits import Limit
 from .margin_limits import LowFrequency
 from .problem import Problem
 from .question import HOOK, PAYLOAD, Question, pose, with_masses
-from .sensed_plant import SAMPLE_TIME, sensed_plant, sensed_spectra
 from .structure import Law
 from .winch_structures import LowOrderFeedback, WinchStructure, structure_named
 

@@ -27,6 +27,7 @@ from models.plant import build_plant
 from models.plant_data import PlantData
 from models.rope import MAX_MASSES
 from models.sea import SeaSpectrum
+from models.shaping import fit_shaping_filter
 from models.vessel import HeaveRao
 
 from .claims import HOOK, PAYLOAD, VELOCITY, Demand, case_demands
@@ -44,7 +45,6 @@ from .recheck import (
     winding_of_plant,
 )
 from .recompute import LawMatrices, Loop, Source, lyapunov_variances, moments
-from .shaping import fit_shaping_filter
 from .threads import one_thread
 from .uncompensated import HeldDrum
 from .verification import Check, Verification, agreement, bounded, failure

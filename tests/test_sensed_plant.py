@@ -12,9 +12,9 @@ from models.hook import HookMotion
 from models.mru import MruModel
 from models.plant import build_plant
 from models.plant_data import PlantData
+from models.sensed_plant import MEASURED, NOISES, sensed_plant, sensed_spectra
 from models.sensing import SensorModel
 from synth.disturbance import White, disturbances
-from synth.sensed_plant import MEASURED, NOISES, sensed_plant, sensed_spectra
 
 OMEGA = np.array([0.05, 0.3, 1.0, 4.0, 11.0])
 DRAG = 12_000.0

@@ -9,9 +9,9 @@ from scipy.integrate import quad
 from models.checks import InputError, SolverError
 from models.linear import LinearPlant
 from models.sea import SeaSpectrum
+from models.shaping import fit_shaping_filter
 from synth.integrals import integrate, panels
 from synth.recompute import LawMatrices, Loop, Source, lyapunov_variances, moments
-from synth.shaping import fit_shaping_filter
 
 
 def oscillator(zeta: float, **options: object) -> LinearPlant:

@@ -295,7 +295,7 @@ def test_simulated_combined_structure_has_the_predicted_rms(crane: Case) -> None
 
 
 def pose_plant(case: Case, drag: float) -> object:
-    from synth.sensed_plant import sensed_plant
+    from models.sensed_plant import sensed_plant
 
     return sensed_plant(case, drag=drag).select(
         measurements=structure_named("combined", case).measurements

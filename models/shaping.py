@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
-from models.checks import InputError, SolverError, check_range, read_only
+from .checks import InputError, SolverError, check_range, read_only
 
 __all__ = ["ShapingFilter", "fit_shaping_filter"]
 

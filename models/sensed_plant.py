@@ -18,17 +18,16 @@ from typing import Any
 
 import numpy as np
 
-from models.case import Case
-from models.checks import check_range
-from models.equations import MEASUREMENTS
-from models.hook import HookMotion
-from models.linear import LinearPlant
-from models.mru import MruModel
-from models.plant import build_plant
-from models.plant_data import PlantData
-from models.sensors import Sensors
-
-from .disturbance import White
+from .case import Case
+from .checks import check_range
+from .equations import MEASUREMENTS
+from .hook import HookMotion
+from .linear import LinearPlant
+from .mru import MruModel
+from .plant import build_plant
+from .plant_data import PlantData
+from .sensors import Sensors
+from .white import White
 
 __all__ = ["MEASURED", "NOISES", "sensed_plant", "sensed_spectra"]
 
