@@ -183,6 +183,9 @@ def run_simulation(
     store = _Store(dt, samples, store_step)
     rows = simulation.rows(check_seed(owner, seed), wanted)
     stepper = stepper_for(simulation, deadline)
+    foresee = getattr(simulation.controller, "foresee", None)
+    if foresee is not None:  # a controller with perfect preview, for reference
+        foresee(rows.motions[0])
     events = [Event(time=t, kind=kind, text=text) for t, kind, text in scenario.events]
     status, message = "completed", ""
     state, mru, trip_time = simulation.start(rows), rows.start(), math.nan

@@ -1,5 +1,7 @@
-"""Model predictive controllers: reserved, nothing here yet.
+"""Predictive control: a winch that acts on what is about to happen, within its motor's limits.
 
-The package holds its place in the layout because the import contract names it: `mpc` will
-stand beside `synth`, build on `models` alone, and be reached through `stillhook`.
+    sensors --> estimator, forecast of the hook's motion --> quadratic programme --> drive command
+
+`LinearMPC` is a controller for the simulator and for a drive; `clairvoyant` is what nobody could do
+better on a record.  The package builds on `models` alone.
 """

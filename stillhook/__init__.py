@@ -38,20 +38,34 @@ _HOME = {
     "bound_for": "synth.bound_case",
     "GainDesign": "synth",
     "evaluate_gains": "synth",
+    "exact_sensors": "synth.bound_beside",
     "Family": "synth.family",
     "optimise_robust": "synth.robust",
     "pareto_front": "synth.pareto",
+    "Robustness": "synth.mu",
+    "robustness": "synth.mu",
     "schedule_gains": "synth.schedule",
     "optimise_gains": "synth",
     "tune": "synth",
+    "co_design": "synth.co_design",
+    "size_winch": "synth.sizing",
+    "worth": "synth.purchase",
     "StructureDesign": "synth.structure_design",
     "optimise_structure": "synth.structure_search",
+    "Clairvoyant": "mpc.clairvoyant",
+    "clairvoyant": "mpc.clairvoyant",
+    "Doubts": "mpc.doubts",
+    "LinearMPC": "mpc.linear",
+    "Weights": "mpc.weights",
+    "tune_weights": "mpc.weights",
     "BrakeOn": "synth.brake_on",
     "ConstantTension": "synth.constant_tension",
     "LinearFeedback": "synth.linear_feedback",
     "VelocityFeedForward": "synth.feed_forward",
     "Runs": "stillhook.runs",
     "simulate": "stillhook.simulation",
+    "Comparison": "stillhook.comparison",
+    "compare": "stillhook.compare_run",
     "write_runs": "stillhook.run_report",
     "cable_study": "stillhook.cables",
     "load_design": "stillhook.design_file",
@@ -65,13 +79,18 @@ __all__ = [
     "Bound",
     "BrakeOn",
     "Case",
+    "Clairvoyant",
+    "Comparison",
     "ConstantTension",
+    "Doubts",
     "Family",
     "GainDesign",
     "InputError",
     "LinearFeedback",
+    "LinearMPC",
     "PhysicsWarning",
     "RecordMotion",
+    "Robustness",
     "Run",
     "Runs",
     "Scenario",
@@ -82,12 +101,17 @@ __all__ = [
     "StructureDesign",
     "SynthesisError",
     "VelocityFeedForward",
+    "Weights",
     "__version__",
     "bound_for",
     "bundled_cases",
     "cable_study",
     "case_schema",
+    "clairvoyant",
+    "co_design",
+    "compare",
     "evaluate_gains",
+    "exact_sensors",
     "load_case",
     "load_design",
     "load_structure",
@@ -95,10 +119,14 @@ __all__ = [
     "optimise_robust",
     "optimise_structure",
     "pareto_front",
+    "robustness",
     "save_design",
     "save_structure",
     "simulate",
+    "size_winch",
     "tune",
+    "tune_weights",
+    "worth",
     "write_report",
     "write_runs",
 ]
@@ -118,24 +146,38 @@ if TYPE_CHECKING:
     from models.run import Run as Run
     from models.scenario import Scenario as Scenario
     from models.six_dof import SixDofMotion as SixDofMotion
+    from mpc.clairvoyant import Clairvoyant as Clairvoyant
+    from mpc.clairvoyant import clairvoyant as clairvoyant
+    from mpc.doubts import Doubts as Doubts
+    from mpc.linear import LinearMPC as LinearMPC
+    from mpc.weights import Weights as Weights
+    from mpc.weights import tune_weights as tune_weights
     from synth import GainDesign as GainDesign
     from synth import evaluate_gains as evaluate_gains
     from synth import optimise_gains as optimise_gains
     from synth import tune as tune
     from synth.bound import Bound as Bound
+    from synth.bound_beside import exact_sensors as exact_sensors
     from synth.bound_case import bound_for as bound_for
     from synth.brake_on import BrakeOn as BrakeOn
+    from synth.co_design import co_design as co_design
     from synth.constant_tension import ConstantTension as ConstantTension
     from synth.family import Family as Family
     from synth.feed_forward import VelocityFeedForward as VelocityFeedForward
     from synth.linear_feedback import LinearFeedback as LinearFeedback
+    from synth.mu import Robustness as Robustness
+    from synth.mu import robustness as robustness
     from synth.pareto import pareto_front as pareto_front
+    from synth.purchase import worth as worth
     from synth.robust import optimise_robust as optimise_robust
     from synth.schedule import schedule_gains as schedule_gains
+    from synth.sizing import size_winch as size_winch
     from synth.structure_design import StructureDesign as StructureDesign
     from synth.structure_search import optimise_structure as optimise_structure
 
     from .cables import cable_study as cable_study
+    from .compare_run import compare as compare
+    from .comparison import Comparison as Comparison
     from .design_file import load_design as load_design
     from .design_file import save_design as save_design
     from .report import write_report as write_report

@@ -1,0 +1,204 @@
+r"""How much to trust the model, and what torque may cost: tuned for a case.
+
+The regulator has one free number, the weight on the input; the filter has four, its doubts about
+force, torque, rope and sensors.  They are chosen so that the mean square of the payload over the
+nominal plant and four others, a payload or a stiffness that is off by thirty per cent, is
+smallest, with the unsaturated loop's M_s within the limit of the case (broken at the torque).
+The error of the hook's forecast counts as much: where the motor saturates it decides.  A controller
+that is good on the nominal plant and unstable on a softer rope has an infinite cost.
+
+Every evaluation is a Riccati equation and five Lyapunov equations
+(`mpc.unsaturated`): milliseconds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import minimize
+from scipy.stats import qmc
+
+from models.case import Case
+from models.checks import SolverError, check_range
+
+from .doubts import Doubts, doubted
+from .prediction_model import prediction_model
+from .regulator import regulator
+from .unsaturated import Unsaturated
+
+__all__ = ["OFF", "Weights", "tune_weights"]
+
+FloatArray = npt.NDArray[np.float64]
+
+#: Plants that the controller has to get along with, as factors on the plant's numbers.
+OFF: tuple[Mapping[str, float], ...] = (
+    {"payload_mass": 0.7},
+    {"payload_mass": 1.3},
+    {"axial_stiffness": 0.7},
+    {"axial_stiffness": 1.3},
+)
+# Logarithms to base ten of (weight, force, torque, rope, sensors): where good ones lie.
+_LOW = np.array([-1.6, -3.0, -3.0, -3.0, -4.0])
+_HIGH = np.array([0.5, -0.5, -0.2, -0.1, -0.7])
+# What was found good on bundled cases, as places to begin.
+_FIRST = np.array(
+    [
+        [-1.4, -1.5, -1.0, -0.6, -2.4],
+        [-1.0, -1.5, -1.0, -1.0, -1.5],
+        [-1.6, -1.1, -1.6, -0.9, -2.3],
+        [-1.6, -2.8, -0.3, -0.5, -2.3],
+        [-1.6, -1.2, -1.8, -0.2, -3.6],
+        [-1.6, -0.6, -0.8, -2.4, -2.5],
+    ]
+)
+_SCREENED = 16
+_POLISHED = 55  # from each of the best two
+_AHEAD = 3.0  # [s]
+_PENALTY = 10.0  # of ln M_s over its limit
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weights:
+    """What a linear predictive controller weighs.
+
+    Parameters
+    ----------
+    torque
+        What an input of the drive's peak torque costs, over a displacement of the hook's rms.
+    doubts
+        What the filter does not trust.
+    max_sensitivity
+        M_s of the unsaturated loop, broken at the torque; NaN if it was not looked at.
+    payload_rms
+        Payload's rms of the unsaturated loop in the case's sea [m], on the nominal plant and on
+        those of `OFF`; empty if it was not looked at.
+    forecast_error
+        Standard deviation of the hook's forecast three seconds ahead [m]; NaN if not looked at.
+
+    Raises
+    ------
+    InputError
+        If the weight is not above zero.
+    """
+
+    torque: float
+    doubts: Doubts
+    max_sensitivity: float = math.nan
+    payload_rms: tuple[float, ...] = ()
+    forecast_error: float = math.nan
+
+    def __post_init__(self) -> None:
+        check_range("weights", "torque", self.torque, low=0.0, open_low=True)
+
+
+def tune_weights(
+    case: Case,
+    *,
+    sample_time: float = 0.05,
+    masses: int | None = None,
+    max_sensitivity: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Weights:
+    """Return weights for a case.
+
+    Parameters
+    ----------
+    case
+        The case.
+    sample_time
+        T [s].
+    masses
+        Masses along the rope; by default those of the case.
+    max_sensitivity
+        Highest M_s; by default that of the case's limits, else 2.
+    progress
+        Called with the share of the work that is done.
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range.
+    SolverError
+        If no weights were found that are stable on all five plants within M_s.
+    """
+    limit = case.limits.max_sensitivity if max_sensitivity is None else max_sensitivity
+    limit = check_range("weights", "max_sensitivity", limit or 2.0, low=1.0, open_low=True)
+    model = prediction_model(case, sample_time=sample_time, masses=masses)
+    others = [
+        prediction_model(case, sample_time=sample_time, masses=model.winch.masses, off=off)
+        for off in OFF
+    ]
+    heave, total = model.waves[0], _SCREENED + len(_FIRST) + 2 * _POLISHED
+    done = 0
+
+    def judged(point: FloatArray) -> Weights | None:
+        weight, force, torque, rope, sensors = 10.0 ** np.clip(point, _LOW, _HIGH)
+        doubts = Doubts(
+            force=float(force), torque=float(torque), rope=float(rope), sensors=float(sensors)
+        )
+        believed = doubted(model, doubts)
+        try:
+            loop = Unsaturated(model=believed, regulator=regulator(believed, float(weight)))
+            rms: tuple[float, ...] = ()
+            for plant in (*others, model):  # those that are off fall first
+                rms = (loop.payload_rms_under(plant), *rms)
+                if not math.isfinite(rms[0]):
+                    return None
+        except SolverError:
+            return None
+        rms = (rms[0], *reversed(rms[1:]))
+        return Weights(
+            torque=float(weight),
+            doubts=doubts,
+            max_sensitivity=loop.max_sensitivity(),
+            payload_rms=rms,
+            forecast_error=loop.forecast_error(_AHEAD),
+        )
+
+    best: tuple[float, Weights | None] = (math.inf, None)
+
+    def cost(point: FloatArray) -> float:
+        nonlocal done, best
+        done += 1
+        if progress is not None:
+            progress(min(1.0, done / total))
+        found = judged(point)
+        outside = float(np.maximum(point - _HIGH, 0.0).sum() + np.maximum(_LOW - point, 0.0).sum())
+        if found is None:
+            return 50.0 + outside
+        over = max(0.0, math.log(found.max_sensitivity / limit))
+        value = math.log(_mean(found.payload_rms) / heave) + _PENALTY * over
+        value += math.log(found.forecast_error / heave)
+        if over == 0.0 and value < best[0]:
+            best = (value, found)
+        return value + outside
+
+    screen = qmc.scale(qmc.Sobol(5, seed=0).random(_SCREENED), _LOW, _HIGH)
+    points = np.vstack([_FIRST, screen])
+    costs = [cost(point) for point in points]
+    for start in points[np.argsort(costs)[:2]]:
+        # towards the middle, so that no side of the simplex lies outside
+        side = np.where(start > 0.5 * (_LOW + _HIGH), -0.35, 0.35)
+        simplex = np.vstack([start, start + np.diag(side)])
+        minimize(
+            cost,
+            start,
+            method="Nelder-Mead",
+            options={"maxfev": _POLISHED, "initial_simplex": simplex, "xatol": 0.02, "fatol": 5e-3},
+        )
+    if progress is not None:
+        progress(1.0)
+    if best[1] is None:
+        raise SolverError(
+            f"predictive control: no weights are stable on a payload and a rope that are off by "
+            f"30 % with M_s <= {limit:g}; a shorter sample time or delay helps"
+        )
+    return best[1]
+
+
+def _mean(rms: tuple[float, ...]) -> float:
+    return math.sqrt(math.fsum(value**2 for value in rms) / len(rms))
