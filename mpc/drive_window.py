@@ -23,6 +23,9 @@ __all__ = ["DriveWindow", "TorqueBudget"]
 
 FloatArray = npt.NDArray[np.float64]
 
+_EDGE = 1e-7  # of a move that is at its bound
+_MOST = 0.2  # of the peak: half of what the torque may fall by over a sample
+_MORE = 0.2  # of the fall, so that the drive stays at its peak though the plan is off
 _STATIC = 1.2  # of the static torque: never less, whatever the temperature
 
 
@@ -47,11 +50,23 @@ class DriveWindow:
         self.peak = min(limits.torque, constant * limits.current)
         self.voltage = limits.voltage if winch.dc else math.inf
         self.power = limits.power
+        #: What the torque of a held command falls by for each rad/s that the motor gets faster.
+        self.fall = winch.gain * winch.back
         self._low = np.full(moves, (-self.peak - winch.rest_torque) / unit)
         self._high = np.full(moves, (self.peak - winch.rest_torque) / unit)
 
-    def bounds(self, speed: float, speeds: FloatArray, cap: float) -> tuple[FloatArray, FloatArray]:
+    def bounds(
+        self,
+        speed: float,
+        speeds: FloatArray,
+        cap: float,
+        changes: FloatArray | None = None,
+    ) -> tuple[FloatArray, FloatArray]:
         """Return the lowest and the highest value of each move.
+
+        A move is the torque at the start of a sample, from which a held command lets it fall as
+        the drum gets faster.  A drive that is asked for more holds its peak to the end of the
+        sample: the peak is then the mean, and the move that stands for it half the fall higher.
 
         Parameters
         ----------
@@ -61,6 +76,9 @@ class DriveWindow:
             Motor speed at the start of each move, by the last plan [rad/s], (n,).
         cap
             Highest torque for now, such as that of the thermal budget [N m].
+        changes
+            Change of speed over the first sample of each move, by the last plan [rad/s], (n,);
+            None to keep the torque at the start of a sample within the peak.
         """
         low, high = self._low, self._high
         rest, unit = self._winch.rest_torque, self._unit
@@ -72,6 +90,10 @@ class DriveWindow:
             there[0] = abs(speed)
             top = self.power / np.maximum(there, self.power / self.peak)
             low, high = np.maximum(low, (-top - rest) / unit), np.minimum(high, (top - rest) / unit)
+        if changes is not None:
+            most = _MOST * self.peak
+            fall = np.clip(0.5 * self.fall * changes, -most, most) / unit
+            low, high = low + fall, high + fall
         if self.voltage < math.inf:
             # u = u_rest + K omega + d / b within the voltage
             middle = self._winch.rest_command + self._winch.back * speed
@@ -84,6 +106,28 @@ class DriveWindow:
             low[0] = min(max(float(low[0]), first_low), float(high[0]))
             high[0] = max(min(float(high[0]), first_high), float(low[0]))
         return low, high
+
+    def asked(self, move: float, low: float, high: float, change: float) -> tuple[float, float]:
+        """Return the input to ask of the drive, and the torque it then holds over the sample.
+
+        A move at the edge of the window asks for as much more as keeps the drive at its peak to
+        the end of the sample; elsewhere the held torque is NaN.
+
+        Parameters
+        ----------
+        move, low, high
+            The first move and its bounds.
+        change
+            Change of speed over the sample, as planned [rad/s].
+        """
+        torque = min(max(move, low), high) * self._unit
+        fall = min(max(self.fall * change, -2.0 * _MOST * self.peak), 2.0 * _MOST * self.peak)
+        for edge, side in ((high, 1.0), (low, -1.0)):
+            if abs(move - edge) < _EDGE:
+                held = side * self.peak - self._winch.rest_torque
+                more = max(0.0, side * 0.5 * fall) + _MORE * abs(fall)
+                return torque + side * more, held
+        return torque, math.nan
 
 
 class TorqueBudget:

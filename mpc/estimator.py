@@ -34,7 +34,7 @@ FloatArray = npt.NDArray[np.float64]
 _AT = np.array([HEARD.index(name) for name in MEASURED])
 _AGE, _FRESH = HEARD.index("payload.age"), HEARD.index("payload.valid")
 _UNIT = HEARD.index("mru.valid")
-_APPLIED = HEARD.index("drive.applied")
+_APPLIED, _SPEED = HEARD.index("drive.applied"), HEARD.index("motor.speed")
 _NO_TELEMETRY = 1  # bits of what is missing
 _NO_UNIT = 2
 _STARTING = 10.0  # in which the gain comes to its steady value [s]
@@ -122,19 +122,31 @@ class Estimator:
         """Motor speed at the last update, as estimated [rad/s]."""
         return self._before
 
-    def update(self, measurement: Measurement) -> FloatArray:
+    def update(self, measurement: Measurement, held: float = math.nan) -> FloatArray:
         """Return chi at this sample, given what is shown now.
 
         The input over the sample before is that which the drive says it has followed, not the one
         that it was asked for.
+
+        Parameters
+        ----------
+        measurement
+            What the sensors show.
+        held
+            Torque over the one at rest that the drive has held since the last sample, if it was at
+            its peak all the time [N m]; NaN if it followed a command.
         """
         shown = measurement.values
         winch = self.model.winch
         ahead = self._ahead
         if self._begun:
-            applied = shown[_APPLIED]
-            if math.isfinite(applied):  # what is not known is taken as having held the load
-                ahead = ahead + self._B * winch.torque(float(applied), self._before)
+            applied, speed = float(shown[_APPLIED]), float(shown[_SPEED])
+            if math.isfinite(held) and math.isfinite(speed):
+                # A torque that is held does as much as one that falls to as much below it.
+                fall = 0.5 * winch.gain * winch.back * (speed - self._before)
+                ahead = ahead + self._B * (held + fall)
+            elif math.isfinite(applied):  # what is not known is taken as having held the load
+                ahead = ahead + self._B * winch.torque(applied, self._before)
             # Quadratic drag at the mean of the velocities before and after: no linear model has it.
             before, after = self._drag, winch.extra_drag(float(self._velocity @ ahead))
             ahead = ahead + self._force * (0.5 * (before + after)) + self._sent * before

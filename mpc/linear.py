@@ -47,6 +47,8 @@ FloatArray = npt.NDArray[np.float64]
 _OWNER = "predictive control"
 _QUADRATIC, _LINEAR = 1e4, 1e2  # price of a soft row, over its scale, in units of the cost
 _CLEAR = 1.5 * SPEED_BAND  # of the highest speed, kept clear of the drive's own overspeed cut
+_HORIZON, _PREVIEWED = 8.0, 14.0  # [s]
+_SAME = 1e-3  # of the peak torque
 _IN_BAND = 3.0  # [rad/s]
 _LEAST = 0.1  # of the static tension, that is to stay in the rope
 _UNIT, _TORQUE = HEARD.index("mru.valid"), HEARD.index("motor.torque")
@@ -91,7 +93,7 @@ class LinearMPC:
     case
         Vessel, sea, rope, payload, winch and sensors.
     horizon
-        Length of the prediction [s].
+        Length of the prediction [s]; by default 8, or 14 with perfect preview, which can use more.
     sample_time
         T [s].
     blocking
@@ -141,7 +143,7 @@ class LinearMPC:
         self,
         case: Case,
         *,
-        horizon: float = 8.0,
+        horizon: float | None = None,
         sample_time: float = 0.05,
         blocking: Sequence[int] | None = None,
         weights: Weights | None = None,
@@ -155,6 +157,8 @@ class LinearMPC:
         name: str | None = None,
     ) -> None:
         T = check_range(_OWNER, "sample_time", sample_time, low=0.0, unit="s", open_low=True)
+        if horizon is None:
+            horizon = _PREVIEWED if predictor == "preview" else _HORIZON
         blocks = default_blocking(horizon, T) if blocking is None else tuple(blocking)
         least = _least_tension(case) if minimum_tension is None else minimum_tension
         check_range(_OWNER, "minimum_tension", least, low=0.0, unit="N")
@@ -181,6 +185,7 @@ class LinearMPC:
             linear=_LINEAR,
             time_limit=0.0 if deadline is None else deadline,
         )
+        self._lengths = np.array(p.blocks[:-1], dtype=np.float64)
         self._deadline = math.inf if deadline is None else deadline
         self._window = DriveWindow(self.model.winch, limits, len(p.blocks), p.unit)
         self._budget = TorqueBudget(case, T, self.horizon) if thermal else None
@@ -207,7 +212,9 @@ class LinearMPC:
         if self.predictor is not None:
             self.predictor.reset()
         self._speeds = np.zeros(len(self.programme.blocks))
+        self._changes = np.zeros(len(self.programme.blocks))
         self._asked = self.model.winch.rest_torque  # of the drive at the sample before [N m]
+        self._kept = math.nan
         self._counts = dict.fromkeys(("steps", "iterations", "late", "shifted", "safe"), 0)
         self.question: tuple[FloatArray, FloatArray, FloatArray] | None = None
         self.solved: Solved | None = None
@@ -223,7 +230,7 @@ class LinearMPC:
         began = clock.perf_counter()
         shown, winch, products = measurement.values, self.model.winch, self.products
         self._counts["steps"] += 1
-        chi = self.estimator.update(measurement)
+        chi = self.estimator.update(measurement, self._held(float(shown[_TORQUE])))
         ahead, gradient, free = products.known(chi)
         self.estimator.advance(ahead)
         reference = shown[_REFERENCE : _REFERENCE + 2]
@@ -238,17 +245,34 @@ class LinearMPC:
         if self._budget is not None:
             # Over a sample the torque falls or rises with the speed: the larger end counts.
             cap = self._budget.update(max(abs(float(shown[_TORQUE])), abs(self._asked)))
-        low, high = self._window.bounds(speed, self._speeds, cap)
+        # Only its own limits does the drive keep by itself.
+        leaning = cap >= self._window.peak
+        low, high = self._window.bounds(
+            speed, self._speeds, cap, self._changes if leaning else None
+        )
         question = products.question(gradient, free, low, high)
         move = self._solve(question, began)
-        if self._window.power < math.inf and self.solved is not None:
+        if self.solved is not None:
             self._speeds = products.speeds(chi, self.solved.v)
+            self._changes[:-1] = (self._speeds[1:] - self._speeds[:-1]) / self._lengths
         if move is None:
             move = self._otherwise(speed)
-        torque = min(max(move, float(low[0])), float(high[0])) * self.programme.unit
+        torque, self._kept = self._window.asked(
+            move, float(low[0]), float(high[0]), float(self._changes[0]) if leaning else 0.0
+        )
         command = winch.command(torque, speed)
-        self._asked = torque + winch.rest_torque
+        self._asked = min(max(torque + winch.rest_torque, -self._window.peak), self._window.peak)
         return min(max(command, -self._window.voltage), self._window.voltage)
+
+    def _held(self, torque: float) -> float:
+        """Return the torque that the drive has held over the last sample, NaN if it did not.
+
+        It was asked to hold its peak, and shows that it still did at the end [N m].
+        """
+        rest = self.model.winch.rest_torque
+        if abs(torque - rest - self._kept) < _SAME * self._window.peak:
+            return self._kept
+        return math.nan
 
     def _solve(
         self, question: tuple[FloatArray, FloatArray, FloatArray], began: float
