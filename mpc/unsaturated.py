@@ -130,6 +130,14 @@ class Unsaturated:
 
     def payload_rms_under(self, truth: PredictionModel) -> float:
         """Return the payload's rms [m] with the noises of another model of the same winch."""
+        return self._rms_under(truth)[0]
+
+    def torque_rms_under(self, truth: PredictionModel) -> float:
+        """Return the rms of the input d [N m] with the noises of another model."""
+        return self._rms_under(truth)[1]
+
+    def _rms_under(self, truth: PredictionModel) -> tuple[float, float]:
+        """Return the rms of payload [m] and input [N m]; infinite if the loop is not stable."""
         Ac, Bc, Cc, Dc = self.controller
         A, B, C = truth.A, truth.B, truth.C
         winch = truth.winch
@@ -150,10 +158,16 @@ class Unsaturated:
         closed[at, at] = 0.0
         covariance = lyapunov(closed, noise @ noise.T)
         if covariance is None:
-            return np.inf
+            return np.inf, np.inf
         row = np.zeros(n + m)
         row[: winch.size] = winch.payload
-        return math.sqrt(max(float(row @ covariance @ row), 0.0))
+        asked = np.concatenate([to_input, np.zeros(m)])
+        asked += winch.gain * np.concatenate([(Dc @ C)[0], Cc[0]])
+        return _root(row @ covariance @ row), _root(asked @ covariance @ asked)
+
+
+def _root(variance: float) -> float:
+    return math.sqrt(max(float(variance), 0.0))
 
 
 def _plant(model: PredictionModel) -> tuple[FloatArray, FloatArray, FloatArray]:

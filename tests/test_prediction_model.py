@@ -21,7 +21,7 @@ from mpc.regulator import regulator
 from mpc.riccati import lyapunov, riccati
 from mpc.sampled_winch import sampled_winch
 from mpc.unsaturated import Unsaturated
-from mpc.weights import OFF, tune_weights
+from mpc.weights import FAR_OFF, OFF, saturates, tune_weights
 
 NAMES = ("thesis-1975", "thesis-1975-rope", "subsea-crane")
 
@@ -261,10 +261,18 @@ def test_tuned_weights_are_stable_on_every_plant_that_they_have_to_get_along_wit
     loop = Unsaturated(model=model, regulator=regulator(model, weights.torque))
     assert loop.max_sensitivity() == pytest.approx(weights.max_sensitivity)
     assert weights.max_sensitivity <= 2.0
-    for off in OFF:
+    for off in (*OFF, *FAR_OFF):
         assert loop.growth(prediction_model(case, off=off)) < 1.0
     assert max(weights.payload_rms) < 0.02 * model.waves[0]
     # Better than where the search began, by the measure that it has.
     first = doubted(prediction_model(case), WEIGHTS["thesis-1975"].doubts)
     begun = Unsaturated(model=first, regulator=regulator(first, 0.1))
     assert weights.payload_rms[0] < begun.payload_rms_under(prediction_model(case))
+
+
+def test_a_drive_saturates_where_the_sea_asks_for_more_than_its_peak():
+    assert [saturates(prediction_model(case_of("thesis-1975", h))) for h in (0.5, 1.25)] == [
+        False,
+        True,
+    ]
+    assert not saturates(prediction_model(case_of("subsea-crane")))
