@@ -48,6 +48,9 @@ GOOD_MRU: Mapping[str, object] = {
 }
 PERFECT_PAYLOAD: Mapping[str, object] = {
     "sensors.payload.bandwidth": "perfect",
+    "sensors.payload.acceleration_noise": 0.0,
+    "sensors.payload.velocity_noise": 0.0,
+    "sensors.payload.displacement_noise": 0.0,
     "sensors.telemetry.delay": 0.0,
 }
 
@@ -244,7 +247,7 @@ Written by `benchmarks/landing.py`; `docs/data/landing.csv` has a row for each r
 The bundled case `landing` sets a module of 12 t down on the seabed at 350 m, in $H_s$ = 1.7 m and
 waves of 10 s; its positioning is wanted within 4 cm. The job is that of a crane assignment of the
 University of Agder (MAS409); vessel, rope and winch are ours, and so is what is measured:
-the payload's motion up to 20 Hz, 20 ms late and without noise; the hook's by a motion reference
+the payload's motion up to 20 Hz, 20 ms late and with noise; the hook's by a motion reference
 unit (MRU) of 5 cm. The scenario holds the module 7.5 m above the seabed for a minute,
 lowers it to 5 m, holds it for another minute and sets it down.
 

@@ -54,6 +54,7 @@ _HOME = {
     "optimise_structure": "synth.structure_search",
     "Clairvoyant": "mpc.clairvoyant",
     "clairvoyant": "mpc.clairvoyant",
+    "NonlinearMPC": "mpc.nonlinear",
     "Doubts": "mpc.doubts",
     "LinearMPC": "mpc.linear",
     "Weights": "mpc.weights",
@@ -88,6 +89,7 @@ __all__ = [
     "InputError",
     "LinearFeedback",
     "LinearMPC",
+    "NonlinearMPC",
     "PhysicsWarning",
     "RecordMotion",
     "Robustness",
@@ -148,6 +150,7 @@ if TYPE_CHECKING:
     from models.six_dof import SixDofMotion as SixDofMotion
     from mpc.clairvoyant import Clairvoyant as Clairvoyant
     from mpc.clairvoyant import clairvoyant as clairvoyant
+    from mpc.nonlinear import NonlinearMPC as NonlinearMPC
     from mpc.doubts import Doubts as Doubts
     from mpc.linear import LinearMPC as LinearMPC
     from mpc.weights import Weights as Weights

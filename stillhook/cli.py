@@ -36,6 +36,7 @@ to begin with:
   stillhook cases                     what comes with the toolkit
   stillhook optimise subsea-crane     the gains of a winch that can do its job
   stillhook simulate thesis-1975      a controller in the time domain
+  stillhook compare thesis-1975       all of them in the same seas
   stillhook new my.yaml               a commented case file of your own
 """
 
@@ -43,8 +44,10 @@ to begin with:
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     from . import __version__
+    from .commands.compare_arguments import add_compare_arguments
     from .commands.robust_arguments import add_pareto_arguments, add_robust_arguments
     from .commands.simulate_arguments import add_simulate_arguments
+    from .commands.size_arguments import add_size_arguments, add_worth_arguments
 
     raw = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(
@@ -81,6 +84,14 @@ def build_parser() -> argparse.ArgumentParser:
             "or --set 'sensors.telemetry.delay=50 ms'; may be repeated",
         )
 
+    def bounded(added: argparse.ArgumentParser) -> None:
+        added.add_argument(
+            "--no-bound",
+            dest="bound",
+            action="store_false",
+            help="do not compare with the best that any linear controller could do (2 s a design)",
+        )
+
     text = "find the gains that hold the payload stillest within the limits"
     optimise = command("optimise", "optimise", text)
     case(optimise)
@@ -100,6 +111,7 @@ def build_parser() -> argparse.ArgumentParser:
         help="another structure than the three gains of payload feedback, such as combined; "
         "`stillhook structures CASE` compares them",
     )
+    bounded(optimise)
 
     structures = command("structures", "structures", "compare controller structures on a case")
     case(structures)
@@ -119,6 +131,7 @@ def build_parser() -> argparse.ArgumentParser:
         "--seed", type=int, default=0, metavar="N", help="seed of the starts (default: 0)"
     )
     structures.add_argument("--quiet", action="store_true", help="print the verdicts only")
+    bounded(structures)
 
     evaluate = command("evaluate", "evaluate", "say what given gains do")
     case(evaluate)
@@ -129,18 +142,55 @@ def build_parser() -> argparse.ArgumentParser:
     )
     evaluate.add_argument("--out", metavar="DIR", help="folder for the results (default: none)")
     evaluate.add_argument("--quiet", action="store_true", help="print the verdict only")
+    bounded(evaluate)
 
     robust = command("robust", "robust", "find one set of gains for many depths, loads and seas")
     case(robust)
     add_robust_arguments(robust)
 
+    text = "say how far the plant's numbers may be off before a design is unstable"
+    margins = command("margins", "margins", text)
+    case(margins)
+    margins.add_argument(
+        "--design", metavar="FILE", help="a design that was written (design.yaml, combined.yaml)"
+    )
+    margins.add_argument(
+        "--gains",
+        metavar="A=..,a=..,a1=..,a2=..",
+        help="or gains (default: those that the case has in use)",
+    )
+    margins.add_argument(
+        "--off",
+        metavar="PATH=SHARE",
+        action="append",
+        default=[],
+        help="what may be off and how far either way, as in payload.mass=0.3, drag=0.5 or "
+        "'delay=20 ms'; may be repeated (default: payload.mass=0.3, stiffness=0.2, drag=0.5)",
+    )
+    margins.add_argument(
+        "--draws", type=int, default=1000, metavar="N", help="random plants to check with"
+    )
+    margins.add_argument("--quiet", action="store_true", help="print the verdict only")
+
     pareto = command("pareto", "pareto", "draw what stillness costs: torque, margin or delay")
     case(pareto)
     add_pareto_arguments(pareto)
 
+    size = command("size", "size", "find the smallest motor and gear that meet a target")
+    case(size)
+    add_size_arguments(size)
+
+    worth = command("worth", "worth", "say what each limit, sensor and delay is worth")
+    case(worth)
+    add_worth_arguments(worth)
+
     simulate = command("simulate", "simulate", "simulate controllers in a sea, limits and all")
     case(simulate)
     add_simulate_arguments(simulate)
+
+    compare = command("compare", "compare", "compare controllers in the same seas, limits and all")
+    case(compare)
+    add_compare_arguments(compare)
 
     scenarios = command("scenarios", "scenarios", "list the operations and the controllers")
     scenarios.add_argument(

@@ -43,6 +43,7 @@ def write_report(
     folder: str | Path,
     *,
     design: GainDesign,
+    bound: bool = True,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> list[Path]:
     """Write everything there is to say about a design into a folder.
@@ -56,8 +57,11 @@ def write_report(
         The folder; it is made if need be.
     design
         The design.
+    bound
+        Whether to compute the best that any linear controller could do, and to say how far
+        the design is from it.
     progress
-        Called as progress("figures", done, total).
+        Called as progress("figures" or "bound", done, total).
 
     Returns
     -------
@@ -90,7 +94,9 @@ def write_report(
                 target.discard(file)
             else:
                 written.append(target.write(file, picture(figure, kind)))
-    written.append(target.write("summary.md", summary_text(design)))
+    if bound and progress is not None and design.margins is not None:
+        progress("bound", 0, 1)
+    written.append(target.write("summary.md", summary_text(design, bound=bound)))
     return written
 
 
@@ -104,7 +110,7 @@ def figures_of(design: GainDesign) -> list[str]:
     return names
 
 
-def summary_text(design: GainDesign) -> str:
+def summary_text(design: GainDesign, *, bound: bool = True) -> str:
     """Return the summary as Markdown; its figures are those of the same folder."""
     case = design.case
     verdict = "Ok" if design.ok else "Not ok"
@@ -135,7 +141,7 @@ def summary_text(design: GainDesign) -> str:
             "A limit that is only reported did not bind the design."
         )
         parts += _figure(design, "limits")
-    parts += ["## What this rests on", _table(("", ""), facts(design))]
+    parts += ["## What this rests on", _table(("", ""), facts(design, bound=bound))]
     parts.append(
         "`design.yaml` holds all of this for `stillhook.load_design`, `case.yaml` the case."
     )

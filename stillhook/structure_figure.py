@@ -7,11 +7,12 @@ beside them.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from models.checks import InputError
 
+from .bound_text import bound_figures
 from .quantities import quantity
 from .structure_table import SHARES, share_of
 from .style import AFTER, BEFORE, DRUM, HOOK, REFERENCE, new_figure, styled, typeset
@@ -25,22 +26,29 @@ if TYPE_CHECKING:
 __all__ = ["structures"]
 
 _COLOURS = {"sea": AFTER, "MRU": "#e69f00", "noise": "#cc79a7"}
+_MARKS: Mapping[str, Mapping[str, Any]] = {
+    "best with its sensors": {"marker": "|", "color": "black", "ms": 15.0, "mew": 2.2},
+    "best with all sensors": {"marker": "|", "color": "0.45", "ms": 15.0, "mew": 1.2},
+}
 _LABELS = {"sea": "from the sea", "MRU": "from the reference unit", "noise": "from other sensors"}
 
 
-def structures(designs: Sequence[StructureDesign]) -> Figure:
+def structures(designs: Sequence[StructureDesign], *, bound: bool = True) -> Figure:
     """Return the comparison of some structures on a case.
 
     Parameters
     ----------
     designs
         Designs of one case; those without a stable controller get an empty row.
+    bound
+        Whether to compute and to mark the bounds beside them.
 
     Returns
     -------
     matplotlib.figure.Figure
         Left: payload rms on a logarithmic axis, coloured by shares of its variance, hatched
-        where the design is not ok.  Right: M_s.
+        where the design is not ok; a mark at the least that any linear controller leaves with
+        the same sensors, a lighter one with all sensors of the case.  Right: M_s.
 
     Raises
     ------
@@ -52,7 +60,9 @@ def structures(designs: Sequence[StructureDesign]) -> Figure:
         raise InputError("structures: there is no stable design to draw")
     before, hook = 1e3 * stable[0].payload_rms_before, 1e3 * stable[0].hook_rms
     values = [1e3 * design.payload_rms for design in stable]
-    low = 0.5 * min([*values, hook])
+    marks = {d.structure: bound_figures(d) if bound else (math.nan, math.nan) for d in stable}
+    least = [1e3 * value for pair in marks.values() for value in pair if math.isfinite(value)]
+    low = 0.5 * min([*values, *least, hook])
     high = 3.0 * max([*values, before])
     with styled():
         figure = new_figure(9.2, 1.9 + 0.38 * len(designs))
@@ -92,6 +102,11 @@ def structures(designs: Sequence[StructureDesign]) -> Figure:
                 fontsize=9.0,
                 bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
             )
+            for value, (text, style) in zip(marks[design.structure], _MARKS.items(), strict=True):
+                if math.isfinite(value):
+                    shown = text if text not in seen else None
+                    left.plot([1e3 * value], [place], linestyle="none", label=shown, **style)
+                    seen.add(text)
             if design.margins is not None:
                 right.plot(design.margins.max_sensitivity, place, "o", color=DRUM)
         for value, colour, text in ((before, BEFORE, "drum held"), (hook, HOOK, "hook")):
@@ -116,7 +131,7 @@ def _frame(
     left.invert_yaxis()
     left.grid(visible=False, axis="y")
     left.set_xlabel("payload motion [mm rms]   (hatched: not ok)")
-    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=5, frameon=False)
+    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=4, frameon=False)
     bounds = [d.limits["max_sensitivity"].bound for d in designs if "max_sensitivity" in d.limits]
     if bounds:
         right.axvline(bounds[0], color=REFERENCE, linewidth=1.2)

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from .bound_text import bound_cell, bounds_note
 from .quantities import number, percent, quantity
 
 if TYPE_CHECKING:
@@ -17,7 +18,18 @@ if TYPE_CHECKING:
 
 __all__ = ["HEADINGS", "SHARES", "StructureRow", "markdown", "share_of", "structure_rows"]
 
-HEADINGS = ("structure", "payload", "sea", "MRU", "noise", "M_s", "delay", "torque", "limited by")
+HEADINGS = (
+    "structure",
+    "payload",
+    "over best",
+    "sea",
+    "MRU",
+    "noise",
+    "M_s",
+    "delay",
+    "torque",
+    "limited by",
+)
 #: Which disturbances make up a share of the payload's variance, by its name.
 SHARES = {"sea": ("hook.heave",), "MRU": ("mru.error",), "noise": ()}
 _TORQUE = "motor.torque.peak"
@@ -29,8 +41,8 @@ class StructureRow:
 
     Attributes
     ----------
-    name, payload
-        Its name; the payload's rms.
+    name, payload, best
+        Its name; the payload's rms; that over the best possible with the same sensors.
     shares
         Shares of the variance from sea, reference unit and other sensors.
     max_sensitivity, delay, torque
@@ -43,6 +55,7 @@ class StructureRow:
 
     name: str
     payload: str
+    best: str
     shares: tuple[str, str, str]
     max_sensitivity: str
     delay: str
@@ -54,12 +67,12 @@ class StructureRow:
     def cells(self) -> tuple[str, ...]:
         """Texts under `HEADINGS`."""
         margins = (self.max_sensitivity, self.delay, self.torque)
-        return (self.name, self.payload, *self.shares, *margins, self.limited)
+        return (self.name, self.payload, self.best, *self.shares, *margins, self.limited)
 
 
-def structure_rows(designs: Sequence[StructureDesign]) -> list[StructureRow]:
-    """Return the rows of some designs, in their order."""
-    return [_row(design) for design in designs]
+def structure_rows(designs: Sequence[StructureDesign], *, bound: bool = True) -> list[StructureRow]:
+    """Return the rows of some designs, in their order; `bound` asks for their bounds too."""
+    return [_row(design, bound=bound) for design in designs]
 
 
 def share_of(design: StructureDesign, name: str) -> float:
@@ -72,14 +85,16 @@ def share_of(design: StructureDesign, name: str) -> float:
     return part / total if total > 0.0 else 0.0
 
 
-def markdown(designs: Sequence[StructureDesign]) -> str:
-    """Return the comparison as a table in Markdown."""
+def markdown(designs: Sequence[StructureDesign], *, bound: bool = True) -> str:
+    """Return the comparison as a table in Markdown, with what its column of bounds means."""
     lines = ["| " + " | ".join(HEADINGS) + " |", "|" + " --- |" * len(HEADINGS)]
-    lines += ["| " + " | ".join(row.cells) + " |" for row in structure_rows(designs)]
+    lines += ["| " + " | ".join(row.cells) + " |" for row in structure_rows(designs, bound=bound)]
+    if bound:
+        lines += ["", f"{bounds_note(designs)}."]
     return "\n".join(lines) + "\n"
 
 
-def _row(design: StructureDesign) -> StructureRow:
+def _row(design: StructureDesign, *, bound: bool) -> StructureRow:
     margins, torque = design.margins, design.limits.get(_TORQUE)
     late = margins.delay if margins is not None else math.nan
     found = math.isfinite(design.payload_rms)
@@ -87,6 +102,7 @@ def _row(design: StructureDesign) -> StructureRow:
     return StructureRow(
         name=design.structure,
         payload=quantity(design.payload_rms, "m") if found else "-",
+        best=bound_cell(design) if bound else "-",
         shares=(shares[0], shares[1], shares[2]),
         max_sensitivity=number(margins.max_sensitivity) if margins is not None else "-",
         delay=("any" if math.isinf(late) else quantity(late, "s")) if margins is not None else "-",

@@ -14,6 +14,7 @@ from models.winch import DCMotor
 from synth.design import GainDesign
 from synth.tune import LimitUse
 
+from .bound_text import bound_sentence
 from .motion import MotionView
 from .quantities import decibels, number, percent, quantity, scale
 
@@ -238,8 +239,11 @@ def label_of(design: GainDesign, name: str) -> str:
     return _LABELS.get(name, name.replace(".", " ").replace("_", " "))
 
 
-def facts(design: GainDesign) -> list[tuple[str, str]]:
-    """Return what the figures rest on: sea, rope, drag, search, check."""
+def facts(design: GainDesign, *, bound: bool = True) -> list[tuple[str, str]]:
+    """Return what the figures rest on: sea, rope, drag, search, check, and the bound beside them.
+
+    `bound` says whether to compute that too, which takes about two seconds.
+    """
     case = design.case
     if case.rope.lumping == "thesis":
         rope = "one spring with all of the rope's mass at the payload"
@@ -257,6 +261,8 @@ def facts(design: GainDesign) -> list[tuple[str, str]]:
         rows.append(("search", f"{design.agreed} of {len(design.starts)} starts agree"))
     if design.verification is not None:
         rows.append(("check", design.verification.status))
+    if bound and (text := bound_sentence(design)):
+        rows.append(("bound", text))
     return rows
 
 

@@ -47,6 +47,7 @@ _STAGES = {
     "largest sea": "looking for the largest feasible sea",
     "verify": "checking by other code",
     "figures": "drawing",
+    "bound": "comparing with the best possible",
 }
 _BAR = 10  # cells
 _PATH = re.compile(r"^[a-z_]+(\.[\w\[\]]+)+$")
@@ -60,8 +61,8 @@ def console(*, stderr: bool = False) -> Console:
     return Console(stderr=stderr, markup=False, highlight=False, emoji=False)
 
 
-def show_design(design: GainDesign, out: Console) -> None:
-    """Write the summary of a design."""
+def show_design(design: GainDesign, out: Console, *, bound: bool = True) -> None:
+    """Write the summary of a design, with the bound beside it if it is wanted."""
     _status(design, out)
     out.print()
     table = _table("motion", "rms", "significant height", _largest(design))
@@ -86,7 +87,7 @@ def show_design(design: GainDesign, out: Console) -> None:
     if design.limits:
         _show_limits(design, out)
         out.print()
-    pairs(facts(design), out)
+    pairs(facts(design, bound=bound), out)
 
 
 def pairs(rows: Sequence[tuple[str, str]], out: Console) -> None:

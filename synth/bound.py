@@ -190,6 +190,8 @@ def lqg_bound(
     order: int = 8,
     refits: int = 2,
     assumptions: tuple[str, ...] = (),
+    factors: Mapping[str, SpectralFactor] | None = None,
+    begin: Mapping[str, float] | None = None,
 ) -> Bound:
     """Return a lower bound on a weighted variance for every linear controller.
 
@@ -214,6 +216,10 @@ def lqg_bound(
         How often these are fitted again, to what counts in the loop.
     assumptions
         Further remarks that the bound carries.
+    factors
+        Spectral factors that are known already, by name of the disturbance.
+    begin
+        Multipliers to begin with, as those of a bound with other sensors.
 
     Returns
     -------
@@ -233,16 +239,21 @@ def lqg_bound(
     sources = disturbances(spectra, plant.independent_disturbances)
     check_range("bound", "pade", pade, low=1, high=6)
     model = plant.without_delays(pade, at="measurements")
-    factors: dict[str, SpectralFactor | float] = {
-        s.name: value.intensity if isinstance(value, White) else spectral_factor(s, order)
+    known = factors or {}
+    fitted: dict[str, SpectralFactor | float] = {
+        s.name: value.intensity
+        if isinstance(value, White)
+        else known.get(s.name) or spectral_factor(s, order)
         for s, value in zip(sources, spectra.values(), strict=True)
     }
     start: FloatArray | None = None
+    if begin is not None and all(begin.get(name, 0.0) > 0.0 for name in limits):
+        start = np.array([begin[name] for name in limits])
     squares = np.array(list(limits.values()), dtype=np.float64) ** 2
     asked = np.ones(len(limits))
     best: tuple[float, Dual, DualPoint, ClosedLoop, dict[str, ShapingFilter | float]] | None = None
     for attempt in range(max(0, refits) + 1):
-        filters = {n: f.filter if isinstance(f, SpectralFactor) else f for n, f in factors.items()}
+        filters = {n: f.filter if isinstance(f, SpectralFactor) else f for n, f in fitted.items()}
         dual = Dual(shaped(model, filters), minimise, limits)
         dual.squares = squares * asked
         point = dual.maximise(start)
@@ -259,7 +270,7 @@ def lqg_bound(
         # What the model has to keep for the true loop to keep its limits.
         asked = np.clip(point.variances[dual.rows] / np.maximum(rms2, 1e-300), 0.25, 4.0)
         if loop.missed > _ENOUGH * max(found, 0.0):
-            factors = refitted(factors, sources, truth, X, dual.charge(point.multipliers))
+            fitted = refitted(fitted, sources, truth, X, dual.charge(point.multipliers))
     assert best is not None
     return _bound(plant, sources, minimise, limits, pade, best, assumptions)
 

@@ -29,7 +29,7 @@ from .limits import Limit
 from .question import PAYLOAD, pose
 from .signal_limits import Continuous, Least, Peak, Rms
 
-__all__ = ["bound_for", "faint_noise", "rms_limits"]
+__all__ = ["bound_for", "command_limit", "faint_noise", "rms_limits"]
 
 _LONGER = 2.0  # T_z of any signal over that of the hook, at most
 _SAMPLE = 0.01  # of the faint noise [s]
@@ -90,7 +90,7 @@ def bound_for(
     given = {k: v for k, v in given.items() if k not in known or known[k] in plant.measurements}
     longest = _LONGER * float(hook.displacement.zero_crossing_period)
     rms = rms_limits(question.limits, periods or {}, longest)
-    command, top = _command(case, plant)
+    command, top = command_limit(case, plant)
     rms = {**{command: top}, **rms} if command not in rms else rms
     plant, given, added = faint_noise(case, plant, hook, given, faint)
     said = [
@@ -198,7 +198,7 @@ def _scales(case: Case, hook: HookMotion) -> dict[str, float]:
     }
 
 
-def _command(case: Case, plant: LinearPlant) -> tuple[str, float]:
+def command_limit(case: Case, plant: LinearPlant) -> tuple[str, float]:
     """Return the input and what its rms cannot exceed, whatever the drive does."""
     name = plant.inputs[0]
     motor, drive = case.winch.motor, case.winch.drive

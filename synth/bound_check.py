@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .bound_dual import DualPoint
     from .disturbance import Disturbance
 
-__all__ = ["verify_bound", "weighted_rms"]
+__all__ = ["banded", "verify_bound", "weighted_rms"]
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -128,12 +128,12 @@ def weighted_rms(bound: Bound, controller: Controller) -> float:
     )
     # Only a controller with a direct path makes a delayed loop ring.
     late = max(bound.plant.delays) if np.any(law.D) else 0.0
-    sources = [_source(source) for source in bound.sources]
+    sources = [banded(source) for source in bound.sources]
     found = moments(loop, list(bound.minimise), sources, orders=(0,), delay=late, rtol=_QUADRATURE)
     return math.sqrt(sum(w * found[name][0] for name, w in bound.minimise.items()))
 
 
-def _source(source: Disturbance) -> Source:
+def banded(source: Disturbance) -> Source:
     """Return a disturbance that is zero outside its band."""
     if source.band is None:
         return Source(name=source.name, density=source.density, band=None, splits=source.splits)
@@ -150,7 +150,7 @@ def _source(source: Disturbance) -> Source:
 def _variances(bound: Bound, names: list[str], point: DualPoint) -> dict[str, float]:
     """Return variances of the true loop whose response from noise to command is the model's."""
     model, kalman = bound.dual.plant, bound.dual.estimator
-    sources = [_source(source) for source in bound.sources]
+    sources = [banded(source) for source in bound.sources]
     shaking = [source.name for source in sources]
 
     def density(omega: FloatArray) -> FloatArray:

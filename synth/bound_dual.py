@@ -37,6 +37,8 @@ _LEAST = 1e-6  # of a multiplier, as a price: lambda b^2 over the cost
 _MOST = 1e6
 _SETTLED = 1e-7  # gap at which no further step is made
 _STEPS = 12
+_NEAR = 0.3  # gap from which Newton's method is tried first ...
+_ARRIVED = 1e-6  # ... and at which its answer is taken
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -182,6 +184,11 @@ class Dual:
         scale = max(self.primal(point), 1e-300)
         low = np.log(_LEAST * scale / self.squares)
         high = np.log(_MOST * scale / self.squares)
+        if start is not None and self.gap(point) < _NEAR:
+            # From close by, Newton's method alone arrives in a few steps.
+            point = self._polished(point, low, high)
+            if self._open(point, low) < _ARRIVED:
+                return point
         best = point
 
         def negative(theta: FloatArray) -> tuple[float, FloatArray]:
@@ -205,6 +212,13 @@ class Dual:
         )
         return self._polished(best, low, high)
 
+    def _open(self, point: DualPoint, low: FloatArray) -> float:
+        """Return the gap without that of slack limits, whose multipliers are as low as they go."""
+        excess = point.variances[self.rows] - self.squares
+        above = (np.log(point.multipliers) > low + 1e-9) | (excess > 0.0)
+        slack = point.multipliers * np.abs(excess) * above
+        return float(np.sum(slack) / max(self.primal(point), 1e-300))
+
     def _begin(self) -> DualPoint:
         """Return multipliers of about the right size."""
         size = 1.0
@@ -219,7 +233,7 @@ class Dual:
     def _polished(self, point: DualPoint, low: FloatArray, high: FloatArray) -> DualPoint:
         """Return a point by Newton's method on log J = log b^2, in log lambda."""
         for _ in range(_STEPS):
-            if self.gap(point) < _SETTLED:
+            if self._open(point, low) < _SETTLED:
                 break
             theta = np.log(point.multipliers)
             excess = np.log(point.variances[self.rows] / self.squares)

@@ -16,6 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from models.case import Case
+from models.checks import InputError
+from models.equations import MEASUREMENTS
 
 from .assess import Assessment
 from .margins import Margins
@@ -23,6 +25,7 @@ from .search import Start
 from .tune import LimitUse
 
 if TYPE_CHECKING:
+    from .bound_beside import DesignBound
     from .verify import Verification
 
 __all__ = ["GainDesign"]
@@ -120,6 +123,37 @@ class GainDesign:
         from .question import assess_gains
 
         return assess_gains(self.sea_case, self.gains, masses=self.masses, drag=self.drag)
+
+    @property
+    def measurements(self) -> tuple[str, ...]:
+        """What the gains hear."""
+        return MEASUREMENTS
+
+    @cached_property
+    def bound(self) -> DesignBound:
+        """The best that any linear controller could do, computed when it is asked for.
+
+        Raises
+        ------
+        InputError
+            If the loop is unstable.
+        SolverError
+            If there is no bound.
+        """
+        from .bound_beside import bound_beside
+        from .question import pose
+
+        if self.margins is None:
+            raise InputError("bound: the loop must be stable")
+        question = pose(self.sea_case, self.masses)
+        return bound_beside(
+            self.sea_case,
+            question.hook,
+            question.assess(self.gains, self.drag).controller,
+            masses=self.masses,
+            drag=self.drag,
+            limits=question.limits,
+        )
 
     def verify(self) -> Verification:
         """Check everything that is claimed by code that the optimiser did not use."""

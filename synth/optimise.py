@@ -39,6 +39,9 @@ def optimise_gains(
 ) -> GainDesign:
     """Return the gains that minimise the payload's variance within the limits of a case.
 
+    As in the thesis, it is the sea alone that shakes them: the noise of the payload's sensors is
+    not counted here, but by `synth.optimise_structure` and by the bound (`GainDesign.bound`).
+
     Parameters
     ----------
     case

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.case import Case
+from models.checks import InputError
 
 from .controller import Controller
 from .margins import Margins
@@ -24,6 +25,7 @@ from .structure_question import StructureQuestion, pose_structure
 from .tune import LimitUse, Tuning
 
 if TYPE_CHECKING:
+    from .bound_beside import DesignBound
     from .verification import Verification
 
 __all__ = ["StructureDesign"]
@@ -102,6 +104,36 @@ class StructureDesign:
         """
         law = self.posed.law
         return law.controller([self.parameters[p.name] for p in law.parameters])
+
+    @property
+    def measurements(self) -> tuple[str, ...]:
+        """What the structure hears."""
+        return self.posed.plant.measurements
+
+    @cached_property
+    def bound(self) -> DesignBound:
+        """The best that any linear controller could do, computed when it is asked for.
+
+        Raises
+        ------
+        InputError
+            If the loop is unstable.
+        SolverError
+            If there is no bound.
+        """
+        from .bound_beside import bound_beside
+
+        if self.margins is None or not self.parameters:
+            raise InputError("bound: the loop must be stable")
+        posed = self.posed
+        return bound_beside(
+            self.case,
+            posed.question.hook,
+            self.controller,
+            masses=self.masses,
+            drag=self.drag,
+            limits=(*posed.limits, *(posed.drive if self.drive_kept else ())),
+        )
 
     @property
     def binding(self) -> tuple[str, ...]:

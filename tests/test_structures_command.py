@@ -73,8 +73,9 @@ def test_table_says_what_limits(forward: sh.StructureDesign, feedback: sh.Struct
     assert "max_sensitivity" in second.limited
     assert first.shares[1].endswith("%")
     assert len(first.cells) == len(HEADINGS)
-    text = markdown([forward, feedback])
+    text = markdown([forward, feedback], bound=False)
     assert text.count("\n") == 4
+    assert markdown([forward, feedback]).count("\n") == 6  # and what "over best" means
     assert "payload-feedback" in text
     broken = replace(forward, ok=False, status="the drive is too small: much")
     assert structure_rows([broken])[0].limited == "the drive is too small"

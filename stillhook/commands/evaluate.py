@@ -33,12 +33,12 @@ def run(arguments: argparse.Namespace) -> int:
         if folder is not None:
             from ..report import write_report
 
-            write_report(folder.path, design=design, progress=tell)
+            write_report(folder.path, design=design, bound=arguments.bound, progress=tell)
     out = console()
     if arguments.quiet:
         out.print(f"{case.name}: {design.status}", soft_wrap=True)
         return 0 if design.ok else 1
-    show_design(design, out)
+    show_design(design, out, bound=arguments.bound)
     out.print()
     if folder is not None:
         out.print(f"Written to {folder.path}: summary.md, design.yaml, figures", soft_wrap=True)

@@ -58,14 +58,14 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         with progress(shown=not arguments.quiet) as tell:
             design = _optimised(case, arguments, tell)
-            _report(folder, design, tell)
+            _report(folder, design, tell, bound=arguments.bound)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(_kept(folder, design)) from None
     out = console()
     if arguments.quiet:
         out.print(f"{case.name}: {design.status}", soft_wrap=True)
     else:
-        show_design(design, out)
+        show_design(design, out, bound=arguments.bound)
         out.print()
         out.print(f"Written to {folder.path}: summary.md, design.yaml, figures", soft_wrap=True)
         commands(_next(design, arguments, folder), out)
@@ -84,10 +84,10 @@ def _optimised(case: Case, arguments: argparse.Namespace, tell: Progress) -> Gai
         return optimise_gains(case, starts=arguments.starts, seed=arguments.seed, progress=step)
 
 
-def _report(folder: OutputFolder, design: GainDesign, tell: Progress) -> None:
+def _report(folder: OutputFolder, design: GainDesign, tell: Progress, *, bound: bool) -> None:
     from ..report import write_report
 
-    write_report(folder.path, design=design, progress=tell)
+    write_report(folder.path, design=design, bound=bound, progress=tell)
 
 
 @contextlib.contextmanager

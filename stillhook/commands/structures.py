@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..bound_text import bound_sentence, bounds_note
 from ..folder import OutputFolder, folder_name
 from ..quantities import count, number, quantity
 from ..structure_table import HEADINGS, markdown, structure_rows
@@ -40,8 +41,10 @@ def run(arguments: argparse.Namespace) -> int:
     with progress(shown=not arguments.quiet) as tell:
         for k, name in enumerate(names):
             designs.append(_design(case, name, arguments, tell, f"{name} ({k + 1}/{len(names)})"))
-            _write(folder, designs)
-    _show(designs, quiet=arguments.quiet)
+            if arguments.bound:
+                tell(f"{name}: bound", 0, 1)
+            _write(folder, designs, bound=arguments.bound)
+    _show(designs, quiet=arguments.quiet, bound=arguments.bound)
     out = console()
     if not arguments.quiet:
         out.print()
@@ -69,7 +72,10 @@ def _optimise_one(arguments: argparse.Namespace) -> int:
     if arguments.quiet:
         out.print(f"{case.name}: {design.structure}: {design.status}", soft_wrap=True)
         return 0 if design.ok else 1
-    _show([design], quiet=False)
+    _show([design], quiet=False, bound=arguments.bound)
+    if arguments.bound and (text := bound_sentence(design)):
+        out.print()
+        pairs([("bound", text)], out)
     if design.parameters:
         out.print()
         out.print("Parameters", style="bold")
@@ -112,7 +118,7 @@ def _design(
         )
 
 
-def _write(folder: OutputFolder, designs: Sequence[StructureDesign]) -> None:
+def _write(folder: OutputFolder, designs: Sequence[StructureDesign], *, bound: bool) -> None:
     """Write what there is so far: an interrupted comparison keeps what is done."""
     import math
 
@@ -122,12 +128,13 @@ def _write(folder: OutputFolder, designs: Sequence[StructureDesign]) -> None:
 
     last = designs[-1]
     folder.write(f"{last.structure}.yaml", structure_text(last))
-    folder.write("structures.md", f"# Structures for {last.case.name}\n\n{markdown(designs)}")
+    text = markdown(designs, bound=bound)
+    folder.write("structures.md", f"# Structures for {last.case.name}\n\n{text}")
     if any(math.isfinite(design.payload_rms) for design in designs):
-        folder.write("structures.svg", picture(structures(designs), "svg"))
+        folder.write("structures.svg", picture(structures(designs, bound=bound), "svg"))
 
 
-def _show(designs: Sequence[StructureDesign], *, quiet: bool) -> None:
+def _show(designs: Sequence[StructureDesign], *, quiet: bool, bound: bool) -> None:
     out, first = console(), designs[0]
     if quiet:
         for design in designs:
@@ -142,10 +149,12 @@ def _show(designs: Sequence[StructureDesign], *, quiet: bool) -> None:
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
     for k, heading in enumerate(HEADINGS[:-1]):
         table.add_column(heading, justify="left" if k == 0 else "right", no_wrap=True)
-    rows = structure_rows(designs)
+    rows = structure_rows(designs, bound=bound)
     for row in rows:
         table.add_row(*row.cells[:-1], style="" if row.ok else "red")
     out.print(table)
+    if bound and len(designs) > 1:
+        out.print(bounds_note(designs))
     out.print()
     # Below, not beside: the names of limits are too long for a column on 80.
     out.print("Limited by", style="bold")

@@ -1,0 +1,104 @@
+"""`stillhook margins`: how far the plant's numbers may be off before a design is unstable."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from models.checks import InputError, check_range
+
+from ..terminal import commands, console, progress
+from .given import case_words, given_case, parse_gains
+from .optimise import interruptible
+
+if TYPE_CHECKING:
+    from models import Case
+    from synth.design import GainDesign
+    from synth.structure_design import StructureDesign
+
+__all__ = ["parse_off", "run"]
+
+_USUAL = {"payload.mass": 0.3, "stiffness": 0.2, "drag": 0.5}
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Analyse and show; return 0 if the loop is stable over the ranges, 1 if not."""
+    check_range("margins", "--draws", arguments.draws, low=0, high=1_000_000)
+    case = given_case(arguments)
+    off = parse_off(arguments.off) or _USUAL
+    design = _design(case, arguments)
+    from synth.mu import robustness
+
+    with progress(shown=not arguments.quiet) as tell, interruptible() as check:
+
+        def step(stage: str, done: int, total: int) -> None:
+            check()
+            tell(stage, done, total)
+
+        found = robustness(design, off, draws=arguments.draws, progress=step)
+    out = console()
+    if arguments.quiet:
+        out.print(f"{case.name}: {found.status}", soft_wrap=True)
+        return 0 if found.ok else 1
+    out.print(str(found), soft_wrap=True)
+    words = case_words(arguments, None)
+    vary = " ".join(
+        f"--vary {d.path}={max(d.at(-1.0), 0.0):.5g}..{d.at(1.0):.5g}"
+        for d in found.doubts
+        if "." in d.path
+    )
+    if vary:
+        commands([("gains for the whole range", f"stillhook robust {words} {vary}")], out)
+    return 0 if found.ok else 1
+
+
+def parse_off(texts: list[str]) -> dict[str, float | str]:
+    """Return shares, or widths with a unit, by path.
+
+    Examples
+    --------
+    >>> parse_off(["payload.mass=0.3", "delay = 20 ms"])
+    {'payload.mass': 0.3, 'delay': '20 ms'}
+    """
+    found: dict[str, float | str] = {}
+    for text in texts:
+        path, sign, width = (part.strip() for part in text.partition("="))
+        if not (path and sign and width):
+            raise InputError(f"--off: must be PATH=SHARE, as in payload.mass=0.3, got {text!r}")
+        if path in found:
+            raise InputError(f"--off: {path} is given twice")
+        try:
+            found[path] = float(width)
+        except ValueError:
+            found[path] = width
+    return found
+
+
+def _design(case: Case, arguments: argparse.Namespace) -> GainDesign | StructureDesign:
+    """Return the design of a file on the case given, or that of gains."""
+    from dataclasses import replace
+
+    from synth import evaluate_gains
+
+    if arguments.design is not None:
+        if arguments.gains is not None:
+            raise InputError("margins: give --design or --gains, not both")
+        from ..design_file import load_design
+        from ..structure_file import load_structure
+
+        try:
+            structure = load_structure(arguments.design)
+        except InputError as error:
+            if "is not a structure's design" not in str(error):
+                raise
+            return evaluate_gains(case, load_design(arguments.design).gains)
+        return replace(structure, case=case)
+    if arguments.gains is not None:
+        return evaluate_gains(case, parse_gains(arguments.gains))
+    if case.gains is None:
+        raise InputError(
+            f"{case.source}: gains: the case has none in use; give --gains, or --design with a "
+            "design.yaml that `stillhook optimise` wrote"
+        )
+    own = {name: getattr(case.gains, name) for name in ("A", "a", "a1", "a2")}
+    return evaluate_gains(case, own)
