@@ -150,9 +150,9 @@ if TYPE_CHECKING:
     from models.six_dof import SixDofMotion as SixDofMotion
     from mpc.clairvoyant import Clairvoyant as Clairvoyant
     from mpc.clairvoyant import clairvoyant as clairvoyant
-    from mpc.nonlinear import NonlinearMPC as NonlinearMPC
     from mpc.doubts import Doubts as Doubts
     from mpc.linear import LinearMPC as LinearMPC
+    from mpc.nonlinear import NonlinearMPC as NonlinearMPC
     from mpc.weights import Weights as Weights
     from mpc.weights import tune_weights as tune_weights
     from synth import GainDesign as GainDesign

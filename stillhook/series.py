@@ -26,11 +26,11 @@ from models.scenario import Scenario
 from models.scenarios import scenario_named
 from models.simulate import run_simulation
 from models.simulation import Simulation, prepare
-from synth.controllers import controller_named
 from synth.design import GainDesign
 from synth.linear_feedback import LinearFeedback
 from synth.tune import Tuning
 
+from .controllers import controller_by_name
 from .run_window import error_of
 from .runs import Runs, stays
 
@@ -161,7 +161,7 @@ def controller_of(
         If it is none of these, or what is given with it does not belong to it.
     """
     if isinstance(controller, str):
-        return controller_named(
+        return controller_by_name(
             controller, case, design=design, gains=gains, sample_time=sample_time
         )
     if design is not None or gains is not None:

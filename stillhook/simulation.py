@@ -61,8 +61,8 @@ def simulate(
     case
         Vessel, sea, rope, payload, winch and sensors.
     controller
-        The name of a controller of `synth.controllers.CONTROLLERS`; a design, whose feedback is
-        meant; or any object with ``name``, ``sample_time``, ``reset()`` and
+        The name of a controller (`stillhook.controllers`); a design, whose feedback is meant; or
+        any object with ``name``, ``sample_time``, ``reset()`` and
         ``step(measurement, time)`` (`models.control.Controller`).
     scenario, options
         An operation, or the name of one and its options: numbers in SI, or texts with a unit

@@ -8,6 +8,7 @@ from models.scenario_options import Choice, Option
 from models.scenarios import scenario_names, scenario_options
 from models.units import KINDS
 
+from ..controllers import PREDICTIVE
 from ..quantities import quantity
 from ..terminal import commands, console, pairs
 
@@ -36,7 +37,8 @@ def run(arguments: argparse.Namespace) -> int:
     pairs(list(scenario_names().items()), out)
     out.print()
     out.print("Controllers (--controller)", style="bold")
-    pairs([(name, CONTROLLER_TEXTS.get(name, "")) for name in CONTROLLERS], out)
+    texts = {name: CONTROLLER_TEXTS.get(name, "") for name in CONTROLLERS}
+    pairs(list({**texts, **PREDICTIVE}.items()), out)
     out.print()
     commands(
         [

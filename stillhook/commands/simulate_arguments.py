@@ -20,7 +20,8 @@ def _what(group: argparse._ArgumentGroup) -> None:
         "--controller",
         default="feedback",
         metavar="NAME",
-        help="a controller, several with commas between, or all (default: feedback)",
+        help="a controller, several with commas between, or all, which leaves out the predictive "
+        "ones (default: feedback; see `stillhook scenarios`)",
     )
     group.add_argument(
         "--scenario", default="hold", metavar="NAME", help="an operation (default: hold)"

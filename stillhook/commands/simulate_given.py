@@ -134,6 +134,8 @@ def asked_of(arguments: argparse.Namespace) -> Asked:
 def parse_controllers(text: str) -> tuple[str, ...]:
     """Return names of controllers from a text: one, several with commas between, or all.
 
+    All are those that need no tuning: the predictive ones have to be named.
+
     Raises
     ------
     InputError
@@ -142,11 +144,12 @@ def parse_controllers(text: str) -> tuple[str, ...]:
     from models.signals import pick
     from synth.controllers import CONTROLLERS
 
-    known = tuple(CONTROLLERS)
+    from ..controllers import known_controllers
+
     if text == "all":
-        return known
+        return tuple(CONTROLLERS)
     names = tuple(name.strip() for name in text.split(","))
-    pick("--controller", "controller", known, names)
+    pick("--controller", "controller", known_controllers(), names)
     if len(set(names)) != len(names):
         raise InputError(f"--controller: each may be named once, got {text!r}")
     return names
