@@ -163,11 +163,8 @@ class Unsaturated:
         row[: winch.size] = winch.payload
         asked = np.concatenate([to_input, np.zeros(m)])
         asked += winch.gain * np.concatenate([(Dc @ C)[0], Cc[0]])
-        return _root(row @ covariance @ row), _root(asked @ covariance @ asked)
-
-
-def _root(variance: float) -> float:
-    return math.sqrt(max(float(variance), 0.0))
+        payload, torque = (float(r @ covariance @ r) for r in (row, asked))
+        return math.sqrt(max(payload, 0.0)), math.sqrt(max(torque, 0.0))
 
 
 def _plant(model: PredictionModel) -> tuple[FloatArray, FloatArray, FloatArray]:

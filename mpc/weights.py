@@ -26,7 +26,7 @@ from models.case import Case
 from models.checks import SolverError, check_range
 
 from .doubts import Doubts, doubted
-from .prediction_model import prediction_model
+from .prediction_model import PredictionModel, prediction_model
 from .regulator import regulator
 from .unsaturated import Unsaturated
 
@@ -215,7 +215,7 @@ def saturates(model: PredictionModel) -> bool:
     believed = doubted(model, Doubts(force=0.01, torque=0.02, rope=0.5, sensors=1e-3))
     loop = Unsaturated(model=believed, regulator=regulator(believed, 0.1))
     asked = abs(model.winch.rest_torque) + _SATURATED * loop.torque_rms_under(model)
-    return asked > model.winch.case.winch.drive.torque_peak
+    return bool(asked > model.winch.case.winch.drive.torque_peak)
 
 
 def _mean(rms: tuple[float, ...]) -> float:
