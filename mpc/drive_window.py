@@ -107,6 +107,16 @@ class DriveWindow:
             high[0] = max(min(float(high[0]), first_high), float(low[0]))
         return low, high
 
+    def within(
+        self, low: FloatArray, high: FloatArray, last: float, step: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the bounds with the first move within a step [N m] of the last input [N m]."""
+        low, high = low.copy(), high.copy()
+        first = (last - step) / self._unit, (last + step) / self._unit
+        # Where the window has moved away from the last torque, the window counts.
+        low[0], high[0] = (min(max(float(e), first[0]), first[1]) for e in (low[0], high[0]))
+        return low, high
+
     def asked(self, move: float, low: float, high: float, change: float) -> tuple[float, float]:
         """Return the input to ask of the drive, and the torque it then holds over the sample.
 

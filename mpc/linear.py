@@ -31,7 +31,7 @@ from .fallback import Fallback
 from .prediction_model import PredictionModel, prediction_model
 from .preview import PerfectPreview
 from .products import Products
-from .qp import SoftQP, Solved
+from .qp import SoftQP, Solved, kkt_residual
 from .regulator import regulator
 from .weights import Weights, tune_weights
 
@@ -48,6 +48,7 @@ _OWNER = "predictive control"
 _QUADRATIC, _LINEAR = 1e4, 1e2  # price of a soft row, over its scale, in units of the cost
 _CLEAR = 1.5 * SPEED_BAND  # of the highest speed, kept clear of the drive's own overspeed cut
 _HORIZON, _PREVIEWED = 8.0, 14.0  # [s]
+_PROVED = 1e-6  # residual of the optimality conditions
 _SAME = 1e-3  # of the peak torque
 _IN_BAND = 3.0  # [rad/s]
 _LEAST = 0.1  # of the static tension, that is to stay in the rope
@@ -72,7 +73,8 @@ class LinearMPC:
         & |d_j + \tau_0| \le \tau(\omega_j), \qquad |u_0| \le V \quad \text{(hard)}, \\
         & |\omega_j| \le \omega_{max}, \quad F_j \ge F_{min}, \quad |u_j| \le V,
             \quad |p_j - r_j| \le p_{max} \quad \text{(soft)}, \\
-        & d \text{ constant over each block,}
+        & |d_{j+1} - d_j| \le \dot\tau T \quad \text{(hard, if asked for)}, \qquad
+            d \text{ constant over each block,}
 
     and the first torque is asked of the drive by the command u = u_rest + K omega + d_0 / b.
 
@@ -113,10 +115,15 @@ class LinearMPC:
         the static one.
     excursion
         Largest displacement of the payload that is aimed at [m]; by default none.
+    torque_rate
+        Highest rate at which the torque may be asked to change [N m/s]; by default none.
     thermal
         Whether the torque is cut back before the motor's windings get hotter than rated.
     deadline
         Longest time for one step [s]; by default none, so that runs can be repeated to the bit.
+    prove
+        Whether every answer is checked against its optimality conditions; those that fail are
+        counted as ``unproved``.
     limits
         Limits of the drive; by default those of the case.
     name
@@ -151,8 +158,10 @@ class LinearMPC:
         masses: int | None = None,
         minimum_tension: float | None = None,
         excursion: float | None = None,
+        torque_rate: float | None = None,
         thermal: bool = False,
         deadline: float | None = None,
+        prove: bool = False,
         limits: DriveLimits | None = None,
         name: str | None = None,
     ) -> None:
@@ -162,6 +171,8 @@ class LinearMPC:
         blocks = default_blocking(horizon, T) if blocking is None else tuple(blocking)
         least = _least_tension(case) if minimum_tension is None else minimum_tension
         check_range(_OWNER, "minimum_tension", least, low=0.0, unit="N")
+        if torque_rate is not None:
+            check_range(_OWNER, "torque_rate", torque_rate, low=0.0, unit="N m/s", open_low=True)
         if deadline is not None:
             check_range(_OWNER, "deadline", deadline, low=0.0, unit="s", open_low=True)
         if weights is None:
@@ -183,11 +194,19 @@ class LinearMPC:
             self.products.rows,
             quadratic=_QUADRATIC,
             linear=_LINEAR,
+            hard=None
+            if torque_rate is None
+            else np.eye(len(blocks))[1:] - np.eye(len(blocks))[:-1],
             time_limit=0.0 if deadline is None else deadline,
         )
         self._lengths = np.array(p.blocks[:-1], dtype=np.float64)
         self._deadline = math.inf if deadline is None else deadline
         self._window = DriveWindow(self.model.winch, limits, len(p.blocks), p.unit)
+        # Change of torque from each move to the next, and over one sample.
+        steps = np.zeros(0) if torque_rate is None else torque_rate * T * self._lengths / p.unit
+        self._rates = (-steps, steps)
+        self._at_most = math.inf if torque_rate is None else torque_rate * T
+        self._prove = prove
         self._budget = TorqueBudget(case, T, self.horizon) if thermal else None
         self._fallback = Fallback(p.blocks)
         self.reset()
@@ -215,7 +234,9 @@ class LinearMPC:
         self._changes = np.zeros(len(self.programme.blocks))
         self._asked = self.model.winch.rest_torque  # of the drive at the sample before [N m]
         self._kept = math.nan
-        self._counts = dict.fromkeys(("steps", "iterations", "late", "shifted", "safe"), 0)
+        self._counts = dict.fromkeys(
+            ("steps", "iterations", "late", "shifted", "safe", "unproved"), 0
+        )
         self.question: tuple[FloatArray, FloatArray, FloatArray] | None = None
         self.solved: Solved | None = None
 
@@ -246,20 +267,27 @@ class LinearMPC:
             # Over a sample the torque falls or rises with the speed: the larger end counts.
             cap = self._budget.update(max(abs(float(shown[_TORQUE])), abs(self._asked)))
         # Only its own limits does the drive keep by itself.
-        leaning = cap >= self._window.peak
+        leaning = cap >= self._window.peak and self._at_most == math.inf
         low, high = self._window.bounds(
             speed, self._speeds, cap, self._changes if leaning else None
         )
-        question = products.question(gradient, free, low, high)
+        if self._at_most < math.inf:
+            low, high = self._window.within(
+                low, high, self._asked - winch.rest_torque, self._at_most
+            )
+        question = products.question(gradient, free, low, high, self._rates)
         move = self._solve(question, began)
         if self.solved is not None:
             self._speeds = products.speeds(chi, self.solved.v)
             self._changes[:-1] = (self._speeds[1:] - self._speeds[:-1]) / self._lengths
         if move is None:
             move = self._otherwise(speed)
-        torque, self._kept = self._window.asked(
-            move, float(low[0]), float(high[0]), float(self._changes[0]) if leaning else 0.0
-        )
+        if leaning:
+            torque, self._kept = self._window.asked(
+                move, float(low[0]), float(high[0]), float(self._changes[0])
+            )
+        else:
+            torque, self._kept = min(max(move, low[0]), high[0]) * self.programme.unit, math.nan
         command = winch.command(torque, speed)
         self._asked = min(max(torque + winch.rest_torque, -self._window.peak), self._window.peak)
         return min(max(command, -self._window.voltage), self._window.voltage)
@@ -287,6 +315,8 @@ class LinearMPC:
         if not (solved.ok and math.isfinite(float(solved.v.sum()))):
             self.qp.reset()
             return None
+        if self._prove and kkt_residual(self.qp, *question, solved) > _PROVED:
+            self._counts["unproved"] += 1
         if clock.perf_counter() - began > self._deadline:
             self._counts["late"] += 1
             return None

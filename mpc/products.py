@@ -27,6 +27,7 @@ __all__ = ["Products"]
 
 FloatArray = npt.NDArray[np.float64]
 
+_NONE = np.zeros(0)
 _WIDE = 1e20  # no limit, for the solver
 
 
@@ -147,11 +148,16 @@ class Products:
         return gradient + self.path_gradient @ path, free + self.path_free @ path
 
     def question(
-        self, gradient: FloatArray, free: FloatArray, low: FloatArray, high: FloatArray
+        self,
+        gradient: FloatArray,
+        free: FloatArray,
+        low: FloatArray,
+        high: FloatArray,
+        hard: tuple[FloatArray, FloatArray] = (_NONE, _NONE),
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return gradient, lower and upper bounds for the solver."""
-        lower = np.concatenate((low, self.low - free))
-        upper = np.concatenate((high, self.high - free))
+        """Return gradient, lower and upper bounds for the solver; `hard`: of its hard rows."""
+        lower = np.concatenate((low, hard[0], self.low - free))
+        upper = np.concatenate((high, hard[1], self.high - free))
         return gradient, lower, upper
 
     def speeds(self, chi: FloatArray, moves: FloatArray) -> FloatArray:

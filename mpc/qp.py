@@ -3,13 +3,13 @@ r"""One quadratic programme after another, each a little different from the last
 .. math::
 
     \min_{v, s} \tfrac12 v'Hv + f'v + \sum_i \tfrac12 W s_i^2 + w s_i
-    \quad \text{subject to} \quad l \le v \le u, \quad
+    \quad \text{subject to} \quad l \le (v, S v) \le u, \quad
     \underline r - s \le R v \le \overline r + s, \; s \ge 0 .
 
 DAQP (D. Arnstrom, A. Bemporad and D. Axehill, IEEE TAC 67, 2022) is a dual active-set method:
 exact, with a bound on its iterations, and with soft rows of its own that need no slack variables.
-Set up once; each sample brings a gradient and bounds, and the active set of the last sample is where the
-next begins.  `benchmarks/mpc.py` compares it with others.
+Set up once; each sample brings a gradient and bounds, and begins with the active set of the last.
+`benchmarks/mpc.py` compares it with others.
 
 `kkt_residual` checks an answer without the solver.
 """
@@ -34,7 +34,7 @@ _SOFT = 8  # DAQP's bit of a soft row
 
 @dataclass(frozen=True, slots=True)
 class Solved:
-    """An answer: moves v (n,), multipliers (n + m,), iterations, and whether it is one."""
+    """An answer: moves v (n,), a multiplier for each bound, iterations, and whether it is one."""
 
     v: FloatArray
     multipliers: FloatArray
@@ -52,6 +52,8 @@ class SoftQP:
         (n, n), positive definite.
     rows
         R, (m, n), scaled so that its values are of the size of one.
+    hard
+        S, (h, n), rows that may not be violated; there is always a v that does not.
     quadratic, linear
         W and w of the soft rows.
     iterations
@@ -72,16 +74,19 @@ class SoftQP:
         *,
         quadratic: float,
         linear: float,
+        hard: FloatArray | None = None,
         iterations: int = 400,
         time_limit: float = 0.0,
     ) -> None:
         n, m = len(H), len(rows)
+        hard = np.zeros((0, n)) if hard is None else hard
         # DAQP wants arrays that it might write to.
         self.H, self.rows = np.array(H, order="C"), np.array(rows, order="C")
+        self.hard, self._all_rows = np.array(hard), np.vstack([hard, rows])
         self.quadratic, self.linear = quadratic, linear
         self._iterations, self._time_limit = iterations, time_limit
-        self._sense = np.concatenate([np.zeros(n), np.full(m, _SOFT)]).astype(np.int32)
-        self._wide = np.full(n + m, 1e20)
+        self._sense = np.concatenate([np.zeros(n + len(hard)), np.full(m, _SOFT)]).astype(np.int32)
+        self._wide = np.full(n + len(hard) + m, 1e20)
         try:
             np.linalg.cholesky(self.H)
         except np.linalg.LinAlgError as error:
@@ -90,10 +95,10 @@ class SoftQP:
 
     def reset(self) -> None:
         """Forget the active set."""
-        n, m = len(self.H), len(self.rows)
+        n = len(self.H)
         model: Any = daqp.Model()
         flag, _ = model.setup(
-            self.H, np.zeros(n), self.rows, self._wide, -self._wide, self._sense.copy()
+            self.H, np.zeros(n), self._all_rows, self._wide, -self._wide, self._sense.copy()
         )
         if flag < 0:
             raise SolverError(f"quadratic programme: DAQP refuses it (flag {flag})")
@@ -103,13 +108,13 @@ class SoftQP:
             "eps_prox": 0.0,
             "primal_tol": 1e-9,
         }
-        rho = np.full(n + m, 1.0 / self.quadratic)
-        w = np.full(n + m, self.linear)
+        rho = np.full(len(self._wide), 1.0 / self.quadratic)
+        w = np.full(len(self._wide), self.linear)
         model.soft_weights(rho, rho, w, w)
         self._model = model
 
     def solve(self, f: FloatArray, lower: FloatArray, upper: FloatArray) -> Solved:
-        """Solve for a gradient (n,) and bounds on moves and rows, (n + m,), finite or +-1e20."""
+        """Solve for a gradient (n,) and bounds on moves, hard and soft rows, finite or +-1e20."""
         self._model.update(f=f, bupper=upper, blower=lower)
         v, _, flag, info = self._model.solve()
         return Solved(v, info["lam"], info["iterations"], flag > 0, flag)
@@ -132,9 +137,9 @@ def kkt_residual(
     solved
         The answer.
     """
-    n = len(f)
     v, lam = solved.v, solved.multipliers
-    G = np.vstack([np.eye(n), qp.rows])
+    G = np.vstack([np.eye(len(f)), qp.hard, qp.rows])
+    n = len(f) + len(qp.hard)  # those that may not be violated
     size = 1.0 + float(np.abs(f).max())
     found = [float(np.abs(qp.H @ v + f + G.T @ lam).max()) / size]
     value = G @ v

@@ -485,6 +485,32 @@ def test_the_thermal_budget_keeps_the_windings_within_their_rating():
     assert rises[1] < 1.06
 
 
+def test_the_torque_changes_no_faster_than_it_may():
+    rate = 20_000.0
+    controller = controller_of("thesis-1975", 1.9, torque_rate=rate, prove=True)
+    free = controller_of("thesis-1975", 1.9)
+    fastest = {}
+    for one in (controller, free):
+        heard: list[float] = []
+
+        class Watched:
+            name, sample_time = "watched", 0.05
+
+            def reset(self) -> None:
+                one.reset()  # noqa: B023
+
+            def step(self, measurement: Measurement, time: float) -> float:
+                command = one.step(measurement, time)  # noqa: B023
+                heard.append(one._asked)  # noqa: B023
+                return command
+
+        sh.simulate(one.case, Watched(), seeds=[1], duration=90.0, settle=40.0)
+        fastest["slow" if one is controller else "free"] = np.abs(np.diff(heard)).max() / 0.05
+    assert fastest["slow"] <= rate * (1.0 + 1e-6)
+    assert fastest["free"] > 2.0 * rate
+    assert controller.counts["unproved"] == 0
+
+
 def test_the_names_of_what_it_hears_are_those_of_the_simulator():
     assert len(MEASURED) == len(set(MEASURED))
     simulation = prepare(case_of("thesis-1975"), controller_of("thesis-1975"))
@@ -500,6 +526,7 @@ def test_the_names_of_what_it_hears_are_those_of_the_simulator():
         ({"predictor": "crystal ball"}, "one of kalman, ar, preview"),
         ({"excursion": -1.0}, "excursion must be above 0 m"),
         ({"deadline": 0.0}, "deadline must be above 0 s"),
+        ({"torque_rate": 0.0}, "torque_rate must be above 0 N m/s"),
     ],
 )
 def test_bad_arguments_get_one_clear_sentence(options, text):
