@@ -205,8 +205,8 @@ CONTENDERS: Mapping[str, Contender] = MappingProxyType({each.name: each for each
 """Every contender by its name."""
 
 # Names that are left out unless they are asked for.  `feedback-no-antiwindup` says only that
-# static gains cannot wind up; `nonlinear-mpc` is not there yet.
-LEFT_OUT = ("feedback-no-antiwindup", "nonlinear-mpc")
+# static gains cannot wind up.
+LEFT_OUT = ("feedback-no-antiwindup",)
 
 DEFAULTS = tuple(name for name in CONTENDERS if name not in LEFT_OUT)
 """Who takes part unless others are named."""

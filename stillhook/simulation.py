@@ -18,6 +18,7 @@ from models.draws import check_seed
 from models.run import Run
 from models.scenario import Scenario
 from synth.design import GainDesign
+from synth.threads import one_thread
 from synth.tune import Tuning
 
 from .runs import Runs, keep_worst
@@ -137,7 +138,9 @@ def simulate(
     found: list[Run] = []
     for done, seed in enumerate(numbers):
         tell = None if progress is None else _part(progress, done, len(numbers))
-        found.append(series.run(seed, tell))
+        # Small matrices: a second BLAS thread only gets in the way of a controller in Python.
+        with one_thread():
+            found.append(series.run(seed, tell))
         if traces == "worst":
             found = keep_worst(found)
         if found[-1].status == "interrupted":
