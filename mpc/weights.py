@@ -14,7 +14,7 @@ Every evaluation is a Riccati equation and five Lyapunov equations
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,6 +62,9 @@ _FIRST = np.array(
         [-1.6, -2.8, -0.3, -0.5, -2.3],
         [-1.6, -1.2, -1.8, -0.2, -3.6],
         [-1.6, -0.6, -0.8, -2.4, -2.5],
+        [-0.6, -2.9, -0.5, -0.3, -2.6],
+        [-0.8, -2.7, -0.9, -0.2, -3.4],
+        [-0.7, -2.8, -0.3, -0.3, -2.8],
     ]
 )
 _SCREENED = 16
@@ -138,9 +141,29 @@ def tune_weights(
     limit = case.limits.max_sensitivity if max_sensitivity is None else max_sensitivity
     limit = check_range("weights", "max_sensitivity", limit or 2.0, low=1.0, open_low=True)
     model = prediction_model(case, sample_time=sample_time, masses=masses)
+    for off in (FAR_OFF, OFF) if saturates(model) else (OFF,):
+        found = _search(model, off, limit, progress or _silent)
+        if found is not None:
+            return found
+    raise SolverError(
+        f"predictive control: no weights are stable on a payload and a rope that are off by "
+        f"30 % with M_s <= {limit:g}; a shorter sample time or delay helps"
+    )
+
+
+def _search(
+    model: PredictionModel,
+    off: Sequence[Mapping[str, float]],
+    limit: float,
+    progress: Callable[[float], None],
+) -> Weights | None:
+    """Return the best weights that are stable on the plants that are off; None without any."""
+    winch = model.winch
     others = [
-        prediction_model(case, sample_time=sample_time, masses=model.winch.masses, off=off)
-        for off in (FAR_OFF if saturates(model) else OFF)
+        prediction_model(
+            winch.case, sample_time=winch.sample_time, masses=winch.masses, off=factors
+        )
+        for factors in off
     ]
     heave, total = model.waves[0], _SCREENED + len(_FIRST) + 2 * _POLISHED
     done = 0
@@ -174,8 +197,7 @@ def tune_weights(
     def cost(point: FloatArray) -> float:
         nonlocal done, best
         done += 1
-        if progress is not None:
-            progress(min(1.0, done / total))
+        progress(min(1.0, done / total))
         found = judged(point)
         outside = float(np.maximum(point - _HIGH, 0.0).sum() + np.maximum(_LOW - point, 0.0).sum())
         if found is None:
@@ -200,14 +222,12 @@ def tune_weights(
             method="Nelder-Mead",
             options={"maxfev": _POLISHED, "initial_simplex": simplex, "xatol": 0.02, "fatol": 5e-3},
         )
-    if progress is not None:
-        progress(1.0)
-    if best[1] is None:
-        raise SolverError(
-            f"predictive control: no weights are stable on a payload and a rope that are off by "
-            f"half with M_s <= {limit:g}; a shorter sample time or delay helps"
-        )
+    progress(1.0)
     return best[1]
+
+
+def _silent(_: float) -> None:
+    """Tell nobody."""
 
 
 def saturates(model: PredictionModel) -> bool:
