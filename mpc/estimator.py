@@ -40,6 +40,7 @@ _NO_UNIT = 2
 _STARTING = 10.0  # in which the gain comes to its steady value [s]
 _LOWER = 1.0  # by which the load may hang lower or higher at first [m]
 _BITS = 1 << np.arange(len(MEASURED))
+_HUGE = 1e12
 _LATER = 1e-3  # of a sample: an age that is no other than usual
 
 
@@ -157,7 +158,7 @@ class Estimator:
             missing |= _NO_UNIT
         y = y - self._felt * winch.extra_drag(float(self._velocity @ ahead))
         error = y - self._C @ ahead
-        if missing == 0 and math.isfinite(float(error @ error)):
+        if missing == 0 and math.isfinite(float(np.abs(error).max())):
             late = float(shown[_AGE]) - self._usual
             if late > self._slack or late < -self._slack:
                 error = y - self._late(float(shown[_AGE])) @ ahead
@@ -168,7 +169,7 @@ class Estimator:
             self.state = ahead + gain @ error
         else:
             self.state = self._partly(ahead, y, missing, float(shown[_AGE]))
-        if not math.isfinite(float(self.state @ self.state)):
+        if not float(np.abs(self.state).max()) < _HUGE:  # no number, or no longer of this world
             self.reset()
         self._before = float(self._speed @ self.state)
         self._drag = winch.extra_drag(float(self._velocity @ self.state))

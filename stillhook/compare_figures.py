@@ -33,6 +33,7 @@ _COLOURS = {
     "thesis": BEFORE,
     "feedback": "#56b4e9",
     "feedback-eager": "#56b4e9",
+    "feedback-half": "#0072b2",
     "feedback-no-antiwindup": "#b3dcf5",
     "combined": AFTER,
     "combined-eager": AFTER,
@@ -45,7 +46,7 @@ _COLOURS = {
 }
 _OTHERS = ("#332288", "#117733", "#999933", "#aa4499")
 _DASHED = (0, (4, 2))
-_DASHES = ("feedback-eager", "combined-eager", "mpc-preview")
+_DASHES = ("feedback-eager", "combined-eager", "mpc-preview", "feedback-half", "combined-half")
 _MARKS = "osD^vP*X<>hd8p"
 _FLOOR_SHOWN = 0.05  # of the least rms: a floor below that leaves the figure
 _FINE = 3e3  # an axis that spans less is marked at 2 and 5 too

@@ -3,9 +3,10 @@
     case at one H_s --> optimise_gains, optimise_structure --> Law --> store, other processes
 
 A linear law can be designed to keep the drive's limits, or as if there were none: the first is
-slow in a sea that the drive could follow, the second falls off where it cannot.  Neither is fair
-to linear control by itself, so both take part, whatever the case says about the limits; the plant
-that they are simulated on has them all the same.
+slow in a sea that the drive could follow, the second falls off where it cannot.  In between is one
+that keeps them in a sea of half the height, and saturates now and then.  None is fair to linear
+control by itself, so all take part, whatever the case says about the limits; the plant that they
+are simulated on has them all the same.
 """
 
 from __future__ import annotations
@@ -22,10 +23,12 @@ from synth.design import GainDesign
 from synth.structure_design import StructureDesign
 from synth.tune import Tuning
 
-__all__ = ["EAGER", "Law", "design_law"]
+__all__ = ["EAGER", "HALF", "Law", "design_law"]
 
 EAGER = "-eager"
 """Ending of the designs that ignore the drive's limits."""
+HALF = "-half"
+"""Ending of the designs that keep them in a sea of half the height."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -112,7 +115,7 @@ def design_law(needs: str, case: Case, starts: int, progress: Progress | None = 
     ----------
     needs
         "gains" or the name of a structure, for a law within the drive's limits; followed by
-        "-eager" for one that ignores them.
+        "-eager" for one that ignores them, or "-half" for one that keeps them in half the sea.
     case
         The case, in the sea that the law is for.
     starts
@@ -128,7 +131,11 @@ def design_law(needs: str, case: Case, starts: int, progress: Progress | None = 
     if needs.endswith(EAGER):
         free = case.replace({"limits.drive": "report"})
         return Law.of(_design(needs.removesuffix(EAGER), free, starts, progress), "reported")
-    strict = case.replace({"limits.drive": "enforce"})
+    changes: dict[str, object] = {"limits.drive": "enforce"}
+    if needs.endswith(HALF):
+        needs = needs.removesuffix(HALF)
+        changes["sea.significant_height"] = 0.5 * float(case.sea.significant_height)
+    strict = case.replace(changes)
     design = _design(needs, strict, starts, progress)
     law = Law.of(design, "enforced")
     if isinstance(design, StructureDesign) and not design.drive_kept:

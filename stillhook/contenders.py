@@ -125,6 +125,14 @@ _ALL = (
         "gains",
     ),
     _built_in(
+        "feedback-half",
+        "three optimised gains, within the drive's limits in a sea of half the height",
+        _PAYLOAD,
+        "linear",
+        functools.partial(linear, "feedback-half", True),
+        "gains-half",
+    ),
+    _built_in(
         "feedback-eager",
         "three optimised gains, as if the drive had no limits",
         _PAYLOAD,
@@ -147,6 +155,14 @@ _ALL = (
         "linear",
         functools.partial(linear, "combined", True),
         "combined",
+    ),
+    _built_in(
+        "combined-half",
+        "the same, within the drive's limits in a sea of half the height",
+        _BOTH,
+        "linear",
+        functools.partial(linear, "combined-half", True),
+        "combined-half",
     ),
     _built_in(
         "combined-eager",

@@ -536,3 +536,18 @@ def test_no_controller_beats_the_floor_and_preview_beats_the_brake():
     for name in ("none", "feed-forward", "mpc-preview"):
         assert found.pooled(name, 1.9) > floor
     assert found.pooled("mpc-preview", 1.9) < 0.2 * found.pooled("none", 1.9)
+
+
+def test_the_table_of_the_documentation_is_that_of_the_study():
+    import sys
+    from pathlib import Path
+
+    root = Path(__file__).resolve().parents[1]
+    sys.path.insert(0, str(root / "benchmarks"))
+    try:
+        import comparison
+    finally:
+        sys.path.pop(0)
+    page = (root / "docs" / "compare.md").read_text(encoding="utf-8")
+    shown = page.partition("<!-- study: begin -->\n")[2].partition("\n<!-- study: end -->")[0]
+    assert shown == comparison.table(comparison.load())
