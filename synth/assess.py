@@ -31,7 +31,8 @@ FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
 _RTOL = 1e-8  # of every variance
-_PADE = 6
+_PADE = 6  # order of the delay models that the poles are those of
+_LATE, _LATE_PADE = 0.2, 12  # delay beyond which that is too little [s], and the order it takes
 _GRID_PER_DECADE = 150
 _MOST_NODES = 150  # that a region of high sensitivity asks for
 
@@ -86,7 +87,9 @@ class Assessment:
     @cached_property
     def poles(self) -> ComplexArray:
         """Poles of the closed loop [1/s], delays as Pade models."""
-        return closed_loop_poles(self.plant.without_delays(_PADE), self.controller)
+        late = max(self.plant.delays, default=0.0) > _LATE
+        rational = self.plant.without_delays(_LATE_PADE if late else _PADE)
+        return closed_loop_poles(rational, self.controller)
 
     @property
     def stable(self) -> bool:

@@ -33,7 +33,7 @@ _RATIO = 1.4  # of the ends of one disc's diameter, where few discs do
 _MOST_DISCS = 12
 _FAR = 1e3  # a loop gain beyond which a gain margin of zero asks for nothing
 _OVERLAP = 0.2  # of neighbouring discs, in their widths
-_ARC = 4  # discs along the arc that a delay margin forbids
+_THICK = 0.03  # half the width of the band about the arc that a delay margin forbids
 _TINY = 1e-12
 _ABOUT = np.array([-0.05, -0.02, -0.01, -0.004, 0.0, 0.004, 0.01, 0.02, 0.05])
 
@@ -135,21 +135,26 @@ class DelayMargin(Limit):
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
         # A delay tau turns L by omega tau: L keeps off the arc of the unit circle that such a
-        # turn carries to -1, which a chain of discs covers.
-        # The disc of a limit on the sensitivity covers the arc's first part.
+        # turn carries to -1.  The disc of a limit on the sensitivity covers the arc's first part.
         covered = 2.0 * np.arcsin(0.5 * symbols.module_margin)
         at = np.flatnonzero(symbols.omega_values * self.bound > covered).tolist()
         turn = ca.fmin(symbols.omega[at] * bound, 2.0 * np.pi)
-        width = (turn - covered) / _ARC
+        # Half as thick as wide where it is short, and its round end where the arc ends.
+        width = ca.fmax(turn - covered, 0.0)
+        thick = ca.fmin(_THICK, 0.25 * width)
+        half = 0.5 * width - thick
+        middle = np.pi + covered + 0.5 * width
         rows = []
-        for k in range(_ARC):
-            # Half a width and a tenth of overlap; the last disc ends where the arc does.
-            angle = np.pi + covered + width * (k + 0.5 - 0.5 * _OVERLAP)
-            centre = Phasor(ca.cos(angle), ca.sin(angle))
-            radius = 2.0 * ca.sin(0.25 * width * (1.0 + _OVERLAP))
-            for d in symbols.differences:
-                loop = d - 1.0
-                rows.append(_off_disc(Phasor(loop.re[at], loop.im[at]), centre, radius))
+        for d in symbols.differences:
+            loop = d - 1.0
+            re, im = loop.re[at], loop.im[at]
+            along = re * ca.cos(middle) + im * ca.sin(middle)
+            across = ca.fabs(im * ca.cos(middle) - re * ca.sin(middle))
+            beside = ca.atan2(across, along) < half
+            radial = (ca.sqrt(along**2 + across**2 + _TINY) - 1.0) ** 2
+            to_end = (along - ca.cos(half)) ** 2 + (across - ca.sin(half)) ** 2
+            squared = ca.if_else(beside, radial, to_end)
+            rows.append(ca.log((thick**2 + _TINY) / (squared + _TINY)))
         return ca.vertcat(*rows)
 
     @override

@@ -23,8 +23,9 @@ from models.checks import InputError, SynthesisError, check_range
 
 from .limits import Limit
 from .margin_limits import DelayMargin, MaxSensitivity
+from .pareto_exchange import exchanged
 from .pareto_point import ParetoPoint
-from .pareto_walk import Walk, exchanged, with_bound
+from .pareto_walk import Walk, with_bound
 from .polish import KEPT
 from .problem import Problem
 from .question import pose
@@ -48,6 +49,7 @@ AGAINST: Mapping[str, tuple[str, str]] = {
 _STARTS = 6  # of the searches at the ends and in the middle
 _ENDS = 2  # distinct answers of each that a walk begins from
 _FROM, _TO = 1.15, 3.0  # of M_s, where the user does not say
+_LONGER = 4.0  # that of the best motion, which a front of delay margins ends at
 _LONGEST = 0.2  # of a telemetry delay [s]
 
 
@@ -186,16 +188,21 @@ def _bound_points(
     guesses = [[case.gains.a, case.gains.a1, case.gains.a2]] if case.gains is not None else []
     tell = progress or (lambda stage, done, total: None)
     tell("ends of the front", 0, 4)
-    low, high = between or _ends(question.problem_with(others), against, seed, guesses)
+    known: dict[int, Found] = {}
+    if between is None:
+        between, known = _ends(question.problem_with(others), against, count, seed, guesses)
+    low, high = between
     bounds = _spaced(low, high, count, against)
-    # The programme is made with the loosest bound; tighter ones keep more than it.
-    loosest = bounds[0] if _limit(against, bounds[0]).at_least else bounds[-1]
-    problem = question.problem_with((*others, _limit(against, float(loosest))))
+    # What a programme covers by the bound that it is made with, it must cover for all: the disc of
+    # the loosest M_s, the arc of the longest delay.
+    problem = question.problem_with((*others, _limit(against, float(bounds[-1]))))
     walk = Walk(problem, name, bounds)
     for n, k in enumerate((0, count // 2, count - 1)):
         tell("ends of the front", n + 1, 4)
-        found = search(with_bound(problem, name, float(bounds[k])), _STARTS, seed, guesses)
-        walk.begins += [(k, *end) for end in _ends_of(found)]
+        if k not in known:
+            here = with_bound(problem, name, float(bounds[k]))
+            known[k] = search(here, _STARTS, seed, guesses)
+        walk.begins += [(k, *end) for end in _ends_of(known[k])]
     if not walk.begins:
         raise SynthesisError(f"pareto: no gains keep the limits for any {name} in the range")
     walk.go(tell)
@@ -211,24 +218,27 @@ def _limit(against: str, bound: float) -> Limit:
 
 
 def _ends(
-    problem: Problem, against: str, seed: int, guesses: Sequence[Sequence[float]]
-) -> tuple[float, float]:
-    """Return where a front begins and ends: the least of the other quantity, and the most."""
+    problem: Problem, against: str, count: int, seed: int, guesses: Sequence[Sequence[float]]
+) -> tuple[tuple[float, float], dict[int, Found]]:
+    """Return where a front begins and ends, and what was found there by index of the point.
+
+    That is the least of the other quantity that can be had, and what the best motion takes.
+    """
     if against == "max_sensitivity":
-        return _FROM, _TO
+        return (_FROM, _TO), {}
     best = search(problem, _STARTS, seed, guesses)
     if best.solved is None or best.view is None or best.excess > KEPT:
         raise SynthesisError("pareto: no gains keep the limits, whatever the other quantity")
     if against == "delay_margin":
         most = best.view.margins.delay
-        return most, 4.0 * most
+        return (most, _LONGER * most), {0: best}
     output = f"motor.{against}"
     least = search(replace(problem, minimise={output: 1.0}), _STARTS, seed, guesses)
     top = best.view.sigma(output)
     if least.view is None or least.excess > KEPT:
-        return 0.1 * top, top
+        return (0.1 * top, top), {count - 1: best}
     # Slightly above the least, where nothing is free any more.
-    return min(1.01 * least.view.sigma(output), 0.99 * top), top
+    return (min(1.01 * least.view.sigma(output), 0.99 * top), top), {0: least, count - 1: best}
 
 
 def _spaced(low: float, high: float, count: int, against: str) -> FloatArray:

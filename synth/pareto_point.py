@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from models.checks import SolverError
 
 from .assess import Assessment
 from .polish import KEPT, view_of
@@ -77,17 +79,28 @@ def point_of(
     share of that one.
     """
     view = view_of(problem, solved) if view is None else view
+    payload, torque = _sigmas(view, (PAYLOAD, "motor.torque"))
     measured = {limit.name: limit.measure(view) for limit in problem.limits}
     uses = [limit.use(measured[limit.name]) - 1.0 for limit in problem.limits]
     return ParetoPoint(
         bound=bound,
         value=measured.get(name, bound),
-        payload_rms=view.sigma(PAYLOAD),
+        payload_rms=payload,
         parameters=problem.law.named([float(v) for v in solved.values]),
         max_sensitivity=view.max_sensitivity,
-        torque_rms=view.sigma("motor.torque"),
+        torque_rms=torque,
         price=float(solved.prices.get(name, 0.0) * bound / (made_with or bound or 1.0)),
         excess=float(max(uses, default=0.0)),
         solved=solved,
         problem=problem,
     )
+
+
+def _sigmas(view: Assessment, outputs: Sequence[str]) -> list[float]:
+    """Return the standard deviations of outputs, on one set of nodes for all."""
+    try:
+        nodes = view.quadrature(outputs)
+    except SolverError:
+        return [np.inf for _ in outputs]
+    found = [nodes.integrate(view.spectrum(output, nodes.omega)) for output in outputs]
+    return [float(np.sqrt(variance)) for variance in found]

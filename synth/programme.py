@@ -19,18 +19,21 @@ rope brings twenty.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
-from typing_extensions import override
 
 from models.quadrature import Quadrature
 
+from .follow import Follower
+from .guard import Guard as Guard
+from .guard import solver_options as solver_options
 from .problem import Goal as Goal
 from .problem import Problem as Problem
 from .problem import Values
@@ -50,7 +53,8 @@ __all__ = [
 FloatArray = npt.NDArray[np.float64]
 
 _ROOM = 12.0  # how far the logarithms of drag, sea and factors may move: e^12
-_PATIENCE = 60  # rejected trial points before a solve is given up
+_ITERATIONS, _MOST_ITERATIONS = 150, 400  # of a solve with few and with many parameters
+_MANY = 6
 
 
 class Pace(Enum):
@@ -77,6 +81,7 @@ class Solved:
     """What a solve returned; nothing in it is verified yet.
 
     `prices` is d log(cost) / d log(bound) by limit (the envelope theorem), for the goal COST.
+    `multipliers` are those of the programme's rows, (m,), which `Programme.follow` begins with.
     """
 
     values: FloatArray
@@ -87,76 +92,7 @@ class Solved:
     message: str
     iterations: int
     prices: dict[str, float]
-
-
-class Guard(ca.Callback):
-    """Zero where the loop is stable, not a number elsewhere; its derivative is zero.
-
-    Parameters
-    ----------
-    stable
-        Says of the programme's vector, (size,), whether the loop (or every loop) is stable.
-    size
-        Length of that vector.
-    """
-
-    def __init__(self, stable: Callable[[FloatArray], bool], size: int) -> None:
-        ca.Callback.__init__(self)
-        self._stable = stable
-        self._size = size
-        self._jacobian: ca.Function | None = None
-        self.rejected = 0
-        self.construct("guard", {})
-
-    @override
-    def get_n_in(self) -> int:
-        return 1
-
-    @override
-    def get_n_out(self) -> int:
-        return 1
-
-    @override
-    def get_sparsity_in(self, i: int) -> ca.Sparsity:
-        del i
-        return ca.Sparsity.dense(self._size, 1)
-
-    @override
-    def eval(self, arg: Sequence[Any]) -> list[float]:
-        if self.rejected > _PATIENCE:
-            return [np.nan]  # ends the solve: its line search finds nothing stable any more
-        x = np.array(arg[0], dtype=np.float64).ravel()
-        if not np.all(np.isfinite(x)):
-            return [np.nan]
-        stable = self._stable(x)
-        self.rejected += not stable
-        return [0.0 if stable else np.nan]
-
-    @override
-    def has_jacobian(self) -> bool:
-        return True
-
-    @override
-    def get_jacobian(
-        self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Mapping[str, Any]
-    ) -> ca.Function:
-        x, out = ca.MX.sym("x", self._size), ca.MX.sym("out", 1)
-        zero = ca.MX(ca.Sparsity(1, self._size))
-        self._jacobian = ca.Function(name, [x, out], [zero], inames, onames, opts)
-        return self._jacobian
-
-
-def solver_options(tolerance: float, max_iterations: int) -> dict[str, Any]:
-    """Return the options of IPOPT that every programme here shares."""
-    return {
-        "print_time": False,
-        "show_eval_warnings": False,
-        "ipopt.print_level": 0,
-        "ipopt.sb": "yes",
-        "ipopt.tol": tolerance,
-        "ipopt.acceptable_tol": 10.0 * tolerance,
-        "ipopt.max_iter": max_iterations,
-    }
+    multipliers: FloatArray | None = None
 
 
 class Programme:
@@ -172,9 +108,12 @@ class Programme:
         reference: FloatArray,
         relaxed: Sequence[str] = (),
         tolerance: float = 1e-7,
-        max_iterations: int = 150,
+        max_iterations: int | None = None,
     ) -> None:
         self.problem = problem
+        if max_iterations is None:
+            many = len(problem.law.parameters) > _MANY
+            max_iterations = _MOST_ITERATIONS if many else _ITERATIONS
         self._goal = goal
         symbols = Symbols(problem, nodes, omega, goal)
         self._bounds = np.array([limit.bound for limit in problem.limits], dtype=np.float64)
@@ -208,6 +147,7 @@ class Programme:
             "f": objective + self._guard(symbols.x),
             "g": constraints,
         }
+        self._cost = objective
         self._options = solver_options(tolerance, max_iterations)
         self._solvers: dict[Pace, Any] = {}
 
@@ -224,6 +164,10 @@ class Programme:
             options = {**self._options, **pace.value}
             self._solvers[pace] = ca.nlpsol("synthesis", "ipopt", self._statement, options)
         return self._solvers[pace]
+
+    @cached_property
+    def _follower(self) -> Follower:
+        return Follower({**self._statement, "f": self._cost})
 
     def pack(
         self, values: Values, coefficient: float | None = None, extra: float | None = None
@@ -243,9 +187,11 @@ class Programme:
             bounds[k] *= 1.0 + step if limit.at_least else 1.0 - step
         return bounds
 
-    def violations(self, x: FloatArray) -> tuple[float, dict[str, float]]:
-        """Return the log cost and the largest row of each limit at a vector."""
-        cost, rows = self.evaluate(x, self._bounds)
+    def violations(
+        self, x: FloatArray, tighten: Mapping[str, float] | None = None
+    ) -> tuple[float, dict[str, float]]:
+        """Return the log cost and the largest row of each limit at a vector; see `solve`."""
+        cost, rows = self.evaluate(x, self._tightened(tighten or {}))
         flat = np.array(rows, dtype=np.float64).ravel()
         worst = {
             limit.name: float(flat[part].max(initial=-np.inf))
@@ -273,41 +219,102 @@ class Programme:
         pace
             How near the start is to the answer.
         """
-        parameters = self.problem.law.parameters
         self._guard.rejected = 0
-        low = [p.low / p.scale for p in parameters]
-        high = [p.high / p.scale for p in parameters]
-        if reach is not None:
-            near = start[: len(parameters)]
-            room = reach * np.maximum(np.abs(near), 1e-3 * np.abs(near).max(initial=1e-3))
-            low, high = list(np.maximum(low, near - room)), list(np.minimum(high, near + room))
-        free = start.size - len(parameters)
-        bottom = np.full(self._inequalities, -np.inf)
-        equalities = [0.0] if self.problem.drag is not None else []
-        solver = self._solver(pace)
+        low, high = self._box(start, reach)
+        bottom, solver = self._bottom(), self._solver(pace)
         answer = solver(
             x0=start,
             p=self._tightened(tighten or {}),
-            lbx=[*low, *(start[-free:] - _ROOM if free else [])],
-            ubx=[*high, *(start[-free:] + _ROOM if free else [])],
-            lbg=np.concatenate([bottom, equalities]),
-            ubg=np.concatenate([np.zeros(self._inequalities), equalities]),
+            lbx=low,
+            ubx=high,
+            lbg=bottom,
+            ubg=np.zeros(bottom.size),
         )
         stats = solver.stats()
-        x = np.array(answer["x"], dtype=np.float64).ravel()
-        lam = np.array(answer["lam_p"], dtype=np.float64).ravel()
-        count = len(parameters)
-        drag = self.problem.drag is not None
-        return Solved(
-            values=x[:count] * np.array([p.scale for p in parameters]),
-            coefficient=float(np.exp(x[count])) if drag else None,
-            objective=float(answer["f"]),
-            extra=float(x[-1]) if self._goal is not Goal.COST else 0.0,
+        found = {k: np.array(answer[k], dtype=np.float64).ravel() for k in ("x", "lam_p", "lam_g")}
+        return self._answer(
+            found["x"],
+            float(answer["f"]),
+            found["lam_p"],
+            found["lam_g"],
             converged=bool(stats["success"]),
             message=str(stats["return_status"]).replace("_", " ").lower(),
             iterations=int(stats["iter_count"]),
+        )
+
+    def follow(
+        self,
+        start: FloatArray,
+        near: Solved | None = None,
+        tighten: Mapping[str, float] | None = None,
+    ) -> Solved | None:
+        """Return the answer near a start in a few steps, None if there is none so near.
+
+        Parameters
+        ----------
+        start, tighten
+            As `solve` takes them.
+        near
+            An answer of this very programme close by, for its multipliers.
+        """
+        bottom = self._bottom()
+        lam = np.zeros(bottom.size)
+        if near is not None and near.multipliers is not None and near.multipliers.size == lam.size:
+            lam = near.multipliers
+        bounds = self._tightened(tighten or {})
+        box = self._box(start, None)
+        found = self._follower.answer(start, bounds, lam, box, bottom, self._stable)
+        if found is None:
+            return None
+        x, lam, objective, steps = found
+        prices = self._follower.prices(x, bounds, lam)
+        return self._answer(
+            x, objective, prices, lam, converged=True, message="followed", iterations=steps
+        )
+
+    def _box(self, start: FloatArray, reach: float | None) -> tuple[FloatArray, FloatArray]:
+        """Return the least and greatest values that variables may take from a start."""
+        parameters = self.problem.law.parameters
+        count = len(parameters)
+        low, high = start - _ROOM, start + _ROOM
+        low[:count] = [p.low / p.scale for p in parameters]
+        high[:count] = [p.high / p.scale for p in parameters]
+        if reach is not None:
+            near = start[:count]
+            room = reach * np.maximum(np.abs(near), 1e-3 * np.abs(near).max(initial=1e-3))
+            low[:count] = np.maximum(low[:count], near - room)
+            high[:count] = np.minimum(high[:count], near + room)
+        return low, high
+
+    def _bottom(self) -> FloatArray:
+        """Return the lower bounds of the rows: only equalities have one."""
+        equalities = int(self.problem.drag is not None)
+        return np.append(np.full(self._inequalities, -np.inf), np.zeros(equalities))
+
+    def _answer(
+        self,
+        x: FloatArray,
+        objective: float,
+        prices: FloatArray,
+        multipliers: FloatArray,
+        *,
+        converged: bool,
+        message: str,
+        iterations: int,
+    ) -> Solved:
+        count = len(self.problem.law.parameters)
+        drag = self.problem.drag is not None
+        return Solved(
+            values=x[:count] * np.array([p.scale for p in self.problem.law.parameters]),
+            coefficient=float(np.exp(x[count])) if drag else None,
+            objective=objective,
+            extra=float(x[-1]) if self._goal is not Goal.COST else 0.0,
+            converged=converged,
+            message=message,
+            iterations=iterations,
             prices={
-                limit.name: float(lam[k] * limit.bound)
+                limit.name: float(prices[k] * limit.bound)
                 for k, limit in enumerate(self.problem.limits)
             },
+            multipliers=multipliers,
         )

@@ -25,6 +25,7 @@ __all__ = [
     "inverse_agreement",
     "loop_margins",
     "margin_checks",
+    "pade_order",
     "pole_check",
     "winding_check",
     "winding_of_plant",
@@ -33,6 +34,7 @@ __all__ = [
 ComplexArray = npt.NDArray[np.complex128]
 
 PADE = 8  # order of the delay models: those of the optimiser have five or six
+_LATE, _LATE_PADE = 0.2, 12  # delay beyond which that is too little [s], and the order it takes
 TIGHT = 1e-4  # of margins, drag and limits on the design's own plant
 
 
@@ -93,21 +95,27 @@ def winding_check(winding: Winding, on: str) -> Check:
     )
 
 
+def pade_order(plant: LinearPlant) -> int:
+    """Return the order of delay models that tells a loop's poles, rope and all."""
+    return _LATE_PADE if max(plant.delays, default=0.0) > _LATE else PADE
+
+
 def pole_check(name: str, plant: LinearPlant, law: LawMatrices, on: str, slowest: float) -> Check:
     """Return the check that all poles with Pade delays lie left of -slowest [1/s]."""
-    poles = np.linalg.eigvals(closed_matrices(plant.without_delays(PADE), law)[0])
+    order = pade_order(plant)
+    poles = np.linalg.eigvals(closed_matrices(plant.without_delays(order), law)[0])
     growth = float(poles.real.max(initial=-np.inf))
     return Check(
         name=name,
         ok=growth < -slowest,
         found=growth,
-        note=f"largest real part [1/s] of {poles.size} poles on {on}, Pade order {PADE}",
+        note=f"largest real part [1/s] of {poles.size} poles on {on}, Pade order {order}",
     )
 
 
 def closed_loop_marks(plant: LinearPlant, law: LawMatrices) -> ComplexArray:
     """Return the poles [1/s] of open and closed loop, without integrators."""
-    closed = closed_matrices(plant.without_delays(PADE), law)[0]
+    closed = closed_matrices(plant.without_delays(pade_order(plant)), law)[0]
     poles = [open_loop_poles(plant.A), open_loop_poles(law.A), np.linalg.eigvals(closed)]
     found = np.concatenate(poles)
     return np.asarray(found[np.abs(found) > 0.0], dtype=np.complex128)

@@ -11,22 +11,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from .assess import Assessment
+from .begin import begin_points as begin_points
+from .begin import briskest as briskest
+from .begin import coarse_programme as coarse_programme
+from .begin import start_coefficient as start_coefficient
 from .nodes import cost_nodes, margin_nodes
 from .polish import KEPT, look, polish, thinned
 from .problem import Goal, Problem
 from .programme import Pace, Programme, Solved
-from .starts import candidates, pick_spread, stabilise
+from .starts import pick_spread
 
 __all__ = [
     "Found",
     "Progress",
     "Start",
+    "begin_points",
     "coarse_programme",
     "least_violation",
     "resume",
@@ -38,8 +42,8 @@ Progress = Callable[[str, int, int], None]
 
 _AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
 _POLISHED = 6  # distinct answers that are polished at most
-_WORST = 20.0  # what one broken limit may add to the merit of a candidate
 _RESERVE = 16  # further starts for a search of which none arrived
+_SECOND_TRIES = 4  # of starts that gave up on the way to something better
 _BASIN = 1.0  # how far, relatively, a parameter may move within its basin
 _RESUMED = 6  # ends of an earlier search that a resumed one starts from
 
@@ -122,11 +126,6 @@ def resume(
     return replace(found, solved=solved, view=view, excess=excess)
 
 
-def briskest(problem: Problem, points: Sequence[FloatArray]) -> FloatArray:
-    """Return the point whose loop settles fastest, to tell the sides of the stability boundary."""
-    return min(points, key=problem.abscissa)
-
-
 def _from(
     problem: Problem,
     begins: Sequence[FloatArray],
@@ -139,10 +138,10 @@ def _from(
     tell = progress or (lambda stage, done, total: None)
     programme = coarse_programme(problem, begins[:wanted], reference)
     records: list[Start] = []
-    first: list[Solved] = []
+    solves: list[Solved] = []
     count = len(begins) if wanted is None else min(wanted, len(begins))
     for k, begin in enumerate(begins):
-        if k >= count and first:
+        if k >= count and any(np.isfinite(record.cost) for record in records):
             break
         tell("starts", min(k, count - 1), count)
         solved = programme.solve(programme.pack(begin, coefficient))
@@ -159,8 +158,11 @@ def _from(
                 iterations=solved.iterations,
             )
         )
-        if solved.converged and stable:
-            first.append(solved)
+        solves.append(solved)
+    _once_more(programme, records, solves)
+    first = [
+        solved for solved, record in zip(solves, records, strict=True) if np.isfinite(record.cost)
+    ]
     tell("starts", count, count)
     if not first:
         solved = least_violation(problem, begins, reference)
@@ -173,6 +175,35 @@ def _from(
             reference=reference,
         )
     return _polished(problem, first, reference, tuple(records), tell)
+
+
+def _once_more(programme: Programme, records: list[Start], solves: list[Solved]) -> None:
+    """Go on from where starts gave up, if they were on the way to something better.
+
+    The guard, or a restoration that failed, ends a solve at a stable point; from there another
+    barrier may lead on.
+    """
+    best = min((np.log(r.cost) for r in records if np.isfinite(r.cost)), default=np.inf)
+    ends: list[tuple[float, int]] = []
+    for k, (record, solved) in enumerate(zip(records, solves, strict=True)):
+        if record.stable and not record.converged:
+            cost, broken = programme.violations(programme.pack(solved.values, solved.coefficient))
+            merit = cost + sum(max(0.0, row) for row in broken.values())
+            if merit < best:
+                ends.append((merit, k))
+    for _, k in sorted(ends)[:_SECOND_TRIES]:
+        x = programme.pack(solves[k].values, solves[k].coefficient)
+        solved = programme.solve(x, pace=Pace.NEAR)
+        if solved.converged and programme.problem.stable(solved.values, solved.coefficient):
+            solves[k] = solved
+            records[k] = replace(
+                records[k],
+                end=solved.values,
+                cost=float(np.exp(solved.objective)),
+                converged=True,
+                message=solved.message,
+                iterations=records[k].iterations + solved.iterations,
+            )
 
 
 def _polished(
@@ -236,35 +267,6 @@ def _second_pass(
     return sound or {solved: solved for solved in first}
 
 
-def coarse_programme(
-    problem: Problem,
-    begins: Sequence[FloatArray],
-    reference: FloatArray,
-    goal: Goal = Goal.COST,
-    **options: Any,
-) -> Programme:
-    """Return a programme on nodes that suit all the starts."""
-    views = [
-        Assessment(
-            problem.plant,
-            problem.law.controller([float(v) for v in begin]),
-            problem.disturbances,
-            drag=problem.drag,
-            coefficient=start_coefficient(problem),
-        )
-        for begin in begins
-    ]
-    return Programme(
-        problem,
-        cost_nodes(problem, views, rtol=1e-4),
-        margin_nodes(problem, [v.poles for v in views[:4]], 40),
-        goal,
-        reference=reference,
-        tolerance=1e-6,
-        **options,
-    )
-
-
 def least_violation(
     problem: Problem, begins: Sequence[FloatArray], reference: FloatArray
 ) -> Solved:
@@ -289,46 +291,6 @@ def least_violation(
         iterations=0,
         prices={limit.name: 0.0 for limit in problem.limits},
     )
-
-
-def start_coefficient(problem: Problem) -> float | None:
-    """Return the drag coefficient that a search begins with [N s/m]."""
-    return None if problem.drag is None else problem.drag.reference
-
-
-def begin_points(
-    problem: Problem, starts: int, seed: int, guesses: Sequence[Sequence[float]]
-) -> list[FloatArray]:
-    """Return stable starting points: guesses, screened candidates, stabilised candidates."""
-    order = len(problem.rational.states)
-    points = candidates(problem, 1024 if order <= 12 else 512, seed)
-    if len(guesses):
-        points = np.vstack([np.array(guesses, dtype=np.float64), points])
-    abscissas = np.array([problem.abscissa(p) for p in points])
-    stable = np.flatnonzero(abscissas < -1e-9)
-    scales = np.array([p.scale for p in problem.law.parameters])
-    if stable.size < starts:
-        found = stabilise(problem, points, np.where(abscissas < 0, np.inf, abscissas), starts)
-        points = np.vstack([points[stable], *[f[None] for f in found]])
-    else:
-        points = points[stable]
-    if not len(points):
-        return []
-    merit = _merit(problem, points)
-    return [points[i] for i in pick_spread(points, merit, scales, starts)]
-
-
-def _merit(problem: Problem, points: FloatArray) -> FloatArray:
-    """Return log cost plus a penalty on broken limits, on nodes that suit the plant alone."""
-    sample = points[:: max(1, len(points) // 4)][:4]
-    programme = coarse_programme(problem, list(sample), briskest(problem, list(sample)))
-    merit = []
-    for point in points:
-        x = programme.pack(point, start_coefficient(problem))
-        cost, broken = programme.violations(x)
-        # Rows are logarithms as the cost is: a margin broken tenfold outweighs a tenfold gain.
-        merit.append(cost + sum(min(_WORST, max(0.0, row)) for row in broken.values()))
-    return np.asarray(np.nan_to_num(np.array(merit, dtype=np.float64), nan=np.inf))
 
 
 def _distinct(solved: Sequence[Solved]) -> list[Solved]:

@@ -1,6 +1,6 @@
 """Optimise a named structure on a case.
 
-    StructureQuestion -> simpler structure within -> search -> (drive too small? say so)
+    StructureQuestion -> simpler structures within -> search -> (drive too small? say so)
                       -> StructureDesign -> verified, on twice the rope masses too
 
 A design that fails its independent check is not ok, whatever the search said.
@@ -8,7 +8,7 @@ A design that fails its independent check is not ok, whatever the search said.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from models.case import Case
@@ -22,9 +22,9 @@ from .question import PAYLOAD
 from .search import Progress, begin_points, briskest, least_violation, search
 from .structure_design import StructureDesign
 from .structure_question import StructureQuestion, pose_structure
+from .structure_starts import nested_starts, no_worse, starts_from
 from .threads import one_thread
 from .tune import LimitUse, Tuning, limit_uses, tuning_of
-from .winch_structures import LowOrderFeedback
 
 __all__ = ["optimise_structure"]
 
@@ -41,6 +41,7 @@ def optimise_structure(
     seed: int = 0,
     *,
     progress: Progress | None = None,
+    guesses: Sequence[Mapping[str, float]] = (),
 ) -> StructureDesign:
     """Return the best controller of a structure for a case.
 
@@ -60,6 +61,10 @@ def optimise_structure(
         Seed of the starts.
     progress
         Called as progress(stage, done, total).
+    guesses
+        Parameters by name of designs for similar cases or of simpler structures, which the search
+        begins with instead of looking for such itself; what they do not name does nothing.  The
+        answer is never worse than one of them that keeps the limits.
 
     Raises
     ------
@@ -68,43 +73,16 @@ def optimise_structure(
     """
     check_range("optimise_structure", "starts", starts, low=1)
     posed = pose_structure(case, name)
-    guesses = _seeds(posed, int(starts), seed, progress)
-    design, values = _searched(posed, int(starts), seed, guesses, progress)
+    known = starts_from(posed, guesses) or nested_starts(posed, int(starts), seed, progress)
+    design, values = _searched(posed, int(starts), seed, known, progress)
     most = 1 if posed.question.data.lumping == "thesis" else MAX_MASSES
-    while design.ok and 2 * design.masses <= most and not design.verify().ok:
+    checked = _verified(design, progress)
+    while design.ok and not checked.ok and 2 * design.masses <= most:
         # It stands on its own rope only: once more on twice the masses.
         posed = pose_structure(case, name, 2 * design.masses)
         design, values = _searched(posed, int(starts), seed, [values], progress)
-    return _verified(design, progress)
-
-
-def _seeds(
-    posed: StructureQuestion, starts: int, seed: int, progress: Progress | None
-) -> list[list[float]]:
-    """Return parameter vectors to begin with: the best of a simpler structure within this one.
-
-    Payload feedback behind filters holds that without; a free controller of order two or more
-    holds that behind a roll-off (with perfect sensors its own candidates, LQG designs, want
-    infinite gains).
-    """
-    structure = posed.structure
-    if isinstance(structure, LowOrderFeedback):
-        within = "payload-feedback-rolloff" if structure.order >= 2 else None
-    else:
-        plain = structure.hears_payload and not structure.drum and structure.filters
-        within = "payload-feedback" if plain else None
-    if within is None:
-        return []
-    simple = pose_structure(posed.question.case, within, posed.question.masses)
-    few = min(starts, _ENDS)
-    guesses = _seeds(simple, few, seed, progress)
-    problem = simple.problem(simple.limits)
-    found = tuning_of(problem, search(problem, few, seed, guesses, progress))
-    if found.controller is None:
-        return []
-    if isinstance(structure, LowOrderFeedback):
-        return [structure.start(posed.law, found.parameters, found.controller)]
-    return [structure.plain_start(posed.law, found.parameters)]
+        checked = _verified(design, progress)
+    return checked
 
 
 def _searched(
@@ -125,7 +103,8 @@ def _searched(
     near = _within(full, values, seed) if broken else values
     if near is not None:
         known = [near, values]
-        tuned = tuning_of(full, search(full, starts if broken else 1, seed, known, progress))
+        count = starts + len(known) if broken else 1
+        tuned = tuning_of(full, no_worse(full, search(full, count, seed, known, progress), known))
         if tuned.ok:
             return _design(posed, tuned, drive_kept=True), list(tuned.parameters.values())
     needs = [f"{u.name} {u.value:.4g} {u.unit} instead of {u.bound:.4g}" for u in broken]
@@ -155,7 +134,8 @@ def _patient(
 
     With ten parameters or more a solve may need more iterations than it is given.
     """
-    tuning = tuning_of(problem, search(problem, starts, seed, guesses, progress))
+    found = search(problem, starts + len(guesses), seed, guesses, progress)
+    tuning = tuning_of(problem, no_worse(problem, found, guesses))
     for _ in range(_ROUNDS):
         if tuning.ok:
             break
@@ -163,7 +143,8 @@ def _patient(
         if not ends:
             break
         again = [*([float(v) for v in end] for end in ends[:_ENDS]), *guesses]
-        tuning = tuning_of(problem, search(problem, min(starts, _ENDS), seed, again, progress))
+        count = min(starts, _ENDS) + len(again)
+        tuning = tuning_of(problem, search(problem, count, seed, again, progress))
     return tuning
 
 

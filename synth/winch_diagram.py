@@ -31,8 +31,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from models.checks import InputError, check_range
 from models.linear import LinearPlant
 from models.signals import pick
@@ -125,21 +123,6 @@ class WinchStructure(Structure):
         wanted = self.motor.inertia * bandwidth - self.motor.damping
         floor = 0.02 * self.motor.inertia * _LEAST_BANDWIDTH
         return max(wanted, floor) / self.motor.torque_gain
-
-    def plain_start(self, law: Law, found: Mapping[str, float]) -> list[float]:
-        """Return the parameters that make of payload feedback without filters this structure."""
-        neutral = {
-            "rolloff.corner": TRANSPARENT,
-            "rolloff.damping": 0.7,
-            "lead.zero": 50.0,
-            "lead.pole": 50.0,
-            "notch.depth": 1.0,
-            "integral.corner": 0.0,
-        }
-        known = {**neutral, **found}
-        values = [known.get(p.name, p.scale) for p in law.parameters]
-        limits = ((p.low, p.high) for p in law.parameters)
-        return [float(np.clip(v, *pair)) for v, pair in zip(values, limits, strict=True)]
 
     def gains(self, plant: LinearPlant) -> list[Parameter]:
         """Return the parameters that are not those of sections."""

@@ -6,6 +6,7 @@ that suit it, and a feed-forward that is the best there is for the rest, by leas
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -70,6 +71,9 @@ class WinchLaw(DiagramLaw):
                 # Most with the sign that damps: the haul follows the payload's speed.
                 size = np.where((k == 0) & (uniform[name] < 0.4), -size, size)
                 put(name, size * structure.pace ** (k - 1))
+            if yu.size:
+                # With good sensors far larger gains do: as large as some crossover allows.
+                self._ask(values[::2], points[::2], omega, yu)
         elif structure.hears_payload:
             self._spread(values, points, omega, yu)
         return self.clipped(values)
@@ -89,6 +93,25 @@ class WinchLaw(DiagramLaw):
                 size = float(np.abs(own[j] * yu[at[k], j, 0]).max())
                 row[i] = loop_gain[k, i] / max(size, 1e-12)
 
+    def _ask(
+        self, values: FloatArray, points: FloatArray, omega: FloatArray, yu: ComplexArray
+    ) -> None:
+        """Set what the payload asks for by loop gains at a crossover, around the drum loop."""
+        at = np.minimum((points[:, -2] * omega.size).astype(int), omega.size - 1)
+        columns = [self.index(name) for name in ASKED]
+        heard = [self._columns[name] for name in PAYLOAD_MEASUREMENTS]
+        for k, row in enumerate(values):
+            row[columns] = 1.0
+            own = self.response(list(row), 1j * omega[at[k] : at[k] + 1])[0]
+            through = np.array([np.ravel(c)[0] for c in own]) * yu[at[k], :, 0]
+            inner = 1.0 - (through.sum() - through[heard].sum())
+            for i, (column, j) in enumerate(zip(columns, heard, strict=True)):
+                signed = 2.0 * points[k, column] - 1.0
+                if i == 0 and points[k, column] < 0.4:
+                    signed = -signed
+                size = _TOP * 10.0 ** (2.0 * (abs(signed) - 1.0)) * abs(inner)
+                row[column] = np.sign(signed) * size / max(abs(through[j]), 1e-12)
+
     def guesses(self, problem: Problem, omega: FloatArray) -> FloatArray:
         """Return drum loops whose feed-forward is the best for the question, by least squares.
 
@@ -98,7 +121,7 @@ class WinchLaw(DiagramLaw):
         if not self._structure.drum:
             return np.zeros((0, len(self.parameters)))
         points = qmc.Sobol(self.dimensions, seed=1).random_base2(8)
-        drawn = self.draw(points, omega, np.zeros((0, 0, 1), dtype=np.complex128))
+        drawn = self.draw(points, omega, problem.plant.response_at((1e-3 + 1j) * omega).yu)
         if self._structure.hears_payload:
             # A quarter of them hardly hears the payload.
             columns = [self.index(name) for name in ASKED]
@@ -111,6 +134,15 @@ class WinchLaw(DiagramLaw):
         for row in drawn:
             self._feed(row, problem, response, weights)
         return self.clipped(drawn)
+
+    def fed(self, values: Sequence[float], problem: Problem) -> list[list[float]]:
+        """Return parameters with the feed-forward that suits the rest best, if there is one."""
+        if not self._structure.heave:
+            return []
+        nodes = np.geomspace(0.05, 20.0, 240)
+        row = np.array(values, dtype=np.float64)
+        self._feed(row, problem, problem.plant.response(nodes), np.gradient(nodes))
+        return [[float(v) for v in self.clipped(row[None])[0]]]
 
     def _feed(
         self, row: FloatArray, problem: Problem, response: PlantResponse, weights: FloatArray

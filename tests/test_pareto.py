@@ -92,3 +92,30 @@ def test_more_delay_is_never_better():
 def test_questions_without_sense_are_refused(options, message):
     with pytest.raises(InputError, match=message):
         pareto_front(load_case("thesis-1975"), **options)
+
+
+@pytest.mark.slow
+def test_every_delay_margin_is_met_and_little_more():
+    front = pareto_front(
+        load_case("thesis-1975"), "delay_margin", points=6, between=(0.14, 0.3), checks=2
+    )
+    assert front.lost == ()
+    assert front.verified == (2, 2)
+    for point in front.points:
+        # The band about the forbidden arc has a thickness: a hundredth or so is given away.
+        assert point.bound * (1.0 - 1e-5) <= point.value <= 1.02 * point.bound
+    rms = [p.payload_rms for p in front.points]
+    assert rms == sorted(rms)
+
+
+def test_a_front_changes_basins_and_loses_no_point():
+    front = pareto_front(
+        load_case("thesis-1975"), "max_sensitivity", points=16, between=(1.3, 3.0), checks=4
+    )
+    assert front.lost == ()
+    assert front.verified == (4, 4)
+    rms = np.array([p.payload_rms for p in front.points])
+    assert np.all(np.diff(rms) < 0.0)
+    assert rms[-1] < 4.2e-3  # the basin of high gains; that of low ones ends at 27 mm
+    for point in front.points:
+        assert point.max_sensitivity <= point.bound * (1.0 + 1.1e-5)
