@@ -9,7 +9,7 @@ r"""One quadratic programme after another, each a little different from the last
 DAQP (D. Arnstrom, A. Bemporad and D. Axehill, IEEE TAC 67, 2022) is a dual active-set method:
 exact, with a bound on its iterations, and with soft rows of its own that need no slack variables.
 Set up once; each sample brings a gradient and bounds, and begins with the active set of the last.
-`benchmarks/mpc.py` compares it with others.
+`benchmarks/mpc_speed.py` compares it with others.
 
 `kkt_residual` checks an answer without the solver.
 """
