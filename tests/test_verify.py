@@ -404,7 +404,7 @@ def test_verification_says_what_failed() -> None:
 def test_the_check_shares_no_code_with_the_optimiser() -> None:
     folder = Path(synth.__file__).parent
     own = {"verify", "verify_tuning", "verification", "recheck", "recompute", "claims"}
-    own |= {"nyquist", "winding", "shaping", "integrals", "uncompensated"}
+    own |= {"nyquist", "winding", "integrals", "uncompensated"}
     shared = {"controller", "disturbance", "limits", "threads"}  # data, and one BLAS thread
     for name in sorted(own):
         tree = ast.parse((folder / f"{name}.py").read_text(encoding="utf-8"))
