@@ -29,7 +29,7 @@ from .plant_data import PlantData
 from .sensors import Sensors
 from .white import White
 
-__all__ = ["MEASURED", "NOISES", "sensed_plant", "sensed_spectra"]
+__all__ = ["MEASURED", "NOISES", "sensed_plant", "sensed_spectra", "with_sensors"]
 
 #: What is measured, in the order of the plant's measurements.
 MEASURED = (
@@ -87,7 +87,26 @@ def sensed_plant(
     check_range("sensed plant", "drag", drag, low=0.0, unit="N s/m")
     if isinstance(case, Case) and sensors is None:
         sensors = case.sensors
-    plant = build_plant(case, masses).linearise(drag=drag)
+    return with_sensors(build_plant(case, masses).linearise(drag=drag), sensors)
+
+
+def with_sensors(plant: LinearPlant, sensors: Sensors | None) -> LinearPlant:
+    """Return a linear plant of `models.plant` with the sensors besides the payload's own.
+
+    Every matrix of the answer is affine in those of `plant`.
+
+    Parameters
+    ----------
+    plant
+        The plant, as `Plant.linearise` gives it.
+    sensors
+        The sensors of a case; None for exact ones.
+
+    Returns
+    -------
+    LinearPlant
+        As `sensed_plant` describes it.
+    """
     known = {name: k for k, name in enumerate(plant.outputs)}
     n, nw = len(plant.states), len(plant.disturbances)
     hook = [plant.disturbances.index(name) for name in ("hook.heave", "hook.heave_rate")]
