@@ -93,6 +93,7 @@ def case_for(sea: Sea | None = None) -> sh.Case:
         changes["vessel.beyond"] = "hold" if sea.continuation == "hold" else "zero"
     if sea is not None and sea.continuation == "hold to 3 rad/s":
         table = case.vessel.heave_rao
+        assert table is not None  # the thesis's is a table
         changes["vessel.heave_rao.omega"] = [*table.omega, 3.0]
         changes["vessel.heave_rao.amplitude"] = [*table.amplitude, table.amplitude[-1]]
     return case.replace(changes)

@@ -11,11 +11,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path as FilePath
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from .checks import InputError
+from .data_file import FOLDER
 from .environment import Sea, Vessel
 from .limits import GainBounds, Gains, Limits
 from .messages import Path, describe, line_of, message_line
@@ -45,7 +48,7 @@ class Case(Section):
     sea: Sea
     """The sea state."""
     vessel: Vessel
-    """The vessel, by the heave of its hook."""
+    """The vessel: the heave of its hook, or its RAOs and the hook's place."""
     rope: Rope
     """The rope between the drum and the payload."""
     payload: Payload
@@ -78,6 +81,7 @@ class Case(Section):
         *,
         source: str = "case",
         lines: Mapping[Path, int] | None = None,
+        folder: str | PathLike[str] | None = None,
     ) -> Case:
         """Make a case from the contents of a case file.
 
@@ -89,6 +93,9 @@ class Case(Section):
             Name of the file, for the messages.
         lines
             Line number of each path in the file, where known.
+        folder
+            Folder that relative paths of files in the case start from; the working directory if
+            left out.
 
         Raises
         ------
@@ -101,7 +108,8 @@ class Case(Section):
             For each implausible figure.
         """
         try:
-            case = cls.model_validate(data)
+            context = {FOLDER: None if folder is None else FilePath(folder)}
+            case = cls.model_validate(data, context=context)
         except ValidationError as error:
             raise InputError(describe(error, cls, source=source, lines=lines)) from error
         case._source = source

@@ -58,9 +58,11 @@ def load_case(name_or_path: str | Path) -> Case:
     if isinstance(name_or_path, str) and source in _bundled_names():
         text = _bundled_text(source)
         kind = "yaml"
+        folder = None  # a bundled case names bundled data only
     else:
         text = _file_text(Path(name_or_path))
         kind = Path(name_or_path).suffix.lower().lstrip(".")
+        folder = Path(name_or_path).parent
     data, lines = _parsed(text, kind, source)
     if data is None:
         raise InputError(f"{source}: is empty; `stillhook new` writes a case to start from")
@@ -69,7 +71,7 @@ def load_case(name_or_path: str | Path) -> Case:
         raise InputError(
             f"{source}: must hold sections (sea:, vessel:, rope:, ...) at the top, got {what}"
         )
-    return Case.from_dict(data, source=source, lines=lines)
+    return Case.from_dict(data, source=source, lines=lines, folder=folder)
 
 
 def bundled_cases() -> tuple[tuple[str, str], ...]:

@@ -3,6 +3,8 @@ r"""The hook's motion: sea times vessel, as spectra, as numbers and as a time se
 Third room in the data's way: what the hook does before any winch acts on it.  The displacement's
 spectrum is |RAO|^2 S; velocity and acceleration follow by omega^2 and omega^4.  All three use the
 same band, and so does the time series, so that statistics of a long record meet the spectrum's.
+Sea and RAO are functions of the waves' own frequency; on a vessel that moves through the water the
+hook's spectra are functions of the frequency at which it meets them (`models.encounter`).
 
 A record is a sum of harmonics with random amplitude, that is independent Gaussian cosine and sine
 parts of variance S(omega) d omega each (Rice 1944; Tucker, Challenor and Carter 1984): the record
@@ -23,11 +25,13 @@ import numpy as np
 import numpy.typing as npt
 
 from .checks import InputError, check_range, read_only
+from .encounter import Encounter, MetSpectrum
 from .metrics import SpectrumStatistics, spectrum_statistics
 from .physics_warning import PhysicsWarning
 from .quadrature import Quadrature, adaptive_nodes
 from .sea import SeaSpectrum
 from .vessel import HeaveRao, OutsideShare
+from .vessels.hook_operator import speed_remark
 
 if TYPE_CHECKING:
     from .case import Case
@@ -91,6 +95,8 @@ class HookMotion:
         The sea's spectrum.
     rao
         Heave of the hook per metre of wave.
+    encounter
+        How the waves are met on a vessel that moves through the water, if it does.
 
     Examples
     --------
@@ -103,12 +109,30 @@ class HookMotion:
 
     sea: SeaSpectrum
     rao: HeaveRao
+    encounter: Encounter | None = None
 
     @classmethod
-    def from_case(cls, case: Case) -> HookMotion:
-        """Return the hook motion of a case; warns if much of it lies outside the RAO's table."""
-        motion = cls(sea=SeaSpectrum.from_case(case), rao=HeaveRao.from_case(case))
-        motion.warn_if_outside()
+    def from_case(cls, case: Case, *, warn: bool = True) -> HookMotion:
+        """Return the hook motion of a case.
+
+        Parameters
+        ----------
+        case
+            The case.
+        warn
+            Whether to warn if much of the motion lies outside the RAO's table; not where the
+            case's user has been told before.
+        """
+        motion = cls(
+            sea=SeaSpectrum.from_case(case),
+            rao=HeaveRao.from_case(case),
+            encounter=Encounter.from_case(case),
+        )
+        if warn:
+            remark = speed_remark(case)
+            if remark is not None:
+                warnings.warn(f"{case.source or case.name}: {remark}", PhysicsWarning, stacklevel=2)
+            motion.warn_if_outside()
         return motion
 
     def scaled(self, significant_height: float) -> HookMotion:
@@ -117,7 +141,9 @@ class HookMotion:
 
     def density(self, omega: npt.ArrayLike) -> FloatArray:
         """Return the displacement's one-sided variance density [m^2 s/rad] at `omega` [rad/s]."""
-        result: FloatArray = np.abs(self.rao.response(omega)) ** 2 * self.sea.density(omega)
+        if self.met is not None:
+            return self.met.density(omega)
+        result: FloatArray = self.rao.gain(omega) ** 2 * self.sea.density(omega)
         return result
 
     def __call__(self, omega: npt.ArrayLike) -> FloatArray:
@@ -132,15 +158,29 @@ class HookMotion:
         """Return the acceleration's variance density [(m/s2)^2 s/rad] at `omega` [rad/s]."""
         return self._density(omega, 2)
 
+    @cached_property
+    def met(self) -> MetSpectrum | None:
+        """The displacement's spectrum over the frequency of encounter; None on a vessel at rest."""
+        if self.encounter is None:
+            return None
+        rao = self.rao if self.encounter.operators is None else None
+        return self.encounter.met(
+            self.sea.density, self.sea.band, rao=rao, splits=self._wave_splits
+        )
+
     @property
     def band(self) -> tuple[float, float]:
-        """Band of the spectra and of the time series: the sea's [rad/s]."""
-        return self.sea.band
+        """Band of the spectra and of the time series: the sea's, or what is met of it [rad/s]."""
+        return self.sea.band if self.met is None else self.met.band
 
     @property
     def splits(self) -> tuple[float, ...]:
         """Frequencies at which a quadrature has to begin a new panel [rad/s]."""
-        low, high = self.band
+        return self._wave_splits if self.met is None else self.met.splits
+
+    @property
+    def _wave_splits(self) -> tuple[float, ...]:
+        low, high = self.sea.band
         return tuple(sorted(w for w in {*self.sea.splits, *self.rao.splits} if low < w < high))
 
     @cached_property
@@ -197,7 +237,7 @@ class HookMotion:
             if part >= 0.0005
         ]
         warnings.warn(
-            f"vessel.heave_rao: {share.total:.1%} of the hook's displacement variance lies outside "
+            f"{self.rao.owner}: {share.total:.1%} of the hook's displacement variance lies outside "
             f"the table ({first:g} to {last:g} rad/s): {'; '.join(parts)}",
             PhysicsWarning,
             stacklevel=3,
@@ -229,7 +269,8 @@ class HookMotion:
         if seed < 0:
             raise InputError(f"hook record: seed must be at least 0, got {seed!r}")
         # Twice the length, so that it does not repeat; 200 lines below the peak resolve its shape.
-        wanted = max(2.0 * duration, 200.0 * 2.0 * math.pi / self.sea.peak_frequency)
+        peak = self.sea.peak_frequency if self.met is None else self.met.peak_frequency
+        wanted = max(2.0 * duration, 200.0 * 2.0 * math.pi / peak)
         steps = math.ceil(10.0 * _transformable(math.ceil(wanted / 10.0)) / step - 1e-6)
         # The transform's own step has to resolve the band's upper end.
         finer = math.floor(self.band[1] * step / math.pi) + 1
@@ -237,8 +278,13 @@ class HookMotion:
         lines = math.floor(self.band[1] / spacing)
         omega = spacing * np.arange(1.0, lines + 1.0)
         parts = np.random.default_rng(seed).standard_normal((lines, 2))
-        wave = np.sqrt(self.sea.density(omega) * spacing) * (parts[:, 0] - 1j * parts[:, 1])
-        heave = self.rao.response(omega) * wave
+        noise = parts[:, 0] - 1j * parts[:, 1]
+        if self.encounter is None:
+            wave = np.sqrt(self.sea.density(omega) * spacing) * noise
+            heave = self.rao.response(omega) * wave
+        else:
+            phase = np.angle(self.rao.response(self.encounter.wave_frequency(omega)))
+            heave = np.sqrt(self.density(omega) * spacing) * np.exp(1j * phase) * noise
         count = math.floor(duration / step + 1e-9) + 1
 
         def series(derivative: int) -> FloatArray:

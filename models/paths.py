@@ -18,7 +18,8 @@ __all__ = ["plain", "replaced"]
 def plain(value: Any) -> Any:
     """Return sections as dicts without empty fields, and sequences as lists."""
     if isinstance(value, Section):
-        items = ((name, getattr(value, name)) for name in type(value).model_fields)
+        names = (name for name in type(value).model_fields if name not in value._derived)
+        items = ((name, getattr(value, name)) for name in names)
         return {name: plain(item) for name, item in items if item is not None}
     if isinstance(value, Mapping):
         return {key: plain(item) for key, item in value.items()}

@@ -49,7 +49,8 @@ def remarks(case: Case) -> list[Finding]:
             f"{sea.spectral_peak_period:.3g} s: feedback cannot act on the waves"
         )
         found.append(("sensors.telemetry.delay", text))
-    phase = case.vessel.heave_rao.phase or ()
+    table = case.vessel.heave_rao
+    phase = (table.phase if table is not None else None) or ()
     if any(abs(angle) > 2.0 * math.pi for angle in phase):
         largest = max(phase, key=abs)
         text = (

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .encounter import Encounter
 from .excitation import HOOK, SECOND_BODY, SpectrumMotion
 from .hook import HookMotion
 from .sea import SeaSpectrum
@@ -40,9 +41,7 @@ def boat_motion(case: Case, cut_off: float = 0.9) -> SpectrumMotion:
     omega = np.linspace(0.1, 4.0, 40) * cut_off
     amplitude = 1.0 / np.sqrt(1.0 + (omega / cut_off) ** 8)
     rao = HeaveRao(omega=omega, amplitude=amplitude, below="unity", beyond="decay")
-    return SpectrumMotion(
-        hook=HookMotion(sea=SeaSpectrum.from_case(case), rao=rao), purpose=SECOND_BODY
-    )
+    return SpectrumMotion(hook=_in_the_sea_of(case, rao), purpose=SECOND_BODY)
 
 
 def surface_motion(case: Case, side: float) -> SpectrumMotion:
@@ -63,4 +62,10 @@ def surface_motion(case: Case, side: float) -> SpectrumMotion:
     omega = np.sqrt(2.0 * GRAVITY * half / side)
     amplitude = np.maximum(np.sinc(half / math.pi), 0.0)
     rao = HeaveRao(omega=omega, amplitude=amplitude, below="unity", beyond="zero")
-    return SpectrumMotion(hook=HookMotion(sea=SeaSpectrum.from_case(case), rao=rao), purpose=HOOK)
+    return SpectrumMotion(hook=_in_the_sea_of(case, rao), purpose=HOOK)
+
+
+def _in_the_sea_of(case: Case, rao: HeaveRao) -> HookMotion:
+    """Return a motion in the waves of a case, as they are met where its vessel is."""
+    met = Encounter.from_case(case, hook=False)
+    return HookMotion(sea=SeaSpectrum.from_case(case), rao=rao, encounter=met)

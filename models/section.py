@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, PrivateAttr, ValidationError
 from pydantic_core import PydanticCustomError
 
 from .checks import InputError
@@ -25,6 +25,9 @@ class Section(BaseModel):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()
     """Groups of fields of which one is given: replacing one drops the others of its group."""
+
+    _derived: frozenset[str] = PrivateAttr(default=frozenset())
+    """Fields that were not given but follow from the others; they are not written to a file."""
 
     def __init__(self, **data: Any) -> None:
         try:

@@ -106,6 +106,9 @@ KINDS: Mapping[str, Kind] = {
     "torque constant": _kind("a torque constant", "N m/A", {"N m/A": 1.0, "kN m/A": 1e3}),
     "back-EMF constant": _kind("a back-EMF constant", "V s/rad", {
         "V s/rad": 1.0, "V s": 1.0, "V/rpm": 1.0 / _RPM}),
+    # Of a sea's elevation.  "m2 s" is refused: people write it for both.
+    "spectral density": _kind("a spectral density", "m2 s/rad", {
+        "m2 s/rad": 1.0, "m2/Hz": 0.5 / math.pi, "cm2/Hz": 0.5e-4 / math.pi}),
     "temperature difference": _kind("a temperature difference", "K", {"K": 1.0, "degC": 1.0}),
     # Amplitude spectral densities: the square root of a one-sided variance density per hertz.
     "acceleration noise": _kind("an acceleration noise density", "m/s2/sqrt(Hz)", {

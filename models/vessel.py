@@ -1,7 +1,9 @@
 """The vessel: how far the hook heaves per metre of wave.
 
 Second room in the data's way: a sea's spectrum times |RAO|^2 is the hook motion's spectrum.  The
-vessel is one response amplitude operator (RAO) of heave at the hook, a table over frequency.
+vessel is one response amplitude operator (RAO) of heave at the hook, a table over frequency: given
+in the case, or made of the RAOs of the vessel's six motions (`models.vessels`) for the place of the
+hook and the headings of the sea.
 
 Between the rows, amplitude and unwrapped phase are each interpolated linearly.  Linear on the
 complex number would cut the corner between two rows whose phases differ and read too low an
@@ -76,6 +78,8 @@ class HeaveRao:
         Phases, positive where heave leads the wave (k,) [rad]; zero if left out.
     below, beyond
         What the operator is outside the table: one of :data:`BELOW` and one of :data:`BEYOND`.
+    owner
+        The field of the case that the table comes from, for messages.
 
     Raises
     ------
@@ -95,10 +99,11 @@ class HeaveRao:
     phase: FloatArray | None = None
     below: str = "unity"
     beyond: str = "decay"
+    owner: str = "vessel.heave_rao"
 
     def __post_init__(self) -> None:
         """Check the table and make its arrays read-only."""
-        owner = "vessel.heave_rao"
+        owner = self.owner
         omega = check_ascending(owner, "omega", check_finite(owner, "omega", self.omega))
         if omega.ndim != 1 or omega.size < 2:
             raise InputError(f"{owner}: omega must have at least 2 rows, got {omega.size}")
@@ -133,9 +138,31 @@ class HeaveRao:
 
     @classmethod
     def from_case(cls, case: Case) -> HeaveRao:
-        """Return the RAO of a case's vessel."""
+        """Return the RAO of a case's hook.
+
+        In a short-crested sea it is the one that gives the hook the same spectrum, see
+        :func:`models.vessels.hook_operator.equivalent`.
+
+        Raises
+        ------
+        InputError
+            If the vessel's file is wrong, or the vessel has not been computed in these headings.
+        """
         vessel = case.vessel
         table = vessel.heave_rao
+        if table is None:
+            from .vessels.hook_operator import equivalent, hook_operators
+
+            omega, operators, _, weights = hook_operators(case)
+            amplitude, phase = equivalent(operators, weights)
+            return cls(
+                omega=omega,
+                amplitude=amplitude,
+                phase=phase,
+                below=vessel.below,
+                beyond=vessel.beyond,
+                owner="vessel.raos",
+            )
         return cls(
             omega=np.asarray(table.omega, dtype=np.float64),
             amplitude=np.asarray(table.amplitude, dtype=np.float64),
@@ -158,27 +185,49 @@ class HeaveRao:
             Hook heave per wave elevation [m/m], same shape.
         """
         frequency = np.asarray(omega, dtype=np.float64)
-        rows, amplitudes, phases = self._columns()
+        rows, _, phases = self._columns()
+        phase = np.interp(frequency, rows, phases)
+        if self.below == "unity":
+            # Long waves lift the vessel as they lift the water: amplitude 1, phase 0.
+            under = frequency < rows[0]
+            part = np.divide(
+                frequency, rows[0], out=np.ones_like(frequency), where=under & (rows[0] > 0.0)
+            )
+            phase = np.where(under, phases[0] * part, phase)
+        result: ComplexArray = self.gain(frequency) * np.exp(1j * phase)
+        return result
+
+    def gain(self, omega: npt.ArrayLike) -> FloatArray:
+        """Return the operator's amplitude, which is all that a spectrum asks for.
+
+        Parameters
+        ----------
+        omega
+            Frequencies [rad/s], any shape, at least zero.
+
+        Returns
+        -------
+        FloatArray
+            Amplitude of the hook's heave per wave amplitude [m/m], same shape.
+        """
+        frequency = np.asarray(omega, dtype=np.float64)
+        rows, amplitudes = self.omega, self.amplitude
         # np.interp holds the end values, which is `hold`.
         amplitude = np.interp(frequency, rows, amplitudes)
-        phase = np.interp(frequency, rows, phases)
         under, over = frequency < rows[0], frequency > rows[-1]
         if self.below == "zero":
             amplitude = np.where(under, 0.0, amplitude)
         elif self.below == "unity":
-            # Long waves lift the vessel as they lift the water: amplitude 1, phase 0.
             part = np.divide(
                 frequency, rows[0], out=np.ones_like(frequency), where=under & (rows[0] > 0.0)
             )
             amplitude = np.where(under, 1.0 + (amplitudes[0] - 1.0) * part, amplitude)
-            phase = np.where(under, phases[0] * part, phase)
         if self.beyond == "zero":
             amplitude = np.where(over, 0.0, amplitude)
         elif self.beyond == "decay":
             part = np.divide(rows[-1], frequency, out=np.ones_like(frequency), where=over)
             amplitude = np.where(over, amplitudes[-1] * part**2, amplitude)
-        result: ComplexArray = amplitude * np.exp(1j * phase)
-        return result
+        return np.asarray(amplitude, dtype=np.float64)
 
     def __call__(self, omega: npt.ArrayLike) -> ComplexArray:
         """Return :meth:`response`."""

@@ -20,8 +20,6 @@ from models.case import Case
 from models.hook import HookMotion
 from models.metrics import most_probable_maximum, zero_crossing_period
 from models.quadrature import adaptive_nodes
-from models.sea import SeaSpectrum
-from models.vessel import HeaveRao
 from synth.design import GainDesign
 from synth.question import locked_response
 
@@ -169,7 +167,7 @@ class MotionView:
 
 def hook_of(case: Case) -> HookMotion:
     """Return the hook motion of a case, without the warnings that its user has had already."""
-    return HookMotion(sea=SeaSpectrum.from_case(case), rao=HeaveRao.from_case(case))
+    return HookMotion.from_case(case, warn=False)
 
 
 def highest(function: Callable[[FloatArray], FloatArray], low: float, high: float) -> float:

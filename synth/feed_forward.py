@@ -47,8 +47,6 @@ from models.checks import SynthesisError, check_range
 from models.discrete import zero_order_hold
 from models.hook import HookMotion
 from models.plant import build_plant
-from models.sea import SeaSpectrum
-from models.vessel import HeaveRao
 
 from .drum_speed import DrumSpeedLoop
 from .recursive import RecursiveController, Signals
@@ -211,7 +209,7 @@ def lead_of(case: Case, *, sample_time: float = 0.02, bandwidth: float | None = 
     The MRU's delay, and that of the drum-speed loop (half a sample of hold included) at the
     zero-crossing frequency of the hook's velocity.
     """
-    hook = HookMotion(sea=SeaSpectrum.from_case(case), rao=HeaveRao.from_case(case))
+    hook = HookMotion.from_case(case, warn=False)
     omega = 2.0 * math.pi / hook.velocity.zero_crossing_period
     loop = DrumSpeedLoop.from_case(case, sample_time=sample_time, bandwidth=bandwidth)
     late = case.sensors.mru.delay if case.sensors.mru else 0.0

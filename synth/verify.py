@@ -26,9 +26,7 @@ from models.linear import LinearPlant
 from models.plant import build_plant
 from models.plant_data import PlantData
 from models.rope import MAX_MASSES
-from models.sea import SeaSpectrum
 from models.shaping import fit_shaping_filter
-from models.vessel import HeaveRao
 
 from .claims import HOOK, PAYLOAD, VELOCITY, Demand, case_demands
 from .nyquist import CurveMargins
@@ -112,9 +110,7 @@ class _View:
 
     @cached_property
     def hook(self) -> HookMotion:
-        # Not `from_case`, which warns the user of what they have been warned of.
-        case = self.design.sea_case
-        return HookMotion(sea=SeaSpectrum.from_case(case), rao=HeaveRao.from_case(case))
+        return HookMotion.from_case(self.design.sea_case, warn=False)  # they have been warned
 
     @cached_property
     def source(self) -> Source:

@@ -86,6 +86,7 @@ def _sea(case: Case, hook: HookMotion) -> Rows:
             number(sea.steepness, 2),
             f"seas stay below {number(sea.breaking_steepness, 2)}",
         ),
+        *_vessel(case),
         (
             "hook, rms",
             quantity(moved.rms, "m"),
@@ -107,6 +108,24 @@ def _sea(case: Case, hook: HookMotion) -> Rows:
         remark = f"of the variance: below {case.vessel.below}, beyond {case.vessel.beyond}"
         rows.append(("outside the RAO's table", percent(outside), remark))
     return rows
+
+
+def _vessel(case: Case) -> Rows:
+    """Return the vessel, the heading of the waves and the hook's place, where the case has them."""
+    from models.vessels.crane import place_text
+    from models.vessels.hook_operator import case_raos
+
+    from ..hook_words import heading_words
+
+    vessel, place = case.vessel, case.vessel.hook_point
+    if place is None or vessel.heading is None:
+        return []
+    raos = case_raos(case)
+    heading = f"{math.degrees(vessel.heading) % 360.0:.4g} deg"
+    return [
+        ("vessel", raos.name, f"hook at {place_text(place)}"),
+        ("waves towards", heading, heading_words(vessel.heading)),
+    ]
 
 
 def _rope(case: Case, hook: HookMotion) -> Rows:

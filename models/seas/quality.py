@@ -1,0 +1,122 @@
+"""Quality control of measured seas: which records are no sea states, and why.
+
+A buoy's file holds rows that are no spectra: missing codes, empty rows, broken dates, the same hour
+twice.  Each is rejected for one stated reason and counted, so that nothing disappears in silence.
+Nothing is rejected for being large: densities of real storms exceed 300 m^2/Hz, and masking by a
+threshold deletes the very storms that a design is for.  Only a whole sea state above 30 m of H_s,
+half as high again as any ever measured, is taken for the error that it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["HIGHEST_SEA", "QualityControl", "Rejection", "sift"]
+
+FloatArray = npt.NDArray[np.float64]
+
+HIGHEST_SEA = 30.0
+"""H_s above which a record is rejected [m]; the highest on record is 19 m."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rejection:
+    """Records that were rejected for one reason."""
+
+    reason: str
+    """Why, as a sentence without its end."""
+    count: int
+    """How many records."""
+    example: str
+    """The first of them: its line, or its time."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class QualityControl:
+    """What became of the records of a file.
+
+    Attributes
+    ----------
+    read
+        How many records the file holds.
+    rejections
+        What was rejected, in the order of the checks.
+    notes
+        What else was found and put right.
+    """
+
+    read: int
+    rejections: tuple[Rejection, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def rejected(self) -> int:
+        """How many records were rejected."""
+        return sum(one.count for one in self.rejections)
+
+    @property
+    def kept(self) -> int:
+        """How many records are left."""
+        return self.read - self.rejected
+
+    def __str__(self) -> str:
+        """Return the account in a few lines."""
+        lines = [f"{self.read} records read, {self.rejected} rejected, {self.kept} kept"]
+        lines += [f"  {one.count} x {one.reason} (first: {one.example})" for one in self.rejections]
+        return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
+
+
+def sift(
+    omega: FloatArray, density: FloatArray, names: Sequence[str], same: Sequence[object]
+) -> tuple[npt.NDArray[np.bool_], list[Rejection]]:
+    """Tell which records are spectra.
+
+    Parameters
+    ----------
+    omega
+        Frequencies (k,) [rad/s].
+    density
+        Densities (n, k) [m^2 s/rad], NaN where a value is missing.
+    names
+        What to call each record (n,): its line or its time.
+    same
+        Time and place of each record (n,): the second with the same is a repetition; None is
+        never one.
+
+    Returns
+    -------
+    keep, rejections
+        Which records are kept (n,), and why the others are not.
+    """
+    count = len(names)
+    open_, found = np.ones(count, dtype=np.bool_), []
+
+    def reject(which: npt.ArrayLike, reason: str) -> None:
+        nonlocal open_
+        wrong = np.asarray(which, dtype=np.bool_) & open_
+        if np.any(wrong):
+            first = names[int(np.argmax(wrong))]
+            found.append(Rejection(reason=reason, count=int(wrong.sum()), example=first))
+            open_ = open_ & ~wrong
+
+    missing = ~np.isfinite(density)
+    reject(missing.all(axis=1), "all values missing")
+    reject(missing.any(axis=1), "some values missing")
+    filled = np.where(missing, 0.0, density)
+    reject((filled < 0.0).any(axis=1), "negative density")
+    variance = np.trapezoid(filled, omega, axis=1)
+    reject(~(variance > 0.0), "no energy")
+    heights = 4.0 * np.sqrt(np.maximum(variance, 0.0))
+    reject(heights > HIGHEST_SEA, f"H_s above {HIGHEST_SEA:g} m")
+    seen: set[object] = set()
+    repeated = np.zeros(count, dtype=np.bool_)
+    for index, key in enumerate(same):
+        if open_[index] and key is not None:
+            repeated[index] = key in seen
+            seen.add(key)
+    reject(repeated, "same time and place again")
+    return open_, found
