@@ -32,10 +32,11 @@ from .lowpass import (
 from .sensors import MRU
 from .telemetry import Interval, check_intervals, during
 
-__all__ = ["MruBlock", "MruModel", "MruState"]
+__all__ = ["Bias", "MruBlock", "MruModel", "MruState", "check_biases"]
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
+Bias = tuple[float, float, float, float]
 
 _SETTLED = 0.01  # share of the filter's transient that is left after the settling time
 
@@ -103,6 +104,8 @@ class MruModel:
         Seed of the run.
     outages
         Intervals (start, end) [s] in which the unit is gone; it shows its last values, not valid.
+    biases
+        (start, end, heave, rate): what it shows too much in an interval [s], [m], [m/s].
     heave_frequency
         Mean frequency of the hook's heave [rad/s], such as rms velocity over rms displacement;
         None if it is not known.
@@ -137,6 +140,7 @@ class MruModel:
     seed: int
     outages: Sequence[Interval] = ()
     heave_frequency: float | None = None
+    biases: Sequence[Bias] = ()
 
     def __post_init__(self) -> None:
         check_range("MRU", "sample_time", self.sample_time, low=0.0, unit="s", open_low=True)
@@ -146,6 +150,7 @@ class MruModel:
             frequency = self.heave_frequency
             check_range("MRU", "heave_frequency", frequency, low=0, unit="rad/s", open_low=True)
         object.__setattr__(self, "outages", check_intervals("MRU", "outages", self.outages))
+        object.__setattr__(self, "biases", check_biases("MRU", "biases", self.biases))
 
     @property
     def delay(self) -> float:
@@ -242,7 +247,7 @@ class MruModel:
         """
         z, v = _motions(displacement, velocity)
         n, start = len(z), state.sample
-        if self.mru is None and not self.outages:
+        if self.mru is None and not (self.outages or self.biases):
             shown_as_it_is = MruBlock(heave=z, heave_rate=v, valid=np.ones(n))
             last = read_only([z[-1], v[-1]])
             return shown_as_it_is, replace(state, sample=start + n, last=last, held=last)
@@ -260,6 +265,9 @@ class MruModel:
             errors = self._errors(error_mode, start, n)
             error_mode = complex(errors[-1])
             delayed = delayed + np.column_stack(from_mode(errors, pole))
+        for since, until, *offset in self.biases:
+            inside = during([(since, until)], start + np.arange(n), self.sample_time)
+            delayed = delayed + inside[:, np.newaxis] * np.array(offset)
         gone = during(self.outages, start + np.arange(n), self.sample_time)
         last = np.maximum.accumulate(np.where(gone, 0, np.arange(1, n + 1)))
         reported = np.vstack((state.held, delayed))[last]
@@ -347,6 +355,23 @@ class MruModel:
         pushes = draw(self.seed, MRU_ERROR, first, start + n - first, 2) @ root.T
         modes = mode_recursion(factor, mode, to_mode(pushes[:, 0], pushes[:, 1], pole))
         return modes if start == 0 else modes[1:]
+
+
+def check_biases(owner: str, name: str, biases: Sequence[Bias]) -> tuple[Bias, ...]:
+    """Return biases, each (start, end, heave, rate) in s, s, m and m/s.
+
+    Raises
+    ------
+    InputError
+        If one is no such row.
+    """
+    checked = []
+    for start, end, heave, rate in biases:
+        ((low, high),) = check_intervals(owner, name, [(start, end)])
+        check_range(owner, f"heave of {name}", heave, low=-100.0, high=100.0, unit="m")
+        check_range(owner, f"heave rate of {name}", rate, low=-100.0, high=100.0, unit="m/s")
+        checked.append((low, high, float(heave), float(rate)))
+    return tuple(checked)
 
 
 def _motions(displacement: npt.ArrayLike, velocity: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:

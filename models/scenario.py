@@ -20,8 +20,10 @@ import numpy as np
 import numpy.typing as npt
 
 from .checks import InputError, check_range
+from .mru import Bias, check_biases
 from .schedule import Period, Profile, Schedule, check_periods, events
 from .surroundings import Surroundings
+from .telemetry import Late, check_late
 
 if TYPE_CHECKING:
     from .case import Case
@@ -61,6 +63,11 @@ class Scenario:
     telemetry_outages, sensor_failures, mru_outages
         Periods without messages from the payload, with a payload sensor that gives no numbers,
         and without the motion reference unit [s].
+    telemetry_delays
+        (start, end, extra) [s]: messages that the payload sends in the period are late by so much
+        more.
+    mru_biases
+        (start, end, heave, rate) [s], [m], [m/s]: what the motion reference unit shows too much.
     parameter_changes
         New values of plant parameters by the time from which they hold [s] and by name; None
         takes a parameter back to its own value.
@@ -93,6 +100,8 @@ class Scenario:
     telemetry_outages: tuple[Period, ...] = ()
     sensor_failures: tuple[Period, ...] = ()
     mru_outages: tuple[Period, ...] = ()
+    telemetry_delays: tuple[Late, ...] = ()
+    mru_biases: tuple[Bias, ...] = ()
     parameter_changes: Mapping[float, Mapping[str, float | None]] = field(
         default_factory=lambda: MappingProxyType({})
     )
@@ -113,6 +122,10 @@ class Scenario:
         for name in ("brake_trips", "telemetry_outages", "sensor_failures", "mru_outages"):
             checked = check_periods(owner, name.replace("_", " "), getattr(self, name))
             object.__setattr__(self, name, checked)
+        late = check_late(owner, "telemetry delays", self.telemetry_delays)
+        object.__setattr__(self, "telemetry_delays", late)
+        biases = check_biases(owner, "MRU biases", self.mru_biases)
+        object.__setattr__(self, "mru_biases", biases)
         changes: dict[float, Mapping[str, float | None]] = {}
         for time, values in self.parameter_changes.items():
             check_range(owner, "time of a parameter change", time, low=0.0, unit="s")

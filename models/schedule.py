@@ -220,6 +220,13 @@ def events(scenario: Scenario) -> tuple[tuple[float, str, str], ...]:
         ("mru", "the motion reference unit gives no numbers", scenario.mru_outages),
     ):
         found += [(start, kind, f"{what} until {end:g} s") for start, end in periods]
+    for start, end, extra in scenario.telemetry_delays:
+        text = f"the link from the payload is late by {extra:.4g} s more until {end:g} s"
+        found.append((start, "telemetry", text))
+    for start, end, heave, rate in scenario.mru_biases:
+        off = f"{heave:.4g} m and {rate:.4g} m/s"
+        text = f"the motion reference unit is off by {off} until {end:g} s"
+        found.append((start, "mru", text))
     for move in scenario.profile.moves:
         verb = "raise" if move.distance > 0.0 else "lower"
         text = f"{verb} by {abs(move.distance):g} m at {move.speed:.3g} m/s"

@@ -13,7 +13,7 @@ link are states of the plant itself, as in the design.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -28,7 +28,7 @@ from .draws import SENSOR_NOISE, check_seed, draw
 from .mru import MruBlock
 from .sensors import Encoder, LoadCell, PayloadSensor, Telemetry
 from .signals import pick
-from .telemetry import TelemetryBlock, TelemetrySchedule
+from .telemetry import Late, TelemetryBlock, TelemetrySchedule
 
 if TYPE_CHECKING:
     from .case import Case
@@ -113,13 +113,13 @@ class SensorModel:
         check_range("sensors", "sample_time", self.sample_time, low=0.0, unit="s", open_low=True)
 
     @classmethod
-    def from_case(cls, case: Case, sample_time: float) -> SensorModel:
-        """Return the sensors of a case at a sample time [s]."""
+    def from_case(cls, case: Case, sample_time: float, late: Sequence[Late] = ()) -> SensorModel:
+        """Return the sensors of a case at a sample time [s], behind a link that may be late."""
         sensors = case.sensors
         return cls(
             sample_time=sample_time,
             payload=sensors.payload,
-            lags=_lags(sensors.telemetry, sample_time),
+            lags=_lags(sensors.telemetry, sample_time, late),
             encoder=sensors.encoder,
             load_cell=sensors.load_cell,
             haul_per_angle=case.drum_radius / case.winch.gearbox.ratio,
@@ -329,6 +329,6 @@ def _rounded(value: ca.SX, step: float) -> ca.SX:
     return step * ca.floor(value / step + 0.5)
 
 
-def _lags(telemetry: Telemetry, sample_time: float) -> range:
+def _lags(telemetry: Telemetry, sample_time: float, late: Sequence[Late]) -> range:
     """Return the lags of the link's schedule; they are the same for every seed."""
-    return TelemetrySchedule(telemetry, sample_time, seed=0).lags
+    return TelemetrySchedule(telemetry, sample_time, seed=0, late=late).lags

@@ -120,6 +120,7 @@ class Simulation:
                 seed,
                 outages=scenario.telemetry_outages,
                 broken=scenario.sensor_failures,
+                late=scenario.telemetry_delays,
             ),
             mru=MruModel(
                 case.sensors.mru,
@@ -127,6 +128,7 @@ class Simulation:
                 rms,
                 seed,
                 outages=scenario.mru_outages,
+                biases=scenario.mru_biases,
                 heave_frequency=frequency,
             ),
             schedule=self.schedule,
@@ -220,7 +222,7 @@ def prepare(
     rest = _rest(case, masses, surroundings)
     values = _parameters(case, plant, parameters or {})
     choice = _choose_step(plant, rest, values, sample_time, step, surroundings)
-    sensors = SensorModel.from_case(case, sample_time)
+    sensors = SensorModel.from_case(case, sample_time, scenario.telemetry_delays)
     recursion = recursion_of(controller)
     loop = build_closed_loop(
         case,

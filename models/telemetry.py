@@ -23,12 +23,21 @@ from .checks import InputError, check_range, read_only
 from .draws import TELEMETRY, check_seed, draw
 from .sensors import Telemetry
 
-__all__ = ["Interval", "TelemetryBlock", "TelemetrySchedule", "check_intervals", "during"]
+__all__ = [
+    "Interval",
+    "Late",
+    "TelemetryBlock",
+    "TelemetrySchedule",
+    "check_intervals",
+    "check_late",
+    "during",
+]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]
 Interval = tuple[float, float]
+Late = tuple[float, float, float]
 
 _ROUNDING = 1e-6  # of a sample: 0.07 s is seven samples of 0.01 s, whatever the division says
 
@@ -73,6 +82,8 @@ class TelemetrySchedule:
         Intervals (start, end) [s] in which nothing is sent.
     broken
         Intervals in which the messages come, but are marked as invalid.
+    late
+        (start, end, extra) [s]: messages sent in the interval are late by so much more.
 
     Raises
     ------
@@ -102,6 +113,7 @@ class TelemetrySchedule:
     seed: int
     outages: Sequence[Interval] = ()
     broken: Sequence[Interval] = ()
+    late: Sequence[Late] = ()
 
     def __post_init__(self) -> None:
         check_range("telemetry", "sample_time", self.sample_time, low=0, unit="s", open_low=True)
@@ -109,11 +121,14 @@ class TelemetrySchedule:
         for name in ("outages", "broken"):
             checked = check_intervals("telemetry", name, getattr(self, name))
             object.__setattr__(self, name, checked)
+        object.__setattr__(self, "late", check_late("telemetry", "late", self.late))
 
     @cached_property
     def lags(self) -> range:
         """Ages in samples that a message may have when it is used."""
         low, high = self._transit
+        latest = max((extra for _, _, extra in self.late), default=0.0)
+        high = _snapped(high + latest / self.sample_time)
         return range(math.floor(low), math.ceil(high) + 1)
 
     @property
@@ -156,7 +171,7 @@ class TelemetrySchedule:
     def _steady(self) -> bool:
         """Whether every message comes, and all after the same time."""
         link = self.telemetry
-        return link.jitter == link.dropout == 0.0 and not (self.outages or self.broken)
+        return link.jitter == link.dropout == 0.0 and not (self.outages or self.broken or self.late)
 
     def _steady_block(self, count: int) -> TelemetryBlock:
         """Return what arrives on such a link, the first messages aside."""
@@ -196,6 +211,12 @@ class TelemetrySchedule:
         transit = np.full(len(sent), low)
         if self.telemetry.jitter > 0.0:
             transit += (high - low) * self._uniform(first, stop)[:, 1]
+        for start, end, extra in self.late:
+            inside = during([(start, end)], sent, self.sample_time)
+            shifted = transit[inside] + extra / self.sample_time
+            nearest = np.round(shifted)
+            whole = np.abs(shifted - nearest) < _ROUNDING
+            transit[inside] = np.where(whole, nearest, shifted)
         late = np.ceil(transit)
         arrival = sent + late.astype(np.int64)
         # The later neighbour of the interpolation may be lost: then the message stands alone.
@@ -274,6 +295,22 @@ def check_intervals(owner: str, name: str, intervals: Sequence[Interval]) -> tup
                 f"got {interval!r}"
             )
         checked.append((start, end))
+    return tuple(checked)
+
+
+def check_late(owner: str, name: str, late: Sequence[Late]) -> tuple[Late, ...]:
+    """Return intervals with an extra delay, each (start, end, extra) [s], extra at most 60 s.
+
+    Raises
+    ------
+    InputError
+        If one is no such triple.
+    """
+    checked = []
+    for start, end, extra in late:
+        ((low, high),) = check_intervals(owner, name, [(start, end)])
+        check_range(owner, f"extra delay of {name}", extra, low=0.0, high=60.0, unit="s")
+        checked.append((low, high, float(extra)))
     return tuple(checked)
 
 

@@ -123,7 +123,17 @@ class Pool:
     """
 
     def __init__(self, jobs: int, question: object, contenders: Mapping[str, object]) -> None:
-        self._setup = (question, dict(contenders))
+        self._begin(jobs, (question, dict(contenders)))
+
+    @classmethod
+    def of(cls, jobs: int, setup: object) -> Pool:
+        """Return processes for another kind of work: `setup.bench()` is what does the tasks."""
+        pool = cls.__new__(cls)
+        pool._begin(jobs, setup)
+        return pool
+
+    def _begin(self, jobs: int, setup: object) -> None:
+        self._setup = setup
         self._answers: queue.Queue[tuple[_Process, Task, Any]] = queue.Queue()
         self._idle: list[_Process] = []
         self._busy: set[_Process] = set()

@@ -144,7 +144,9 @@ def serve() -> None:
     os.dup2(2, 1)  # whatever a controller prints must not come among the answers
     tasks = sys.stdin.buffer
     try:
-        bench = Bench(*receive(tasks))
+        setup = receive(tasks)
+        # A sweep brings a bench of its own (`stillhook.sweeps.time_cases`).
+        bench = setup.bench() if hasattr(setup, "bench") else Bench(*setup)
         while True:
             send(answers, bench.do(receive(tasks)))
     except (EOFError, BrokenPipeError):

@@ -202,6 +202,8 @@ def stays(scenario: Scenario) -> bool:
         or scenario.telemetry_outages
         or scenario.sensor_failures
         or scenario.mru_outages
+        or scenario.telemetry_delays
+        or scenario.mru_biases
     )
 
 

@@ -1,0 +1,234 @@
+"""One case of a time-domain sweep: a changed plant, a controller, a seed, and the run's numbers.
+
+    TimeQuestion --(to any process)--> bench() --> do(CaseTask) --> CaseResult (plain data)
+
+The same function does a case in this process, in a pool and on a cluster, on one BLAS thread, from
+the case, its changes and its seed alone: so the numbers are the same to the last bit wherever and
+in whatever order it is done.
+"""
+
+from __future__ import annotations
+
+import math
+import time as clock
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from models.case import Case
+from models.checks import StillhookError
+from models.control import Controller
+from models.faults import with_faults
+from models.physics_warning import PhysicsWarning
+from models.run import Run
+from models.scenarios import scenario_named
+from synth.threads import one_thread
+
+from ..compare_worker import Task
+from ..series import Progress, Series
+from .pilots import Pilot
+from .time_metrics import numbers_of, status_of
+from .trim import Shift, shift_between, static_of, trimmed
+
+__all__ = ["CaseResult", "CaseTask", "TimeBench", "TimeQuestion", "seed_of"]
+
+_PURPOSE = 7  # second entry of the seeds of cases; those of a run's own draws are others
+
+
+@dataclass(frozen=True, kw_only=True)
+class CaseTask(Task):
+    """A case to be run.
+
+    Attributes
+    ----------
+    index
+        Its number in the sweep.
+    changes, gains, faults
+        Values by path of the case, by gain, and by ``fault.`` path.
+    """
+
+    kind: str = "sweep"
+    name: str = ""
+    height: float = 0.0
+    index: int = 0
+    changes: Mapping[str, float] = field(default_factory=dict, compare=False)
+    gains: Mapping[str, float] = field(default_factory=dict, compare=False)
+    faults: Mapping[str, float] = field(default_factory=dict, compare=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CaseResult:
+    """What came of a case.
+
+    Attributes
+    ----------
+    index
+        Its number in the sweep.
+    status
+        A name of `time_metrics.STATUS`.
+    message
+        Why it failed, if it did.
+    values
+        Metrics by name, SI; NaN where there is none.
+    wall
+        Time that it took, preparing included [s].
+    """
+
+    index: int
+    status: str
+    message: str = ""
+    values: Mapping[str, float] = field(default_factory=dict)
+    wall: float = math.nan
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TimeQuestion:
+    """What every case of a sweep is asked.
+
+    Attributes
+    ----------
+    case
+        The nominal case, which the controller is made for unless it follows.
+    pilot
+        Who flies.
+    metrics
+        What is kept, names of `time_metrics.METRICS`.
+    duration, settle
+        Length of a run, and when its statistics begin [s]; None: as `sh.simulate` has it.
+    scenario, options
+        The operation by its name, and its options.
+    masses, compiled
+        Of the simulated plant, as for `sh.simulate`.
+    design_follows
+        Whether the controller is made for each case; a design is then designed anew.
+    weighed
+        Whether a controller that does not follow knows the static load, by the load cell.
+    starts
+        Starts of the searches of designs that follow.
+    """
+
+    case: Case
+    pilot: Pilot
+    metrics: tuple[str, ...]
+    duration: float
+    settle: float | None = None
+    scenario: str = "hold"
+    options: Mapping[str, Any] = field(default_factory=dict)
+    masses: int | None = None
+    compiled: bool | None = None
+    design_follows: bool = False
+    weighed: bool = True
+    starts: int = 8
+
+    def bench(self) -> TimeBench:
+        """Return what does the cases, in whatever process."""
+        return TimeBench(self)
+
+
+class TimeBench:
+    """Does cases, one after the other.
+
+    Parameters
+    ----------
+    question
+        What every case is asked.
+    """
+
+    def __init__(self, question: TimeQuestion) -> None:
+        self._question = question
+        self._own: Controller | None = None
+        self._static: Shift | None = None
+
+    def do(self, task: CaseTask, progress: Progress | None = None) -> CaseResult:
+        """Return what comes of a case; what is wrong with it is part of the answer.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            If the run was interrupted: half a run is worth nothing.
+        """
+        began = clock.perf_counter()
+        names = self._question.metrics
+        with warnings.catch_warnings(), one_thread():
+            warnings.simplefilter("ignore", PhysicsWarning)  # told once, of the nominal case
+            try:
+                run = self.run(task, progress)
+                status, message = status_of(run), run.message
+                values = numbers_of(run, names)
+            except Exception as error:  # what a controller of the user's own may do
+                known = isinstance(error, StillhookError)
+                message = str(error) if known else f"{type(error).__name__}: {error}"
+                status, values = "failed", dict.fromkeys(names, math.nan)
+        wall = clock.perf_counter() - began
+        return CaseResult(
+            index=task.index, status=status, message=message, values=values, wall=wall
+        )
+
+    def run(self, task: CaseTask, progress: Progress | None = None) -> Run:
+        """Return the whole run of a case, with its traces.
+
+        Raises
+        ------
+        InputError, SynthesisError, SolverError
+            If there is no such case, or no controller for it.
+        KeyboardInterrupt
+            If it was interrupted.
+        """
+        question = self._question
+        case = question.case.replace(task.changes) if task.changes else question.case
+        controller = self.controller(case, task)
+        scenario = scenario_named(question.scenario, question.case, **question.options)
+        series = Series.prepare(
+            case,
+            controller,
+            scenario=with_faults(scenario, task.faults, case, question.duration),
+            duration=question.duration,
+            settle=question.settle,
+            masses=question.masses,
+            compiled=question.compiled,
+        )
+        run = series.run(task.seed, progress)
+        if run.status == "interrupted":
+            raise KeyboardInterrupt
+        return run
+
+    def controller(self, case: Case, task: CaseTask) -> Controller:
+        """Return the controller of a case: made for the nominal one, or for this one."""
+        question, pilot = self._question, self._question.pilot
+        if question.design_follows:
+            return pilot.follow(case, question.starts)
+        if task.gains:
+            own = pilot.controller(question.case, task.gains)
+        else:
+            if self._own is None:
+                self._own = pilot.controller(question.case)
+            own = self._own
+        if not (question.weighed and task.changes):
+            return own
+        if self._static is None:
+            self._static = static_of(question.case)
+        return trimmed(own, shift_between(self._static, static_of(case)))
+
+
+def seed_of(seed: int, index: int, *, common: bool = False) -> int:
+    """Return the seed of a case's run, which depends on nothing but these.
+
+    Parameters
+    ----------
+    seed
+        Of the sweep.
+    index
+        Number of the case.
+    common
+        Whether all cases meet the same sea and noise.
+
+    Examples
+    --------
+    >>> seed_of(0, 3), seed_of(0, 3, common=True) == seed_of(0, 4, common=True)
+    (3725892462, True)
+    """
+    entropy = [seed, _PURPOSE, 0 if common else index + 1]
+    return int(np.random.SeedSequence(entropy).generate_state(1)[0])

@@ -1,0 +1,272 @@
+"""A time-domain sweep from its question to its result: what is drawn, run, kept and told.
+
+    TimeQuestion, Spread, Draw --> tasks --> engine --> store (or memory) --> xarray.Dataset
+
+The driver knows which cases are done and hands out the others; it never looks into a run.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time as clock
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from models.checks import InputError
+from models.faults import FAULTS, PREFIX
+from models.scenarios import scenario_named
+from models.spreads import Spread
+
+from .engines import Engine, engine_of
+from .header import ATTRIBUTE, Draw, header_of, text_of
+from .time_cases import CaseResult, CaseTask, TimeQuestion, seed_of
+from .time_metrics import METRICS, STATUS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Keeper", "Progress", "row_of", "run_sweep", "tasks_of", "template_of"]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+Progress = Callable[[str, int, int], None]
+
+_TOLD = 20  # reasons of failed cases that a result tells
+
+
+class Keeper(Protocol):
+    """Where results are kept: a store on disk, or memory."""
+
+    @property
+    def done(self) -> BoolArray:
+        """Which cases are there (n,)."""
+
+    def put(self, index: int, row: Mapping[str, float]) -> None:
+        """Keep the numbers of a case, by variable."""
+
+    def dataset(self) -> xr.Dataset:
+        """Return the results so far."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Memory:
+    """Results in memory alone."""
+
+    template: xr.Dataset
+    values: dict[str, npt.NDArray[np.generic]]
+
+    @property
+    def done(self) -> BoolArray:
+        return np.asarray(self.values["status"] != STATUS["not run"])
+
+    def put(self, index: int, row: Mapping[str, float]) -> None:
+        for name, value in row.items():
+            self.values[name][index] = value
+
+    def dataset(self) -> xr.Dataset:
+        own = self.template
+        return own.assign(
+            {name: (own[name].dims, v, own[name].attrs) for name, v in self.values.items()}
+        )
+
+
+def run_sweep(
+    question: TimeQuestion,
+    spread: Spread,
+    draw: Draw,
+    *,
+    engine: str | Engine | None = None,
+    jobs: int | None = None,
+    store: str | Path | None = None,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Run what is missing of a sweep, and return all of it.
+
+    Parameters
+    ----------
+    question, spread, draw
+        What every case is asked, what varies (already on the case), and how it is drawn.
+    engine, jobs
+        As for `engine_of`.
+    store
+        Folder or ``.nc`` file in which results are kept as they come; None for memory alone.
+    progress
+        Called as progress(what, done, total), several times a second; it may raise
+        KeyboardInterrupt.
+
+    Returns
+    -------
+    Dataset
+        Along "case"; ``attrs["complete"]`` is 1 if every case is there, 0 after Ctrl-C.
+
+    Raises
+    ------
+    InputError
+        If the spread cannot be run in time, or the store is another's or spoilt.
+    SolverError
+        If the cluster is gone.
+    """
+    last = draw.first + draw.samples
+    rows = spread.sample(last, draw.sampling, draw.seed, start=draw.first, stop=last)
+    if len(rows) != draw.samples:
+        raise InputError(f"sweep: the spread gives {len(rows)} cases, not {draw.samples}")
+    _check(question, spread)
+    tell = progress or _silent
+    template = template_of(question, spread, draw, rows)
+    used = engine_of(engine, question, jobs)
+    messages: dict[int, str] = {}
+    began, wall = clock.perf_counter(), 0.0
+    with _keeper(store, template) as keeper:
+        missing = np.flatnonzero(~keeper.done)
+        done, total = len(rows) - len(missing), len(rows)
+        if missing.size and not question.design_follows:
+            question.pilot.controller(question.case)  # one that cannot be made is told at once
+        # Closed at once when something raises: processes must not outlive the sweep.
+        with (
+            contextlib.suppress(KeyboardInterrupt),
+            contextlib.closing(
+                used.run(question, tasks_of(spread, draw, rows, missing), missing.size)
+            ) as answers,
+        ):
+            tell("starting", done, total)
+            for answered in answers:
+                if answered is not None:
+                    task, result = answered
+                    keeper.put(task.index - draw.first, row_of(result))
+                    wall += result.wall if result.status != "died" else 0.0
+                    done += 1
+                    if result.message and len(messages) < _TOLD:
+                        messages[task.index] = result.message
+                tell("", done, total)
+        found = keeper.dataset()
+    complete = bool((found["status"] != STATUS["not run"]).all())
+    return found.assign_attrs(
+        complete=int(complete),
+        messages=[f"case {index}: {messages[index]}" for index in sorted(messages)],
+        seconds=clock.perf_counter() - began,
+        seconds_in_cases=wall,
+        engine=used.name,
+        jobs=used.jobs,
+    )
+
+
+def tasks_of(
+    spread: Spread, draw: Draw, rows: FloatArray, wanted: npt.NDArray[np.intp]
+) -> Iterator[CaseTask]:
+    """Yield the cases of a sweep whose places among the rows are wanted, in their order.
+
+    One at a time: a million of them would need more memory than their results.
+    """
+    faulty = [(j, path) for j, path in enumerate(spread.paths) if path.startswith(PREFIX)]
+    for place in wanted:
+        row, index = rows[place], draw.first + int(place)
+        yield CaseTask(
+            index=index,
+            seed=seed_of(draw.seed, index, common=draw.common),
+            changes=spread.changes(row),
+            gains=spread.gains(row),
+            faults={path: float(row[j]) for j, path in faulty},
+        )
+
+
+def template_of(question: TimeQuestion, spread: Spread, draw: Draw, rows: FloatArray) -> xr.Dataset:
+    """Return the result with nothing in it yet: coordinates, variables, units, attributes."""
+    import xarray as xr
+
+    n, units = len(rows), spread.units
+    cases = draw.first + np.arange(n)
+    coordinates: dict[str, object] = {
+        "case": ("case", cases, {"long_name": "number of the case"}),
+        "seed": (
+            "case",
+            np.array([seed_of(draw.seed, int(i), common=draw.common) for i in cases], np.int64),
+            {"long_name": "seed of the run"},
+        ),
+    }
+    for j, path in enumerate(spread.paths):
+        about: dict[str, object] = {"long_name": f"{path}, varied", "units": units[path] or "1"}
+        about["nominal"] = spread.nominal[path]
+        coordinates[path] = ("case", rows[:, j].copy(), about)
+    flags = {
+        "long_name": "what became of the case",
+        "flag_values": list(STATUS.values()),
+        "flag_meanings": " ".join(name.replace(" ", "_") for name in STATUS),
+    }
+    variables: dict[str, object] = {
+        "status": ("case", np.full(n, STATUS["not run"], np.int8), flags),
+        "stable": (
+            "case",
+            np.zeros(n, np.int8),
+            {"long_name": "1 where the payload was held to the end: completed", "units": "1"},
+        ),
+    }
+    for name in question.metrics:
+        metric = METRICS[name]
+        told = {"long_name": metric.text, "units": metric.unit}
+        variables[name] = ("case", np.full(n, np.nan), told)
+    header = header_of(question, spread, draw)
+    attributes = {
+        "title": f"{question.pilot.name} on {n} cases about {question.case.name}, in time",
+        "case_name": question.case.name,
+        "controller": question.pilot.name,
+        "mode": "time",
+        "sampling": draw.sampling,
+        "source": f"Stillhook {header['versions']['stillhook']}",
+        ATTRIBUTE: text_of(header),
+    }
+    return xr.Dataset(variables, coords=coordinates, attrs=attributes)
+
+
+def row_of(result: CaseResult) -> dict[str, float]:
+    """Return the row of a result by variable."""
+    return {
+        "status": STATUS[result.status],
+        "stable": float(result.status == "completed"),
+        **result.values,
+    }
+
+
+def _check(question: TimeQuestion, spread: Spread) -> None:
+    """Say at once what no case could be run with."""
+    scenario_named(question.scenario, question.case, **question.options)
+    gains = [path for path in spread.paths if path.startswith("gains.")]
+    if "drag" in spread.paths:
+        raise InputError(
+            "sweep: drag is a number of a design and plays no part in the time domain; vary "
+            "payload.drag_coefficient"
+        )
+    if gains and question.design_follows:
+        raise InputError(f"sweep: {gains[0]} cannot vary where the design follows the case")
+    if gains and not question.pilot.gains:
+        raise InputError(f"sweep: {question.pilot.name} has no gains that could vary ({gains[0]})")
+    if any(path.startswith(PREFIX) for path in spread.paths):
+        own = spread.distributions.get("fault.at")
+        latest = FAULTS["at"].nominal if own is None else own.ends[1]
+        if latest >= question.duration:
+            raise InputError(
+                f"sweep: fault.at must be before the end of the run, {question.duration:g} s, got "
+                f"up to {latest:g} s; vary it too, or run for longer"
+            )
+
+
+@contextlib.contextmanager
+def _keeper(store: str | Path | None, template: xr.Dataset) -> Iterator[Keeper]:
+    if store is None:
+        values = {str(n): template[n].to_numpy().copy() for n in template.data_vars}
+        yield _Memory(template=template, values=values)
+        return
+    from .netcdf_store import NetcdfStore
+    from .store import Store
+
+    kind = NetcdfStore if str(store).endswith(".nc") else Store
+    with kind(store, template) as keeper:
+        yield keeper
+
+
+def _silent(what: str, done: int, total: int) -> None:
+    """Tell nobody."""

@@ -1,0 +1,131 @@
+"""A controller whose load is weighed: its static part is that of the plant, all else as it knows.
+
+    measurement - shift --> controller made for the nominal case --> command + shift
+
+Whoever engages a winch has the load on the load cell.  A controller that was made for another
+weight would let the load fall in the first second, which says nothing about its loop.  The
+controller keeps its model; command, motor torque and rope tension are told to it, and taken from
+it, as deviations from a static state that is shifted to the true one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from models.case import Case
+from models.control import MEASURED, Controller, Measurement, Recursion, holds_brake, recursion_of
+from models.plant import MEAN_LOSSES, build_plant
+from synth.recursive import RecursiveController
+
+__all__ = ["Shift", "shift_between", "static_of", "trimmed"]
+
+_SHIFTED = ("drive.applied", "rope.tension", "motor.torque")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shift:
+    """A static state, or by how much the true one is above that which a controller knows.
+
+    Attributes
+    ----------
+    command
+        Drive command [V, rad/s or N m].
+    tension
+        Rope tension at the drum [N].
+    torque
+        Motor torque [N m].
+    """
+
+    command: float
+    tension: float
+    torque: float
+
+    def __bool__(self) -> bool:
+        """Whether there is any."""
+        return bool(self.command or self.tension or self.torque)
+
+    @property
+    def values(self) -> tuple[float, float, float]:
+        """In the order of what is measured of it."""
+        return self.command, self.tension, self.torque
+
+
+def static_of(case: Case) -> Shift:
+    """Return the static state of a case, as the controllers reckon it."""
+    point = build_plant(case).operating_point(MEAN_LOSSES)
+    return Shift(command=point.command, tension=point.tension, torque=point.torque)
+
+
+def shift_between(known: Shift, true: Shift) -> Shift:
+    """Return the shift from the static state that a controller knows to the true one."""
+    return Shift(
+        command=true.command - known.command,
+        tension=true.tension - known.tension,
+        torque=true.torque - known.torque,
+    )
+
+
+def trimmed(controller: Controller, shift: Shift) -> Controller:
+    """Return a controller with its static part shifted; the same one if there is no shift."""
+    if not shift or holds_brake(controller):
+        return controller
+    recursion = recursion_of(controller)
+    if recursion is None:
+        return _Trimmed(controller, shift)
+    return RecursiveController(
+        name=controller.name,
+        sample_time=controller.sample_time,
+        recursion=_shifted(recursion, shift),
+    )
+
+
+def _shifted(recursion: Recursion, shift: Shift) -> Recursion:
+    """Return the recursion with the shift as states: the compiled loop is the same for any."""
+    n = recursion.initial.size
+    state, m = ca.SX.sym("xc", n + len(_SHIFTED)), ca.SX.sym("m", len(MEASURED))
+    by = state[n:]
+    seen = ca.SX(m)
+    for i, name in enumerate(_SHIFTED):
+        seen[MEASURED.index(name)] = m[MEASURED.index(name)] - by[i]
+    following, command = recursion.function(state[:n], seen)
+    function = ca.Function(
+        "trimmed",
+        [state, m],
+        [ca.densify(ca.vertcat(following, by)), ca.densify(command + by[0])],
+        ["xc", "m"],
+        ["xc_next", "u"],
+    )
+    return Recursion(function=function, initial=np.concatenate([recursion.initial, shift.values]))
+
+
+class _Trimmed:
+    """A controller in Python with its static part shifted."""
+
+    def __init__(self, controller: Controller, shift: Shift) -> None:
+        self._controller, self._shift = controller, shift
+        self._at = [MEASURED.index(name) for name in _SHIFTED]
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):  # while it is unpickled there is no controller yet
+            raise AttributeError(name)
+        return getattr(self._controller, name)
+
+    @property
+    def name(self) -> str:
+        return self._controller.name
+
+    @property
+    def sample_time(self) -> float:
+        return self._controller.sample_time
+
+    def reset(self) -> None:
+        self._controller.reset()
+
+    def step(self, measurement: Measurement, time: float) -> float:
+        values = measurement.values.copy()
+        values[self._at] -= self._shift.values
+        return self._controller.step(Measurement(values), time) + self._shift.command

@@ -1,0 +1,209 @@
+"""What a sweep says: how many cases hold, how the numbers are distributed, which are the worst.
+
+    Dataset --> SweepSummary.of, worst_cases, case_at --> the command line, reports, the next case
+
+Cases that are not stable are counted, with the exact interval of Clopper and Pearson, and never
+averaged in: every quantile is of those that hold.
+"""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.case import Case
+from models.checks import InputError, check_range
+from models.intervals import Share, share
+from models.physics_warning import PhysicsWarning
+from models.signals import pick
+from models.spreads import Samples, Spread
+
+from .header import ATTRIBUTE
+from .time_metrics import STATUS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["QUANTILES", "SweepSummary", "case_at", "varied_paths", "worst_cases"]
+
+QUANTILES = (0.05, 0.5, 0.95)
+"""Shares of the stable cases that are below what is told."""
+
+_AFTER = {  # what a status says, after "1 case" and after "N cases"
+    "diverged": ("diverged", "diverged"),
+    "limit cycle": ("ended in a limit cycle", "ended in a limit cycle"),
+    "brake": ("was stopped by the brake", "were stopped by the brake"),
+    "failed": ("could not be run", "could not be run"),
+    "died": ("killed its process", "killed their processes"),
+    "not run": ("was not run", "were not run"),
+}
+_NO_NUMBERS = ("stable", "status")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SweepSummary:
+    """What a sweep says.
+
+    Attributes
+    ----------
+    cases
+        Number of cases that were run.
+    stable
+        Share of them that is stable, with its 95 % interval.
+    statuses
+        How many ended otherwise, by status.
+    quantiles
+        By variable: quantiles of `QUANTILES` and the largest, of the stable cases.
+    units
+        By variable.
+    in_time
+        Whether cases were run in time, or loops looked at.
+    """
+
+    cases: int
+    stable: Share
+    statuses: Mapping[str, int]
+    quantiles: Mapping[str, tuple[float, ...]]
+    units: Mapping[str, str]
+    in_time: bool = True
+
+    @classmethod
+    def of(cls, result: xr.Dataset) -> SweepSummary:
+        """Return the summary of a result.
+
+        Raises
+        ------
+        InputError
+            If no case of it was run.
+        """
+        ran = np.ones(result.sizes["case"], np.bool_)
+        statuses: dict[str, int] = {}
+        if "status" in result:
+            codes = result["status"].to_numpy()
+            ran = codes != STATUS["not run"]
+            for name, code in STATUS.items():
+                if name != "completed" and (count := int((codes == code).sum())):
+                    statuses[name] = count
+        if not ran.any():
+            raise InputError("sweep: no case was run")
+        stable = (result["stable"].to_numpy() == 1) & ran
+        quantiles, units = {}, {}
+        for label, variable in result.data_vars.items():
+            name = str(label)
+            if name in _NO_NUMBERS or variable.dims != ("case",):
+                continue
+            values = np.asarray(variable.to_numpy()[stable], dtype=np.float64)
+            values = values[~np.isnan(values)]
+            if values.size == 0:
+                continue
+            found = (*np.quantile(values, QUANTILES), values.max())
+            quantiles[name] = tuple(float(value) for value in found)
+            units[name] = str(variable.attrs.get("units", "1"))
+        return cls(
+            cases=int(ran.sum()),
+            stable=share(int(stable.sum()), int(ran.sum())),
+            statuses=MappingProxyType(statuses),
+            quantiles=MappingProxyType(quantiles),
+            units=MappingProxyType(units),
+            in_time="status" in result,
+        )
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What there is to say, in words."""
+        s = self.stable
+        low, high = (f"{100.0 * value:.4g}" for value in (s.low, s.high))
+        what = "hold the payload" if self.in_time else "are stable"
+        first = (
+            f"{s.count} of {s.total} cases {what}: {100.0 * s.value:.4g} % "
+            f"(95 % interval {low} to {high} %)"
+        )
+        others = [
+            f"1 case {_AFTER[name][0]}" if count == 1 else f"{count} cases {_AFTER[name][1]}"
+            for name, count in self.statuses.items()
+        ]
+        return first, *([", ".join(others)] if others else [])
+
+    def __str__(self) -> str:
+        """Return the summary as a small tree."""
+        lines = [*self.sentences]
+        for name, values in self.quantiles.items():
+            figures = ", ".join(f"{value:.4g}" for value in values)
+            lines.append(f"{name} [{self.units[name]}] 5, 50, 95 %, largest: {figures}")
+        marks = ["", *["├ "] * (len(lines) - 2), "└ "] if len(lines) > 1 else [""]
+        return "\n".join(mark + line for mark, line in zip(marks, lines, strict=True))
+
+
+def worst_cases(result: xr.Dataset, count: int, *, by: str = "payload_rms") -> list[int]:
+    """Return the numbers of the worst cases, the worst first.
+
+    Parameters
+    ----------
+    result
+        What `sh.sweep` returned.
+    count
+        How many.
+    by
+        Of two stable cases the one with the larger value is worse; one that is not stable is
+        worse than all that are, and one that has no number there is worst.
+
+    Raises
+    ------
+    InputError
+        If there is no such variable.
+    """
+    check_range("worst cases", "count", count, low=1)
+    pick("worst cases", "variable", tuple(str(name) for name in result.data_vars), (by,))
+    values = np.asarray(result[by].to_numpy(), dtype=np.float64)
+    stable = result["stable"].to_numpy() == 1
+    number = result["case"].to_numpy()
+    order = np.lexsort((number, -np.nan_to_num(values, nan=np.inf), stable))
+    if "status" in result:  # of cases that were not run, or not to be run, nothing is known
+        codes = result["status"].to_numpy()
+        unknown = (codes == STATUS["not run"]) | (codes == STATUS["failed"])
+        order = order[~unknown[order]]
+    return [int(number[i]) for i in order[:count]]
+
+
+def varied_paths(result: xr.Dataset) -> tuple[str, ...]:
+    """Return what varied in a sweep, by path."""
+    return tuple(str(name) for name in result.coords if str(name) not in ("case", "seed"))
+
+
+def case_at(result: xr.Dataset, number: int, nominal: Case) -> Case:
+    """Return a case of a sweep, with the design's gains in it where they are the three.
+
+    Faults and what else is no part of a case are left out.
+
+    Raises
+    ------
+    InputError
+        If there is none of that number, or it is not valid.
+    """
+    there = np.flatnonzero(result["case"].to_numpy() == number)
+    if there.size == 0:
+        last = int(result["case"].to_numpy().max())
+        raise InputError(f"sweep: case must be one of 0 to {last}, got {number}")
+    if result.attrs.get("mode") == "frequency":
+        from synth.sweeps.dataset import case_of
+
+        return case_of(result, number)
+    values = {p: float(result[p].to_numpy()[there[0]]) for p in varied_paths(result)}
+    law = json.loads(result.attrs[ATTRIBUTE])["controller"].get("law") or {}
+    gains = dict(law.get("values", {})) if law.get("kind") == "gains" else {}
+    spread = Spread({path: Samples([value]) for path, value in values.items()})
+    own = spread.on(nominal, gains or None)
+    changes = {**own.changes(list(values.values()))}
+    gains |= own.gains(list(values.values()))
+    if gains:
+        changes["gains"] = gains
+    changes["name"] = f"{nominal.name} ({number})"[:100]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PhysicsWarning)  # told of the nominal case
+        return nominal.replace(changes)

@@ -1,0 +1,277 @@
+"""Sweeps in the frequency domain: thousands to millions of cases around one design.
+
+frequency_sweep(design, spread, samples=..) -> xarray.Dataset along "case"
+FrequencyEngine(design, spread).evaluate(rows) -> columns, for whoever brings rows
+frequency_chunks(..) -> dataset after dataset, for more cases than memory holds
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from models.case import Case
+from models.checks import InputError, check_range
+from models.quadrature import Quadrature
+from models.spreads import Spread
+from models.spreads.fields import FAULTS
+
+from ..design import GainDesign
+from ..structure_design import StructureDesign
+from ..threads import one_thread
+from .dataset import dataset_of
+from .gain_rows import GainRows
+from .metrics import chosen_metrics
+from .structure_rows import StructureRows
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["FrequencyEngine", "frequency_chunks", "frequency_sweep"]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+Progress = Callable[[str, int, int], None]
+Design = GainDesign | StructureDesign
+
+ACCURACY = 1e-5  # difference of two rules from which a variance gets finer nodes
+_CHUNK = 65_536
+
+
+class FrequencyEngine:
+    """A design, asked about rows of numbers: what all sweeps in the frequency domain go through.
+
+    Parameters
+    ----------
+    design
+        A design of three gains (fast), or of any structure (one case after the other).
+    spread
+        What varies.
+    metrics
+        Names of `synth.sweeps.metrics.METRICS`; `stable` always comes along.
+    accuracy
+        Relative difference of a variance by two rules from which it gets finer nodes; what is
+        then left of the error is some two digits less.
+    nodes
+        Nodes for all integrals (three gains only), with no look at their error.
+
+    Raises
+    ------
+    InputError
+        If the design or the spread does not suit.
+    """
+
+    def __init__(
+        self,
+        design: Design,
+        spread: Spread,
+        *,
+        metrics: Sequence[str] | None = None,
+        accuracy: float = ACCURACY,
+        nodes: Quadrature | None = None,
+    ) -> None:
+        check_range("sweep", "accuracy", accuracy, low=0.0, high=1.0, open_low=True)
+        self.design = design
+        if isinstance(design, GainDesign):
+            case, gains = design.sea_case, dict(design.gains)
+        elif isinstance(design, StructureDesign):
+            case, gains = design.case, dict(design.parameters)
+        else:
+            raise InputError(
+                "sweep: in the frequency domain the design must be a GainDesign or a "
+                f"StructureDesign, got {type(design).__name__}"
+            )
+        late = [path for path in spread.paths if path.startswith(FAULTS)]
+        if late:
+            raise InputError(f"sweep: {late[0]} happens in time; use mode 'time'")
+        self.case: Case = case
+        self.spread = spread.on(case, gains, design.drag)
+        self.metrics = chosen_metrics(metrics, dc=case.winch.motor.type == "dc")
+        self.rows: GainRows | StructureRows
+        if isinstance(design, GainDesign):
+            self.rows = GainRows(design, self.spread, self.metrics, accuracy=accuracy, nodes=nodes)
+        elif nodes is not None:
+            raise InputError("sweep: nodes are for a design of three gains; leave them out")
+        else:
+            self.rows = StructureRows(design, self.spread, self.metrics)
+
+    def evaluate(
+        self, rows: FloatArray, progress: Progress | None = None
+    ) -> dict[str, FloatArray | BoolArray]:
+        """Return ``stable`` and the metrics of rows, (n,) each; NaN where a loop is unstable.
+
+        A row's numbers do not depend on the rows beside it, but for the last digits.
+
+        Parameters
+        ----------
+        rows
+            Values in SI, (n, d), in the order of `spread.paths`.
+        progress
+            Called as progress(stage, done, total).
+
+        Raises
+        ------
+        InputError
+            If rows do not fit the spread, or one is no valid case.
+        """
+        table = np.atleast_2d(np.asarray(rows, dtype=np.float64))
+        if table.shape[1] != len(self.spread.paths):
+            raise InputError(
+                f"sweep: rows must have {len(self.spread.paths)} columns, got {table.shape[1]}"
+            )
+        found: dict[str, Any] = {
+            "stable": np.zeros(len(table), dtype=bool),
+            **{m.name: np.full(len(table), np.nan) for m in self.metrics},
+        }
+        for at in range(0, len(table), self.rows.block):
+            part = slice(at, min(at + self.rows.block, len(table)))
+            for name, column in self.rows.evaluate(table[part]).items():
+                found[name][part] = column
+            if progress is not None:
+                progress("cases", part.stop, len(table))
+        return found
+
+    def loop_gain(self, rows: FloatArray, omega: FloatArray) -> npt.NDArray[np.complex128]:
+        """Return the loop gain L(i omega) of rows, (n, k), at frequencies above zero [rad/s]."""
+        return self.rows.loop_gain(np.atleast_2d(rows), np.asarray(omega, dtype=np.float64))
+
+    def dataset(
+        self,
+        rows: FloatArray,
+        *,
+        first: int = 0,
+        notes: dict[str, Any] | None = None,
+        progress: Progress | None = None,
+    ) -> xr.Dataset:
+        """Return the dataset of rows, the first of them being case number `first`."""
+        columns = self.evaluate(rows, progress)
+        nodes = self.rows.level_nodes()
+        return dataset_of(
+            self.design,
+            self.spread,
+            np.asarray(rows, dtype=np.float64),
+            columns,
+            self.metrics,
+            first=first,
+            notes={
+                **(notes or {}),
+                "engine": "one by one" if isinstance(self.rows, StructureRows) else "columns",
+                "nodes": 0 if nodes is None else len(nodes),
+                "refined": self.rows.refined,
+                "unresolved": self.rows.unresolved,
+            },
+        )
+
+
+@one_thread()
+def frequency_sweep(
+    design: Design,
+    spread: Spread,
+    *,
+    samples: int | None,
+    sampling: str = "sobol",
+    seed: int = 0,
+    metrics: Sequence[str] | None = None,
+    chunk: int | None = None,
+    progress: Progress | None = None,
+    accuracy: float = ACCURACY,
+    nodes: Quadrature | None = None,
+) -> xr.Dataset:
+    """Return what a spread does to a design: one case after the other along "case".
+
+    Parameters
+    ----------
+    design
+        A design of three gains, or of any structure.
+    spread
+        What varies, see `models.spreads.Spread`.
+    samples
+        Number of cases; None for ``corners`` and ``given``.
+    sampling
+        ``sobol``, ``lhs``, ``random``, ``grid``, ``corners`` or ``given``.
+    seed
+        Of the samples: case i depends on (seed, i) only.
+    metrics
+        Names of `synth.sweeps.metrics.METRICS`; by default rms of payload, torque and speed, and
+        M_s.
+    chunk
+        Cases at once; memory beyond the dataset's own is that of a chunk.
+    progress
+        Called as progress(stage, done, total).
+    accuracy, nodes
+        See `FrequencyEngine`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimension "case"; a coordinate for every path; `stable` and the metrics, NaN where the
+        loop is unstable; the question in the attributes.
+
+    Raises
+    ------
+    InputError
+        If the design, the spread or a case is not valid.
+    """
+    import xarray as xr
+
+    parts = list(
+        frequency_chunks(
+            design,
+            spread,
+            samples=samples,
+            sampling=sampling,
+            seed=seed,
+            metrics=metrics,
+            chunk=chunk,
+            progress=progress,
+            accuracy=accuracy,
+            nodes=nodes,
+        )
+    )
+    if len(parts) == 1:
+        return parts[0]
+    # The counts of the last chunk are those of all.
+    whole = xr.concat(parts, dim="case", combine_attrs="override")
+    return whole.assign_attrs(parts[-1].attrs)
+
+
+def frequency_chunks(
+    design: Design,
+    spread: Spread,
+    *,
+    samples: int | None,
+    sampling: str = "sobol",
+    seed: int = 0,
+    metrics: Sequence[str] | None = None,
+    chunk: int | None = None,
+    start: int = 0,
+    progress: Progress | None = None,
+    accuracy: float = ACCURACY,
+    nodes: Quadrature | None = None,
+) -> Iterator[xr.Dataset]:
+    """Yield the datasets of one chunk of cases after the other, from case `start` on.
+
+    Nothing but the chunk at hand is kept, so that the number of cases has no bound but time.
+    Parameters are those of `frequency_sweep`.
+
+    Raises
+    ------
+    InputError
+        If the design, the spread or a case is not valid.
+    """
+    size = int(check_range("sweep", "chunk", chunk or _CHUNK, low=1))
+    engine = FrequencyEngine(design, spread, metrics=metrics, accuracy=accuracy, nodes=nodes)
+    total = engine.spread.count(samples, sampling)
+    notes = {"sampling": sampling, "seed": seed, "samples": total}
+    for at in range(start, total, size):
+        stop = min(at + size, total)
+        rows = engine.spread.sample(samples, sampling, seed, start=at, stop=stop)
+
+        def tell(stage: str, done: int, _: int, before: int = at) -> None:
+            if progress is not None:
+                progress(stage, before + done, total)
+
+        yield engine.dataset(rows, first=at, notes=notes, progress=tell)

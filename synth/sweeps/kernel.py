@@ -1,0 +1,313 @@
+r"""The fourth-order loop, thousands at once: coefficients, stability and variances by columns.
+
+One spring, the payload feedback of three gains and no delay: then every response is a ratio of
+polynomials in s over one common denominator,
+
+    Den = Open B + h phi q kappa,     Open = W (kappa + D) + g h D kappa e,
+
+    D = M s^2 + C s (payload),  kappa = K (1 + tau s) (rope),  q = A (a s^2 + a1 s + a2),
+    W = (I s^2 + B_v s) e + beta s (motor and drive),  e its lag,  B the sensors' low-passes,
+    h = r/n, g = h (1/eta + eta)/2,  phi torque per command,  beta torque per speed
+
+(the equations of `models.line` with the rope's closed form put in).  What costs time is
+1/\|Den\|^2 at every node of every loop; it is made in real arithmetic, in chunks that stay in the
+cache.  All variances then are its products with a few powers of the frequency, as every
+\|numerator\|^2 is a polynomial in omega^2: one matrix product for all outputs together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from .numbers import PlantNumbers
+
+__all__ = ["SpringLoops", "hurwitz", "product"]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+Columns = list[FloatArray]  # coefficients of s^0, s^1, .., each (n,), or (1,) if all have the same
+
+CHUNK = 500  # loops at once: two arrays of 500 x 200 numbers stay in the second-level cache
+
+
+class SpringLoops:
+    """Closed loops of one spring without delay, as polynomials in s/reference.
+
+    Parameters
+    ----------
+    plants
+        The plants, their delays zero.
+    gains
+        A a, A a1, A a2 of each loop, (n, 3).
+    drag
+        Linear drag coefficient of each, (n,) [N s/m].
+    mass_share
+        Share of the rope's mass that moves with the payload: 1/3, or 1 as in the thesis.
+    reference
+        Frequency by which s is scaled [rad/s].
+    """
+
+    def __init__(
+        self,
+        plants: PlantNumbers,
+        gains: FloatArray,
+        drag: FloatArray,
+        *,
+        mass_share: float,
+        reference: float,
+    ) -> None:
+        self.reference = reference
+        n, like = plants, plants.like
+        self._count = max(len(plants), len(gains), drag.size)
+        zero, one = np.zeros(1), np.ones(1)
+        h = n["drum_radius"] / n["gear_ratio"]
+        load = n.gear_factor * h
+        if like.motor == "dc":
+            phi = n["torque_constant"] / n["resistance"]
+            beta, lag = phi * n["back_emf_constant"], n["inductance"] / n["resistance"]
+        else:
+            lag = 1.0 / n["torque_bandwidth"]
+            speed_mode = like.speed_gain > 0.0
+            phi = n["speed_gain"] if speed_mode else one
+            beta = n["speed_gain"] if speed_mode else zero
+        K, mass = n.stiffness, n["payload_mass"] + mass_share * n.rope_mass
+        kappa = _trimmed([K, K * n.damping_time])
+        D, e = [zero, drag, mass], _trimmed([one, lag])
+        shaft = [zero, n["viscous_friction"], n["inertia"]]
+        W = total(product(shaft, e), [zero, beta])
+        q = [gains[:, 2], gains[:, 1], gains[:, 0]]
+        sensors: Columns = [one]
+        for name in ("sensor_bandwidth", "telemetry_bandwidth"):
+            if np.all(np.isfinite(n[name])):
+                b = n[name]
+                sensors = product(sensors, [one, np.sqrt(2.0) / b, 1.0 / b**2])
+        heard = product(q, kappa)  # what the sensors' denominators leave of the feedback
+        pull = product([load * d for d in D], product(kappa, product(e, sensors)))
+        free = total(product(W, product(total(kappa, D), sensors)), [h * c for c in pull])
+        self.open = self._scaled(free)
+        self.closed = self._scaled(total(free, [h * phi * c for c in heard]))
+        moved = product(W, product(kappa, sensors))
+        drum = total(pull, [phi * c for c in heard])
+        direct = product(shaft, [phi * c for c in heard])
+        torque = total(
+            [-c for c in direct],
+            product([zero, beta * load], product(D, product(kappa, sensors))),
+        )
+        command = product(W, heard)
+        self._numerators = {
+            "payload.displacement": moved,
+            "payload.velocity": [zero, *moved],
+            "motor.speed": [zero, *drum],
+            "motor.torque": torque,
+            "motor.current": [c / n["torque_constant"] for c in torque],
+            "drum.haul": [h * c for c in drum],
+            "drive.command": command,
+            "motor.voltage": command,
+            "rope.tension": product(D, moved),
+        }
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def order(self) -> int:
+        """Degree of the characteristic polynomial."""
+        return len(self.closed) - 1
+
+    @property
+    def stable(self) -> BoolArray:
+        """Whether all roots of the characteristic polynomial lie in the left half plane, (n,)."""
+        return np.broadcast_to(hurwitz(self.closed), (len(self),))
+
+    def moments(
+        self,
+        outputs: Sequence[str],
+        omega: FloatArray,
+        weights: FloatArray,
+        density: FloatArray | None = None,
+        *,
+        second: bool = False,
+    ) -> dict[str, FloatArray]:
+        """Return the variance of outputs by the rules that `weights` holds, (n, rules) each.
+
+        Parameters
+        ----------
+        outputs
+            Names of outputs.
+        omega
+            Nodes [rad/s], (k,).
+        weights
+            Weight times density at the nodes, (rules, k).
+        density
+            Further density of each loop at the nodes, (n, k), where loops differ in it.
+        second
+            The second moments instead, of the outputs' rates.
+        """
+        x = (omega / self.reference) ** 2
+        squares = {name: squared(self._scaled(self._numerators[name])) for name in outputs}
+        highest = max(len(c) for c in squares.values()) + second
+        powers = np.stack([x**m for m in range(highest)])
+        right = (weights[:, None, :] * powers[None]).reshape(-1, omega.size).T.copy()
+        sums = np.empty((len(self), right.shape[1]))
+        even, odd, y = self._halves(self.closed, omega)
+        for part in _chunks(len(self)):
+            inverse = self._inverse(even[part], odd[part], y)
+            if density is not None:
+                inverse *= density[part]
+            np.matmul(inverse, right, out=sums[part])
+        folded = sums.reshape(len(self), len(weights), highest)
+        found = {}
+        for name, square in squares.items():
+            columns = np.zeros((len(self), len(weights)))
+            for m, c in enumerate(square):
+                if _there(c):
+                    columns += c[:, None] * folded[:, :, m + second]
+            found[name] = columns * self.reference**2 if second else columns
+        return found
+
+    def distance(self, rows: npt.NDArray[np.intp], omega: FloatArray) -> FloatArray:
+        """Return |1 + L|^2 of some loops, each at its own frequencies [rad/s], (m, k)."""
+        return np.asarray(self._size(self.closed, rows, omega) / self._size(self.open, rows, omega))
+
+    def poles(
+        self, rows: npt.NDArray[np.intp], *, closed: bool = True
+    ) -> npt.NDArray[np.complex128]:
+        """Return poles of some loops, (m, order) [1/s], from their companion matrices."""
+        coefficients = self.closed if closed else self.open
+        c = self._table(coefficients)[rows]
+        degree = c.shape[1] - 1
+        matrix = np.zeros((rows.size, degree, degree))
+        matrix[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
+        matrix[:, :, -1] = -c[:, :-1] / c[:, -1:]
+        found = np.linalg.eigvals(matrix) * self.reference
+        return np.asarray(found, dtype=np.complex128)
+
+    def _scaled(self, columns: Columns) -> Columns:
+        return [c * self.reference**j for j, c in enumerate(columns)]
+
+    def _table(self, columns: Columns) -> FloatArray:
+        found = np.empty((len(self), len(columns)))
+        for j, column in enumerate(columns):
+            found[:, j] = column
+        return found
+
+    def _halves(
+        self, columns: Columns, omega: FloatArray
+    ) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatArray]]:
+        """Return even and odd coefficients with their signs, and the powers that they go with."""
+        y = omega / self.reference
+        even, odd = self._table(columns[0::2]), self._table(columns[1::2])
+        even[:, 1::2] *= -1.0
+        odd[:, 1::2] *= -1.0
+        evens = np.stack([y ** (2 * m) for m in range(even.shape[1])])
+        odds = np.stack([y ** (2 * m + 1) for m in range(odd.shape[1])])
+        return even, odd, (evens, odds)
+
+    @staticmethod
+    def _inverse(
+        even: FloatArray, odd: FloatArray, powers: tuple[FloatArray, FloatArray]
+    ) -> FloatArray:
+        """Return 1/|Den|^2, (loops, nodes): real and imaginary part apart, nothing cancels."""
+        real = even @ powers[0]
+        imaginary = odd @ powers[1]
+        np.multiply(real, real, out=real)
+        np.multiply(imaginary, imaginary, out=imaginary)
+        np.add(real, imaginary, out=real)
+        return np.reciprocal(real, out=real)
+
+    def _size(self, columns: Columns, rows: npt.NDArray[np.intp], omega: FloatArray) -> FloatArray:
+        """Return |polynomial|^2, (m, k), by Horner's rule in -omega^2."""
+        y = omega / self.reference
+        x = -(y**2)
+        parts = []
+        for start in (0, 1):
+            half = columns[start::2]
+            value = np.broadcast_to(_at(half[-1], rows), y.shape).copy()
+            for c in half[-2::-1]:
+                value *= x
+                value += _at(c, rows)
+            parts.append(value)
+        return np.asarray(parts[0] ** 2 + (parts[1] * y) ** 2)
+
+
+def product(one: Columns, other: Columns) -> Columns:
+    """Return the product of two polynomials."""
+    found = [np.zeros(1)] * (len(one) + len(other) - 1)
+    for i, a in enumerate(one):
+        for j, b in enumerate(other):
+            if _there(a) and _there(b):
+                found[i + j] = found[i + j] + a * b
+    return found
+
+
+def total(one: Columns, other: Columns) -> Columns:
+    """Return the sum of two polynomials."""
+    long, short = (one, other) if len(one) >= len(other) else (other, one)
+    return [c + short[j] if j < len(short) else c for j, c in enumerate(long)]
+
+
+def squared(columns: Columns) -> Columns:
+    """Return |N(i y)|^2 as a polynomial in y^2."""
+    even = [c * (-1.0) ** m for m, c in enumerate(columns[0::2])]
+    odd = [c * (-1.0) ** m for m, c in enumerate(columns[1::2])]
+    found = product(even, even)
+    if odd:
+        found = total(found, [np.zeros(1), *product(odd, odd)])
+    return found
+
+
+def hurwitz(columns: Columns) -> BoolArray:
+    """Return whether all roots of polynomials lie in the open left half plane, (n,).
+
+    Routh's array, all loops at once, with time scaled by the roots' geometric mean so that
+    nothing overflows (Routh 1877; for the fourth order it is Lienard and Chipart's pair of
+    inequalities).  A zero in its first column, the boundary, counts as unstable.
+
+    Parameters
+    ----------
+    columns
+        Coefficients of s^0 to s^m, each (n,); the highest not zero.
+    """
+    degree = len(columns) - 1
+    sign = np.sign(columns[-1])
+    with np.errstate(all="ignore"):
+        pace = (np.abs(columns[0]) / np.abs(columns[-1])) ** (1.0 / degree)
+        pace = np.where((pace > 0.0) & np.isfinite(pace), pace, 1.0)
+        lead = columns[-1] * pace**degree
+        scaled = [c * pace**j / lead for j, c in enumerate(columns)]
+        stable = sign != 0.0
+        for c in scaled:
+            stable = stable & (c > 0.0)
+        upper = scaled[degree::-2]
+        lower = scaled[degree - 1 :: -2] if degree else []
+        while lower:
+            stable = stable & (lower[0] > 0.0)
+            ratio = upper[0] / lower[0]
+            padded = [*lower[1:], np.zeros(1)]
+            upper, lower = (
+                lower,
+                [u - ratio * p for u, p in zip(upper[1:], padded, strict=False)],
+            )
+    return np.asarray(stable)
+
+
+def _trimmed(columns: Columns) -> Columns:
+    """Return a polynomial without highest coefficients that are zero in all loops."""
+    while len(columns) > 1 and not np.any(columns[-1]):
+        columns = columns[:-1]
+    return columns
+
+
+def _there(column: FloatArray) -> bool:
+    return column.size > 1 or bool(column[0] != 0.0)
+
+
+def _at(column: FloatArray, rows: npt.NDArray[np.intp]) -> FloatArray:
+    return column[rows][:, None] if column.size > 1 else column[:, None]
+
+
+def _chunks(count: int) -> list[slice]:
+    return [slice(at, min(at + CHUNK, count)) for at in range(0, count, CHUNK)]

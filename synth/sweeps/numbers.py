@@ -1,0 +1,308 @@
+"""The plant's numbers of many cases at once: columns of a spread -> columns of `PlantData`.
+
+A thousand checked cases take seconds, a thousand columns of arithmetic microseconds.  So what
+`models.plant_data.PlantData.from_case` does to one case is done here to whole columns, for those
+paths that it is known for, and compared with the checked cases of some of the rows; any other
+path, and any difference, sends every row through its own checked case.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from models.case import Case
+from models.checks import InputError
+from models.plant_data import PlantData
+from models.spreads import Spread
+from models.spreads.fields import DRAG, GAINS
+
+__all__ = ["PlantNumbers", "numbers_of"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_AGREE = 1e-12
+_NEWTON = 30
+
+# Paths whose effect on the plant stands below; limits have none on a linear plant.
+_KNOWN = {
+    "rope.axial_stiffness",
+    "rope.damping_ratio",
+    "rope.length",
+    "rope.mass_per_length",
+    "rope.submerged_weight_per_length",
+    "payload.added_mass",
+    "payload.area",
+    "payload.drag.coefficient",
+    "payload.drag_coefficient",
+    "payload.mass",
+    "payload.submerged_weight",
+    "payload.water_density",
+    "winch.drum.inertia",
+    "winch.drum.radius",
+    "winch.gearbox.efficiency",
+    "winch.gearbox.inertia",
+    "winch.gearbox.ratio",
+    "winch.motor.back_emf_constant",
+    "winch.motor.inductance",
+    "winch.motor.inertia",
+    "winch.motor.resistance",
+    "winch.motor.speed_gain",
+    "winch.motor.torque_bandwidth",
+    "winch.motor.torque_constant",
+    "winch.motor.viscous_friction",
+    "sensors.payload.bandwidth",
+    "sensors.telemetry.bandwidth",
+    "sensors.telemetry.delay",
+}
+_ELSEWHERE = ("sea.", "vessel.", "limits.", GAINS)
+_PLAIN = tuple(
+    f.name
+    for f in fields(PlantData)
+    if f.name not in ("masses", "lumping", "motor", "coulomb_friction", "friction_speed")
+)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlantNumbers:
+    """Numbers of n plants of one kind, in SI, named as in `PlantData`.
+
+    Attributes
+    ----------
+    count
+        How many plants, n.
+    values
+        By name of a field of `PlantData`: (n,), or (1,) where all plants have the same, so that
+        arithmetic on what does not vary costs nothing.
+    like
+        The plant of the case itself: its kind of motor, how its rope is lumped.
+    fixed_drag
+        Linear drag coefficient [N s/m]; NaN where it agrees with the response.
+    """
+
+    count: int
+    values: Mapping[str, FloatArray]
+    like: PlantData
+    fixed_drag: FloatArray
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __getitem__(self, name: str) -> FloatArray:
+        return self.values[name]
+
+    def part(self, index: slice | npt.NDArray[np.intp]) -> PlantNumbers:
+        """Return some of the plants."""
+
+        def some(column: FloatArray) -> FloatArray:
+            return column if column.size < self.count else column[index]
+
+        return replace(
+            self,
+            count=len(range(*index.indices(self.count)))
+            if isinstance(index, slice)
+            else len(index),
+            values={name: some(column) for name, column in self.values.items()},
+            fixed_drag=some(self.fixed_drag),
+        )
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """K = EA/L [N/m]."""
+        return self["axial_stiffness"] / self["rope_length"]
+
+    @property
+    def rope_mass(self) -> FloatArray:
+        """Mass of the rope paid out [kg]."""
+        return self["mass_per_length"] * self["rope_length"]
+
+    @property
+    def static_tension(self) -> FloatArray:
+        """Rope tension at the drum at rest [N]."""
+        return self["payload_weight"] + self["rope_weight"] * self["rope_length"]
+
+    @property
+    def gear_factor(self) -> FloatArray:
+        """(1/eta + eta)/2, see `PlantData.mean_gear_factor` [-]."""
+        eta = self["gear_efficiency"]
+        return 0.5 * (1.0 / eta + eta)
+
+    @property
+    def damping_time(self) -> FloatArray:
+        """Kelvin-Voigt time of the rope, 2 zeta over the first exact mode [s]."""
+        zeta = self["damping_ratio"]
+        if not np.any(zeta):
+            return np.zeros(1)
+        wave = np.sqrt(self["axial_stiffness"] / np.maximum(self["mass_per_length"], 1e-300))
+        nu = _first_root(self.rope_mass / self["payload_mass"])
+        return 2.0 * zeta * self["rope_length"] / (nu * wave)
+
+
+def numbers_of(
+    case: Case, spread: Spread, rows: FloatArray, *, checked: int | None = None
+) -> tuple[PlantNumbers, bool]:
+    """Return the plants of a spread's rows, (n, d), and whether columns sufficed.
+
+    `checked` rows of them are compared with their checked cases; one if left out.
+
+    Raises
+    ------
+    InputError
+        If a row is no valid case; its values are named.
+    """
+    paths = [p for p in spread.paths if p != DRAG and not p.startswith(_ELSEWHERE)]
+    drag = rows[:, spread.paths.index(DRAG)] if DRAG in spread.paths else None
+    like = PlantData.from_case(case)
+    count = len(rows)
+    if not set(paths) <= _KNOWN or (case.payload.shape and "payload.water_density" in paths):
+        found = _one_by_one(like, spread, rows)
+        return _with_drag(found, drag), False
+    quick = _columns(case, like, spread, rows)
+    for k in np.unique(np.linspace(0, count - 1, min(checked or 1, count)).astype(int)):
+        exact = PlantData.from_case(_case_at(spread, rows[k]))
+        for name in _PLAIN:
+            value, own = getattr(exact, name), float(quick[name][k % quick[name].size])
+            same = value == own or abs(value - own) <= _AGREE * abs(value)
+            if not (same or (math.isnan(value) and math.isnan(own))):
+                return _with_drag(_one_by_one(like, spread, rows), drag), False
+    return _with_drag(quick, drag), True
+
+
+def _with_drag(numbers: PlantNumbers, drag: FloatArray | None) -> PlantNumbers:
+    return numbers if drag is None else replace(numbers, fixed_drag=drag)
+
+
+def _case_at(spread: Spread, row: FloatArray) -> Case:
+    try:
+        return spread.case_at(row)
+    except InputError as error:
+        named = ", ".join(f"{p} = {v:.6g}" for p, v in zip(spread.paths, row, strict=True))
+        raise InputError(f"sweep: no case at {named}: {error}") from None
+
+
+def _one_by_one(like: PlantData, spread: Spread, rows: FloatArray) -> PlantNumbers:
+    """Return the plants of rows, each through its own checked case."""
+    data, fixed = [], []
+    for row in rows:
+        own = _case_at(spread, row)
+        data.append(PlantData.from_case(own))
+        drag = own.payload.fixed_drag
+        fixed.append(math.nan if drag is None else drag)
+    values = {name: np.array([getattr(d, name) for d in data]) for name in _PLAIN}
+    kinds = {(d.motor, d.lumping, d.masses) for d in data}
+    if kinds != {(like.motor, like.lumping, like.masses)}:
+        raise InputError("sweep: the motor's kind and the rope's lumping cannot vary within one")
+    return PlantNumbers(count=len(rows), values=values, like=like, fixed_drag=np.array(fixed))
+
+
+def _columns(case: Case, like: PlantData, spread: Spread, rows: FloatArray) -> PlantNumbers:
+    """Return the plants of rows by column arithmetic."""
+    given = {path: rows[:, j] for j, path in enumerate(spread.paths)}
+    rope, payload, winch = case.rope, case.payload, case.winch
+
+    def of(path: str, own: float) -> FloatArray:
+        return given[path] if path in given else np.array([float(own)])
+
+    mass = of("payload.mass", payload.mass)
+    share = mass / payload.mass  # added mass and weight grow with it, as in `Spread.changes`
+    added = given.get("payload.added_mass", share * payload.hydrodynamic_mass)
+    weight = given.get("payload.submerged_weight", share * payload.submerged_weight)
+    length = of("rope.length", rope.length)
+    line = of("rope.mass_per_length", rope.mass_per_length)
+    if "rope.submerged_weight_per_length" in given or rope.submerged_weight_per_length is not None:
+        wet = of("rope.submerged_weight_per_length", rope.submerged_weight_per_length or 0.0)
+    else:  # that of steel, in proportion to its mass
+        wet = line * (rope.submerged_weight / rope.length / rope.mass_per_length)
+    density = of("payload.water_density", payload.water_density)
+    quadratic = (
+        0.5
+        * density
+        * of("payload.drag_coefficient", payload.c_d)
+        * of("payload.area", payload.area)
+    )
+    ratio = of("winch.gearbox.ratio", winch.gearbox.ratio)
+    inertia = (
+        of("winch.motor.inertia", winch.motor.inertia)
+        + of("winch.gearbox.inertia", winch.gearbox.inertia)
+        + of("winch.drum.inertia", winch.drum.inertia) / ratio**2
+    )
+    values = {name: np.array([float(getattr(like, name))]) for name in _PLAIN}
+    values |= {
+        "axial_stiffness": of("rope.axial_stiffness", rope.ea),
+        "rope_length": length,
+        "mass_per_length": line,
+        "rope_weight": wet,
+        "damping_ratio": of("rope.damping_ratio", rope.damping_ratio),
+        "payload_mass": mass + added,
+        "payload_weight": weight,
+        "quadratic_drag": quadratic,
+        "drum_radius": _radius(case, given, length),
+        "gear_ratio": ratio,
+        "gear_efficiency": of("winch.gearbox.efficiency", winch.gearbox.efficiency),
+        "inertia": inertia,
+        "viscous_friction": of("winch.motor.viscous_friction", winch.viscous_friction),
+        "delay": of("sensors.telemetry.delay", like.delay),
+        "sensor_bandwidth": of("sensors.payload.bandwidth", like.sensor_bandwidth),
+        "telemetry_bandwidth": of("sensors.telemetry.bandwidth", like.telemetry_bandwidth),
+    }
+    for name in (
+        "resistance",
+        "torque_constant",
+        "back_emf_constant",
+        "inductance",
+        "torque_bandwidth",
+        "speed_gain",
+    ):
+        values[name] = of(f"winch.motor.{name}", getattr(like, name))
+    drag = _fixed_drag(case, given, quadratic)
+    return PlantNumbers(count=len(rows), values=values, like=like, fixed_drag=drag)
+
+
+def _fixed_drag(case: Case, given: Mapping[str, FloatArray], quadratic: FloatArray) -> FloatArray:
+    own = case.payload.fixed_drag
+    if own is None:
+        return np.array([math.nan])
+    if "payload.drag.coefficient" in given:
+        return given["payload.drag.coefficient"]
+    nominal = case.payload.quadratic_drag
+    # That of equal energy grows with the quadratic one; one that is given does not.
+    moved = case.payload.drag.method == "energy" and nominal > 0.0
+    return own / nominal * quadratic if moved else np.array([own])
+
+
+def _radius(case: Case, given: Mapping[str, FloatArray], length: FloatArray) -> FloatArray:
+    """Return the drum's radius of the layer in use, as `Drum.radius_at` does."""
+    drum, diameter = case.winch.drum, case.rope.diameter
+    if "winch.drum.radius" in given:
+        return given["winch.drum.radius"]
+    if drum.radius is not None:
+        return np.array([drum.radius])
+    total = drum.total(diameter)
+    if np.any(length > total):
+        raise InputError(
+            f"sweep: rope.length must be at most what the drum holds, {total:.4g} m, "
+            f"got {length.max():g} m"
+        )
+    lays = drum.lays(diameter)  # innermost first: from which length on a radius holds
+    found = np.full(length.size, lays[-1][1])
+    for start, radius in reversed(lays):
+        found = np.where(length >= start, radius, found)
+    return found
+
+
+def _first_root(eps: FloatArray) -> FloatArray:
+    """Return the root of nu tan nu = eps in (0, pi/2), by Newton's rule; sqrt(eps) for small."""
+    nu = np.sqrt(3.0 * eps / (3.0 + eps))
+    nu = np.minimum(nu, 0.5 * np.pi * eps / (1.0 + eps) + 1e-3)
+    for _ in range(_NEWTON):
+        value = nu * np.sin(nu) - eps * np.cos(nu)
+        slope = np.sin(nu) + nu * np.cos(nu) + eps * np.sin(nu)
+        step = value / slope
+        nu = np.clip(nu - step, 0.25 * nu, 0.5 * np.pi)
+        if np.all(np.abs(step) <= 1e-15 * nu):
+            break
+    return nu

@@ -1,0 +1,160 @@
+"""What shakes each row of a sweep: densities of the hook's motion on common nodes.
+
+Mostly the sea does not vary, or only its height, which is a factor; with its period, a standard
+spectrum keeps its shape, S(omega; H, T) = (H/H0)^2 (T/T0) S(omega T/T0; H0, T0).  Whether that
+holds for the case at hand is tried on some rows; where it does not, every different sea goes
+through its own case.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from models.case import Case
+from models.hook import HookMotion
+from models.physics_warning import PhysicsWarning
+from models.spreads import Spread
+
+__all__ = ["SeaRows"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_HEIGHT = "sea.significant_height"
+_PERIODS = ("sea.peak_period", "sea.significant_period")
+_SEA = ("sea.", "vessel.")
+_TRIED = 5
+_AGREE = 1e-10
+_PROBES = np.geomspace(0.05, 50.0, 60)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Law:
+    """How the density follows from the case's own: a factor, a stretch, or not at all."""
+
+    height: str | None = None
+    period: str | None = None
+
+
+class SeaRows:
+    """Densities of the hook's motion of a spread's rows.
+
+    Parameters
+    ----------
+    case, spread
+        The case, and the spread on it.
+    """
+
+    def __init__(self, case: Case, spread: Spread) -> None:
+        self.spread = spread
+        self.hook = _hook(case)
+        self._columns = [j for j, p in enumerate(spread.paths) if p.startswith(_SEA)]
+        self._known: dict[bytes, HookMotion] = {}
+        names = {spread.paths[j] for j in self._columns}
+        self._law: _Law | None = _Law()
+        if names:
+            self._law = self._tried(
+                _Law(
+                    height=_HEIGHT if _HEIGHT in names else None,
+                    period=next((p for p in _PERIODS if p in names), None),
+                ),
+                names,
+            )
+
+    @property
+    def varies(self) -> bool:
+        """Whether rows differ in more than a factor."""
+        return self._law is None or self._law.period is not None
+
+    def frame(self) -> tuple[float, float, list[float]]:
+        """Return the band that holds all densities, and their kinks [rad/s]."""
+        hooks = [self.hook]
+        if self.varies:
+            # Ends and some in between: a kink that lies elsewhere meets panels that are short.
+            hooks += [self._own(row) for row in self._some(16)]
+        low, high = min(h.band[0] for h in hooks), max(h.band[1] for h in hooks)
+        splits = sorted({w for h in hooks for w in h.splits if low < w < high})
+        return low, high, splits
+
+    def factors(self, rows: FloatArray) -> FloatArray:
+        """Return the factor on the common density of each row, (n,) or (1,)."""
+        if self._law is None or self._law.height is None or not len(rows):
+            return np.ones(1)
+        j = self.spread.paths.index(self._law.height)
+        factor: FloatArray = (rows[:, j] / self.spread.nominal[self._law.height]) ** 2
+        return factor
+
+    def density(self, omega: FloatArray) -> FloatArray:
+        """Return the case's own density at nodes, (k,) [m2 s/rad]."""
+        return np.asarray(self.hook.density(omega))
+
+    def ratios(self, rows: FloatArray, omega: FloatArray) -> FloatArray | None:
+        """Return density over factor of each row at the nodes, (n, k); None if it is common."""
+        if not self.varies:
+            return None
+        if self._law is None:
+            return np.stack([np.asarray(self._own(row).density(omega)) for row in rows])
+        assert self._law.period is not None
+        j = self.spread.paths.index(self._law.period)
+        stretch = rows[:, j] / self.spread.nominal[self._law.period]
+        sea = np.asarray(self.hook.sea.density((stretch[:, None] * omega).ravel()))
+        heave = np.abs(self.hook.rao.response(omega)) ** 2
+        return np.asarray(sea.reshape(len(rows), -1) * stretch[:, None] * heave)
+
+    def _tried(self, law: _Law, names: set[str]) -> _Law | None:
+        """Return the law if it holds on some rows and nothing else of the sea varies."""
+        if names - {law.height, law.period}:
+            return None
+        self._law = law
+        if law.period is not None:
+            plain = np.abs(self.hook.rao.response(_PROBES)) ** 2 * self.hook.sea.density(_PROBES)
+            if not np.allclose(plain, self.hook.density(_PROBES), rtol=_AGREE, atol=0.0):
+                return None
+        for row in self._some(_TRIED):
+            own = np.asarray(self._own(row).density(_PROBES))
+            common = self.ratios(row[None], _PROBES)
+            found = self.density(_PROBES) if common is None else common[0]
+            found = found * self.factors(row[None])[0]
+            if np.any(np.abs(found - own) > _AGREE * np.maximum(own, 1e-12 * own.max())):
+                return None
+        return law
+
+    def _some(self, count: int) -> list[FloatArray]:
+        """Return rows at the ends of what varies of the sea, and some in between."""
+        own = list(self.spread.distributions.values())
+        middle = np.array([field.nominal for field in self.spread.fields])
+        rows = []
+        for j in self._columns:
+            for end in own[j].ends:
+                row = middle.copy()
+                row[j] = end
+                rows.append(row)
+        return [*rows, *self.spread.sample(count, "random")]
+
+    def _own(self, row: FloatArray) -> HookMotion:
+        """Return the hook's motion of a row, through its own case."""
+        key = row[self._columns].tobytes()
+        if key not in self._known:
+            if len(self._known) > 20_000:
+                self._known.clear()
+            named = dict(zip(self.spread.paths, row, strict=True))
+            self._known[key] = _hook(_with(self.spread, named, self._columns))
+        return self._known[key]
+
+
+def _with(spread: Spread, named: Mapping[str, float], columns: list[int]) -> Case:
+    assert spread.case is not None
+    changes = {spread.paths[j]: float(named[spread.paths[j]]) for j in columns}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PhysicsWarning)
+        return spread.case.replace(changes)
+
+
+def _hook(case: Case) -> HookMotion:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PhysicsWarning)  # the case has told its own
+        return HookMotion.from_case(case)

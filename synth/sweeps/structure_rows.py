@@ -1,0 +1,127 @@
+"""Any structure's design on rows of a spread, one case at a time.
+
+Slower than the columns of `synth.sweeps.gain_rows` by three orders of magnitude, but with no
+assumption about structure, sensors or disturbances: the question of every case is posed anew and
+assessed as `synth.structure_design` does, with the design's own parameters.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from models.checks import InputError, SolverError
+from models.metrics import peak_factor
+from models.physics_warning import PhysicsWarning
+from models.quadrature import Quadrature
+from models.spreads import Spread
+
+from ..assess import Assessment
+from ..structure_design import StructureDesign
+from ..structure_question import pose_structure
+from .metrics import Metric
+
+__all__ = ["StructureRows"]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+
+class StructureRows:
+    """A structure's design, asked about rows of a spread.
+
+    Parameters
+    ----------
+    design, spread, metrics
+        The design, the spread on its case, and what is wanted.
+    """
+
+    refined = 0
+    unresolved = 0
+    columns = False
+    spring = False
+
+    def __init__(self, design: StructureDesign, spread: Spread, metrics: Sequence[Metric]) -> None:
+        if not design.parameters:
+            raise InputError(f"sweep: the design has no controller: {design.status}")
+        if "rope.masses" in spread.paths:
+            raise InputError("sweep: rope.masses cannot vary; a design has one number of masses")
+        self.design, self.spread, self.metrics = design, spread, tuple(metrics)
+
+    @property
+    def block(self) -> int:
+        """Rows between two words of progress."""
+        return 16
+
+    def level_nodes(self, level: int = 0) -> Quadrature | None:
+        """Return None: every case has nodes of its own."""
+        del level
+        return None
+
+    def evaluate(self, rows: FloatArray) -> dict[str, FloatArray | BoolArray]:
+        """Return ``stable`` and the metrics of rows, (n,) each.
+
+        Raises
+        ------
+        InputError
+            If a row is no valid case.
+        """
+        found: dict[str, Any] = {m.name: np.full(len(rows), np.nan) for m in self.metrics}
+        found["stable"] = np.zeros(len(rows), dtype=bool)
+        for k, row in enumerate(rows):
+            view = self._view(row)
+            try:
+                stable = view.stable
+            except SolverError:  # no drag makes it stable
+                stable = False
+            found["stable"][k] = stable
+            if stable:
+                for metric in self.metrics:
+                    found[metric.name][k] = self._measure(metric, view, row)
+        return found
+
+    def loop_gain(self, rows: FloatArray, omega: FloatArray) -> npt.NDArray[np.complex128]:
+        """Return L(i omega) of rows, (n, k), at frequencies above zero [rad/s]."""
+        return np.stack([self._view(row).loop_gain(omega) for row in rows])
+
+    def _view(self, row: FloatArray) -> Assessment:
+        case = self.spread.case_at(row)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PhysicsWarning)  # the design's case has told its own
+            posed = pose_structure(case, self.design.structure, self.design.masses)
+        own = {**self.design.parameters, **self.spread.gains(row)}
+        problem = posed.problem(())
+        return Assessment(
+            problem.plant,
+            posed.law.controller([own[p.name] for p in posed.law.parameters]),
+            problem.disturbances,
+            drag=problem.drag,
+            coefficient=self.spread.drag(row) if problem.drag is not None else None,
+        )
+
+    def _measure(self, metric: Metric, view: Assessment, row: FloatArray) -> float:
+        static = view.plant.static
+        if metric.name == "max_sensitivity":
+            return view.max_sensitivity
+        if metric.name == "drag":
+            fixed = self.spread.case_at(row).payload.fixed_drag
+            return view.coefficient if fixed is None else fixed
+        if metric.kind == "static":
+            return static["motor.torque" if metric.name == "static_torque" else "rope.tension"]
+        output = metric.output
+        if output == "drive.command" and output not in view.plant.outputs:
+            output = "motor.voltage"
+        if output not in view.plant.outputs:
+            raise InputError(f"sweep: {metric.name} is not known of this plant")
+        if metric.kind == "rms":
+            return view.sigma(output)
+        if metric.kind == "period":
+            return view.mean_period(output)
+        time = self.spread.case_at(row).limits.exposure_time
+        swing = peak_factor(view.mean_period(output), time) * view.sigma(output)
+        rest = static.get(output, 0.0)
+        return abs(rest) + swing if metric.kind == "peak" else rest - swing
