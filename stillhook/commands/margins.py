@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
 from models.checks import InputError, check_range
 
 from ..terminal import commands, console, progress
-from .given import case_words, given_case, parse_gains
+from .given import case_words, given_case
+from .given_design import given_design
 from .optimise import interruptible
-
-if TYPE_CHECKING:
-    from models import Case
-    from synth.design import GainDesign
-    from synth.structure_design import StructureDesign
 
 __all__ = ["parse_off", "run"]
 
@@ -26,7 +21,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_range("margins", "--draws", arguments.draws, low=0, high=1_000_000)
     case = given_case(arguments)
     off = parse_off(arguments.off) or _USUAL
-    design = _design(case, arguments)
+    design = given_design(case, arguments)
     from synth.mu import robustness
 
     with progress(shown=not arguments.quiet) as tell, interruptible() as check:
@@ -72,33 +67,3 @@ def parse_off(texts: list[str]) -> dict[str, float | str]:
         except ValueError:
             found[path] = width
     return found
-
-
-def _design(case: Case, arguments: argparse.Namespace) -> GainDesign | StructureDesign:
-    """Return the design of a file on the case given, or that of gains."""
-    from dataclasses import replace
-
-    from synth import evaluate_gains
-
-    if arguments.design is not None:
-        if arguments.gains is not None:
-            raise InputError("margins: give --design or --gains, not both")
-        from ..design_file import load_design
-        from ..structure_file import load_structure
-
-        try:
-            structure = load_structure(arguments.design)
-        except InputError as error:
-            if "is not a structure's design" not in str(error):
-                raise
-            return evaluate_gains(case, load_design(arguments.design).gains)
-        return replace(structure, case=case)
-    if arguments.gains is not None:
-        return evaluate_gains(case, parse_gains(arguments.gains))
-    if case.gains is None:
-        raise InputError(
-            f"{case.source}: gains: the case has none in use; give --gains, or --design with a "
-            "design.yaml that `stillhook optimise` wrote"
-        )
-    own = {name: getattr(case.gains, name) for name in ("A", "a", "a1", "a2")}
-    return evaluate_gains(case, own)

@@ -163,6 +163,18 @@ class Sensitivity:
             )
         return tuple(found)
 
+    def to_csv(self) -> str:
+        """Return all elasticities as a table, one row for each number; zeros included."""
+        lines = ["path,value,unit," + ",".join(f"dln({n})/dln(path)" for n in FIGURES)]
+        lines[0] += ",d2ln(payload_rms)/dln(path)2,note"
+        for e in self.elasticities:
+            cells = [repr(float(getattr(e, name))) for name in ("value", *FIGURES)]
+            curvature = "" if e.curvature is None else repr(e.curvature)
+            lines.append(",".join([e.path, cells[0], e.unit, *cells[1:], curvature, ""]))
+        lines += [f"{path},,,0,0,0,0,,no effect" for path in self.without_effect]
+        lines += [f"{path},,,,,,,,steps at its value" for path in self.stepping]
+        return "\n".join(lines) + "\n"
+
     def __str__(self) -> str:
         """Return a small tree, the largest first."""
         lines = [
