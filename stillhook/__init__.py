@@ -44,6 +44,10 @@ _HOME = {
     "pareto_front": "synth.pareto",
     "Robustness": "synth.mu",
     "robustness": "synth.mu",
+    "morris_screening": "synth.sensitivities.screening",
+    "sobol_indices": "synth.sensitivities.global_indices",
+    "Sensitivity": "synth.sensitivities",
+    "sensitivity": "synth.sensitivities",
     "schedule_gains": "synth.schedule",
     "optimise_gains": "synth",
     "tune": "synth",
@@ -73,6 +77,17 @@ _HOME = {
     "load_structure": "stillhook.structure_file",
     "save_structure": "stillhook.structure_file",
     "save_design": "stillhook.design_file",
+    "Spread": "models.spreads",
+    "VesselRaos": "models.vessels",
+    "read_raos": "models.vessels",
+    "write_raos": "models.vessels",
+    "bundled_vessels": "models.vessels",
+    "sweep": "stillhook.sweeps.sweep",
+    "resume_sweep": "stillhook.sweeps.sweep",
+    "operability": "synth.operability",
+    "Operability": "synth.operability.result",
+    "Scatter": "models.seas.scatter",
+    "read_scatter": "models.seas.scatter",
     "write_report": "stillhook.report",
 }
 
@@ -90,23 +105,29 @@ __all__ = [
     "LinearFeedback",
     "LinearMPC",
     "NonlinearMPC",
+    "Operability",
     "PhysicsWarning",
     "RecordMotion",
     "Robustness",
     "Run",
     "Runs",
+    "Scatter",
     "Scenario",
+    "Sensitivity",
     "SineMotion",
     "SixDofMotion",
     "SolverError",
+    "Spread",
     "StillhookError",
     "StructureDesign",
     "SynthesisError",
     "VelocityFeedForward",
+    "VesselRaos",
     "Weights",
     "__version__",
     "bound_for",
     "bundled_cases",
+    "bundled_vessels",
     "cable_study",
     "case_schema",
     "clairvoyant",
@@ -117,18 +138,27 @@ __all__ = [
     "load_case",
     "load_design",
     "load_structure",
+    "morris_screening",
+    "operability",
     "optimise_gains",
     "optimise_robust",
     "optimise_structure",
     "pareto_front",
+    "read_raos",
+    "read_scatter",
+    "resume_sweep",
     "robustness",
     "save_design",
     "save_structure",
+    "sensitivity",
     "simulate",
     "size_winch",
+    "sobol_indices",
+    "sweep",
     "tune",
     "tune_weights",
     "worth",
+    "write_raos",
     "write_report",
     "write_runs",
 ]
@@ -147,7 +177,14 @@ if TYPE_CHECKING:
     from models.record_file import RecordMotion as RecordMotion
     from models.run import Run as Run
     from models.scenario import Scenario as Scenario
+    from models.seas.scatter import Scatter as Scatter
+    from models.seas.scatter import read_scatter as read_scatter
     from models.six_dof import SixDofMotion as SixDofMotion
+    from models.spreads import Spread as Spread
+    from models.vessels import VesselRaos as VesselRaos
+    from models.vessels import bundled_vessels as bundled_vessels
+    from models.vessels import read_raos as read_raos
+    from models.vessels import write_raos as write_raos
     from mpc.clairvoyant import Clairvoyant as Clairvoyant
     from mpc.clairvoyant import clairvoyant as clairvoyant
     from mpc.doubts import Doubts as Doubts
@@ -155,6 +192,8 @@ if TYPE_CHECKING:
     from mpc.nonlinear import NonlinearMPC as NonlinearMPC
     from mpc.weights import Weights as Weights
     from mpc.weights import tune_weights as tune_weights
+    from stillhook.sweeps.sweep import resume_sweep as resume_sweep
+    from stillhook.sweeps.sweep import sweep as sweep
     from synth import GainDesign as GainDesign
     from synth import evaluate_gains as evaluate_gains
     from synth import optimise_gains as optimise_gains
@@ -170,10 +209,16 @@ if TYPE_CHECKING:
     from synth.linear_feedback import LinearFeedback as LinearFeedback
     from synth.mu import Robustness as Robustness
     from synth.mu import robustness as robustness
+    from synth.operability import operability as operability
+    from synth.operability.result import Operability as Operability
     from synth.pareto import pareto_front as pareto_front
     from synth.purchase import worth as worth
     from synth.robust import optimise_robust as optimise_robust
     from synth.schedule import schedule_gains as schedule_gains
+    from synth.sensitivities import Sensitivity as Sensitivity
+    from synth.sensitivities import sensitivity as sensitivity
+    from synth.sensitivities.global_indices import sobol_indices as sobol_indices
+    from synth.sensitivities.screening import morris_screening as morris_screening
     from synth.sizing import size_winch as size_winch
     from synth.structure_design import StructureDesign as StructureDesign
     from synth.structure_search import optimise_structure as optimise_structure

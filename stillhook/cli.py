@@ -45,9 +45,16 @@ def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     from . import __version__
     from .commands.compare_arguments import add_compare_arguments
+    from .commands.given_design import add_design_arguments
+    from .commands.motion_arguments import add_motion_arguments
+    from .commands.operability_arguments import add_operability_arguments
     from .commands.robust_arguments import add_pareto_arguments, add_robust_arguments
+    from .commands.sea_arguments import add_sea_arguments
+    from .commands.sensitivity_arguments import add_sensitivity_arguments
     from .commands.simulate_arguments import add_simulate_arguments
     from .commands.size_arguments import add_size_arguments, add_worth_arguments
+    from .commands.sweep_arguments import add_sweep_arguments
+    from .commands.vessel_arguments import add_vessel_arguments
 
     raw = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(
@@ -151,14 +158,7 @@ def build_parser() -> argparse.ArgumentParser:
     text = "say how far the plant's numbers may be off before a design is unstable"
     margins = command("margins", "margins", text)
     case(margins)
-    margins.add_argument(
-        "--design", metavar="FILE", help="a design that was written (design.yaml, combined.yaml)"
-    )
-    margins.add_argument(
-        "--gains",
-        metavar="A=..,a=..,a1=..,a2=..",
-        help="or gains (default: those that the case has in use)",
-    )
+    add_design_arguments(margins)
     margins.add_argument(
         "--off",
         metavar="PATH=SHARE",
@@ -171,6 +171,16 @@ def build_parser() -> argparse.ArgumentParser:
         "--draws", type=int, default=1000, metavar="N", help="random plants to check with"
     )
     margins.add_argument("--quiet", action="store_true", help="print the verdict only")
+
+    text = "say which numbers of the case matter most to a design"
+    sensitivity = command("sensitivity", "sensitivity", text)
+    case(sensitivity)
+    add_sensitivity_arguments(sensitivity)
+
+    text = "say in which seas the winch can work, what limits it, and how much of the year"
+    operability = command("operability", "operability", text)
+    case(operability)
+    add_operability_arguments(operability)
 
     pareto = command("pareto", "pareto", "draw what stillness costs: torque, margin or delay")
     case(pareto)
@@ -191,6 +201,9 @@ def build_parser() -> argparse.ArgumentParser:
     compare = command("compare", "compare", "compare controllers in the same seas, limits and all")
     case(compare)
     add_compare_arguments(compare)
+
+    text = "try a design or a controller on many cases: what is not known exactly, what fails"
+    add_sweep_arguments(command("sweep", "sweep", text))
 
     scenarios = command("scenarios", "scenarios", "list the operations and the controllers")
     scenarios.add_argument(
@@ -213,6 +226,18 @@ def build_parser() -> argparse.ArgumentParser:
         help="noise of a sensor that the case calls exact, over the hook's rms (default: 0.001)",
     )
     bound.add_argument("--quiet", action="store_true", help="print the bound only")
+
+    sea = command("sea", "sea", "read wave spectra: what they hold, scatter diagram, one of them")
+    add_sea_arguments(sea)
+
+    text = "show the hook's motion over headings, periods and sides, and what it asks of a winch"
+    motion = command("motion", "motion", text)
+    case(motion)
+    add_motion_arguments(motion)
+
+    text = "read a vessel's RAOs from a file, or compute them from a hull"
+    vessel = command("vessel", "vessel", text)
+    add_vessel_arguments(vessel)
 
     case(command("check", "check", "read a case, and show what follows from it"))
 

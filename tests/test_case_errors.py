@@ -222,8 +222,8 @@ WRONG = {
     "unknown spectrum": (
         ("spectrum: jonswap", "spectrum: jonswop"),
         "my.yaml:4: sea.spectrum: must be 'bretschneider-1975', 'bretschneider', 'jonswap', "
-        "'torsethaugen', 'ochi-hubble', 'pierson-moskowitz', 'tma', 'gaussian-swell', 'measured' or "
-        "'sum', got 'jonswop'; did you mean 'jonswap'?",
+        "'torsethaugen', 'ochi-hubble', 'pierson-moskowitz', 'tma', 'gaussian-swell', "
+        "'measured' or 'sum', got 'jonswop'; did you mean 'jonswap'?",
     ),
     "future format": (
         ("stillhook: 1", "stillhook: 2"),

@@ -1,0 +1,64 @@
+"""Figures of `docs/operability.md`, and its figures: `python benchmarks/operability_figures.py`.
+
+A present-day winch (`subsea-crane`) over the starboard quarter of the bundled supply vessel, with
+the gains of the structure `combined`, against the made-up scatter diagram.  About three minutes.
+"""
+
+from __future__ import annotations
+
+import time
+import warnings
+from pathlib import Path
+
+IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
+VESSEL = {
+    "vessel.raos": "osv-83m",
+    "vessel.hook": {"x": -25.0, "y": -15.0, "z": 20.0},
+    "vessel.heading": "165 deg",
+}
+
+
+def main() -> None:
+    """Find the design and its contours, draw them, and print what the page says."""
+    import numpy as np
+
+    import stillhook as sh
+    from models.physics_warning import PhysicsWarning
+    from stillhook.operability_figure import capability_figure, contour_figure, depth_figure
+    from stillhook.operability_site_figure import heading_figure, scatter_figure
+    from stillhook.style import picture
+    from synth.operability import operability
+
+    warnings.simplefilter("ignore", PhysicsWarning)
+    case = sh.load_case("subsea-crane").replace(VESSEL)
+    design = sh.optimise_structure(case, "combined", starts=1)
+    print(design)
+    begun = time.perf_counter()
+    study = operability(
+        design,
+        headings=np.radians(np.arange(0.0, 360.0, 15.0)),
+        payload_rms="50 mm",
+        scatter="example",
+    )
+    seas = study.periods.size * (1 if study.headings is None else study.headings.size)
+    print(f"{seas} seas in {time.perf_counter() - begun:.1f} s")
+    deep = operability(
+        design, periods=np.arange(5.0, 16.0), headings=[np.radians(165.0)], payload_rms="50 mm",
+        depths=[300.0, 500.0, 1000.0, 1300.0],
+    )  # fmt: skip
+    print(study)
+    print(deep)
+    for check in (*study.verify(), *deep.verify(1)):
+        print(check)
+    for name, figure in (
+        ("contour", contour_figure(study)),
+        ("headings", heading_figure(study)),
+        ("year", scatter_figure(study)),
+        ("capability", capability_figure(study)),
+        ("depths", depth_figure(deep)),
+    ):
+        (IMAGES / f"operability-{name}.svg").write_bytes(picture(figure, "svg"))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,156 @@
+"""From a design or a case to the systems whose limiting seas are wanted, and their criteria."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from models.case import Case
+from models.checks import InputError
+from models.linear import LinearPlant
+from models.physics_warning import PhysicsWarning
+from models.plant_data import PlantData
+
+from ..controller import Controller
+from ..design import GainDesign
+from ..disturbance import Disturbance
+from ..element import DragElement
+from ..question import HOOK, PAYLOAD, pose
+from ..structure_design import StructureDesign
+from ..structure_question import pose_structure
+from .criteria import STABILITY, Criterion, case_criteria, outputs_of
+from .systems import VELOCITY, HeldSystem, LoopSystem, PerfectSystem, System
+
+__all__ = ["Asked", "Design", "asked_of"]
+
+FloatArray = npt.NDArray[np.float64]
+Design = GainDesign | StructureDesign
+
+_HELD = {PAYLOAD, VELOCITY, "rope.tension"}
+_WINCH = ("motor.torque", "motor.speed", "motor.current", "motor.voltage")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Asked:
+    """One rope length: what is moved, and what must be kept.
+
+    Attributes
+    ----------
+    case
+        The case, its limits reported rather than enforced.
+    held, perfect
+        The hook with the drum held, and a winch that holds the rope's upper end still.
+    loop
+        The design's loop; None where a case alone was asked about.
+    criteria
+        By name of the system, ``held``, ``perfect`` and ``loop``: stability first.
+    plant
+        The linear plant, for its static values.
+    """
+
+    case: Case
+    held: HeldSystem
+    perfect: PerfectSystem
+    loop: LoopSystem | None
+    criteria: dict[str, tuple[Criterion, ...]]
+    plant: LinearPlant
+
+    @property
+    def systems(self) -> dict[str, System]:
+        """The systems by name."""
+        found: dict[str, System] = {"held": self.held, "perfect": self.perfect}
+        return found if self.loop is None else {**found, "loop": self.loop}
+
+
+def asked_of(
+    source: Case | Design, wanted: Sequence[Criterion], *, length: float | None = None
+) -> Asked:
+    """Return what is asked of a design, or of a case alone.
+
+    Parameters
+    ----------
+    source
+        A design, whose gains or parameters are kept, or a case.
+    wanted
+        Criteria on the payload.
+    length
+        Another length of rope than the case's [m]: the drum then is on the layer, and the rope as
+        stiff, as it is at that length.
+
+    Raises
+    ------
+    InputError
+        If the design has no controller, or the drum does not hold so much rope.
+    """
+    case = source if isinstance(source, Case) else source.case
+    changes: dict[str, object] = {"limits.drive": "report"}
+    if length is not None:
+        changes["rope.length"] = length
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PhysicsWarning)
+        reported = case.replace(changes)
+        same = reported.rope.length == case.rope.length
+        question = pose(reported, source.masses if same and not isinstance(source, Case) else None)
+        loop_plant: LinearPlant = question.plant
+        noises: tuple[Disturbance, ...] = ()
+        loop_parts: tuple[LinearPlant, Controller, DragElement | None] | None = None
+        if isinstance(source, GainDesign):
+            if source.margins is None:
+                raise InputError("operability: the design has no stabilising gains")
+            view = question.assess(source.gains, 0.0)
+            loop_parts = (question.plant, view.controller, question.drag)
+        elif isinstance(source, StructureDesign):
+            if not source.parameters:
+                raise InputError("operability: the design has no controller")
+            posed = pose_structure(reported, source.structure, source.masses if same else None)
+            law = posed.law
+            controller = law.controller([source.parameters[p.name] for p in law.parameters])
+            problem = posed.problem(())
+            noises = tuple(d for d in problem.disturbances if d.name != HOOK)
+            loop_parts = (problem.plant, controller, problem.drag)
+            loop_plant = problem.plant
+    of_case = case_criteria(reported, question.plant)
+    every = (STABILITY, *wanted, *of_case)
+    held = tuple(c for c in every if set(c.outputs) <= _HELD)
+    winch = tuple(c for c in of_case if set(c.outputs) <= set(_WINCH))
+    fixed = reported.payload.fixed_drag
+    slope = 0.0 if fixed is not None else _slope(question.data)
+    reference = question.drag_before
+    loop = None
+    if loop_parts is not None:
+        plant, controller, drag = loop_parts
+        loop = LoopSystem(
+            outputs=tuple(dict.fromkeys((PAYLOAD, VELOCITY, *outputs_of(every)))),
+            slope=drag.slope if drag is not None else 0.0,
+            reference=drag.reference if drag is not None else reference,
+            noises=noises,
+            mru=reported.sensors.mru if any(n.name == "mru.error" for n in noises) else None,
+            mru_rms=float(question.hook.displacement.rms),
+            plant=plant,
+            controller=controller,
+            drag=drag,
+        )
+    return Asked(
+        case=reported,
+        held=HeldSystem(
+            outputs=tuple(dict.fromkeys((PAYLOAD, VELOCITY, *outputs_of(held)))),
+            slope=slope,
+            reference=reference,
+            data=question.data,
+        ),
+        perfect=PerfectSystem(
+            outputs=outputs_of(winch), slope=0.0, reference=0.0, data=question.data
+        ),
+        loop=loop,
+        criteria={"held": held, "perfect": winch, "loop": every},
+        plant=loop_plant,
+    )
+
+
+def _slope(data: PlantData) -> float:
+    """Return the drag coefficient per rms speed, q sqrt(8/pi) [N s2/m2]."""
+    return float(data.quadratic_drag * np.sqrt(8.0 / np.pi))

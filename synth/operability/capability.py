@@ -1,0 +1,108 @@
+r"""What a winch can follow: the maker's lines of heave height over period, in regular heave.
+
+A hook that heaves as a sine of double amplitude H and period T moves at up to v = pi H / T and
+accelerates at up to a = 2 pi^2 H / T^2.  A winch that is to hold the rope's upper end still can do
+so up to
+
+.. math::
+
+    H = v T / \pi, \qquad H = a T^2 / (2 \pi^2), \qquad
+    a = (T_{peak} - |T_{static}|)\, r / (n I),
+
+and the maker's sheet draws these lines.  Here they come from the same responses as the irregular
+contours (`systems.PerfectSystem`), so friction and, of a DC motor, resistance are in them too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from models.checks import read_only
+from models.quadrature import Quadrature
+
+from ..signal_limits import Continuous, Peak, Power
+from .criteria import Criterion
+from .systems import PerfectSystem
+
+__all__ = ["Capability", "capability"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Capability:
+    """Largest regular heave that a winch can follow.
+
+    Attributes
+    ----------
+    periods
+        Periods of the heave (p,) [s].
+    criteria
+        The limits of the winch (c,).
+    heights
+        Double amplitude of the hook's heave at which each is reached (c, p) [m]; 0 where the load
+        at rest breaks it.
+    """
+
+    periods: FloatArray
+    criteria: tuple[Criterion, ...]
+    heights: FloatArray
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for name in ("periods", "heights"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def limit(self) -> FloatArray:
+        """The lowest of them (p,) [m]."""
+        return np.asarray(self.heights.min(axis=0))
+
+
+def capability(
+    system: PerfectSystem, criteria: Sequence[Criterion], periods: npt.ArrayLike
+) -> Capability:
+    """Return the largest regular heave that a winch can follow at given periods [s] (p,).
+
+    Parameters
+    ----------
+    system
+        The winch that follows.
+    criteria
+        Its limits: of peaks, of continuous ratings, and of power (on the box of the two peaks).
+    periods
+        Periods of the heave [s].
+    """
+    given = np.asarray(periods, dtype=np.float64)
+    order = np.argsort(-given)  # nodes ascend
+    omega = 2.0 * math.pi / given[order]
+    base = system.responses(Quadrature(omega=omega, weights=np.ones_like(omega)))
+    sizes = {name: np.abs(base.zw[k, 0]) for k, name in enumerate(base.outputs)}
+    rows = []
+    for criterion in criteria:
+        amplitude = _amplitude(criterion, sizes)
+        row = np.empty_like(given)
+        row[order] = 2.0 * np.maximum(amplitude, 0.0)
+        rows.append(row)
+    return Capability(periods=given, criteria=tuple(criteria), heights=np.array(rows))
+
+
+def _amplitude(criterion: Criterion, sizes: dict[str, FloatArray]) -> FloatArray:
+    """Return the amplitude of the heave at which a limit is reached (p,) [m]."""
+    limit = criterion.limit
+    if isinstance(limit, Peak):
+        return (limit.bound - abs(limit.static)) / sizes[limit.output]
+    if isinstance(limit, Continuous):
+        # The rms of a sine is its amplitude over sqrt(2).
+        room = max(limit.bound**2 - limit.static**2, 0.0)
+        return math.sqrt(2.0 * room) / sizes[limit.output]
+    assert isinstance(limit, Power)
+    # (|static| + t A) s A = bound, for the torque t and the speed s of an amplitude of one metre.
+    t, s, static = sizes[limit.torque], sizes[limit.speed], abs(limit.static)
+    root = np.sqrt((static * s) ** 2 + 4.0 * t * s * limit.bound)
+    return np.asarray(2.0 * s * limit.bound / (s * (static * s + root)))

@@ -1,0 +1,264 @@
+"""The seas of a contour: for one peak period, the hook's motion in every heading, for any H_s.
+
+case, T_p, headings -> SeaColumn -> densities of all disturbances on nodes, at given H_s
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from models.case import Case
+from models.checks import InputError
+from models.hook import HookMotion
+from models.physics_warning import PhysicsWarning
+from models.quadrature import Quadrature, adaptive_nodes
+
+from ..assess import integration_band
+from ..disturbance import Disturbance, disturbances
+from ..question import HOOK
+from .systems import ComplexArray, System
+
+__all__ = ["SeaColumn", "has_headings", "has_period", "own_period", "sea_column"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_RTOL = 1e-8  # of every variance, as in `synth.assess`
+_SAME = 1e-9  # relative, of densities that scale with H_s^2
+_WITHOUT_PERIOD = ("pierson-moskowitz", "sum", "measured")
+_HEIGHTS = (0.25, 2.0, 5.0, 14.0)  # at which that is looked at [m]
+_FLOOR = 1e-3  # lowest H_s that is looked at [m], and how well the lowest that is defined is known
+_SPEEDS = (1e-3, 3e-2, 1.0)  # rms speeds of the payload whose drag the nodes are made for [m/s]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SeaColumn:
+    """Seas of one peak period.
+
+    Attributes
+    ----------
+    period
+        T_p [s].
+    headings
+        Headings (h,) [rad], or None where the case knows none.
+    cases
+        The case in each heading (h,), at its own H_s.
+    hooks
+        The hook's motion in each (h,).
+    scalable
+        Whether the shape of the spectrum stays the same at another H_s.
+    """
+
+    period: float
+    headings: tuple[float, ...] | None
+    cases: tuple[Case, ...]
+    hooks: tuple[HookMotion, ...]
+    scalable: bool
+
+    def hook(self, index: int, height: float) -> HookMotion:
+        """Return the hook's motion in one heading at a significant height [m]."""
+        if self.scalable:
+            return self.hooks[index].scaled(height)
+        return _quiet_hook(self.cases[index].replace({"sea.significant_height": height}))
+
+    @cached_property
+    def floor(self) -> float:
+        """Lowest H_s at which the spectrum is defined [m]: torsethaugen's is not in a flat sea.
+
+        Below it the shape is kept.
+        """
+        high = self.cases[0].sea.significant_height
+        if self.scalable or self._defined(_FLOOR):
+            return 0.0
+        low = _FLOOR
+        while high / low > 1.0 + _FLOOR:
+            middle = float(np.sqrt(low * high))
+            low, high = (low, middle) if self._defined(middle) else (middle, high)
+        return high
+
+    def _defined(self, height: float) -> bool:
+        try:
+            self.hook(0, height)
+        except InputError:
+            return False
+        return True
+
+    def heave(
+        self, omega: FloatArray, heights: FloatArray, index: npt.NDArray[np.intp]
+    ) -> FloatArray:
+        """Return the hook's density (r, n) at heights (r,) [m] in headings `index` (r,)."""
+        if self.scalable:
+            unit = self._unit(omega)
+            return np.asarray(heights[:, None] ** 2 * unit[index])
+        rows = np.empty((heights.size, omega.size))
+        for k, (height, i) in enumerate(zip(heights, index, strict=True)):
+            defined = max(float(height), self.floor)
+            rows[k] = (height / defined) ** 2 * self.hook(int(i), defined).density(omega)
+        return rows
+
+    def _unit(self, omega: FloatArray) -> FloatArray:
+        """Return the densities at H_s = 1 m, (h, n); kept for the last nodes asked for."""
+        if self._kept.get("key") is not omega:
+            self._kept["key"] = omega
+            self._kept["unit"] = np.array([hook.scaled(1.0).density(omega) for hook in self.hooks])
+        return np.asarray(self._kept["unit"])
+
+    @cached_property
+    def _kept(self) -> dict[str, FloatArray]:
+        return {}
+
+    @cached_property
+    def sources(self) -> tuple[Disturbance, ...]:
+        """The hook's motion in every heading, as disturbances."""
+        found: list[Disturbance] = []
+        for hook in self.hooks:
+            found += disturbances({HOOK: hook}, (HOOK,))
+        return tuple(found)
+
+    def nodes(self, system: System) -> Quadrature:
+        """Return nodes on which every variance of a system is accurate, for any H_s and drag.
+
+        As `synth.assess.Assessment.quadrature`, for three drag coefficients from that of a payload
+        that hardly moves to that of one that moves at metres per second.
+        """
+        coefficients = self._coefficients(system)
+        poles = np.concatenate([_off_axis(system.poles(c)) for c in coefficients])
+        low, high, half_line = integration_band([*self.sources, *system.noises], poles)
+        splits = {w for s in (*self.sources, *system.noises) for w in s.splits}
+        # Each heading counts alike, however little the hook moves in it.
+        rms = np.array([hook.displacement.rms for hook in self.hooks])
+        scale = np.where(rms > 0.0, 1.0 / np.where(rms > 0.0, rms, 1.0) ** 2, 0.0)
+
+        def integrands(omega: FloatArray) -> FloatArray:
+            weights = np.ones_like(omega)
+            base = system.responses(Quadrature(omega=omega, weights=weights))
+            heave = scale @ np.array([source.density(omega) for source in self.sources])
+            shaken = np.array([heave, *(noise.density(omega) for noise in system.noises)])
+            rows = [heave[None]]
+            for c in coefficients:
+                rows.append((base.gains(c) * shaken).reshape(-1, omega.size))
+            return np.concatenate(rows)
+
+        return adaptive_nodes(
+            integrands,
+            low,
+            high,
+            splits=sorted(splits),
+            poles=[complex(p) for p in poles],
+            rtol=_RTOL,
+            half_line=half_line,
+        )
+
+    def _coefficients(self, system: System) -> list[float]:
+        if system.slope == 0.0:
+            return [system.reference]
+        low, high = system.stable_range
+        wanted = [system.slope * speed for speed in _SPEEDS]
+        # A loop on the very edge of stability has a variance without end.
+        return sorted({min(max(c, 1.05 * low), 0.95 * high) for c in wanted})
+
+
+def own_period(case: Case) -> float:
+    """Return the peak period of a case's own sea [s]."""
+    return float(2.0 * np.pi / _quiet_hook(case).sea.peak_frequency)
+
+
+def sea_column(
+    case: Case, period: float | None, headings: Sequence[float] | None = None
+) -> SeaColumn:
+    """Return the seas of one peak period.
+
+    Parameters
+    ----------
+    case
+        The case; its spectrum keeps its shape.
+    period
+        T_p [s]; None for the case's own.
+    headings
+        Headings [rad], for a vessel that has them.
+
+    Raises
+    ------
+    InputError
+        If the sea of the case has no period that could be changed, or the vessel no headings.
+    """
+    changed = case
+    with warnings.catch_warnings():
+        # Of seas that nobody has asked for: a contour goes up to where waves break and beyond.
+        warnings.simplefilter("ignore", PhysicsWarning)
+        if period is not None:
+            changed = case.replace(_period_changes(case, period))
+        cases = [changed]
+        if headings is not None:
+            if not has_headings(case):
+                raise InputError(
+                    f"{case.source or case.name}: vessel: has no headings, as it is given by the "
+                    "heave of its hook alone; give raos for a contour over heading"
+                )
+            cases = [changed.replace({"vessel.heading": float(b)}) for b in headings]
+        hooks = [_quiet_hook(c) for c in cases]
+        return SeaColumn(
+            period=period if period is not None else own_period(case),
+            headings=None if headings is None else tuple(float(b) for b in headings),
+            cases=tuple(cases),
+            hooks=tuple(hooks),
+            scalable=_scales(cases[0], hooks[0]),
+        )
+
+
+def has_headings(case: Case) -> bool:
+    """Return whether the vessel of a case is known in more than one heading."""
+    return getattr(case.vessel, "raos", None) is not None
+
+
+def has_period(case: Case) -> bool:
+    """Return whether the sea of a case has a period that can be changed."""
+    return case.sea.spectrum not in _WITHOUT_PERIOD
+
+
+def _period_changes(case: Case, period: float) -> dict[str, float | None]:
+    sea = case.sea
+    if not has_period(case):
+        raise InputError(
+            f"{case.source or case.name}: sea: the {sea.spectrum} spectrum has no peak_period "
+            "that could be changed; leave the periods out for a limit in its own shape"
+        )
+    if sea.spectrum == "bretschneider-1975":
+        # It peaks at 0.9 T_S / 0.54^(1/4), see `models.sea_section.Sea`.  Where height and period
+        # came from the wind they are taken apart.
+        return {
+            "sea.wind_speed": None,
+            "sea.significant_height": sea.significant_height,
+            "sea.significant_period": period * 0.54**0.25 / 0.9,
+        }
+    return {"sea.peak_period": period}
+
+
+def _quiet_hook(case: Case) -> HookMotion:
+    # Without the remarks on the case, which its user has been told.
+    return HookMotion.from_case(case, warn=False)
+
+
+def _scales(case: Case, hook: HookMotion) -> bool:
+    """Return whether the hook's density grows as H_s^2, as far as some sea states tell."""
+    omega = np.linspace(0.5, 3.0, 11) * hook.sea.peak_frequency
+    try:
+        # Far apart, as a shape may follow the height in steep seas only (`gamma: auto`).
+        for height in _HEIGHTS:
+            scaled = hook.scaled(height).density(omega)
+            rebuilt = _quiet_hook(case.replace({"sea.significant_height": height})).density(omega)
+            if not np.allclose(scaled, rebuilt, rtol=_SAME, atol=0.0):
+                return False
+    except InputError:
+        return False
+    return True
+
+
+def _off_axis(poles: ComplexArray) -> ComplexArray:
+    keep = (np.abs(poles.real) > 1e-12 * np.maximum(1.0, np.abs(poles))) & (poles.imag >= 0.0)
+    return np.asarray(poles[keep])

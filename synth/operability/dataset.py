@@ -1,0 +1,213 @@
+"""An operability study as an xarray Dataset and as a table of text."""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .result import STAGES, AtDepth, Operability
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from .contour import Contour
+
+__all__ = ["dataset_of", "table_text"]
+
+_SUFFIX = {"loop": "", "held": "_held", "perfect": "_perfect", "reoptimised": "_reoptimised"}
+
+
+def dataset_of(study: Operability) -> xr.Dataset:
+    """Return a study as a Dataset.
+
+    Dimensions are ``rope_length`` (where lengths were asked for), ``limit``, ``heading`` (where the
+    vessel has headings) and ``peak_period``.  A limit that a system does not have is NaN; one that
+    is kept up to the highest H_s looked at is infinite.
+    """
+    import xarray as xr
+
+    names = list(
+        dict.fromkeys(
+            c.name for at in study.depths for n in at.contours.values() for c in n.criteria
+        )
+    )
+    many = len(study.depths) > 1
+    turns = study.headings is not None
+    tail = (*(("heading",) if turns else ()), "peak_period")
+    lead = ("rope_length",) if many else ()
+    variables: dict[str, Any] = {}
+    for system, words in STAGES.items():
+        if system not in study.depths[0].contours:
+            continue
+        contours = [at.contours[system] for at in study.depths]
+        every = np.array([_by_limit(contour, names) for contour in contours])
+        lowest = np.array([contour.limit for contour in contours])
+        binding = np.array([contour.binding for contour in contours]).astype(object)
+        drag = np.array([contour.drag for contour in contours])
+        end = _SUFFIX[system]
+        text = f"limiting significant wave height {words}"
+        for name, values, dims, about in (
+            (
+                f"height_limit{end}",
+                every,
+                ("limit", *tail),
+                {"units": "m", "long_name": f"{text}, by limit"},
+            ),
+            (f"height{end}", lowest, tail, {"units": "m", "long_name": text}),
+            (f"binding{end}", binding, tail, {"long_name": f"limit that binds {words}"}),
+            (
+                f"drag{end}",
+                drag,
+                tail,
+                {"units": "N s/m", "long_name": f"drag coefficient at the limit {words}"},
+            ),
+        ):
+            shown = values if turns else values.squeeze(axis=-2)
+            variables[name] = ((*lead, *dims), shown if many else shown[0], about)
+    if study.design is not None:
+        peaks = np.array([at.max_sensitivity for at in study.depths])
+        about = {"units": "1", "long_name": "sensitivity peak M_s of the design's loop"}
+        variables["max_sensitivity"] = (lead, peaks if many else peaks[0], about)
+    variables |= _shares(study, lead)
+    first = {c.name: c for n in study.depths[0].contours.values() for c in n.criteria}
+    coordinates: dict[str, Any] = {
+        "limit": ("limit", names, {"long_name": "limit"}),
+        "bound": ("limit", [first[n].bound for n in names], {"long_name": "bound, in `unit`"}),
+        "unit": ("limit", [first[n].unit for n in names], {"long_name": "unit of the bound"}),
+        "peak_period": (
+            "peak_period",
+            study.periods,
+            {"units": "s", "long_name": "peak period T_p"},
+        ),
+    }
+    if turns and study.headings is not None:
+        about = {
+            "units": "degree",
+            "long_name": "heading: where the waves travel to, counter-clockwise from the bow",
+        }
+        coordinates["heading"] = ("heading", np.degrees(study.headings), about)
+    coordinates |= _ropes(study.depths, many)
+    attributes = {
+        "title": f"Operability of {study.case.name}",
+        "case": study.case.to_yaml(),
+        "sea": study.case.sea.spectrum,
+        "exposure_time": study.case.limits.exposure_time,
+        "highest_height": study.depths[0].main.highest,
+        "status": study.status,
+    }
+    if not turns:
+        attributes["headings"] = "none: the vessel is given by the heave of its hook alone"
+    return xr.Dataset(variables, coords=coordinates, attrs=attributes)
+
+
+def table_text(study: Operability) -> str:
+    """Return a study as CSV: a line for each length of rope, system, heading and period."""
+    names = list(
+        dict.fromkeys(
+            c.name for at in study.depths for n in at.contours.values() for c in n.criteria
+        )
+    )
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    head = [
+        "rope_length_m",
+        "drum_layer",
+        "system",
+        "heading_deg",
+        "peak_period_s",
+        "height_m",
+        "binding",
+    ]
+    writer.writerow([*head, *(f"{name}_height_m" for name in names)])
+    for at in study.depths:
+        for system, contour in at.contours.items():
+            every = _by_limit(contour, names)
+            for h in range(contour.limit.shape[0]):
+                heading = (
+                    "" if contour.headings is None else f"{np.degrees(contour.headings[h]):.6g}"
+                )
+                for p, period in enumerate(contour.periods):
+                    row = [
+                        f"{at.rope.length:g}",
+                        at.rope.layer or "",
+                        system,
+                        heading,
+                        f"{period:.6g}",
+                    ]
+                    row += [_figure(contour.limit[h, p]), str(contour.binding[h, p])]
+                    writer.writerow([*row, *(_figure(v) for v in every[:, h, p])])
+    return out.getvalue()
+
+
+def _figure(value: float) -> str:
+    return "" if np.isnan(value) else f"{value:.6g}"
+
+
+def _by_limit(contour: Contour, names: list[str]) -> Any:
+    """Return the heights of a contour by all names (l, h, p), NaN where it has no such limit."""
+    rows = {c.name: contour.heights[k] for k, c in enumerate(contour.criteria)}
+    nothing = np.full(contour.limit.shape, np.nan)
+    return np.array([rows.get(name, nothing) for name in names])
+
+
+def _ropes(depths: tuple[AtDepth, ...], many: bool) -> dict[str, Any]:
+    figures: dict[str, tuple[list[float], str, str]] = {
+        "rope_length": ([at.rope.length for at in depths], "m", "rope paid out"),
+        "drum_layer": (
+            [at.rope.layer for at in depths],
+            "1",
+            "layer of the drum, 1 the bare drum; 0 not known",
+        ),
+        "drum_radius": ([at.rope.radius for at in depths], "m", "pitch radius of the drum"),
+        "static_torque": (
+            [at.rope.torque for at in depths],
+            "N m",
+            "motor torque at rest, with losses",
+        ),
+        "static_tension": (
+            [at.rope.tension for at in depths],
+            "N",
+            "rope tension at the winch at rest",
+        ),
+        "stiffness": ([at.rope.stiffness for at in depths], "N/m", "stiffness of the rope"),
+    }
+    return {
+        name: (
+            ("rope_length",) if many else (),
+            values if many else values[0],
+            {"units": unit, "long_name": text},
+        )
+        for name, (values, unit, text) in figures.items()
+    }
+
+
+def _shares(study: Operability, lead: tuple[str, ...]) -> dict[str, Any]:
+    """Return the workable shares as variables; none without a scatter diagram."""
+    if study.scatter is None:
+        return {}
+    found: dict[str, Any] = {}
+    for system, words in STAGES.items():
+        if system not in study.depths[0].workable:
+            continue
+        shares = [at.workable[system] for at in study.depths]
+        end = _SUFFIX[system]
+        about = {"units": "1", "long_name": f"share of the time workable {words}"}
+
+        def put(name: str, dims: tuple[str, ...], values: list[Any], about: dict[str, str]) -> None:
+            found[name] = ((*lead, *dims), values if lead else values[0], about)
+
+        put(f"workable{end}", (), [s.share for s in shares], about)
+        if shares[0].best_heading is not None:
+            text = {**about, "long_name": f"{about['long_name']}, best heading in each sea"}
+            put(f"workable_best_heading{end}", (), [s.best_heading for s in shares], text)
+            values = [list(s.by_heading.values()) for s in shares]
+            text = {**about, "long_name": f"{about['long_name']}, one heading all year"}
+            put(f"workable_by_heading{end}", ("heading",), values, text)
+        if shares[0].by_month:
+            values = [[s.by_month.get(m, np.nan) for m in range(1, 13)] for s in shares]
+            text = {**about, "long_name": f"{about['long_name']}, by month"}
+            put(f"workable_by_month{end}", ("month",), values, text)
+    return found

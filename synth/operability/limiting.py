@@ -1,0 +1,233 @@
+"""The limiting H_s: the lowest at which a criterion breaks, in all headings of a column at once.
+
+For each H_s of a coarse grid the drag coefficient that agrees with the motion is found, then the
+variances, then by how much each criterion is broken.  The first step up of a criterion from kept
+to broken is a bracket; in it the limiting H_s is found by Chandrupatla's method (1997), which
+never leaves its bracket.  Nothing is interpolated: every step solves for the drag anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import elementwise
+
+from models.checks import SolverError, read_only
+
+from .columns import SeaColumn
+from .criteria import Criterion, Moments
+from .responses import DragResponses
+from .systems import System
+
+__all__ = ["ColumnLimits", "SeaStates", "limiting_heights"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.intp]
+
+LOWEST, HIGHEST = 0.01, 30.0  # H_s that are looked at [m]
+_INSIDE = 1e-12  # how far inside the edge of stability, in the logarithm
+_SCAN = 55  # coefficients that are tried where drag can be too much, six a decade
+_STEPS = 25  # of the coarse grid
+_SPEEDS = (1e-9, 1e3)  # rms speeds of the payload between which the drag's is looked for [m/s]
+_DRAG_RTOL = 1e-13  # of the logarithm's step, so of the drag
+_HEIGHT_TOL = 1e-10  # of the logarithm of H_s
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SeaStates:
+    """A system in the seas of a column, at any H_s: drag, variances, all at once.
+
+    Attributes
+    ----------
+    system, column
+        What is moved, and by which seas.
+    responses
+        The system's responses on nodes that suit both.
+    """
+
+    system: System
+    column: SeaColumn
+    responses: DragResponses
+
+    @classmethod
+    def of(cls, system: System, column: SeaColumn) -> SeaStates:
+        """Return the states of a system in a column."""
+        responses = system.responses(column.nodes(system))
+        return cls(system=system, column=column, responses=responses)
+
+    def densities(self, heights: FloatArray, index: IntArray) -> list[FloatArray]:
+        """Return the disturbances' densities at heights (r,) [m] in headings `index` (r,)."""
+        omega = self.responses.nodes.omega
+        heave = self.column.heave(omega, heights, index)
+        found = [heave]
+        for noise in self.system.noises:
+            density = noise.density(omega)[None]
+            if noise.name == "mru.error":
+                rms = np.sqrt(heave @ self.responses.nodes.weights)
+                density = self.system.mru_growth(rms)[:, None] ** 2 * density
+            found.append(density)
+        return found
+
+    def coefficients(self, densities: Sequence[FloatArray]) -> FloatArray:
+        """Return the drag coefficients that agree with the motion (r,) [N s/m].
+
+        NaN where there is none: no stationary motion, or one that does not vanish with the sea.
+        """
+        system = self.system
+        rows = densities[0].shape[0]
+        low, high = system.stable_range
+        if low > high or system.swings:
+            return np.full(rows, np.nan)
+        if system.slope == 0.0:
+            return np.full(rows, system.reference)
+        weighted = self.responses.weighted_speed(densities)
+
+        def surplus(size: FloatArray, row: FloatArray) -> FloatArray:
+            C = np.exp(size)
+            speed = self.responses.speed_variance(weighted[row.astype(np.intp)], C)
+            wanted = system.slope * np.sqrt(np.maximum(speed, 0.0))
+            # An unstable loop moves without end, however large its spectral integral.
+            found = (wanted - C) / (wanted + C)
+            return np.where((low < C) & (high > C), found, 1.0)
+
+        first, last = np.log(system.slope * np.array(_SPEEDS))
+        begin, end = np.full(rows, first), np.full(rows, last)
+        if high < np.inf:
+            # Too much drag destabilises it: the least coefficient that is enough is looked for.
+            edge = min(last, float(np.log(high)) - _INSIDE)
+            end, steps = np.full(rows, np.nan), np.linspace(first, edge, _SCAN)
+            for before, after in pairwise(steps):
+                enough = surplus(np.full(rows, after), np.arange(float(rows))) <= 0.0
+                new = enough & np.isnan(end)
+                begin[new], end[new] = before, after
+            end = np.where(np.isnan(end), last, end)
+        solved = elementwise.find_root(
+            surplus,
+            (begin, end),
+            args=(np.arange(float(rows)),),
+            tolerances={"xatol": _DRAG_RTOL, "xrtol": 0.0, "fatol": 0.0, "frtol": 0.0},
+        )
+        C = np.exp(np.asarray(solved.x, dtype=np.float64))
+        # What is no root is a jump: from too much drag to a loop that is unstable with less.
+        good = np.asarray(solved.success) & (np.abs(np.asarray(solved.f_x)) < 1e-6)
+        still = np.all(weighted == 0.0, axis=1)  # no motion, no drag
+        return np.where(still, max(low, 0.0), np.where(good, C, np.nan))
+
+    def look(self, heights: FloatArray, index: IntArray) -> tuple[Moments, FloatArray]:
+        """Return moments and drag coefficients at heights (r,) [m] in headings `index` (r,)."""
+        densities = self.densities(heights, index)
+        C = self.coefficients(densities)
+        known = np.where(np.isfinite(C), C, self.system.reference)
+        m0, m2 = self.responses.moments(densities, known)
+        names = self.responses.outputs
+        return (
+            Moments(
+                m0={name: m0[:, k] for k, name in enumerate(names)},
+                m2={name: m2[:, k] for k, name in enumerate(names)},
+            ),
+            C,
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ColumnLimits:
+    """Limiting significant heights of one peak period.
+
+    Attributes
+    ----------
+    heights
+        By criterion and heading (c, h) [m]: 0 where the criterion is broken in a flat sea,
+        infinite where it is kept up to the highest H_s looked at.
+    drag
+        Drag coefficient at the lowest of them (h,) [N s/m]; NaN where that is 0 or infinite.
+    """
+
+    heights: FloatArray
+    drag: FloatArray
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for name in ("heights", "drag"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+def limiting_heights(
+    states: SeaStates, criteria: Sequence[Criterion], *, highest: float = HIGHEST
+) -> ColumnLimits:
+    """Return the lowest H_s at which each criterion breaks, in every heading of a column.
+
+    Parameters
+    ----------
+    states
+        The system in the column's seas.
+    criteria
+        What must be kept.
+    highest
+        Highest H_s that is looked at [m].
+
+    Raises
+    ------
+    SolverError
+        If a root is not found in its bracket.
+    """
+    headings, count = len(states.column.hooks), len(criteria)
+    grid = np.geomspace(LOWEST, highest, _STEPS)
+    row_heading = np.repeat(np.arange(headings), grid.size)
+    moments, C = states.look(np.tile(grid, headings), row_heading)
+    excess = np.array([c.excess(moments, np.isfinite(C)) for c in criteria])
+    excess = excess.reshape(count, headings, grid.size)
+    broken = excess > 0.0
+    first = np.where(broken.any(axis=2), broken.argmax(axis=2), grid.size)  # (c, h)
+    heights = np.where(first == 0, 0.0, np.inf)
+    at = np.argwhere((first > 0) & (first < grid.size))
+    if at.size:
+        which, heading = at[:, 0], at[:, 1]
+        above = first[which, heading]
+        heights[which, heading] = _refined(
+            states, criteria, which, heading, grid[above - 1], grid[above]
+        )
+    lowest = heights.min(axis=0)
+    drag = np.full(headings, np.nan)
+    some = np.flatnonzero((lowest > 0.0) & np.isfinite(lowest))
+    if some.size:
+        drag[some] = states.look(lowest[some], some)[1]
+    return ColumnLimits(heights=heights, drag=drag)
+
+
+def _refined(
+    states: SeaStates,
+    criteria: Sequence[Criterion],
+    which: IntArray,
+    heading: IntArray,
+    low: FloatArray,
+    high: FloatArray,
+) -> FloatArray:
+    def excess(size: FloatArray, w: FloatArray, h: FloatArray) -> FloatArray:
+        # Every row is looked at for all criteria, which costs no more than for one.
+        moments, C = states.look(np.exp(size), h.astype(np.intp))
+        stationary = np.isfinite(C)
+        found = np.zeros(size.size)
+        for k in np.unique(w.astype(np.intp)):
+            mine = w == k
+            found[mine] = criteria[k].excess(moments, stationary)[mine]
+        return found
+
+    solved = elementwise.find_root(
+        excess,
+        (np.log(low), np.log(high)),
+        args=(which.astype(np.float64), heading.astype(np.float64)),
+        tolerances={"xatol": _HEIGHT_TOL, "xrtol": 0.0, "fatol": 0.0, "frtol": 0.0},
+    )
+    if not np.all(solved.success):
+        bad = criteria[int(which[int(np.argmin(solved.success))])].name
+        raise SolverError(
+            f"operability: the limiting H_s of {bad} was not found within its bracket"
+        )
+    # The side on which the criterion is kept.
+    ends = np.asarray(solved.bracket), np.asarray(solved.f_bracket)
+    kept = np.where(ends[1][0] <= 0.0, ends[0][0], ends[0][1])
+    return np.asarray(np.exp(kept), dtype=np.float64)

@@ -1,0 +1,152 @@
+"""A contour's numbers by single evaluations: the same sea put into the case, one at a time.
+
+    sea on the contour -> case in that sea -> its own plant and nodes -> value against bound,
+                                                         drag coefficient against the motion
+
+Nothing of this room is used: neither the rank-one update nor its nodes nor its root search.  The
+drag coefficient is taken over, and shown to agree with the motion that it leads to.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.case import Case
+from models.physics_warning import PhysicsWarning
+from models.plant_data import PlantData
+
+from ..assess import Assessment
+from ..design import GainDesign
+from ..question import pose
+from ..structure_question import pose_structure
+
+if TYPE_CHECKING:
+    from .asked import Design
+    from .columns import SeaColumn
+    from .contour import Contour
+
+__all__ = ["ContourCheck", "evaluate_in", "recheck"]
+
+_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContourCheck:
+    """One point of a contour, evaluated once more.
+
+    Attributes
+    ----------
+    period, heading, height
+        The sea: T_p [s], heading [rad] or None, the limiting H_s [m].
+    criterion
+        What binds there.
+    value, bound
+        Of the criterion, by the single evaluation, and what it may be.
+    drag, agreed
+        Drag coefficient of the contour, and the one that its motion asks for [N s/m].
+    """
+
+    period: float
+    heading: float | None
+    height: float
+    criterion: str
+    value: float
+    bound: float
+    drag: float
+    agreed: float
+
+    @property
+    def difference(self) -> float:
+        """Relative difference of value and bound, or of the two drags where it is larger [-]."""
+        scale = abs(self.bound) if self.bound != 0.0 else 1.0
+        still = abs(self.drag - self.agreed) / self.drag if self.drag > 0.0 else 0.0
+        return max(abs(self.value - self.bound) / scale, still)
+
+    @property
+    def ok(self) -> bool:
+        """Whether the value meets the bound to 1e-6."""
+        return self.difference <= _TOLERANCE
+
+
+def evaluate_in(design: Design, case: Case, drag: float | None = None) -> Assessment:
+    """Return a design's loop in the sea of a case, in numbers.
+
+    Parameters
+    ----------
+    design
+        The design; its gains or parameters are kept.
+    case
+        The case: its sea, vessel and rope.
+    drag
+        Drag coefficient [N s/m] where it is known; else it is solved with the motion.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PhysicsWarning)
+        case = case.replace({"limits.drive": "report"})
+        masses = design.masses if case.rope.length == design.case.rope.length else None
+        if isinstance(design, GainDesign):
+            question = pose(case, masses)
+            return question.assess(design.gains, None if question.drag is None else drag)
+        posed = pose_structure(case, design.structure, masses)
+        law = posed.law
+        problem = posed.problem(())
+        return Assessment(
+            problem.plant,
+            law.controller([design.parameters[p.name] for p in law.parameters]),
+            problem.disturbances,
+            drag=problem.drag,
+            coefficient=None if problem.drag is None else drag,
+        )
+
+
+def recheck(
+    design: Design, contour: Contour, columns: Sequence[SeaColumn], count: int
+) -> tuple[ContourCheck, ...]:
+    """Return the binding criterion at some points of a contour by single evaluations.
+
+    Parameters
+    ----------
+    design
+        The design whose contour it is.
+    contour
+        The contour.
+    columns
+        The seas it is over.
+    count
+        Points to look at, spread over the contour; fewer where fewer have a limit.
+    """
+    limit = contour.limit
+    known = np.argwhere(np.isfinite(limit) & (limit > 0.0) & (contour.binding != "stability"))
+    found = []
+    for place in np.unique(np.linspace(0, len(known) - 1, count).astype(int)) if len(known) else ():
+        h, p = known[place]
+        k = int(contour.heights[:, h, p].argmin())
+        criterion = contour.criteria[k]
+        assert criterion.limit is not None
+        height = float(limit[h, p])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PhysicsWarning)
+            case = columns[p].cases[h].replace({"sea.significant_height": height})
+        drag = float(contour.drag[h, p])
+        view = evaluate_in(design, case, drag)
+        # The velocity's drag; a coefficient that the case fixes agrees with itself.
+        fixed = case.payload.fixed_drag is not None
+        slope = PlantData.from_case(case).quadratic_drag * float(np.sqrt(8.0 / np.pi))
+        found.append(
+            ContourCheck(
+                period=float(contour.periods[p]),
+                heading=None if contour.headings is None else float(contour.headings[h]),
+                height=height,
+                criterion=criterion.name,
+                value=criterion.shown * criterion.limit.measure(view),
+                bound=criterion.bound,
+                drag=drag,
+                agreed=drag if fixed else slope * view.sigma("payload.velocity"),
+            )
+        )
+    return tuple(found)

@@ -1,0 +1,115 @@
+"""The limiting H_s when the gains are found anew for every sea: what fixed gains give away.
+
+    sea -> best gains without the drive's limits -> largest sea that any gains can do -> its limit
+
+The largest sea is the programme of `synth.infeasible`, with the payload's criteria among the
+limits; the gains that it ends with are then looked at like those of any design.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from models.case import Case
+from models.checks import SolverError
+from models.physics_warning import PhysicsWarning
+
+from ..design import GainDesign
+from ..infeasible import shortfall
+from ..limits import Limit
+from ..question import Question, pose
+from ..search import search
+from ..threads import one_thread
+from ..tune import tuning_of
+from .asked import Asked
+from .columns import SeaColumn
+from .contour import Contour
+from .limiting import HIGHEST, SeaStates, limiting_heights
+
+__all__ = ["reoptimised_contour"]
+
+_STARTS = 3  # of each search, besides the design's own gains
+
+
+@one_thread()
+def reoptimised_contour(
+    design: GainDesign,
+    asked: Asked,
+    columns: Sequence[SeaColumn],
+    *,
+    highest: float = HIGHEST,
+    seed: int = 0,
+    step: Callable[[], None] = lambda: None,
+) -> Contour:
+    """Return the contour of gains that are optimised for each sea.
+
+    Parameters
+    ----------
+    design
+        Where the searches start from, and the rope masses.
+    asked
+        What the design is asked: its loop and criteria.
+    columns
+        The seas.
+    highest
+        Highest H_s that is looked at [m].
+    seed
+        Of the searches.
+    step
+        Called after each sea.
+    """
+    assert asked.loop is not None
+    criteria = asked.criteria["loop"]
+    drive = tuple(c.limit for c in criteria if c.limit is not None)
+    shape = (len(criteria), len(columns[0].hooks), len(columns))
+    heights, drag = np.zeros(shape), np.full(shape[1:], np.nan)
+    for p, column in enumerate(columns):
+        for h, case in enumerate(column.cases):
+            gains = _best(case, design, drive, seed)
+            step()
+            if gains is None:
+                continue
+            one = replace(column, headings=None, cases=(case,), hooks=(column.hooks[h],))
+            loop = replace(
+                asked.loop, controller=_question(case, design.masses).assess(gains, 0.0).controller
+            )
+            found = limiting_heights(SeaStates.of(loop, one), criteria, highest=highest)
+            heights[:, h, p], drag[h, p] = found.heights[:, 0], found.drag[0]
+    return Contour(
+        criteria=criteria,
+        periods=np.array([column.period for column in columns]),
+        headings=None if columns[0].headings is None else np.array(columns[0].headings),
+        heights=heights,
+        drag=drag,
+        highest=highest,
+    )
+
+
+def _best(
+    case: Case, design: GainDesign, drive: tuple[Limit, ...], seed: int
+) -> dict[str, float] | None:
+    """Return the gains of the largest sea that any gains can do, or None."""
+    question = _question(case, design.masses)
+    loop_limits = tuple(limit for limit in question.limits if not limit.drive)
+    problem = question.problem_with(loop_limits)
+    scale = design.gains["A"] / question.amplifier
+    own = [scale * design.gains[name] for name in ("a", "a1", "a2")]
+    free = tuning_of(problem, search(problem, _STARTS, seed, [own], None))
+    if not free.ok:
+        return None
+    limited = replace(question, limits=(*loop_limits, *drive), reported=())
+    try:
+        found = shortfall(limited, free)
+    except SolverError:
+        found = None
+    return None if found is None else {"A": question.amplifier, **found.values}
+
+
+def _question(case: Case, masses: int) -> Question:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PhysicsWarning)
+        return pose(case, masses)

@@ -1,0 +1,305 @@
+"""In which seas can we work: `sh.operability`.
+
+design or case, periods, headings -> columns of seas
+    -> contours of the loop, of the held drum, of a perfect winch, for each rope length
+    -> against a scatter diagram -> Operability
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from models.case import Case
+from models.checks import InputError, check_ascending, check_range
+from models.physics_warning import PhysicsWarning
+from models.seas.scatter import Scatter, read_scatter
+
+from ..assess import Assessment
+from ..design import GainDesign
+from ..threads import one_thread
+from .asked import Asked, Design, asked_of
+from .capability import capability
+from .columns import SeaColumn, has_headings, has_period, sea_column
+from .contour import Contour, contour_of
+from .criteria import payload_criteria
+from .depths import rope_state
+from .example_site import EXAMPLE, example_scatter
+from .limiting import HIGHEST
+from .reoptimise import reoptimised_contour
+from .result import AtDepth, Operability
+from .workable import workable
+
+__all__ = ["default_headings", "default_periods", "operability"]
+
+FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+_PERIODS = (4.0, 18.0, 15)  # first, last and number of the default periods
+_STEP = 30.0  # deg between the default headings
+_MOST_HEADINGS = 361
+_MOST_PERIODS = 200
+
+
+@one_thread()
+def operability(
+    design: Design | Case,
+    *,
+    periods: Sequence[float] | None = None,
+    headings: Sequence[float] | None = None,
+    payload_rms: float | str | None = None,
+    payload_significant: float | str | None = None,
+    payload_max: float | str | None = None,
+    payload_speed: float | str | None = None,
+    depths: Sequence[float] | None = None,
+    scatter: Scatter | str | Path | None = None,
+    reoptimise: bool = False,
+    highest: float = HIGHEST,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Operability:
+    """Return the limiting H_s over peak period and heading, for every limit, and what binds.
+
+    The rule is that of all designs: |static| + k sigma within the bound for peaks, with each
+    signal's own k = sqrt(2 ln(T/T_z)); sqrt(static^2 + sigma^2) for continuous ratings.  The
+    payload's drag agrees with its motion in each sea, so the response is not linear in H_s, and
+    the limit is found as a root; where the spectrum is known at one H_s only it is rebuilt at
+    each step.
+
+    Parameters
+    ----------
+    design
+        A design, whose gains are kept; or a case, for the drum held and for a perfect winch only.
+    periods
+        Peak periods [s], ascending; by default 4 to 18 s, or what the scatter diagram needs, or
+        the case's own where its sea has no period to change.
+    headings
+        Headings [rad], ascending; by default every 30 deg where the vessel has RAOs.  A vessel
+        that is given by the heave of its hook has none.
+    payload_rms, payload_significant, payload_max
+        How still the payload must be: standard deviation, significant double amplitude (4
+        sigma), most probable maximum amplitude in the exposure time; in m or text with a unit.
+    payload_speed
+        Largest most probable maximum of the payload's speed, in m/s or text with a unit.
+    depths
+        Lengths of rope paid out [m]; the case's own if left out.
+    scatter
+        Scatter diagram, its file, or ``example`` for a made-up one: what share of the year the
+        work can be done.
+    reoptimise
+        Whether to find the gains anew for each sea as well: seconds for each point.
+    highest
+        Highest H_s that is looked at [m].
+    seed
+        Of the searches for new gains.
+    progress
+        Called as progress(stage, done, total).
+
+    Returns
+    -------
+    Operability
+        With `dataset`, an xarray Dataset.
+
+    Raises
+    ------
+    InputError
+        If the design has no stable loop, or an argument is out of its range.
+    """
+    with warnings.catch_warnings():
+        # Of seas that nobody has asked for: a contour goes up to where waves break and beyond.
+        warnings.simplefilter("ignore", PhysicsWarning)
+        return _operability(
+            design,
+            periods=periods,
+            headings=headings,
+            wanted={
+                "rms": payload_rms,
+                "significant": payload_significant,
+                "maximum": payload_max,
+                "speed": payload_speed,
+            },
+            depths=depths,
+            scatter=scatter,
+            reoptimise=reoptimise,
+            highest=highest,
+            seed=seed,
+            progress=progress,
+        )
+
+
+def _operability(
+    design: Design | Case,
+    *,
+    periods: Sequence[float] | None,
+    headings: Sequence[float] | None,
+    wanted: Mapping[str, float | str | None],
+    depths: Sequence[float] | None,
+    scatter: Scatter | str | Path | None,
+    reoptimise: bool,
+    highest: float,
+    seed: int,
+    progress: Progress | None,
+) -> Operability:
+    case = design if isinstance(design, Case) else design.case
+    check_range("operability", "highest", highest, low=0.1, high=HIGHEST, unit="m")
+    diagram = _diagram(scatter)
+    if reoptimise and not isinstance(design, GainDesign):
+        raise InputError(
+            "operability: reoptimise is for the gains of payload feedback (`optimise_gains`, "
+            "`evaluate_gains`); other structures keep their parameters"
+        )
+    if diagram is not None and not has_period(case):
+        raise InputError(
+            f"{case.source or case.name}: sea: the {case.sea.spectrum} spectrum has no peak_period "
+            "of its own, so that it cannot be set against a scatter diagram; use jonswap"
+        )
+    criteria = payload_criteria(case, **wanted)
+    angles = _headings(case, headings)
+    times = _periods(case, periods, diagram)
+    columns = [sea_column(case, period, angles) for period in times]
+    lengths = [None] if depths is None else [_length(case, d) for d in depths]
+    stages = [asked_of(design, criteria, length=length) for length in lengths]
+    count = sum(len(stage.systems) for stage in stages) * len(columns)
+    count += len(stages) * len(columns) * len(columns[0].hooks) if reoptimise else 0
+    done = 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress("limiting seas", done, count)
+
+    if progress is not None:
+        progress("limiting seas", 0, count)
+    found = []
+    for stage in stages:
+        seas = [_on_rope(column, stage) for column in columns]
+        contours = {
+            name: contour_of(system, stage.criteria[name], seas, highest=highest, step=step)
+            for name, system in stage.systems.items()
+        }
+        if reoptimise and isinstance(design, GainDesign):
+            contours["reoptimised"] = reoptimised_contour(
+                design, stage, seas, highest=highest, seed=seed, step=step
+            )
+        found.append(_at_depth(stage, contours, seas, diagram))
+    return Operability(
+        case=case,
+        design=None if isinstance(design, Case) else design,
+        depths=tuple(found),
+        scatter=diagram,
+        wanted=criteria,
+    )
+
+
+def default_periods(scatter: Scatter | None = None) -> FloatArray:
+    """Return the peak periods of a contour where none are asked for [s]: whole seconds."""
+    if scatter is None:
+        return np.linspace(*_PERIODS[:2], int(_PERIODS[2]))
+    low = np.floor(float(scatter.peak_period.min()))
+    high = np.ceil(float(scatter.peak_period.max()))
+    if low == high:
+        return np.array([max(low, 1.0)])
+    return np.linspace(max(low, 1.0), high, int(min(high - max(low, 1.0), 40.0)) + 1)
+
+
+def default_headings() -> FloatArray:
+    """Return the headings of a contour where none are asked for [rad]."""
+    return np.asarray(np.radians(np.arange(0.0, 360.0, _STEP)))
+
+
+def _diagram(given: Scatter | str | Path | None) -> Scatter | None:
+    if given is None or isinstance(given, Scatter):
+        return given
+    return example_scatter() if str(given) == EXAMPLE else read_scatter(given)
+
+
+def _headings(case: Case, given: Sequence[float] | None) -> Sequence[float] | None:
+    if given is None:
+        return [float(b) for b in default_headings()] if has_headings(case) else None
+    owner = "operability"
+    axis = check_ascending(owner, "headings", given)
+    if axis.size == 0 or axis.size > _MOST_HEADINGS:
+        raise InputError(f"{owner}: headings must be 1 to {_MOST_HEADINGS}, got {axis.size}")
+    check_range(owner, "headings", float(axis[0]), low=0.0, unit="rad")
+    check_range(owner, "headings", float(axis[-1]), high=2.0 * np.pi, unit="rad", open_high=True)
+    return [float(b) for b in axis]
+
+
+def _periods(
+    case: Case, given: Sequence[float] | None, scatter: Scatter | None
+) -> Sequence[float | None]:
+    if given is None:
+        if not has_period(case):
+            return [None]
+        return [float(t) for t in default_periods(scatter)]
+    axis = check_ascending("operability", "periods", given)
+    if axis.size == 0 or axis.size > _MOST_PERIODS:
+        raise InputError(f"operability: periods must be 1 to {_MOST_PERIODS}, got {axis.size}")
+    check_range("operability", "periods", float(axis[0]), low=0.0, unit="s", open_low=True)
+    check_range("operability", "periods", float(axis[-1]), high=60.0, unit="s")
+    return [float(t) for t in axis]
+
+
+def _length(case: Case, depth: float) -> float:
+    source = case.source or case.name
+    return check_range(source, "depths", depth, low=1.0, high=12000.0, unit="m")
+
+
+def _on_rope(column: SeaColumn, asked: Asked) -> SeaColumn:
+    """Return the column with the rope of what is asked, for the searches and the checks."""
+    length = asked.case.rope.length
+    if all(c.rope.length == length for c in column.cases):
+        return column
+    return replace(column, cases=tuple(c.replace({"rope.length": length}) for c in column.cases))
+
+
+def _at_depth(
+    asked: Asked,
+    contours: dict[str, Contour],
+    columns: Sequence[SeaColumn],
+    scatter: Scatter | None,
+) -> AtDepth:
+    vessel = asked.case.vessel
+    heading = getattr(vessel, "heading", None) if has_headings(asked.case) else None
+    # Where the diagram knows directions, the bow is along its axis until it is turned.
+    turned = 0.0 if scatter is not None and scatter.heading is not None else heading
+    shares = (
+        {}
+        if scatter is None
+        else {name: workable(contour, scatter, turned) for name, contour in contours.items()}
+    )
+    periods = contours["perfect"].periods
+    return AtDepth(
+        rope=rope_state(asked.case),
+        contours=contours,
+        columns=tuple(columns),
+        capability=capability(asked.perfect, asked.criteria["perfect"], _lines(periods)),
+        workable=shares,
+        max_sensitivity=_sensitivity(asked, contours.get("loop")),
+    )
+
+
+def _sensitivity(asked: Asked, contour: Contour | None) -> float:
+    """Return M_s of the loop at the drag of the contour nearest the case's own sea."""
+    if asked.loop is None or contour is None:
+        return math.nan
+    loop = asked.loop
+    if loop.stable_range[0] > loop.stable_range[1] or loop.swings:
+        return math.inf
+    order = np.abs(contour.periods - asked.case.sea.spectral_peak_period).argsort()
+    known = [c for p in order for c in contour.drag[:, p] if np.isfinite(c)]
+    drag = float(known[0]) if known and loop.drag is not None else loop.reference
+    view = Assessment(loop.plant, loop.controller, (), drag=loop.drag, coefficient=drag)
+    return view.max_sensitivity if view.stable else math.inf
+
+
+def _lines(periods: FloatArray) -> FloatArray:
+    low, high = float(periods[0]), float(periods[-1])
+    return np.linspace(0.75 * low, 1.1 * high, 60)

@@ -1,0 +1,298 @@
+"""What a limiting sea is asked of: a loop, the hook with the drum held, a perfect winch.
+
+All three answer the same two questions, so that one search serves them: what are the responses on
+nodes with the drag as a variable (`responses.DragResponses`), and with which drag are they stable.
+
+    design, case -> LoopSystem      the payload with the design's gains
+    case         -> HeldSystem      the payload with the brake on, on the exact distributed rope
+    case         -> PerfectSystem   what any winch must do to hold the upper end still
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from typing_extensions import override
+
+from models.line import rope_transfers
+from models.linear import LinearPlant
+from models.plant_data import PlantData
+from models.quadrature import Quadrature
+from models.rope import fixed_top_modes
+from models.sensors import MRU
+
+from ..assess import Assessment
+from ..controller import Controller
+from ..disturbance import Disturbance
+from ..element import DragElement
+from ..loop import closed_loop, numeric_blocks
+from ..question import HOOK, PAYLOAD
+from .responses import DragResponses
+
+__all__ = ["HeldSystem", "LoopSystem", "PerfectSystem", "System"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+VELOCITY, FORCE = "payload.velocity", "payload.force"
+_COEFFICIENTS = np.concatenate([[0.0], np.geomspace(1e-6, 1e2, 33)])  # over the slope [m/s]
+_EDGE = 60  # halvings that find the edge of stability
+_HIGHEST = 60.0  # where seas end [rad/s]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class System(ABC):
+    """What is moved by the sea.
+
+    Attributes
+    ----------
+    outputs
+        The signals that are looked at.
+    slope
+        Drag coefficient per standard deviation of the payload's velocity [N s2/m2]; 0 where
+        the coefficient is fixed.
+    reference
+        Drag coefficient that the responses are computed with [N s/m]: the fixed one, or one of
+        the size that is to be expected.
+    noises
+        What disturbs besides the sea.
+    mru, mru_rms
+        The motion reference unit whose error is among the noises, if any, and the rms of the
+        hook's heave that this error is given for [m].
+    """
+
+    outputs: tuple[str, ...]
+    slope: float
+    reference: float
+    noises: tuple[Disturbance, ...] = field(default=())
+    mru: MRU | None = None
+    mru_rms: float = 0.0
+
+    @property
+    def disturbances(self) -> tuple[str, ...]:
+        """Names of the disturbances: the hook first."""
+        return (HOOK, *(noise.name for noise in self.noises))
+
+    def mru_growth(self, rms: FloatArray) -> FloatArray:
+        """Return the error of the reference unit over that in `noises`, (r,).
+
+        Parameters
+        ----------
+        rms
+            Standard deviations of the hook's heave (r,) [m]; the error is a floor or a share of
+            it, whichever is greater (`models.mru.MruModel.error_rms`).
+        """
+        if self.mru is None:
+            return np.ones_like(rms)
+        floor, share = self.mru.noise_floor, self.mru.noise_fraction
+        given = max(floor, share * self.mru_rms)
+        return np.asarray(
+            np.maximum(floor, share * rms) / given if given > 0.0 else 1.0 + 0.0 * rms
+        )
+
+    @abstractmethod
+    def responses(self, nodes: Quadrature) -> DragResponses:
+        """Return the responses on nodes."""
+
+    @abstractmethod
+    def poles(self, coefficient: float) -> ComplexArray:
+        """Return the poles [1/s] for a drag coefficient [N s/m]; those above the real axis do."""
+
+    @cached_property
+    def stable_range(self) -> tuple[float, float]:
+        """Drag coefficients for which the system is stable [N s/m]; (inf, 0) if none is.
+
+        Where stability comes and goes it is the last range that begins at or below a coefficient
+        of usual size.
+        """
+        if self.slope == 0.0:
+            return (0.0, np.inf) if self._stable(self.reference) else (np.inf, 0.0)
+        values = self.slope * _COEFFICIENTS
+        kept = [self._stable(float(v)) for v in values]
+        if all(kept):
+            return 0.0, np.inf
+        if not any(kept):
+            return np.inf, 0.0
+        first = kept.index(True)
+        last = next((k for k in range(first, len(kept)) if not kept[k]), len(kept))
+        low = 0.0 if first == 0 else self._edge(values[first - 1], values[first])
+        high = np.inf if last == len(kept) else self._edge(values[last], values[last - 1])
+        return low, high
+
+    @cached_property
+    def swings(self) -> bool:
+        """Whether it swings by itself: unstable without drag, as quadratic drag is in small motion.
+
+        Whatever the sea, its motion is then at least the one that gives it drag enough.
+        """
+        return self.slope > 0.0 and bool(self.poles(0.0).real.max(initial=-np.inf) > 0.0)
+
+    def _stable(self, coefficient: float) -> bool:
+        return bool(self.poles(coefficient).real.max(initial=-np.inf) < 0.0)
+
+    def _edge(self, unstable: float, stable: float) -> float:
+        """Return where stability ends, on its stable side."""
+        for _ in range(_EDGE):
+            middle = 0.5 * (unstable + stable)
+            if self._stable(middle):
+                stable = middle
+            else:
+                unstable = middle
+        return float(stable)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LoopSystem(System):
+    """A plant with a linear controller around it.
+
+    Attributes
+    ----------
+    plant, controller
+        The two ends of the loop; the plant holds the drag `DragElement.reference`.
+    drag
+        Quadratic drag, or None where the plant holds a fixed coefficient.
+    """
+
+    plant: LinearPlant
+    controller: Controller
+    drag: DragElement | None
+
+    @override
+    def responses(self, nodes: Quadrature) -> DragResponses:
+        names = [*self.disturbances, FORCE]
+        outputs = [*self.outputs, VELOCITY]
+        law = self.controller.response_at(1j * nodes.omega)
+        rows, columns = law.shape[1:]
+        matrix = [[law[:, i, j] for j in range(columns)] for i in range(rows)]
+        blocks = numeric_blocks(self.plant.response(nodes.omega))
+        found = closed_loop(blocks, matrix, [(z, w) for z in outputs for w in names])
+        table = np.array([[np.asarray(found[z, w]) for w in names] for z in outputs])
+        return DragResponses(
+            nodes=nodes,
+            outputs=self.outputs,
+            disturbances=self.disturbances,
+            zw=table[:-1, :-1],
+            zf=table[:-1, -1],
+            vw=table[-1, :-1],
+            vf=table[-1, -1],
+            reference=self.reference,
+        )
+
+    @override
+    def poles(self, coefficient: float) -> ComplexArray:
+        return Assessment(
+            self.plant, self.controller, (), drag=self.drag, coefficient=coefficient
+        ).poles
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HeldSystem(System):
+    """Rope and payload with the drum held by its brake, from the rope's closed form."""
+
+    data: PlantData
+
+    @override
+    def responses(self, nodes: Quadrature) -> DragResponses:
+        s = 1j * nodes.omega
+        P_Y, P_F, T_Y, T_F = _held(self.data, s.astype(np.complex128), self.reference)
+        to_heave = {PAYLOAD: P_Y, VELOCITY: s * P_Y, "rope.tension": T_Y}
+        to_force = {PAYLOAD: P_F, VELOCITY: s * P_F, "rope.tension": T_F}
+        return DragResponses(
+            nodes=nodes,
+            outputs=self.outputs,
+            disturbances=self.disturbances,
+            zw=np.array([[to_heave[z]] for z in self.outputs]),
+            zf=np.array([to_force[z] for z in self.outputs]),
+            vw=to_heave[VELOCITY][None],
+            vf=to_force[VELOCITY],
+            reference=self.reference,
+        )
+
+    @override
+    def poles(self, coefficient: float) -> ComplexArray:
+        # Those of the payload on its rope: what a quadrature has to look for, and no more.
+        return held_poles(self.data, coefficient)
+
+    @override
+    def _stable(self, coefficient: float) -> bool:
+        # Nothing drives the rope's own modes; the first, undamped, would have no variance.
+        return bool(held_poles(self.data, coefficient)[0].real < 0.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PerfectSystem(System):
+    """A winch that holds the rope's upper end still: X = -Z, the tension constant.
+
+    Motor torque is then that of the inertia alone, T = (I s^2 + B s) theta with theta = -n Z / r:
+    what every winch pays whose load is to stand still, whatever its controller.
+    """
+
+    data: PlantData
+
+    @override
+    def responses(self, nodes: Quadrature) -> DragResponses:
+        data, s = self.data, 1j * nodes.omega
+        angle = -data.gear_ratio / data.drum_radius + 0.0 * s
+        torque = (data.inertia * s**2 + data.viscous_friction * s) * angle
+        current = torque / data.torque_constant
+        moved = {"motor.torque": torque, "motor.speed": s * angle, "motor.current": current}
+        if data.motor == "dc":
+            coil = data.resistance + data.inductance * s
+            moved["motor.voltage"] = coil * current + data.back_emf_constant * s * angle
+        nothing = np.zeros_like(s)
+        return DragResponses(
+            nodes=nodes,
+            outputs=self.outputs,
+            disturbances=self.disturbances,
+            zw=np.array([[moved[z]] for z in self.outputs]),
+            zf=np.array([nothing for _ in self.outputs]),
+            vw=nothing[None],
+            vf=nothing,
+            reference=self.reference,
+        )
+
+    @override
+    def poles(self, coefficient: float) -> ComplexArray:
+        del coefficient
+        return np.zeros(0, dtype=np.complex128)
+
+
+def held_poles(data: PlantData, coefficient: float, highest: float = _HIGHEST) -> ComplexArray:
+    """Return about where the poles are with the drum held [1/s], the upper half.
+
+    Parameters
+    ----------
+    data
+        The plant's numbers.
+    coefficient
+        Drag coefficient [N s/m]; it damps the first mode, as the payload hardly moves in others.
+    highest
+        Frequency up to which the modes are wanted [rad/s].
+    """
+    if data.lumping == "thesis" or data.mass_per_length == 0.0:
+        mass = data.payload_mass + (data.rope_mass if data.lumping == "thesis" else 0.0)
+        modes = np.array([np.sqrt(data.stiffness / mass)])
+    else:
+        mass = data.payload_mass + data.rope_mass / 3.0
+        rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
+        spacing = np.pi / data.rope_length * np.sqrt(data.axial_stiffness / data.mass_per_length)
+        modes = fixed_top_modes(*rope, data.payload_mass, int(highest / spacing) + 1)
+    decay = 0.5 * data.damping_time * modes**2
+    decay[0] += 0.5 * coefficient / mass
+    return np.asarray(-decay + 1j * modes, dtype=np.complex128)
+
+
+def _held(
+    data: PlantData, s: ComplexArray, drag: float
+) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+    """Return P/Y, P/F, T/Y and T/F: one spring, or the exact distributed rope."""
+    if data.lumping != "thesis":
+        return rope_transfers(data, s, drag)
+    spring = data.stiffness * (1.0 + s * data.damping_time)
+    mass = data.payload_mass + data.rope_mass
+    P_F = 1.0 / (mass * s**2 + drag * s + spring)
+    return spring * P_F, P_F, spring * (1.0 - spring * P_F), -spring * P_F
