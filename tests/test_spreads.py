@@ -248,7 +248,7 @@ def test_file_becomes_a_spread_and_text_again(tmp_path: Path) -> None:
         ("vary:\n  payload.mass: {normal: {mean: 3}}", "sd is missing"),
         ("vary:\n  payload.mass: [1, 2, 3]", r"\[low, high\] or"),
         ("vary:\n  payload.mass: {uniform: {lo: 1}}", "lo is unknown; did you mean 'low'"),
-        ("vary:\n  payload.mass: 5 %\ncorrelations:\n  - [a, b]", r":4: correlations\[0\]: must be"),
+        ("vary:\n  delay: 5 %\ncorrelations:\n  - [a, b]", r":4: correlations\[0\]: must be"),
         ("vary:\n  payload.mass: 5 %\ncorelations: 1", "did you mean 'correlations'"),
     ],
 )

@@ -85,7 +85,7 @@ def test_cloud_holds_the_designs_own_curve(result: xr.Dataset) -> None:
     axes = nyquist_cloud(result, thesis_design()).axes[0]
     own = next(line for line in axes.lines if line.get_label() == "the design")
     curve = np.asarray(own.get_xdata()) + 1j * np.asarray(own.get_ydata())
-    omega = np.geomspace(0.02, 200.0, 1200)
+    omega = np.geomspace(0.02, 200.0, 5000)
     gain = thesis_design().assessment.loop_gain(omega)
     seen = np.isfinite(curve)
     np.testing.assert_allclose(curve[seen], gain[seen], rtol=1e-9)

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["nyquist_cloud"]
 
 _CURVES = 150
+_BAND = (0.02, 200.0, 5000)  # ends [rad/s] and points: circles of light rope modes look round
+_AT_ONCE = 16  # curves
 
 
 def nyquist_cloud(result: xr.Dataset, design: GainDesign | StructureDesign) -> Figure:
@@ -40,8 +42,9 @@ def nyquist_cloud(result: xr.Dataset, design: GainDesign | StructureDesign) -> F
     paths = engine.spread.paths
     rows = np.stack([numbers_in(result, p)[at] for p in paths], axis=1)
     nominal = np.array([[engine.spread.nominal[p] for p in paths]])
-    omega = np.geomspace(0.02, 200.0, 1200)
-    gains = engine.loop_gain(rows, omega)
+    omega = np.geomspace(*_BAND)
+    parts = [engine.loop_gain(rows[k : k + _AT_ONCE], omega) for k in range(0, len(rows), _AT_ONCE)]
+    gains = np.concatenate(parts)
     own = engine.loop_gain(nominal, omega)[0]
     stable = stable_of(result)[at]
     bound = engine.case.limits.max_sensitivity
