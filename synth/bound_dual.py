@@ -39,6 +39,7 @@ _SETTLED = 1e-7  # gap at which no further step is made
 _STEPS = 12
 _NEAR = 0.3  # gap from which Newton's method is tried first ...
 _ARRIVED = 1e-6  # ... and at which its answer is taken
+_HAIR = 0.5  # in the logarithm of a multiplier that is at most a millionth of the cost
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -232,6 +233,12 @@ class Dual:
 
     def _polished(self, point: DualPoint, low: FloatArray, high: FloatArray) -> DualPoint:
         """Return a point by Newton's method on log J = log b^2, in log lambda."""
+        # A slack limit whose multiplier stopped a hair above its least is slack all the same; taken
+        # for an active one it would lead the steps astray.
+        theta = np.log(point.multipliers)
+        slack = (theta < low + _HAIR) & (point.variances[self.rows] < self.squares)
+        if np.any(slack & (theta > low)):
+            point = self.at(np.exp(np.where(slack, low, theta)))
         for _ in range(_STEPS):
             if self._open(point, low) < _SETTLED:
                 break

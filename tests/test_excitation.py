@@ -292,7 +292,11 @@ class TestOtherBodies:
         assert 0.7 * sea < boat_motion(case).hook.displacement.rms < sea
 
     def test_the_surface_is_that_of_the_waves_that_move_the_hook(self):
-        case = load_case("subsea-crane")
+        table = {
+            "omega": [0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6],
+            "amplitude": [1.0, 1.0, 1.05, 0.98, 0.62, 0.28, 0.12, 0.05],
+        }
+        case = load_case("subsea-crane").replace({"vessel.heave_rao": table})
         surface, hook = surface_motion(case, side=4.0), SpectrumMotion.from_case(case)
         z, _, _ = whole(surface.motion(600.0, 0.1, seed=6))
         heave, _, _ = whole(hook.motion(600.0, 0.1, seed=6))
