@@ -42,8 +42,9 @@ def code_digest(packages: tuple[str, ...]) -> str:
     home = Path(__file__).resolve().parent.parent
     digest = hashlib.sha256()
     for package in packages:
-        for path in sorted((home / package).glob("*.py")):
-            digest.update(path.name.encode() + b"\0" + path.read_bytes())
+        for path in sorted((home / package).rglob("*.py")):
+            name = path.relative_to(home).as_posix()
+            digest.update(name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
 
 

@@ -114,7 +114,8 @@ def test_optimise_suggests_commands_that_work(optimised, run):
     folder, done = optimised
     lines = done.stdout.partition("\nNext:\n")[2].splitlines()
     commands = [line.strip() for line in lines if line.startswith("  stillhook ")]
-    assert [command.split()[1] for command in commands] == ["optimise", "evaluate", "check"]
+    names = ["optimise", "evaluate", "operability", "sweep", "check"]
+    assert [command.split()[1] for command in commands] == names
     for command in commands:
         words = shlex.split(command)[1:]
         cli.build_parser().parse_args(words)

@@ -169,9 +169,10 @@ def _next(
             )
         )
     if design.margins is not None:
-        rows.append(
-            ("these gains again", f"stillhook evaluate {case} --gains {gains_text(design.gains)}")
-        )
+        gains = f"{case} --gains {gains_text(design.gains)}"
+        rows.append(("these gains again", f"stillhook evaluate {gains}"))
+        rows.append(("in which seas they can work", f"stillhook operability {gains}"))
+        rows.append(("where mass, stiffness and delay are off", f"stillhook sweep {gains}"))
     rows.append(("what was read from the case", f"stillhook check {case}"))
     return rows
 

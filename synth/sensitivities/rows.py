@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from models.spreads import Samples, Spread
+from models.spreads import Spread
 
 if TYPE_CHECKING:
     from ..design import GainDesign
@@ -45,23 +45,17 @@ def evaluate_rows(
     Raises
     ------
     InputError
-        If the spread does not fit the case.
+        If the spread does not fit the case, or there is no such figure.
     """
-    from ..design import GainDesign
-    from ..sweeps.frequency import frequency_sweep
+    from ..sweeps.frequency import FrequencyEngine
 
     inverse = figure == "modulus_margin"
     metric = "max_sensitivity" if inverse else figure
-    gains = design.gains if isinstance(design, GainDesign) else design.parameters
-    ready = spread.on(design.case, gains, design.drag)
+    engine = FrequencyEngine(design, spread, metrics=[metric])
 
     def evaluate(rows: FloatArray) -> FloatArray:
-        given = Spread({path: Samples(rows[:, j]) for j, path in enumerate(ready.paths)}, None)
-        found = frequency_sweep(
-            design, given, samples=len(rows), sampling="given", metrics=[metric], progress=progress
-        )
-        values = np.asarray(found[metric].values, dtype=np.float64)
-        values = np.where(np.asarray(found["stable"].values, dtype=bool), values, np.nan)
+        found = engine.evaluate(rows, progress)
+        values = np.where(found["stable"], np.asarray(found[metric], dtype=np.float64), np.nan)
         return 1.0 / values if inverse else values
 
-    return ready, evaluate
+    return engine.spread, evaluate
