@@ -204,7 +204,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             lambda: objectives(2 if quick else 24, 500 if quick else 2000),
         ),
         "fronts": ("pareto.csv", lambda: fronts(10 if quick else 100)),
-        "bounds": ("structure_bounds.csv", lambda: bounds(1 if quick else 3)),
+        "bounds": ("structure_bounds.csv", lambda: bounds(1 if quick else 8)),
     }
     for question, (name, answer) in stored.items():
         if given.only in ("", question):

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["HookSurvey", "hook_motion"]
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 
 HEADINGS = tuple(float(b) for b in range(0, 360, 15))
 PEAK_PERIODS = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0)
@@ -72,7 +73,7 @@ class HookSurvey:
     peak_periods: FloatArray
     points: tuple[Point, ...]
     moments: FloatArray
-    steep: npt.NDArray[np.bool_]
+    steep: BoolArray
     own: HookDemand
     probability: float = 0.9
 
@@ -228,7 +229,7 @@ def hook_motion(
 
 def _seas(
     case: Case, wanted: Sequence[float] | None
-) -> tuple[FloatArray, list[SeaSpectrum], npt.NDArray[np.bool_]]:
+) -> tuple[FloatArray, list[SeaSpectrum], BoolArray]:
     """Return peak periods (t,) [s], the seas, and which of them are steeper than breaking (t,)."""
     given = case.to_dict()["sea"]  # without what follows from a file, a wind, the parts of a sum
     field = next((n for n in ("peak_period", "significant_period") if n in given), None)

@@ -135,8 +135,9 @@ class Vessel(Section):
         Annotated[str, DataFile(names=_bundled, what="a RAO file or the name of a bundled vessel")]
         | None
     ) = None
-    """RAOs of the vessel's six motions: a bundled vessel (`osv-83m`) or a file, see `stillhook
-    vessel import`; with `hook` or `crane`, and `heading`. Or give `heave_rao`."""
+    """RAOs of the vessel's six motions: a bundled vessel (`osv-83m`) or a file, as
+    `stillhook vessel import` reads it; with `hook` or `crane`, and `heading`. Or give
+    `heave_rao`."""
     hook: Hook | None = None
     """Where the rope leaves the crane, in the vessel frame of `raos`, or give `crane`."""
     crane: Crane | None = None

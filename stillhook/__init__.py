@@ -88,6 +88,22 @@ _HOME = {
     "Operability": "synth.operability.result",
     "Scatter": "models.seas.scatter",
     "read_scatter": "models.seas.scatter",
+    "hook_motion": "models.hook_survey",
+    "HookSurvey": "models.hook_survey",
+    "HookDemand": "models.hook_demand",
+    "read_seas": "models.seas.records",
+    "gain_tolerance": "synth.sweeps.gain_tolerance",
+    "usual_spread": "stillhook.sweeps.usual",
+    "fault_spread": "stillhook.sweeps.usual",
+    "vessel_from_hull": "models.vessels.hull_vessel",
+    "ShipLines": "models.vessels.hull_lines",
+    "box_hull": "models.vessels.hull",
+    "read_hull": "models.vessels.hull_files",
+    "Uniform": "models.spreads",
+    "Normal": "models.spreads",
+    "Triangular": "models.spreads",
+    "LogNormal": "models.spreads",
+    "Samples": "models.spreads",
     "write_report": "stillhook.report",
 }
 
@@ -101,19 +117,25 @@ __all__ = [
     "Doubts",
     "Family",
     "GainDesign",
+    "HookDemand",
+    "HookSurvey",
     "InputError",
     "LinearFeedback",
     "LinearMPC",
+    "LogNormal",
     "NonlinearMPC",
+    "Normal",
     "Operability",
     "PhysicsWarning",
     "RecordMotion",
     "Robustness",
     "Run",
     "Runs",
+    "Samples",
     "Scatter",
     "Scenario",
     "Sensitivity",
+    "ShipLines",
     "SineMotion",
     "SixDofMotion",
     "SolverError",
@@ -121,11 +143,14 @@ __all__ = [
     "StillhookError",
     "StructureDesign",
     "SynthesisError",
+    "Triangular",
+    "Uniform",
     "VelocityFeedForward",
     "VesselRaos",
     "Weights",
     "__version__",
     "bound_for",
+    "box_hull",
     "bundled_cases",
     "bundled_vessels",
     "cable_study",
@@ -135,6 +160,9 @@ __all__ = [
     "compare",
     "evaluate_gains",
     "exact_sensors",
+    "fault_spread",
+    "gain_tolerance",
+    "hook_motion",
     "load_case",
     "load_design",
     "load_structure",
@@ -144,8 +172,10 @@ __all__ = [
     "optimise_robust",
     "optimise_structure",
     "pareto_front",
+    "read_hull",
     "read_raos",
     "read_scatter",
+    "read_seas",
     "resume_sweep",
     "robustness",
     "save_design",
@@ -157,6 +187,8 @@ __all__ = [
     "sweep",
     "tune",
     "tune_weights",
+    "usual_spread",
+    "vessel_from_hull",
     "worth",
     "write_raos",
     "write_report",
@@ -174,17 +206,30 @@ if TYPE_CHECKING:
     from models import case_schema as case_schema
     from models import load_case as load_case
     from models.excitation import SineMotion as SineMotion
+    from models.hook_demand import HookDemand as HookDemand
+    from models.hook_survey import HookSurvey as HookSurvey
+    from models.hook_survey import hook_motion as hook_motion
     from models.record_file import RecordMotion as RecordMotion
     from models.run import Run as Run
     from models.scenario import Scenario as Scenario
+    from models.seas.records import read_seas as read_seas
     from models.seas.scatter import Scatter as Scatter
     from models.seas.scatter import read_scatter as read_scatter
     from models.six_dof import SixDofMotion as SixDofMotion
+    from models.spreads import LogNormal as LogNormal
+    from models.spreads import Normal as Normal
+    from models.spreads import Samples as Samples
     from models.spreads import Spread as Spread
+    from models.spreads import Triangular as Triangular
+    from models.spreads import Uniform as Uniform
     from models.vessels import VesselRaos as VesselRaos
     from models.vessels import bundled_vessels as bundled_vessels
     from models.vessels import read_raos as read_raos
     from models.vessels import write_raos as write_raos
+    from models.vessels.hull import box_hull as box_hull
+    from models.vessels.hull_files import read_hull as read_hull
+    from models.vessels.hull_lines import ShipLines as ShipLines
+    from models.vessels.hull_vessel import vessel_from_hull as vessel_from_hull
     from mpc.clairvoyant import Clairvoyant as Clairvoyant
     from mpc.clairvoyant import clairvoyant as clairvoyant
     from mpc.doubts import Doubts as Doubts
@@ -194,6 +239,8 @@ if TYPE_CHECKING:
     from mpc.weights import tune_weights as tune_weights
     from stillhook.sweeps.sweep import resume_sweep as resume_sweep
     from stillhook.sweeps.sweep import sweep as sweep
+    from stillhook.sweeps.usual import fault_spread as fault_spread
+    from stillhook.sweeps.usual import usual_spread as usual_spread
     from synth import GainDesign as GainDesign
     from synth import evaluate_gains as evaluate_gains
     from synth import optimise_gains as optimise_gains
@@ -222,6 +269,7 @@ if TYPE_CHECKING:
     from synth.sizing import size_winch as size_winch
     from synth.structure_design import StructureDesign as StructureDesign
     from synth.structure_search import optimise_structure as optimise_structure
+    from synth.sweeps.gain_tolerance import gain_tolerance as gain_tolerance
 
     from .cables import cable_study as cable_study
     from .compare_run import compare as compare

@@ -38,6 +38,7 @@ def best(case: sh.Case) -> CoDesign:
     return sh.co_design(case, gear=(26.0, 46.0), starts=2)
 
 
+@pytest.mark.slow
 def test_no_gear_of_a_grid_does_better(case: sh.Case, best: CoDesign) -> None:
     assert best.ok, best.status
     found = {}

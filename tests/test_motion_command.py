@@ -52,7 +52,7 @@ def test_a_vessel_over_headings_periods_and_sides(tmp_path, capsys, crane):
 
 
 def test_a_table_over_periods_only(tmp_path, capsys):
-    words = ["motion", "subsea-crane", "--set", "sea.significant_height=5"]
+    words = ["motion", "landing", "--set", "sea.significant_height=5"]
     assert main([*words, "--tp", "6,12", "--out", str(tmp_path)]) == 0
     said = capsys.readouterr().out
     assert "over the peak period only: heave_rao holds for one hook in one heading" in said
