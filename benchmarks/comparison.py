@@ -1,19 +1,22 @@
 """Predictive control against linear feedback on the 1975 winch, in the same seas.
 
-    python benchmarks/comparison.py [--out DIR] [--seeds 6] [--cases thesis-1975,thesis-1975-rope]
+    python benchmarks/comparison.py [--out DIR] [--only PART,...] [--until HH:MM]
 
 Torque of at most twice the rating, quadratic drag, and a reference unit whose error is white noise
-of 1 % of the heave's rms sampled at 4 Hz.  Runs of 20 minutes; one that was stopped goes on.
-It takes an hour or two on two cores, the designs and the floors on the rope most of it.  Writes
-`docs/data/comparison.csv`, a row for each run, and prints the table of `docs/compare.md`.
+of 1 or 5 % of the heave's rms sampled at 4 Hz.  Runs of 20 minutes.  It takes some hours on two
+cores, in parts that are named in `PARTS`: one that was stopped goes on, and rows of other parts
+stay as they are.  Writes `docs/data/comparison.csv`, a row for each run, and prints the tables of
+`docs/compare.md`.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import datetime
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import stillhook as sh
@@ -22,51 +25,115 @@ from stillhook.compare_cell import Cell
 ROOT = Path(__file__).resolve().parents[1]
 CSV = ROOT / "docs" / "data" / "comparison.csv"
 HEIGHTS = (1.0, 1.25, 1.9, 2.43, 3.75)  # H_s [m]
-UNIT = {"noise_floor": 0.0, "noise_fraction": 0.01, "noise_bandwidth": 11.31}
-CONTENDERS: Mapping[str, tuple[str, ...]] = {
-    "thesis-1975": (
-        *("none", "thesis", "feedback", "feedback-half", "combined", "combined-half"),
-        *("mpc", "mpc-preview", "nonlinear-mpc", "clairvoyant"),
+CALM = (0.5, 1.0)  # H_s where next to nothing saturates [m]
+LINEAR = ("none", "thesis", "feedback", "feedback-half", "combined", "combined-half")
+EAGER = "combined-eager"
+PREDICTIVE = ("mpc", "mpc-preview", "nonlinear-mpc")
+FLOOR = "clairvoyant"
+ORDER = (*LINEAR, "feedback-eager", EAGER, *PREDICTIVE, FLOOR)
+CASES = ("thesis-1975", "thesis-1975-rope")
+COLUMNS = (
+    *("case", "noise", "mismatch", "contender", "height", "seed", "rms", "largest"),
+    *("torque_rms", "lost", "broken"),
+)
+KEY = COLUMNS[:6]
+MISMATCHES = (
+    *("payload=-30%", "payload=+30%", "weight=-20%", "E=-30%", "E=+30%"),
+    *("delay=+50ms", "period=+20%", "spectrum=jonswap"),
+)
+TWICE = 2.0  # what a mismatch may cost, over the nominal rms
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """One call of `sh.compare`."""
+
+    case: str
+    contenders: tuple[str, ...]
+    seeds: int
+    heights: tuple[float, ...] = HEIGHTS
+    noise: float = 0.01
+    mismatch: str = ""
+    duration: str = "20 min"
+
+
+_ONE, _ROPE = CASES
+PARTS: Mapping[str, Part] = {
+    "one-mpc": Part(case=_ONE, contenders=("mpc",), seeds=10),
+    "one-preview": Part(case=_ONE, contenders=("mpc-preview",), seeds=10),
+    "rope-mpc": Part(case=_ROPE, contenders=("mpc",), seeds=6),
+    "rope-preview": Part(case=_ROPE, contenders=("mpc-preview",), seeds=6),
+    **{
+        f"{case}-{text}": Part(
+            case=case, contenders=("mpc",), seeds=6, heights=(1.25, 2.43), mismatch=text
+        )
+        for case in CASES
+        for text in MISMATCHES
+    },
+    "one-5": Part(case=_ONE, contenders=("mpc",), seeds=6, noise=0.05),
+    "rope-5": Part(case=_ROPE, contenders=("mpc",), seeds=6, noise=0.05),
+    "one-half": Part(
+        case=_ONE, contenders=("feedback-half", "combined-half"), seeds=6, heights=HEIGHTS[:4]
     ),
-    "thesis-1975-rope": ("none", "combined-half", "combined-eager", "mpc", "mpc-preview"),
+    "rope-half": Part(case=_ROPE, contenders=("combined-half",), seeds=6, heights=HEIGHTS[:2]),
+    "one-nonlinear": Part(
+        case=_ONE, contenders=("nonlinear-mpc",), seeds=3, heights=(1.25, 1.9, 2.43)
+    ),
+    "one-floor": Part(case=_ONE, contenders=(FLOOR,), seeds=10),
+    "rope-mpc-10": Part(case=_ROPE, contenders=("mpc",), seeds=10),
+    "one-calm": Part(
+        case=_ONE, contenders=("thesis", "feedback-eager", EAGER, "mpc"), seeds=6, heights=CALM
+    ),
+    "rope-calm": Part(case=_ROPE, contenders=(EAGER, "mpc"), seeds=3, heights=CALM[:1]),
+    "one-linear": Part(case=_ONE, contenders=("none", "thesis", "feedback", "combined"), seeds=10),
+    "rope-linear": Part(case=_ROPE, contenders=("none", EAGER), seeds=6),
 }
-COLUMNS = ("case", "contender", "height", "seed", "rms", "largest", "torque_rms", "lost")
 
 
-def case_of(name: str) -> sh.Case:
+def case_of(name: str, noise: float) -> sh.Case:
     """Return a case with its noisy reference unit."""
-    return sh.load_case(name).replace({"sensors.mru": UNIT})
+    unit = {"noise_floor": 0.0, "noise_fraction": noise, "noise_bandwidth": 11.31}
+    return sh.load_case(name).replace({"sensors.mru": unit})
 
 
-def rows_of(name: str, cells: Iterable[Cell]) -> list[dict[str, object]]:
+def rows_of(part: Part, cells: Iterable[Cell]) -> list[dict[str, str]]:
     """Return rows of the data file from the cells of a comparison, as it keeps them."""
     found = []
     for cell in cells:
         numbers = cell.quantities
-        lost = numbers.get("lost lock at", math.nan)
-        found.append(
-            {
-                "case": name,
-                "contender": cell.contender,
-                "height": cell.height,
-                "seed": cell.seed,
-                "rms": numbers.get("payload rms", math.nan),
-                "largest": numbers.get("payload largest", math.nan),
-                "torque_rms": numbers.get("motor torque rms", math.nan),
-                "lost": int(not math.isnan(lost)),
-            }
-        )
+        row: dict[str, object] = {
+            "case": part.case,
+            "noise": part.noise,
+            "mismatch": part.mismatch,
+            "contender": cell.contender,
+            "height": cell.height,
+            "seed": cell.seed,
+            "rms": numbers.get("payload rms", math.nan),
+            "largest": numbers.get("tracking error largest", math.nan),
+            "torque_rms": numbers.get("motor torque rms", math.nan),
+            "lost": int(not math.isnan(numbers.get("lost lock at", math.nan))),
+            "broken": max(cell.broken.values(), default=math.nan),
+        }
+        found.append({k: f"{v:.6g}" if isinstance(v, float) else str(v) for k, v in row.items()})
     return found
 
 
-def write(rows: Sequence[Mapping[str, object]]) -> None:
-    """Write the data file."""
+def write(rows: Iterable[Mapping[str, str]]) -> None:
+    """Write the data file, with those of its rows that are not told anew."""
+    kept: dict[tuple[str, ...], Mapping[str, str]] = {}
+    for row in [*(load() if CSV.exists() else ()), *rows]:
+        kept[tuple(row[k] for k in KEY)] = row
+
+    def place(row: Mapping[str, str]) -> tuple[object, ...]:
+        who = ORDER.index(row["contender"])
+        first = (CASES.index(row["case"]), float(row["noise"]), row["mismatch"])
+        return (*first, who, float(row["height"]), int(row["seed"]))
+
     with CSV.open("w", encoding="utf-8", newline="") as file:
         file.write("# Written by benchmarks/comparison.py. SI units; a row for each run.\n")
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()
-        for row in rows:
-            writer.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()})
+        writer.writerows(sorted(kept.values(), key=place))
 
 
 def load() -> list[dict[str, str]]:
@@ -75,59 +142,167 @@ def load() -> list[dict[str, str]]:
         return list(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
-def pooled(rows: Iterable[Mapping[str, str]], case: str, contender: str, height: float) -> float:
-    """Return the root of the mean square over the seeds [m]; NaN without one."""
-    values = [
-        float(row["rms"])
+def some(
+    rows: Iterable[Mapping[str, str]],
+    case: str,
+    contender: str,
+    *,
+    noise: float = 0.01,
+    mismatch: str = "",
+    height: float | None = None,
+) -> dict[tuple[float, int], Mapping[str, str]]:
+    """Return the rows of a contender by height and seed."""
+    return {
+        (float(row["height"]), int(row["seed"])): row
         for row in rows
-        if (row["case"], row["contender"]) == (case, contender)
-        and math.isclose(float(row["height"]), height)
-    ]
-    return math.sqrt(sum(v * v for v in values) / len(values)) if values else math.nan
+        if (row["case"], row["contender"], row["mismatch"]) == (case, contender, mismatch)
+        and math.isclose(float(row["noise"]), noise)
+        and (height is None or math.isclose(float(row["height"]), height))
+    }
+
+
+def pooled(rows: Iterable[Mapping[str, str]]) -> float:
+    """Return the root of the mean square over runs [mm]; NaN without one."""
+    values = [float(row["rms"]) for row in rows]
+    return 1e3 * math.sqrt(sum(v * v for v in values) / len(values)) if values else math.nan
 
 
 def table(rows: Sequence[Mapping[str, str]]) -> str:
-    """Return the table of the documentation, in Markdown: pooled rms in millimetres."""
-    lines = ["| case | controller | " + " | ".join(f"{h:g} m" for h in HEIGHTS) + " | lost |"]
-    lines.append("| --- | --- |" + " --- |" * (len(HEIGHTS) + 1))
-    for case, names in CONTENDERS.items():
-        for name in names:
-            own = [row for row in rows if (row["case"], row["contender"]) == (case, name)]
+    """Return the table of who leaves what, in Markdown: pooled rms in millimetres."""
+    heads = " | ".join(f"{h:g} m" for h in HEIGHTS)
+    lines = [f"| case | controller | {heads} | seeds | lost |"]
+    lines.append("| --- | --- |" + " --- |" * (len(HEIGHTS) + 2))
+    for case in CASES:
+        for noise, name in [*((0.01, name) for name in ORDER), (0.05, "mpc")]:
+            own = {
+                k: row for k, row in some(rows, case, name, noise=noise).items() if k[0] in HEIGHTS
+            }
             if not own:
                 continue
-            cells = []
-            for height in HEIGHTS:
-                value = 1e3 * pooled(rows, case, name, height)
-                cells.append("-" if math.isnan(value) else f"{value:.3g}")
-            lost = sum(int(row["lost"]) for row in own)
-            floor = "" if name == "clairvoyant" else f"{lost} of {len(own)}"
-            lines.append(f"| {case} | `{name}` | " + " | ".join(cells) + f" | {floor} |")
+            cells = [
+                _number(pooled(row for (h, _), row in own.items() if h == height))
+                for height in HEIGHTS
+            ]
+            counts = {sum(1 for h, _ in own if h == height) for height in HEIGHTS} - {0}
+            seeds = "-".join(str(count) for count in sorted({min(counts), max(counts)}))
+            lost = sum(int(row["lost"]) for row in own.values())
+            last = "" if name == FLOOR else f"{lost} of {len(own)}"
+            who = f"`{name}`" + (", 5 % noise" if noise > 0.01 else "")
+            lines.append(f"| {case} | {who} | " + " | ".join(cells) + f" | {seeds} | {last} |")
     return "\n".join(lines)
 
 
+def floor_table(rows: Sequence[Mapping[str, str]]) -> str:
+    """Return the table of mean squares over the floor's, in Markdown; same seeds."""
+    lines = ["| controller | quantity | " + " | ".join(f"{h:g} m" for h in HEIGHTS) + " |"]
+    lines.append("| --- | --- |" + " --- |" * len(HEIGHTS))
+    floor = some(rows, _ONE, FLOOR)
+    for name, noise, factor in (
+        *(("mpc-preview", 0.01, 4.0), ("mpc", 0.01, 4.0), ("mpc", 0.05, 6.0)),
+        ("nonlinear-mpc", 0.01, 4.0),
+    ):
+        own = some(rows, _ONE, name, noise=noise)
+        both = sorted(set(own) & set(floor))
+        if not both:
+            continue
+        ratios, worst = [], []
+        for height in HEIGHTS:
+            here = [key for key in both if key[0] == height]
+            if not here:
+                ratios.append("-")
+                worst.append("-")
+                continue
+            ours, least = pooled(own[key] for key in here), pooled(floor[key] for key in here)
+            ratios.append(_number((ours / least) ** 2))
+            within = sum(
+                float(own[key]["rms"]) <= factor * float(floor[key]["rms"]) + 0.02 for key in here
+            )
+            worst.append(f"{within} of {len(here)}")
+        who = f"`{name}`" + (f", {100 * noise:g} % noise" if name == "mpc" else "")
+        lines.append(f"| {who} | mean square over the floor's | " + " | ".join(ratios) + " |")
+        lines.append(f"| | seeds within {factor:g} x floor + 20 mm | " + " | ".join(worst) + " |")
+    return "\n".join(lines)
+
+
+def mismatch_table(rows: Sequence[Mapping[str, str]]) -> str:
+    """Return the table of plants that are not as they are believed to be, in Markdown."""
+    heights = (1.25, 2.43)
+    lines = ["| plant | " + " | ".join(f"{c}, {h:g} m" for c in CASES for h in heights) + " |"]
+    lines.append("| --- |" + " --- |" * (len(CASES) * len(heights)))
+    for text in ("", *MISMATCHES):
+        cells = []
+        for case in CASES:
+            for height in heights:
+                own = some(rows, case, "mpc", mismatch=text, height=height)
+                as_told = some(rows, case, "mpc", height=height)
+                if not own:
+                    cells.append("-")
+                    continue
+                value = pooled(own.values())
+                nominal = pooled(row for key, row in as_told.items() if key in own)
+                lost = sum(int(row["lost"]) for row in own.values())
+                cell = _number(value) + ("" if text == "" else f" ({value / nominal:.2g} x)")
+                cells.append(cell + (f", {lost} of {len(own)} lost" if lost else ""))
+        lines.append(f"| {f'`{text}`' if text else 'as told'} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def calm_table(rows: Sequence[Mapping[str, str]]) -> str:
+    """Return the table of calm seas: the best linear law of each height against MPC."""
+    lines = ["| case | $H_s$ | best linear law | leaves | `mpc` leaves |", "| --- |" + " --- |" * 4]
+    linear = [name for name in ORDER if name not in (*PREDICTIVE, FLOOR)]
+    for case in CASES:
+        for height in CALM:
+            found = {
+                name: pooled(some(rows, case, name, height=height).values()) for name in linear
+            }
+            name = min((n for n, v in found.items() if not math.isnan(v)), key=found.__getitem__)
+            mpc = pooled(some(rows, case, "mpc", height=height).values())
+            cells = f"`{name}` | {_number(found[name])} | {_number(mpc)}"
+            lines.append(f"| {case} | {height:g} m | {cells} |")
+    return "\n".join(lines)
+
+
+def _number(value: float) -> str:
+    """Return three digits without powers of ten."""
+    if math.isnan(value):
+        return "-"
+    if value >= 1000.0:
+        return f"{value:.0f}" if value < 1e5 else f"{value:.2g}"
+    return f"{value:.3g}"
+
+
+TABLES = {"study": table, "floor": floor_table, "mismatch": mismatch_table, "calm": calm_table}
+
+
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the study, write its data and print the table."""
+    """Run the study, write its data and print the tables."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "comparison")
-    parser.add_argument("--seeds", type=int, default=6)
-    parser.add_argument("--cases", default=",".join(CONTENDERS))
+    parser.add_argument("--only", default=",".join(PARTS))
+    parser.add_argument("--until", help="time of day after which no other part is begun")
+    parser.add_argument("--jobs", type=int)
     given = parser.parse_args(argv)
-    rows: list[dict[str, object]] = []
-    for name in given.cases.split(","):
-        comparison = sh.compare(
-            case_of(name),
-            CONTENDERS[name],
-            seeds=given.seeds,
-            duration="20 min",
-            heights=HEIGHTS,
+    for name in given.only.split(",") if given.only else ():
+        if given.until and datetime.datetime.now().strftime("%H:%M") >= given.until:
+            break
+        part = PARTS[name]
+        found = sh.compare(
+            case_of(part.case, part.noise),
+            part.contenders,
+            seeds=part.seeds,
+            duration=part.duration,
+            heights=part.heights,
+            mismatch=part.mismatch or None,
             out=given.out / name,
             traces=False,
             starts=4,
+            jobs=given.jobs,
         )
-        print(comparison)
-        rows += rows_of(name, comparison.cells)
-    write(rows)
-    print(table(load()))
+        print(name, datetime.datetime.now().strftime("%H:%M"), flush=True)
+        write(rows_of(part, found.cells))
+    for make in TABLES.values():
+        print(make(load()), end="\n\n")
 
 
 if __name__ == "__main__":

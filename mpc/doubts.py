@@ -50,6 +50,10 @@ class Doubts:
     sensors
         Error at every sample of a sensor, besides what the case says of it, over the rms of the
         hook's motion (for a tension: over the static one).
+    unit
+        Slow error of the reference unit, of which the case says nothing, over the rms of the hook's
+        motion.  A filter that holds it to be impossible takes it for a sea of thirty standard
+        deviations.
 
     Raises
     ------
@@ -61,6 +65,7 @@ class Doubts:
     torque: float = 1e-3
     rope: float = 1e-4
     sensors: float = 1e-4
+    unit: float = 0.05
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -74,7 +79,8 @@ def doubted(model: PredictionModel, doubts: Doubts) -> PredictionModel:
     n, T = winch.size, winch.sample_time
     shaken = [k for k, name in enumerate(winch.plant.states) if _is_mass(name)]
     scales = constant_scales(model)
-    columns = np.zeros((model.size, 2 + len(scales) + len(shaken)))
+    slow, first = model.slow, 2 + len(scales) + len(shaken)
+    columns = np.zeros((model.size, first + slow.shape[1]))
     # An independent error over every sample that adds up to the given rms in a second.
     unknown = scales[:2] * [doubts.force, doubts.torque] / math.sqrt(T)
     columns[:n, :2] = winch.from_constants * unknown
@@ -82,6 +88,10 @@ def doubted(model: PredictionModel, doubts: Doubts) -> PredictionModel:
     columns[model.constants_at, 2 : 2 + len(scales)] = np.diag(drift)
     kick = doubts.rope * model.waves[1] * math.sqrt(T)
     columns[shaken, 2 + len(scales) + np.arange(len(shaken))] = kick
+    # The slow error of the unit is next to the constants.
+    columns[model.constants_at.start - 2 : model.constants_at.start, first:] = (
+        doubts.unit * model.waves[0] * slow
+    )
     return replace(
         model,
         G=np.hstack([model.G[:, : model.known], columns]),

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -28,6 +29,7 @@ from .doubts import doubted
 from .drive_window import DriveWindow, TorqueBudget
 from .estimator import Estimator
 from .fallback import Fallback
+from .plan_model import plan_model
 from .prediction_model import PredictionModel, prediction_model
 from .preview import PerfectPreview
 from .products import Products
@@ -90,6 +92,9 @@ class LinearMPC:
       motor's thermal budget is used up [N m]
     * rho: weight on the input [m2/(N m)2]; P, N_zeta: value function (`mpc.regulator`)
 
+    A, B and Gamma are those of a rope that is stiffer than the estimator's (`mpc.plan_model`), so
+    that a saturated loop stays stable on loads and ropes that are not as in the case.
+
     Parameters
     ----------
     case
@@ -103,7 +108,8 @@ class LinearMPC:
         blocks that grow.
     weights
         What is weighed; by default tuned for the case, which takes some seconds
-        (`mpc.weights.tune_weights`).
+        (`mpc.weights.tune_weights`); with perfect preview the plan is then made on the rope that is
+        there.
     predictor
         Where the hook's path comes from: ``kalman`` (the estimator's own sea), ``ar`` (learnt on
         line, no knowledge of the spectrum), ``preview`` (the record itself, for reference only), or
@@ -177,10 +183,13 @@ class LinearMPC:
             check_range(_OWNER, "deadline", deadline, low=0.0, unit="s", open_low=True)
         if weights is None:
             weights = tune_weights(case, sample_time=T, masses=masses)
+            if predictor == "preview":  # who knows the future may know the rope
+                weights = replace(weights, stiffness=1.0)
         self.case, self.sample_time, self.weights = case, T, weights
-        self.model = doubted(prediction_model(case, sample_time=T, masses=masses), weights.doubts)
+        believed = doubted(prediction_model(case, sample_time=T, masses=masses), weights.doubts)
+        self.model = plan_model(believed, weights.stiffness)
         self.regulator = regulator(self.model, weights.torque)
-        self.estimator = Estimator(self.model)
+        self.estimator = Estimator(believed)
         limits = DriveLimits.from_case(case) if limits is None else limits
         self.soft_limits = _soft_limits(self.model, limits, least, excursion)
         self.programme = condense(self.model, self.regulator, blocks, tuple(self.soft_limits))
@@ -188,7 +197,7 @@ class LinearMPC:
         self.predictor, word = _predictor(case, predictor, T, p.steps * T)
         self.name = word if name is None else name
         covariance = None if self.predictor is None else self.estimator.sea_covariance
-        self.products = Products.of(self.model, p, self.soft_limits, covariance)
+        self.products = Products.of(self.model, p, self.soft_limits, covariance, believed)
         self.qp = SoftQP(
             p.H,
             self.products.rows,

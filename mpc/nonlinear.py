@@ -185,12 +185,14 @@ class NonlinearMPC(LinearMPC):
             self.programme = with_drift(
                 condense(model, self.regulator, blocks, tuple(limited)), self.stage
             )
-            self.products = Products.of(model, self.programme, limited, covariance)
+            self.products = Products.of(
+                model, self.programme, limited, covariance, self.estimator.model
+            )
         else:
             model = self.model
         p, products = self.programme, self.products
         self._shooting = self.shooting = Shooting(
-            model, self.regulator, p, products, self.stage, covariance
+            model, self.regulator, p, products, self.stage, covariance, self.estimator.model
         )
         powers = len(p.blocks) - 1 if self._window.power < math.inf else 0
         self._low = np.concatenate([products.low, -np.ones(powers)])

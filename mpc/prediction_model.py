@@ -8,7 +8,8 @@ The state chi holds, in this order,
 * the states of the winch and its rope (`mpc.sampled_winch`);
 * those of a filter whose white-noise response has the spectrum of the hook's motion
   (`models.shaping`), so that to predict the state is to predict the sea;
-* the error of the reference unit, a Butterworth low-pass of second order (`models.mru`);
+* the error of the reference unit, a Butterworth low-pass of second order (`models.mru`), and a slow
+  one, of which the case does not speak (`Doubts.unit`);
 * constants that are to be estimated: a force on the payload, a torque at the motor, the bias of
   the accelerometer and of the tension.  Without them a load of another weight would be held off
   its place.  (Where the payload's zero is, a heavier load has stretched the rope by more: seen from
@@ -55,6 +56,8 @@ CONSTANTS = (
 #: What comes late, in the order of the first measurements.
 LATE = (*MEASUREMENTS, "mru.heave", "mru.heave_rate")
 _GRAVITY = 9.81
+_ERRORS = 4  # states of the reference unit's error: two of what the case says, two of a slow one
+_SLOW = 0.12  # frequency below which that lies, over the mean one of the hook
 _SPARE = 2  # samples by which the telemetry may be later than the case says
 
 
@@ -74,6 +77,8 @@ class PredictionModel:
         (n, n), (n, 1), (n, ng).
     known
         How many columns of G are of the sea and the reference unit; the others are doubts.
+    slow
+        Noise over a sample of a slow error of the reference unit of one metre rms, (2, 2).
     now
         Rows of what telemetry and reference unit take in at a sample, (5, n).
     first, depth
@@ -93,6 +98,7 @@ class PredictionModel:
     B: FloatArray
     G: FloatArray
     known: int
+    slow: FloatArray
     now: FloatArray
     first: Mapping[str, int]
     depth: Mapping[str, int]
@@ -101,7 +107,7 @@ class PredictionModel:
     hook: FloatArray
 
     def __post_init__(self) -> None:
-        for name in ("A", "B", "G", "now", "C", "R", "hook"):
+        for name in ("A", "B", "G", "slow", "now", "C", "R", "hook"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
@@ -117,7 +123,7 @@ class PredictionModel:
     @property
     def constants_at(self) -> slice:
         """Where in chi the constants are."""
-        first = self.winch.size + self.sea.order + 2
+        first = self.winch.size + self.sea.order + _ERRORS
         return slice(first, first + len(CONSTANTS))
 
     @cached_property
@@ -190,7 +196,7 @@ def prediction_model(
     error_A, error_Q = _unit_error(case, hook, T)
     depth = _depths(case, T)
     sea_at = slice(n, n + sea.order)
-    error_at = slice(sea_at.stop, sea_at.stop + 2)
+    error_at = slice(sea_at.stop, sea_at.stop + _ERRORS)
     constants_at = slice(error_at.stop, error_at.stop + len(CONSTANTS))
     first, end = {}, constants_at.stop
     for name in LATE:
@@ -202,7 +208,7 @@ def prediction_model(
     A[:n, :n] = winch.A
     A[:n, sea_at] = winch.from_hook[:, :2] @ shown + winch.from_hook[:, 2:] @ shown @ sea_A
     A[sea_at, sea_at] = sea_A
-    A[error_at, error_at] = error_A
+    A[error_at, error_at] = scipy.linalg.block_diag(error_A, _slow_error(hook, T)[0])
     A[:n, constants_at.start : constants_at.start + 2] = winch.from_constants
     A[constants_at, constants_at] = np.eye(len(CONSTANTS))
     for k, name in enumerate(LATE):
@@ -225,7 +231,7 @@ def prediction_model(
     G = np.zeros((end, sea_root.shape[1] + error_root.shape[1]))
     G[sea_at, : sea_root.shape[1]] = sea_root
     G[:n, : sea_root.shape[1]] = winch.from_hook[:, 2:] @ shown @ sea_root
-    G[error_at, sea_root.shape[1] :] = error_root
+    G[error_at.start : error_at.start + 2, sea_root.shape[1] :] = error_root
     parts = (hook.displacement, hook.velocity, hook.acceleration)
     model = PredictionModel(
         winch=winch,
@@ -235,6 +241,7 @@ def prediction_model(
         B=np.vstack([winch.B, np.zeros((end - n, 1))]),
         G=G,
         known=G.shape[1],
+        slow=root_of(_slow_error(hook, T)[1]),
         now=now,
         first=first,
         depth=depth,
@@ -242,7 +249,7 @@ def prediction_model(
         R=np.ones(len(MEASURED)),
         hook=hook_rows,
     )
-    return doubted(model, Doubts() if doubts is None else doubts)
+    return doubted(model, Doubts(unit=0.0) if doubts is None else doubts)
 
 
 def sea_filter(hook: HookMotion) -> ShapingFilter:
@@ -284,6 +291,14 @@ def _unit_error(case: Case, hook: HookMotion, T: float) -> tuple[FloatArray, Flo
     return over, added * unit.error_rms**2 * 2.0 * math.sqrt(2.0) * w**3
 
 
+def _slow_error(hook: HookMotion, T: float) -> tuple[FloatArray, FloatArray]:
+    """Return a slow error of the unit (e, e') over a sample, and what adds up to an rms of one."""
+    w = _SLOW * float(hook.velocity.rms / hook.displacement.rms)
+    A = np.array([[0.0, 1.0], [-(w**2), -math.sqrt(2.0) * w]])
+    over, added = noisy_hold(A, np.array([[0.0], [1.0]]), T)
+    return over, added * 2.0 * math.sqrt(2.0) * w**3
+
+
 def _depths(case: Case, T: float) -> dict[str, int]:
     """Return how many earlier values are remembered of each late signal."""
     link = case.sensors.telemetry
@@ -304,7 +319,8 @@ def _present(
     rows = np.zeros((len(LATE), size))
     rows[:, : winch.size] = winch.plant.C[: len(LATE)]
     rows[:, sea_at] = winch.plant.F[: len(LATE), :2] @ shown
-    rows[3, error_at.start] = rows[4, error_at.start + 1] = 1.0
+    rows[3, error_at.start : error_at.stop : 2] = 1.0
+    rows[4, error_at.start + 1 : error_at.stop : 2] = 1.0
     # A force on the payload is felt by its accelerometer at once.
     rows[: len(MEASUREMENTS), constants_at.start] = winch.force_felt
     rows[0, constants_at.start + 2] = 1.0
@@ -335,8 +351,8 @@ def _scales(model: PredictionModel) -> FloatArray:
     for k, name in enumerate(model.winch.plant.states):
         if not model.winch.moved[k].any():
             sizes[k] = by_signal.get(name.rsplit(".", 1)[-1], heave)
-    added = np.sqrt(np.diag(model.G @ model.G.T)[w : w + 2])
-    sizes[w : w + 2] = np.where(added > 0.0, added, 1.0)
+    added = np.sqrt(np.diag(model.G @ model.G.T)[w : w + _ERRORS])
+    sizes[w : w + _ERRORS] = np.where(added > 0.0, added, 1.0)
     sizes[model.constants_at] = [0.1 * force, 0.1 * torque, 0.1 * _GRAVITY, 0.1 * force]
     for name in LATE:
         at = slice(model.first[name], model.first[name] + model.depth[name])

@@ -64,6 +64,7 @@ class Products:
         programme: Condensed,
         limits: Mapping[str, tuple[float, float]],
         covariance: FloatArray | None,
+        believed: PredictionModel | None = None,
     ) -> Products:
         """Return the products of a programme.
 
@@ -76,7 +77,10 @@ class Products:
         covariance
             None where the hook's path is that of the model's own sea; where it comes with each
             step, the covariance of the sea's estimate, (nh, nh).
+        believed
+            The estimator's model, whose A it is; by default that of the programme.
         """
+        over = (model if believed is None else believed).A
         p, winch, nb = programme, model.winch, len(programme.blocks)
         names = [WATCHED[k] for k in p.kind]
         bounds = np.array([limits[name] for name in names]).reshape(len(names), 2)
@@ -114,7 +118,7 @@ class Products:
         return cls(
             size=model.size,
             moves=nb,
-            matrix=np.ascontiguousarray(np.vstack([model.A, gradient, free * scale[:, None]])),
+            matrix=np.ascontiguousarray(np.vstack([over, gradient, free * scale[:, None]])),
             rows=np.ascontiguousarray(p.rows * scale[:, None]),
             scale=read_only(scale),
             low=read_only(np.maximum(bounds[:, 0] * scale, -_WIDE)),

@@ -141,6 +141,16 @@ class SampledWinch:
     @cached_property
     def steady(self) -> FloatArray:
         """Input that holds the payload in its place against each of the constants, (2,)."""
+        return read_only(self._held[self.size])
+
+    @cached_property
+    def resting(self) -> FloatArray:
+        """State in which it then rests, for each of the constants, (n, 2)."""
+        return read_only(self._held[: self.size])
+
+    @cached_property
+    def _held(self) -> FloatArray:
+        """State and input that hold the payload in its place against the constants, (n + 1, 2)."""
         n = self.size
         system = np.zeros((n + 1, n + 1))
         system[:n, :n] = self.A - np.eye(n)
@@ -149,7 +159,7 @@ class SampledWinch:
         wanted = np.vstack([-self.from_constants, np.zeros((1, 2))])
         scale = np.abs(system).max(axis=1)
         solved = np.linalg.lstsq(system / scale[:, None], wanted / scale[:, None], rcond=None)[0]
-        return read_only(solved[n])
+        return np.asarray(solved)
 
 
 def sampled_winch(

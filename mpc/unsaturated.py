@@ -63,27 +63,43 @@ class Unsaturated:
     @cached_property
     def controller(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return (A, B, C, D) of u = C(z) y, with x the one-step prediction."""
+        return self._throttled(1.0)
+
+    def _throttled(self, share: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return that of a drive which gives a share of the torque asked for, and says so."""
         model, winch = self.model, self.model.winch
-        row = self.regulator.feedback(model)
+        row = share * self.regulator.feedback(model)
         ahead = model.A - model.B @ row[None, :]
         command = -row / winch.gain
         command[: winch.size] += winch.back * winch.speed
         kept = np.eye(model.size) - self.gain @ model.C
         return ahead @ kept, ahead @ self.gain, (command @ kept)[None, :], command[None] @ self.gain
 
-    def poles(self, plant: PredictionModel | None = None) -> ComplexArray:
-        """Return the poles of the closed loop on a plant, by default that of the model."""
+    def poles(self, plant: PredictionModel | None = None, *, share: float = 1.0) -> ComplexArray:
+        """Return the poles of the closed loop on a plant, by default that of the model.
+
+        Parameters
+        ----------
+        plant
+            The plant.
+        share
+            How much of the torque that is asked for the drive gives: below one where it saturates
+            (the gain of its describing function; A. Gelb and W. E. Vander Velde, *Multiple-Input
+            Describing Functions and Nonlinear System Design*, 1968, sec. 2.3).  The filter is told.
+        """
         A, B, C = _plant(self.model if plant is None else plant)
-        Ac, Bc, Cc, Dc = self.controller
+        Ac, Bc, Cc, Dc = self.controller if share == 1.0 else self._throttled(share)
         top = np.hstack([A + B @ Dc @ C, B @ Cc])
         closed = np.vstack([top, np.hstack([Bc @ C, Ac])])
         return np.asarray(np.linalg.eigvals(closed), dtype=np.complex128)
 
-    def growth(self, plant: PredictionModel | None = None) -> float:
+    def growth(self, plant: PredictionModel | None = None, *, share: float = 1.0) -> float:
         """Return the largest modulus of the poles, below one where the loop is stable."""
-        return float(np.abs(self.poles(plant)).max())
+        return float(np.abs(self.poles(plant, share=share)).max())
 
-    def sensitivity(self, omega: FloatArray, *, at: str = "torque") -> ComplexArray:
+    def sensitivity(
+        self, omega: FloatArray, *, at: str = "torque", plant: PredictionModel | None = None
+    ) -> ComplexArray:
         """Return S = 1/(1 + L), the loop broken at the torque or at the command, (k,).
 
         At the torque the drive's back-EMF, or its speed regulator, stays part of the plant's own
@@ -95,14 +111,17 @@ class Unsaturated:
             [rad/s], below half the sample rate, (k,).
         at
             ``torque`` or ``command``.
+        plant
+            The plant; by default that of the model.
         """
         model, winch = self.model, self.model.winch
+        true = model if plant is None else plant
         z = np.exp(1j * np.asarray(omega, dtype=np.float64) * winch.sample_time)
-        A, B, C = _plant(model)
+        A, B, C = _plant(true)
         Ac, Bc, Cc, Dc = self.controller
         if at == "torque":
-            kept = _reached(model)
-            A, B = model.A[np.ix_(kept, kept)], model.B[kept]
+            kept = _reached(true)
+            A, B = true.A[np.ix_(kept, kept)], true.B[kept]
             row = -self.regulator.feedback(model)
             held = np.eye(model.size) - self.gain @ model.C
             Cc, Dc = (row @ held)[None, :], (row @ self.gain)[None, :]

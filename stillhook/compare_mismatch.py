@@ -16,13 +16,15 @@ from typing import Any
 
 from models.case import Case
 from models.checks import InputError
+from models.tables import GRAVITY
 from models.units import parse_quantity
 from models.yaml_lines import read_yaml
 
 __all__ = ["SHORT", "Mismatch"]
 
 SHORT: Mapping[str, str] = {
-    "payload": "mass of the payload, by a share of the added mass too; not its weight",
+    "payload": "mass of the payload, by a share the water that moves with it too; not its weight",
+    "weight": "weight of the payload in water; not its mass",
     "stiffness": "axial stiffness of the rope, or its modulus",
     "E": "the same as stiffness",
     "delay": "delay of the telemetry",
@@ -33,6 +35,7 @@ SHORT: Mapping[str, str] = {
 """Short names of what may be off."""
 
 _OWNER = "--mismatch"
+_HEAVIEST = 1.0 + 1e-6  # of its weight in air may a payload weigh in water
 _SIGNED = re.compile(r"^[+-]\s*[0-9.]")
 
 
@@ -99,6 +102,8 @@ class Mismatch:
             share = isinstance(value, str) and value.strip().endswith("%")
             for path in paths if share else paths[:1]:
                 wanted[path] = _value(name, path, value, case)
+        if "payload.mass" in wanted and "payload.added_mass" in wanted:
+            _not_below_its_weight(wanted, case)
         return case.replace(wanted)
 
 
@@ -106,6 +111,8 @@ def _paths(name: str, case: Case) -> tuple[str, ...]:
     rope, sea = case.rope, case.sea
     if name == "payload":
         return "payload.mass", "payload.added_mass"
+    if name == "weight":
+        return ("payload.submerged_weight",)
     if name in ("stiffness", "E"):
         given = getattr(rope, "axial_stiffness", None)
         return ("rope.modulus" if given is None else "rope.axial_stiffness",)
@@ -123,6 +130,15 @@ def _paths(name: str, case: Case) -> tuple[str, ...]:
             "such as winch.motor.inertia"
         )
     return (name,)
+
+
+def _not_below_its_weight(wanted: dict[str, Any], case: Case) -> None:
+    """Let the water alone be less where a mass would be too small for the weight that stays."""
+    mass, water = wanted["payload.mass"], wanted["payload.added_mass"]
+    weight = wanted.get("payload.submerged_weight", case.payload.submerged_weight)
+    lacking = min(_HEAVIEST * weight / GRAVITY, case.payload.mass) - mass
+    if 0.0 < lacking <= water:
+        wanted["payload.mass"], wanted["payload.added_mass"] = mass + lacking, water - lacking
 
 
 def _value(name: str, path: str, value: object, case: Case) -> object:

@@ -342,6 +342,11 @@ def test_a_mismatch_changes_the_plant_and_not_the_controller():
     assert true.rope.stiffness == pytest.approx(0.7 * CASE.rope.stiffness, rel=1e-12)
     assert true.sensors.telemetry.delay == pytest.approx(0.05)
     assert true.sea.significant_height == pytest.approx(0.6)
+    # less than what hangs in the water cannot move: the water gives way
+    light = Mismatch.read("payload=-30%,weight=-20%").apply(CASE).payload
+    assert light.virtual_mass == pytest.approx(0.7 * CASE.payload.virtual_mass, rel=1e-12)
+    assert light.mass * 9.80665 >= light.submerged_weight
+    assert light.submerged_weight == pytest.approx(0.8 * CASE.payload.submerged_weight, rel=1e-12)
     other = Mismatch.read("spectrum=jonswap, winch.motor.inertia=120").apply(CASE)
     assert other.sea.spectral_peak_period == pytest.approx(CASE.sea.spectral_peak_period)
     assert (other.sea.spectrum, other.winch.motor.inertia) == ("jonswap", 120.0)
@@ -350,7 +355,7 @@ def test_a_mismatch_changes_the_plant_and_not_the_controller():
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("foo=1", "there is no 'foo'; there are payload, stiffness"),
+        ("foo=1", "there is no 'foo'; there are payload, weight, stiffness"),
         ("payload", r"must be NAME=VALUE, as in payload=\+30%"),
         ("payload=1,payload=2", "payload is given twice"),
         ("delay=-50 ms", r"telemetry.delay: must be a time in \[0, 60\] s"),
@@ -538,7 +543,8 @@ def test_no_controller_beats_the_floor_and_preview_beats_the_brake():
     assert found.pooled("mpc-preview", 1.9) < 0.2 * found.pooled("none", 1.9)
 
 
-def test_the_table_of_the_documentation_is_that_of_the_study():
+@pytest.mark.parametrize("name", ["study", "floor", "mismatch", "calm"])
+def test_a_table_of_the_documentation_is_that_of_the_study(name):
     import sys
     from pathlib import Path
 
@@ -549,5 +555,7 @@ def test_the_table_of_the_documentation_is_that_of_the_study():
     finally:
         sys.path.pop(0)
     page = (root / "docs" / "compare.md").read_text(encoding="utf-8")
-    shown = page.partition("<!-- study: begin -->\n")[2].partition("\n<!-- study: end -->")[0]
-    assert shown == comparison.table(comparison.load())
+    _, _, after = page.partition(f"<!-- {name}: begin -->\n")
+    assert after.partition(f"\n<!-- {name}: end -->")[0] == comparison.TABLES[name](
+        comparison.load()
+    )

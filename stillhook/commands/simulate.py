@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -120,8 +120,18 @@ def _simulated(asked: Asked, target: RunFolder, stop: Stop, tick: Ticker) -> _Si
         if stop():
             break
         tick(f"preparing {name}", before)
+
+        def tune(share: float, what: str = f"tuning {name}", at: float = before) -> None:
+            tick(f"{what}, {100.0 * share:.0f} %", at)
+            if stop():
+                raise KeyboardInterrupt
+
         try:
-            series = _prepared(asked, name)
+            series = _prepared(asked, name, tune)
+        except KeyboardInterrupt:
+            if stop():
+                break  # what was simulated before is shown
+            raise
         except StillhookError as error:
             if stop():
                 break  # the compiler was interrupted too
@@ -148,8 +158,17 @@ def _simulated(asked: Asked, target: RunFolder, stop: Stop, tick: Ticker) -> _Si
     return found
 
 
-def _prepared(asked: Asked, name: str) -> Series:
+def _prepared(asked: Asked, name: str, tune: Callable[[float], None]) -> Series:
     feedback = name.startswith("feedback")
+    with contextlib.ExitStack() as stack:
+        if "mpc" in name:  # whose weights take seconds
+            from mpc.weights import watched
+
+            stack.enter_context(watched(tune))
+        return _series(asked, name, feedback)
+
+
+def _series(asked: Asked, name: str, feedback: bool) -> Series:
     return Series.prepare(
         asked.case,
         name,
