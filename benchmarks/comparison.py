@@ -256,7 +256,10 @@ def calm_table(rows: Sequence[Mapping[str, str]]) -> str:
             found = {
                 name: pooled(some(rows, case, name, height=height).values()) for name in linear
             }
-            name = min((n for n, v in found.items() if not math.isnan(v)), key=found.__getitem__)
+            there = [name for name, value in found.items() if not math.isnan(value)]
+            if not there:
+                continue
+            name = min(there, key=found.__getitem__)
             mpc = pooled(some(rows, case, "mpc", height=height).values())
             cells = f"`{name}` | {_number(found[name])} | {_number(mpc)}"
             lines.append(f"| {case} | {height:g} m | {cells} |")
