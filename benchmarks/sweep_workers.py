@@ -322,7 +322,7 @@ def main() -> int:
     if arguments.write:
         write_data(rows)
         text = "\n\n".join(markdown(table) for table in found.values())
-        about = f"Measured on {machine()}; the machine was busy with other work."
+        about = f"Measured on {machine()}."
         write_into(PAGE, f"{about}\n\n{text}")
     return 0
 
