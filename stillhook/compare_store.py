@@ -13,7 +13,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
 import zlib
 from collections.abc import Mapping
 from functools import lru_cache
@@ -26,6 +25,7 @@ from models.checks import InputError
 from .compare_cell import Cell, Question
 from .compare_law import Law
 from .contenders import Contender
+from .kept_lines import difference, lock, put
 
 __all__ = ["STORE", "Store", "code_digest"]
 
@@ -93,7 +93,7 @@ class Store:
         except OSError as error:
             raise InputError(f"{self.path}: cannot be written: {error.strerror}") from error
         try:
-            self._lock()
+            lock(self._file, self.path, "comparison")
             self._read(asked)
         except BaseException:
             self._file.close()
@@ -110,14 +110,14 @@ class Store:
     def add_cell(self, contender: Contender, law: Law | None, cell: Cell) -> None:
         """Keep the result of a run."""
         identity = _identity(contender, law)
-        self._put({"kind": "run", "identity": identity, **cell.to_dict()})
+        put(self._file, self.path, _text({"kind": "run", "identity": identity, **cell.to_dict()}))
         self._cells[contender.name, identity, cell.height, cell.seed] = cell
 
     def add_law(self, needs: str, height: float, law: Law) -> None:
         """Keep a design."""
         identity = code_digest(("models", "synth"))
         content = {"kind": "design", "identity": identity, "name": needs, "height": height}
-        self._put({**content, "law": law.to_dict()})
+        put(self._file, self.path, _text({**content, "law": law.to_dict()}))
         self._laws[needs, identity, height] = law
 
     def close(self) -> None:
@@ -137,30 +137,6 @@ class Store:
         """Close the file."""
         self.close()
 
-    def _lock(self) -> None:
-        """Keep other processes out; the system lets go when this one ends, however it does."""
-        try:
-            import fcntl
-        except ImportError:  # Windows
-            return
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InputError(
-                f"{self.path}: another process writes this comparison; wait for it, or take "
-                "another folder"
-            ) from None
-
-    def _put(self, content: Mapping[str, Any]) -> None:
-        text = _text(content)
-        line = f'{{"crc": {zlib.crc32(text.encode())}, "of": {text}}}\n'.encode()
-        try:
-            self._file.write(line)
-            self._file.flush()
-            os.fsync(self._file.fileno())
-        except OSError as error:
-            raise InputError(f"{self.path}: cannot be written: {error.strerror}") from error
-
     def _read(self, asked: Mapping[str, Any]) -> None:
         self._file.seek(0)
         data = self._file.read()
@@ -169,12 +145,12 @@ class Store:
             self._drop(data[whole:], whole)
         lines = data[:whole].splitlines()
         if not lines:
-            self._put(asked)
+            put(self._file, self.path, _text(asked))
             return
         header = self._content(lines[0], 1)
         if header.get("stillhook_comparison") != _FORMAT:
             raise self._foreign()
-        other = [_differs(key, header.get(key), asked[key]) for key in asked]
+        other = [difference(key, header.get(key), asked[key]) for key in asked]
         changed = [text for text in other if text]
         if changed:
             raise InputError(
@@ -258,20 +234,3 @@ def _numbers(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _numbers(each) for key, each in value.items()}
     return value
-
-
-def _differs(key: str, there: object, asked: object) -> str:
-    """Return how an entry differs; empty if it does not."""
-    if there == asked:
-        return ""
-    if isinstance(there, dict) and isinstance(asked, dict):
-        for name in sorted({*there, *asked}):
-            text = _differs(f"{key}.{name}", there.get(name), asked.get(name))
-            if text:
-                return text
-    return f"{key} is {_short(there)}, not {_short(asked)}"
-
-
-def _short(value: object) -> str:
-    text = "not given" if value is None or value == {} else str(value)
-    return text if len(text) <= 40 else f"{text[:37]}..."

@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from models.case import Case
 from models.checks import InputError
+from models.spreads.fields import ALIASES
 
 from .sea_states import SeaState as SeaState
 from .sea_states import read_scatter as read_scatter
@@ -28,16 +29,6 @@ __all__ = ["Axis", "Choice", "Family", "Member", "SeaState", "read_scatter"]
 
 FloatArray = npt.NDArray[np.float64]
 
-#: Short names of what is most often varied.
-ALIASES: Mapping[str, str] = {
-    "depth": "rope.length",
-    "length": "rope.length",
-    "payload": "payload.mass",
-    "added_mass": "payload.added_mass",
-    "stiffness": "rope.axial_stiffness",
-    "radius": "winch.drum.radius",
-    "delay": "sensors.telemetry.delay",
-}
 _MOST_CORNERS = 4096
 
 

@@ -18,8 +18,9 @@ from models.linear import LinearPlant
 from models.physics_warning import PhysicsWarning
 from models.plant_data import PlantData
 from models.sensed_plant import sensed_plant
+from models.spreads.fields import ALIASES
 
-from .family import ALIASES, Axis, Family, Member
+from .family import Axis, Family, Member
 
 __all__ = ["DELAYS", "Doubt", "doubts_of", "plant_of"]
 

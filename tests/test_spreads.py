@@ -24,8 +24,6 @@ from models.spreads import (
     Triangular,
     Uniform,
 )
-from models.spreads.fields import ALIASES
-from synth.family import ALIASES as FAMILY_ALIASES
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -208,10 +206,6 @@ def test_gains_and_drag_are_no_part_of_the_case(case: Case) -> None:
         "payload.added_mass",
         "payload.submerged_weight",
     }
-
-
-def test_short_names_are_those_of_a_family() -> None:
-    assert dict(ALIASES) == dict(FAMILY_ALIASES)
 
 
 FILE = """

@@ -21,7 +21,7 @@ from ..units import KINDS
 
 __all__ = ["ALIASES", "DRAG", "FAULTS", "GAINS", "Field", "field_of"]
 
-#: Short names of what is most often varied; those of `synth.family`.
+#: Short names of what is most often varied.
 ALIASES: Mapping[str, str] = {
     "depth": "rope.length",
     "length": "rope.length",

@@ -20,6 +20,7 @@ from models.case import Case
 from models.checks import InputError
 from models.spreads import Spread
 
+from ..kept_lines import difference
 from .pilots import pilot_from
 from .time_cases import TimeQuestion
 from .versions import versions
@@ -177,7 +178,7 @@ def differences(there: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]
     for key in asked:
         if key == "versions":
             found += _versions(there.get(key, {}), asked[key])
-        elif text := _differs(key, there.get(key), asked[key]):
+        elif text := difference(key, there.get(key), asked[key]):
             found.append(text)
     return found
 
@@ -191,23 +192,6 @@ def _versions(there: Mapping[str, str], asked: Mapping[str, str]) -> list[str]:
                 f"{version}), and the numbers may not belong together"
             ]
     return []
-
-
-def _differs(key: str, there: object, asked: object) -> str:
-    """Return how an entry differs; empty if it does not."""
-    if there == asked:
-        return ""
-    if isinstance(there, dict) and isinstance(asked, dict):
-        for name in sorted({*there, *asked}):
-            text = _differs(f"{key}.{name}", there.get(name), asked.get(name))
-            if text:
-                return text
-    return f"{key} is {_short(there)}, not {_short(asked)}"
-
-
-def _short(value: object) -> str:
-    text = "not given" if value is None or value == {} else str(value)
-    return text if len(text) <= 40 else f"{text[:37]}..."
 
 
 def _plain(value: Any) -> Any:

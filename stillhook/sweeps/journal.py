@@ -9,13 +9,14 @@ cut short and is computed again, and one that is not as its last "end" says was 
 from __future__ import annotations
 
 import json
-import os
 import zlib
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
 
 from models.checks import InputError
+
+from ..kept_lines import lock, put
 
 __all__ = ["Journal"]
 
@@ -46,7 +47,7 @@ class Journal:
         except OSError as error:
             raise InputError(f"{path}: cannot be written: {error.strerror}") from error
         try:
-            self._lock()
+            lock(self._file, self.path.parent, "sweep")
             self._read(identity)
         except BaseException:
             self._file.close()
@@ -54,12 +55,12 @@ class Journal:
 
     def begin(self, piece: int) -> None:
         """Say that a piece is about to be written."""
-        self._put({"begin": piece})
+        put(self._file, self.path, json.dumps({"begin": piece}))
         self.torn.add(piece)
 
     def end(self, piece: int, check_sum: int) -> None:
         """Say that a piece is written, and what the check sum of its content is."""
-        self._put({"end": piece, "sum": check_sum})
+        put(self._file, self.path, json.dumps({"end": piece, "sum": check_sum}))
         self.torn.discard(piece)
         self.sums[piece] = check_sum
 
@@ -80,29 +81,6 @@ class Journal:
         """Close the file."""
         self.close()
 
-    def _lock(self) -> None:
-        """Keep other processes out; the system lets go when this one ends, however it does."""
-        try:
-            import fcntl
-        except ImportError:  # Windows
-            return
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InputError(
-                f"{self.path.parent}: another process writes this sweep; wait for it, or take "
-                "another folder"
-            ) from None
-
-    def _put(self, content: dict[str, Any]) -> None:
-        text = json.dumps(content)
-        try:
-            self._file.write(f'{{"crc": {zlib.crc32(text.encode())}, "of": {text}}}\n'.encode())
-            self._file.flush()
-            os.fsync(self._file.fileno())
-        except OSError as error:
-            raise InputError(f"{self.path}: cannot be written: {error.strerror}") from error
-
     def _read(self, identity: str) -> None:
         self._file.seek(0)
         data = self._file.read()
@@ -115,7 +93,7 @@ class Journal:
             self._file.truncate(whole)
         lines = data[:whole].splitlines()
         if not lines:
-            self._put({"sweep": identity})
+            put(self._file, self.path, json.dumps({"sweep": identity}))
             return
         for number, line in enumerate(lines, 1):
             content = self._content(line, number)
