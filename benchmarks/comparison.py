@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import stillhook as sh
-from stillhook.compare_cell import Cell
+from stillhook.comparison.cell import Cell
 
 ROOT = Path(__file__).resolve().parents[1]
 CSV = ROOT / "docs" / "data" / "comparison.csv"

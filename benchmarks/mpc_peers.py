@@ -31,7 +31,7 @@ import numpy as np
 import numpy.typing as npt
 from mpc_horizon import Horizon
 
-from mpc.condensed import WATCHED
+from mpc.linear.condensed import WATCHED
 
 __all__ = ["Peer", "acados_peer", "do_mpc_peer", "ipopt_peer"]
 
@@ -59,7 +59,7 @@ class Peer:
 def ipopt_peer(horizon: Horizon, *, tight: bool = False) -> Peer:
     """Return CasADi's IPOPT on multiple shooting, set up once, started at the last answer.
 
-    Its tolerance is the default one, or as tight as `mpc.nlp_oracle` has it.
+    Its tolerance is the default one, or as tight as `ipopt_programme` has it.
     """
     h = horizon
     N, n, m, nb = h.N, h.n, h.forces, len(h.starts)

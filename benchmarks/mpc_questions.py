@@ -15,13 +15,13 @@ import numpy as np
 import numpy.typing as npt
 
 from models import Case, load_case
-from models.control import Measurement
-from models.simulate import run_simulation
-from models.simulation import prepare
-from mpc.doubts import Doubts
-from mpc.linear import LinearMPC
-from mpc.qp import SoftQP
-from mpc.weights import Weights
+from models.sensing.control import Measurement
+from models.simulation.simulate import run_simulation
+from models.simulation.simulation import prepare
+from mpc.linear.linear import LinearMPC
+from mpc.programme.qp import SoftQP
+from mpc.winch.doubts import Doubts
+from mpc.winch.weights import Weights
 
 __all__ = [
     "HEIGHTS",

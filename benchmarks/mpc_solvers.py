@@ -65,7 +65,7 @@ def version_of(package: str) -> str | None:
 
 
 def daqp_soft(recording: Recording, *, warm: bool = True) -> Ask:
-    """DAQP on the condensed programme with soft rows of its own: `mpc.qp.SoftQP`."""
+    """DAQP on the condensed programme with soft rows of its own: `mpc.programme.qp.SoftQP`."""
     qp, asked = again(recording.controller.qp), recording.questions
     sense = qp._sense.copy()
 

@@ -49,10 +49,10 @@ from mpc_solvers import SOLVERS, version_of
 from mpc_turns import Replay, Task, measure, nothing, timed
 from mpc_wrappers import cvxpy_oracle
 
-from models.simulate import run_simulation
-from models.simulation import prepare
-from mpc.linear import LinearMPC
-from mpc.nonlinear import NonlinearMPC
+from models.simulation.simulate import run_simulation
+from models.simulation.simulation import prepare
+from mpc.linear.linear import LinearMPC
+from mpc.nonlinear.nonlinear import NonlinearMPC
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -19,8 +19,8 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from mpc_questions import Recording
 
-from mpc.condensed import WATCHED, path_of_sea
-from mpc.linear import LinearMPC
+from mpc.linear.condensed import WATCHED, path_of_sea
+from mpc.linear.linear import LinearMPC
 
 __all__ = [
     "Programme",

@@ -6,8 +6,10 @@ What they cost beyond the solver is the point: a hundred times the solution, whe
 from __future__ import annotations
 
 import math
+import sys
 import warnings
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,10 +18,11 @@ import scipy.sparse as sp
 from mpc_questions import Recording
 from mpc_statements import Programme, one_sided, slack_statement, stated
 
-from mpc.condensed import path_of_sea
-from mpc.oracle import oracle
+from mpc.linear.condensed import path_of_sea
 
 __all__ = ["casadi_any", "cvxpy_oracle", "qpsolvers_any"]
+
+ORACLES = Path(__file__).resolve().parents[1] / "tests" / "oracles"
 
 FloatArray = npt.NDArray[np.float64]
 Ask = Callable[[int], float]
@@ -104,8 +107,11 @@ def qpsolvers_any(recording: Recording, *, solver: str) -> Ask:
 
 
 def cvxpy_oracle(recording: Recording) -> Ask:
-    """Ask the plain statement in CVXPY (`mpc.oracle`), compiled once, with its parameters set."""
+    """Ask the plain statement in CVXPY, compiled once, with its parameters set."""
     import cvxpy
+
+    sys.path.insert(0, str(ORACLES))
+    from cvxpy_programme import oracle
 
     stated, controller = oracle(recording.controller), recording.controller
     model, winch, p = controller.model, controller.model.winch, controller.programme

@@ -1,10 +1,10 @@
 """Compute the bundled vessel `osv-83m`: an offshore supply vessel of 83 m, from our own hull lines.
 
-    .venv/bin/python benchmarks/osv.py              # writes models/vessels/data/osv-83m.csv
+    .venv/bin/python benchmarks/osv.py              # writes models/vessel/data/osv-83m.csv
     .venv/bin/python benchmarks/osv.py --check      # computes it on fewer panels and compares
 
 Main dimensions are those of a usual offshore supply and construction vessel.  Its lines are not
-those of any ship that was built: they are the simple ship of `models/vessels/hull_lines.py`.  It
+those of any ship that was built: they are the simple ship of `models/vessel/hull/lines.py`.  It
 needs the extra `bem`, and about a minute.
 """
 
@@ -17,17 +17,17 @@ from pathlib import Path
 
 import numpy as np
 
-from models.files import write_text_atomically
-from models.vessels.csv_file import csv_text
-from models.vessels.files import read_raos
-from models.vessels.hull_lines import ShipLines
-from models.vessels.hull_vessel import HullVessel, vessel_from_hull
-from models.vessels.raos import MODES, VesselRaos
-from stillhook.hull_figure import hull_figure
-from stillhook.style import picture
+from models.basics.files import write_text_atomically
+from models.vessel.hull.lines import ShipLines
+from models.vessel.hull.vessel import HullVessel, vessel_from_hull
+from models.vessel.raos import MODES, VesselRaos
+from models.vessel.readers.csv_file import csv_text
+from models.vessel.readers.files import read_raos
+from stillhook.seas.hull_plot import hull_figure
+from stillhook.text.style import picture
 
 ROOT = Path(__file__).parents[1]
-PLACE = ROOT / "models" / "vessels" / "data" / "osv-83m.csv"
+PLACE = ROOT / "models" / "vessel" / "data" / "osv-83m.csv"
 PICTURE = ROOT / "docs" / "images" / "osv-83m-hull.png"
 COMMAND = (
     "stillhook vessel hull --length 82.8 --beam 19.2 --draught 6 --block 0.68 --gm 2 "

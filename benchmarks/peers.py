@@ -1,6 +1,6 @@
 r"""The peers of the gain synthesis: what an engineer would reach for without it.
 
-Both answer the question that `synth.tune` answers, the least payload variance within the
+Both answer the question that `synth.design.tuning` answers, the least payload variance within the
 limits, for the feedback u = -(k_2 P'' + k_1 P' + k_0 P):
 
 * `differential_evolution`, on an objective that is written for speed: everything that does not
@@ -22,16 +22,16 @@ import numpy as np
 import numpy.typing as npt
 import scipy.optimize
 
-from models.hook import HookMotion
-from models.linear import LinearPlant
-from models.quadrature import Quadrature, spectral_nodes
-from synth.assess import Assessment
-from synth.controller import Controller
-from synth.disturbance import disturbances
-from synth.element import DragElement
-from synth.limits import Limit
-from synth.margin_limits import LowFrequency, MaxSensitivity
-from synth.structure import PayloadFeedback
+from models.basics.quadrature import Quadrature, spectral_nodes
+from models.hook.hook import HookMotion
+from models.plant.linear import LinearPlant
+from synth.limits.limits import Limit
+from synth.limits.margin_limits import LowFrequency, MaxSensitivity
+from synth.loop.assess import Assessment
+from synth.loop.controller import Controller
+from synth.loop.disturbance import disturbances
+from synth.loop.element import DragElement
+from synth.structures.structure import PayloadFeedback
 
 if TYPE_CHECKING:
     import control
@@ -64,7 +64,7 @@ class Task:
     name
         How the table calls it.
     plant, hook, structure
-        What `synth.question.pose` makes of a case.
+        What `synth.question.question.pose` makes of a case.
     limits
         Of these kinds: `MaxSensitivity` (always there) and `LowFrequency`.
     box

@@ -31,16 +31,16 @@ import numpy as np
 import numpy.typing as npt
 
 from models import PhysicsWarning, load_case
-from synth.controller import closed_loop_poles
-from synth.element import with_drag
-from synth.problem import Problem
-from synth.programme import Solved
-from synth.question import pose
-from synth.recheck import winding_of_plant
-from synth.recompute import LawMatrices
-from synth.search import briskest, coarse_programme, start_coefficient
-from synth.starts import crossover_grid
-from synth.threads import one_thread
+from models.basics.threads import one_thread
+from synth.loop.controller import closed_loop_poles
+from synth.loop.element import with_drag
+from synth.question.problem import Problem
+from synth.question.question import pose
+from synth.search.multistart import briskest, coarse_programme, start_coefficient
+from synth.search.programme import Solved
+from synth.search.starts import crossover_grid
+from synth.verify.recheck import winding_of_plant
+from synth.verify.recompute import LawMatrices
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -178,7 +178,7 @@ def write(rows: Sequence[Row], path: Path = CSV) -> None:
 
 def figure(rows: Sequence[Row], kind: str = "svg") -> bytes:
     """Return the sorted final costs of each question as a picture."""
-    from stillhook.style import AFTER, BEFORE, new_figure, picture, styled, typeset
+    from stillhook.text.style import AFTER, BEFORE, new_figure, picture, styled, typeset
 
     names = list(dict.fromkeys(row.question for row in rows))
     with styled():

@@ -28,15 +28,15 @@ from pathlib import Path
 
 import numpy as np
 
-from models.physics_warning import PhysicsWarning
-from models.vessels import MODES, VesselRaos, read_raos, write_raos
+from models.basics.physics_warning import PhysicsWarning
+from models.vessel import MODES, VesselRaos, read_raos, write_raos
 
 LIMIT = 1.0  # s
 
 _FIRST = """
 import sys, time
 start = time.process_time()
-from models.vessels import read_raos
+from models.vessel import read_raos
 read_raos(sys.argv[1])
 print(time.process_time() - start)
 """
@@ -110,8 +110,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         fast = reading(["osv-83m", *own, *given.files], given.repeats)
     using(vessel, given.repeats)
     if given.picture:
-        from stillhook.rao_figure import rao_figure
-        from stillhook.style import picture
+        from stillhook.seas.rao_plot import rao_figure
+        from stillhook.text.style import picture
 
         place = Path(given.picture)
         place.write_bytes(picture(rao_figure(vessel), place.suffix.removeprefix(".")))

@@ -75,7 +75,7 @@ def measure(path: Path) -> tuple[int, str, float, float]:
 def one(path: str) -> None:
     """Read one file and print what `measure` wants."""
     begin = clock.perf_counter()
-    from models.seas import records
+    from models.sea import records
 
     found = records.read_seas(path)
     first = clock.perf_counter() - begin

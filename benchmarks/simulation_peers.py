@@ -26,10 +26,10 @@ import numpy as np
 import numpy.typing as npt
 import scipy.integrate
 
-from models.control import MEASURED, Measurement, recursion_of
-from models.drive import DriveLimits
-from models.plant import Plant, build_plant
-from models.simulation import Simulation
+from models.plant.drive import DriveLimits
+from models.plant.plant import Plant, build_plant
+from models.sensing.control import MEASURED, Measurement, recursion_of
+from models.simulation.simulation import Simulation
 
 __all__ = ["Answer", "Peer"]
 
@@ -220,7 +220,7 @@ def _interpolated(
     """Return displacement and velocity at any time, by cubics between rows `step` [s] apart.
 
     The displacement's cubic has the velocities at its ends, the velocity's the accelerations,
-    as in `models.integrate.hermite_midpoint`.
+    as in `models.simulation.integrate.hermite_midpoint`.
     """
     table = np.column_stack((_cubic(z, v, step), _cubic(v, a, step))).tolist()
     last = len(table) - 1

@@ -37,12 +37,12 @@ import numpy as np
 import numpy.typing as npt
 
 from models import load_case
-from models.hook import HookMotion
-from models.physics_warning import PhysicsWarning
-from models.quadrature import Quadrature, spectral_nodes
-from models.spreads import LogNormal, Normal, Spread, Uniform
+from models.basics.physics_warning import PhysicsWarning
+from models.basics.quadrature import Quadrature, spectral_nodes
+from models.hook.hook import HookMotion
+from models.spread import LogNormal, Normal, Spread, Uniform
 from synth import GainDesign, evaluate_gains
-from synth.question import pose
+from synth.question.question import pose
 from synth.sweeps.frequency import FrequencyEngine, frequency_chunks
 
 FloatArray = npt.NDArray[np.float64]
@@ -296,8 +296,8 @@ def write(rows: list[Row], figures: dict[str, float]) -> None:
 
 def draw() -> None:
     """Draw the figures of docs/sweeps.md."""
-    from stillhook.style import picture
     from stillhook.sweeps.figures import cumulative_share, nyquist_cloud, scatter_matrix, violins
+    from stillhook.text.style import picture
     from synth.sweeps.frequency import frequency_sweep
 
     design = evaluate_gains(load_case("thesis-1975"), THESIS)

@@ -35,11 +35,11 @@ from typing import Any
 from synthesis import machine, markdown, plain, write_into
 
 import stillhook as sh
-from models.case import Case
-from models.spreads import Spread
+from models.case.case import Case
+from models.spread import Spread
 from stillhook.sweeps.header import Draw
 from stillhook.sweeps.pilots import pilot_of
-from stillhook.sweeps.sweep import sweep
+from stillhook.sweeps.sweeping import sweep
 from stillhook.sweeps.time_cases import CaseResult, CaseTask, TimeBench, TimeQuestion
 from stillhook.sweeps.time_metrics import METRICS
 from stillhook.sweeps.time_sweep import run_sweep

@@ -1,8 +1,8 @@
 """How good and how fast the gain synthesis is: `python benchmarks/synthesis.py [--quick]`.
 
 One question at a time (`peers.Task`: least payload rms within the same limits) is answered by
-`synth.tune` with 16 starts, by SciPy's differential evolution with ten seeds, and by SLSQP on
-python-control objects from the same 16 starts.  Whatever they find is measured by the same
+`synth.design.tuning` with 16 starts, by SciPy's differential evolution with ten seeds, and by SLSQP
+on python-control objects from the same 16 starts.  Whatever they find is measured by the same
 `synth.Assessment`, which has no grid that a peak could hide in.
 
 Exit code 1 if the tuning is worse than the best of the peers by more than a part in a thousand.
@@ -32,7 +32,7 @@ from peers import HOOK, PAYLOAD, Answer, Exact, PythonControlLoop, SampledLoop, 
 
 from models import load_case
 from synth import LowFrequency, MaxSensitivity, Tuning, tune
-from synth.question import pose
+from synth.question.question import pose
 
 FloatArray = npt.NDArray[np.float64]
 

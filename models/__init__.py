@@ -8,30 +8,30 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 _HOME = {
-    "Case": "case",
-    "DiscretePlant": "discrete",
-    "HeaveRao": "vessel",
-    "HookMotion": "hook",
-    "HookRecord": "hook",
-    "InputError": "checks",
-    "LinearPlant": "linear",
-    "PhysicsWarning": "physics_warning",
-    "Plant": "plant",
-    "PlantData": "plant_data",
-    "PlantResponse": "response",
-    "SeaSpectrum": "sea",
-    "SolverError": "checks",
-    "StillhookError": "checks",
-    "SynthesisError": "checks",
-    "build_plant": "plant",
-    "bundled_cases": "case_file",
-    "case_schema": "case_file",
-    "fixed_top_modes": "rope",
-    "line_response": "line",
-    "load_case": "case_file",
-    "parse_quantity": "units",
-    "template_text": "case_file",
-    "write_text_atomically": "files",
+    "Case": "case.case",
+    "DiscretePlant": "plant.discrete",
+    "HeaveRao": "vessel.vessel",
+    "HookMotion": "hook.hook",
+    "HookRecord": "hook.hook",
+    "InputError": "basics.checks",
+    "LinearPlant": "plant.linear",
+    "PhysicsWarning": "basics.physics_warning",
+    "Plant": "plant.plant",
+    "PlantData": "plant.plant_data",
+    "PlantResponse": "plant.response",
+    "SeaSpectrum": "sea.sea",
+    "SolverError": "basics.checks",
+    "StillhookError": "basics.checks",
+    "SynthesisError": "basics.checks",
+    "build_plant": "plant.plant",
+    "bundled_cases": "case.case_file",
+    "case_schema": "case.case_file",
+    "fixed_top_modes": "plant.rope",
+    "line_response": "plant.line",
+    "load_case": "case.case_file",
+    "parse_quantity": "basics.units",
+    "template_text": "case.case_file",
+    "write_text_atomically": "basics.files",
 }
 
 __all__ = [
@@ -62,30 +62,30 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from .case import Case as Case
-    from .case_file import bundled_cases as bundled_cases
-    from .case_file import case_schema as case_schema
-    from .case_file import load_case as load_case
-    from .case_file import template_text as template_text
-    from .checks import InputError as InputError
-    from .checks import SolverError as SolverError
-    from .checks import StillhookError as StillhookError
-    from .checks import SynthesisError as SynthesisError
-    from .discrete import DiscretePlant as DiscretePlant
-    from .files import write_text_atomically as write_text_atomically
-    from .hook import HookMotion as HookMotion
-    from .hook import HookRecord as HookRecord
-    from .line import line_response as line_response
-    from .linear import LinearPlant as LinearPlant
-    from .physics_warning import PhysicsWarning as PhysicsWarning
-    from .plant import Plant as Plant
-    from .plant import build_plant as build_plant
-    from .plant_data import PlantData as PlantData
-    from .response import PlantResponse as PlantResponse
-    from .rope import fixed_top_modes as fixed_top_modes
-    from .sea import SeaSpectrum as SeaSpectrum
-    from .units import parse_quantity as parse_quantity
-    from .vessel import HeaveRao as HeaveRao
+    from .basics.checks import InputError as InputError
+    from .basics.checks import SolverError as SolverError
+    from .basics.checks import StillhookError as StillhookError
+    from .basics.checks import SynthesisError as SynthesisError
+    from .basics.files import write_text_atomically as write_text_atomically
+    from .basics.physics_warning import PhysicsWarning as PhysicsWarning
+    from .basics.units import parse_quantity as parse_quantity
+    from .case.case import Case as Case
+    from .case.case_file import bundled_cases as bundled_cases
+    from .case.case_file import case_schema as case_schema
+    from .case.case_file import load_case as load_case
+    from .case.case_file import template_text as template_text
+    from .hook.hook import HookMotion as HookMotion
+    from .hook.hook import HookRecord as HookRecord
+    from .plant.discrete import DiscretePlant as DiscretePlant
+    from .plant.line import line_response as line_response
+    from .plant.linear import LinearPlant as LinearPlant
+    from .plant.plant import Plant as Plant
+    from .plant.plant import build_plant as build_plant
+    from .plant.plant_data import PlantData as PlantData
+    from .plant.response import PlantResponse as PlantResponse
+    from .plant.rope import fixed_top_modes as fixed_top_modes
+    from .sea.sea import SeaSpectrum as SeaSpectrum
+    from .vessel.vessel import HeaveRao as HeaveRao
 
 
 def __getattr__(name: str) -> Any:

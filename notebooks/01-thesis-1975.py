@@ -34,17 +34,17 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import thesis_tables as tables
+from cables import cable_study
+from feedback import with_feedback
 from IPython.display import Markdown
+from time_response import Sine, Step, time_response
 
 import stillhook as sh
 from models import HookMotion, PlantData, build_plant, fixed_top_modes
-from models.feedback import with_feedback
-from models.quadrature import spectral_nodes
-from models.time_response import Sine, Step, time_response
-from stillhook.cables import cable_study
-from stillhook.style import AFTER, BEFORE, DRUM, HOOK, REFERENCE
-from synth.controller import Controller, closed_loop_poles
-from synth.question import locked_response, pose
+from models.basics.quadrature import spectral_nodes
+from stillhook.text.style import AFTER, BEFORE, DRUM, HOOK, REFERENCE
+from synth.loop.controller import Controller, closed_loop_poles
+from synth.question.question import locked_response, pose
 
 sys.path.insert(0, str(Path.cwd().parent / "benchmarks"))
 import headline

@@ -38,17 +38,17 @@ from IPython.display import Markdown
 
 import stillhook as sh
 from models import HookMotion, build_plant
-from models.drive import DriveLimits
-from models.quadrature import spectral_nodes
-from models.simulate import run_simulation
-from models.simulation import prepare
-from stillhook.style import AFTER, BEFORE, DRUM, HOOK, REFERENCE
-from synth.controller import closed_loop_poles
-from synth.describing import bias_for, gaussian_response, sine_response
-from synth.limit_cycles import limit_cycles
-from synth.question import pose
-from synth.sampled_loop import sampled_loop
-from synth.torque_loop import TorqueLoop
+from models.basics.quadrature import spectral_nodes
+from models.plant.drive import DriveLimits
+from models.simulation.simulate import run_simulation
+from models.simulation.simulation import prepare
+from stillhook.text.style import AFTER, BEFORE, DRUM, HOOK, REFERENCE
+from synth.loop.controller import closed_loop_poles
+from synth.question.question import pose
+from synth.saturation.describing import bias_for, gaussian_response, sine_response
+from synth.saturation.limit_cycles import limit_cycles
+from synth.saturation.torque_loop import TorqueLoop
+from synth.structures.sampling import sampled_loop
 
 sys.path.insert(0, str(Path.cwd().parent / "benchmarks"))
 import saturation

@@ -27,9 +27,9 @@ import numpy as np
 from IPython.display import Markdown
 
 import stillhook as sh
-from models.spreads import Normal, Spread, Uniform
-from stillhook.operability_figure import contour_figure
-from stillhook.style import AFTER, BEFORE
+from models.spread import Normal, Spread, Uniform
+from stillhook.seas.operability_plot import contour_figure
+from stillhook.text.style import AFTER, BEFORE
 
 # %matplotlib inline
 case = sh.load_case("thesis-1975")

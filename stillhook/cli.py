@@ -44,17 +44,17 @@ to begin with:
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     from . import __version__
-    from .commands.compare_arguments import add_compare_arguments
-    from .commands.given_design import add_design_arguments
-    from .commands.motion_arguments import add_motion_arguments
-    from .commands.operability_arguments import add_operability_arguments
-    from .commands.robust_arguments import add_pareto_arguments, add_robust_arguments
-    from .commands.sea_arguments import add_sea_arguments
-    from .commands.sensitivity_arguments import add_sensitivity_arguments
-    from .commands.simulate_arguments import add_simulate_arguments
-    from .commands.size_arguments import add_size_arguments, add_worth_arguments
-    from .commands.sweep_arguments import add_sweep_arguments
-    from .commands.vessel_arguments import add_vessel_arguments
+    from .commands.design.robust_arguments import add_pareto_arguments, add_robust_arguments
+    from .commands.design.size_arguments import add_size_arguments, add_worth_arguments
+    from .commands.design_argument import add_design_arguments
+    from .commands.run.simulate_arguments import add_simulate_arguments
+    from .commands.study.compare_arguments import add_compare_arguments
+    from .commands.study.operability_arguments import add_operability_arguments
+    from .commands.study.sensitivity_arguments import add_sensitivity_arguments
+    from .commands.study.sweep_arguments import add_sweep_arguments
+    from .commands.world.motion_arguments import add_motion_arguments
+    from .commands.world.sea_arguments import add_sea_arguments
+    from .commands.world.vessel_arguments import add_vessel_arguments
 
     raw = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(
@@ -100,7 +100,7 @@ def build_parser() -> argparse.ArgumentParser:
         )
 
     text = "find the gains that hold the payload stillest within the limits"
-    optimise = command("optimise", "optimise", text)
+    optimise = command("optimise", "design.optimise", text)
     case(optimise)
     optimise.add_argument(
         "--out", metavar="DIR", help="folder for the results (default: out/<name of the case>)"
@@ -120,7 +120,9 @@ def build_parser() -> argparse.ArgumentParser:
     )
     bounded(optimise)
 
-    structures = command("structures", "structures", "compare controller structures on a case")
+    structures = command(
+        "structures", "design.structures", "compare controller structures on a case"
+    )
     case(structures)
     structures.add_argument(
         "--structures",
@@ -140,7 +142,7 @@ def build_parser() -> argparse.ArgumentParser:
     structures.add_argument("--quiet", action="store_true", help="print the verdicts only")
     bounded(structures)
 
-    evaluate = command("evaluate", "evaluate", "say what given gains do")
+    evaluate = command("evaluate", "design.evaluate", "say what given gains do")
     case(evaluate)
     evaluate.add_argument(
         "--gains",
@@ -151,12 +153,14 @@ def build_parser() -> argparse.ArgumentParser:
     evaluate.add_argument("--quiet", action="store_true", help="print the verdict only")
     bounded(evaluate)
 
-    robust = command("robust", "robust", "find one set of gains for many depths, loads and seas")
+    robust = command(
+        "robust", "design.robust", "find one set of gains for many depths, loads and seas"
+    )
     case(robust)
     add_robust_arguments(robust)
 
     text = "say how far the plant's numbers may be off before a design is unstable"
-    margins = command("margins", "margins", text)
+    margins = command("margins", "design.margins", text)
     case(margins)
     add_design_arguments(margins)
     margins.add_argument(
@@ -173,44 +177,48 @@ def build_parser() -> argparse.ArgumentParser:
     margins.add_argument("--quiet", action="store_true", help="print the verdict only")
 
     text = "say which numbers of the case matter most to a design"
-    sensitivity = command("sensitivity", "sensitivity", text)
+    sensitivity = command("sensitivity", "study.sensitivity", text)
     case(sensitivity)
     add_sensitivity_arguments(sensitivity)
 
     text = "say in which seas the winch can work, what limits it, and how much of the year"
-    operability = command("operability", "operability", text)
+    operability = command("operability", "study.operability", text)
     case(operability)
     add_operability_arguments(operability)
 
-    pareto = command("pareto", "pareto", "draw what stillness costs: torque, margin or delay")
+    pareto = command(
+        "pareto", "design.pareto", "draw what stillness costs: torque, margin or delay"
+    )
     case(pareto)
     add_pareto_arguments(pareto)
 
-    size = command("size", "size", "find the smallest motor and gear that meet a target")
+    size = command("size", "design.size", "find the smallest motor and gear that meet a target")
     case(size)
     add_size_arguments(size)
 
-    worth = command("worth", "worth", "say what each limit, sensor and delay is worth")
+    worth = command("worth", "design.worth", "say what each limit, sensor and delay is worth")
     case(worth)
     add_worth_arguments(worth)
 
-    simulate = command("simulate", "simulate", "simulate controllers in a sea, limits and all")
+    simulate = command("simulate", "run.simulate", "simulate controllers in a sea, limits and all")
     case(simulate)
     add_simulate_arguments(simulate)
 
-    compare = command("compare", "compare", "compare controllers in the same seas, limits and all")
+    compare = command(
+        "compare", "study.compare", "compare controllers in the same seas, limits and all"
+    )
     case(compare)
     add_compare_arguments(compare)
 
     text = "try a design or a controller on many cases: what is not known exactly, what fails"
-    add_sweep_arguments(command("sweep", "sweep", text))
+    add_sweep_arguments(command("sweep", "study.sweep", text))
 
-    scenarios = command("scenarios", "scenarios", "list the operations and the controllers")
+    scenarios = command("scenarios", "run.scenarios", "list the operations and the controllers")
     scenarios.add_argument(
         "name", metavar="NAME", nargs="?", help="an operation, to see its options"
     )
 
-    bound = command("bound", "bound", "say what no linear controller can do better than")
+    bound = command("bound", "design.bound", "say what no linear controller can do better than")
     case(bound)
     bound.add_argument(
         "--sensors",
@@ -227,27 +235,29 @@ def build_parser() -> argparse.ArgumentParser:
     )
     bound.add_argument("--quiet", action="store_true", help="print the bound only")
 
-    sea = command("sea", "sea", "read wave spectra: what they hold, scatter diagram, one of them")
+    sea = command(
+        "sea", "world.sea", "read wave spectra: what they hold, scatter diagram, one of them"
+    )
     add_sea_arguments(sea)
 
     text = "show the hook's motion over headings, periods and sides, and what it asks of a winch"
-    motion = command("motion", "motion", text)
+    motion = command("motion", "world.motion", text)
     case(motion)
     add_motion_arguments(motion)
 
     text = "read a vessel's RAOs from a file, or compute them from a hull"
-    vessel = command("vessel", "vessel", text)
+    vessel = command("vessel", "world.vessel", text)
     add_vessel_arguments(vessel)
 
-    case(command("check", "check", "read a case, and show what follows from it"))
+    case(command("check", "world.check", "read a case, and show what follows from it"))
 
-    command("cases", "files", "list the bundled cases")
+    command("cases", "world.files", "list the bundled cases")
 
-    new = command("new", "files", "write a commented case file that runs as it is")
+    new = command("new", "world.files", "write a commented case file that runs as it is")
     new.add_argument("file", metavar="FILE", help="the file to write")
     new.add_argument("--force", action="store_true", help="overwrite the file if it exists")
 
-    schema = command("schema", "files", "write the JSON Schema of a case file, for editors")
+    schema = command("schema", "world.files", "write the JSON Schema of a case file, for editors")
     schema.add_argument(
         "file", metavar="FILE", nargs="?", help="the file to write (default: standard output)"
     )
@@ -299,7 +309,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(arguments: argparse.Namespace) -> int:
     structured = getattr(arguments, "structure", None) is not None
-    name = "structures" if structured else arguments.module
+    name = "design.structures" if structured else arguments.module
     module = import_module(f".commands.{name}", __package__)
     with warnings.catch_warnings():  # what a command sets about warnings ends with it
         status: int = module.run(arguments)
@@ -308,7 +318,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def _failed(error: Exception) -> int:
     """Write one sentence (or one for each error in a file), and return the exit status."""
-    from models.checks import InputError, StillhookError
+    from models.basics.checks import InputError, StillhookError
 
     if isinstance(error, InputError):
         print(error, file=sys.stderr)

@@ -10,11 +10,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from models import Case, load_case
-from models.checks import InputError
-from models.physics_warning import PhysicsWarning
-from models.yaml_lines import read_yaml
+from models.basics.checks import InputError
+from models.basics.physics_warning import PhysicsWarning
+from models.casefile.yaml_lines import read_yaml
 
-from ..terminal import told_once
+from ..text.terminal import told_once
 
 __all__ = ["case_words", "gains_text", "given_case", "parse_gains"]
 
@@ -32,7 +32,7 @@ def given_case(arguments: argparse.Namespace) -> Case:
     InputError
         If the case is wrong, or a change is.
     """
-    from models.hook import HookMotion
+    from models.hook.hook import HookMotion
 
     with told_once():
         case = load_case(arguments.case)

@@ -18,7 +18,7 @@ from .export import table_of, write_result
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped]
 
-    from models.case import Case
+    from models.case.case import Case
 
     from .words import SweepSummary
 

@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..quantities import number
-from ..style import AFTER, BROKEN, HOOK, REFERENCE, new_figure, styled
+from ..text.quantities import number
+from ..text.style import AFTER, BROKEN, HOOK, REFERENCE, new_figure, styled
 from .figure_parts import numbers_in, shown, stable_of, title
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from synth.design import GainDesign
-    from synth.structure_design import StructureDesign
+    from synth.design.design import GainDesign
+    from synth.design.structure_design import StructureDesign
 
 __all__ = ["nyquist_cloud"]
 

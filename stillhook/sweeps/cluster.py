@@ -21,12 +21,12 @@ from typing import Any
 
 from typing_extensions import override
 
-from models.checks import InputError, SolverError, check_range
+from models.basics.checks import InputError, SolverError, check_range
 
-from ..compare_pool import Died
+from ..keeper.digest import code_digest
+from ..keeper.pool import Died
 from .engines import RETRIES, Answers, Engine, Todo, died
 from .time_cases import CaseResult, CaseTask, TimeBench, TimeQuestion
-from .versions import code_digest
 
 __all__ = ["Cluster", "do_case"]
 

@@ -18,9 +18,9 @@ from collections.abc import Generator, Iterator
 
 from typing_extensions import override
 
-from models.checks import InputError, check_range
+from models.basics.checks import InputError, check_range
 
-from ..compare_pool import Died, Pool
+from ..keeper.pool import Died, Pool
 from .time_cases import CaseResult, CaseTask, TimeQuestion
 
 __all__ = ["RETRIES", "Answers", "Engine", "Processes", "Serial", "Todo", "died", "engine_of"]

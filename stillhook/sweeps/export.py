@@ -9,9 +9,9 @@ import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from models.checks import InputError
-from models.files import replace_atomically
-from models.signals import pick
+from models.basics.checks import InputError
+from models.basics.files import replace_atomically
+from models.basics.signals import pick
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped]

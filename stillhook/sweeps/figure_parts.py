@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..quantities import scale
-from ..style import typeset
+from ..text.quantities import scale
+from ..text.style import typeset
 
 if TYPE_CHECKING:
     import xarray as xr

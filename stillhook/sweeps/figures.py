@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from models.checks import InputError
-from models.intervals import share
+from models.basics.checks import InputError
+from models.basics.intervals import share
 
-from ..quantities import number, quantity
-from ..style import AFTER, BROKEN, HOOK, REFERENCE, new_figure, styled, typeset
+from ..text.quantities import number, quantity
+from ..text.style import AFTER, BROKEN, HOOK, REFERENCE, new_figure, styled, typeset
 from .cloud_figure import nyquist_cloud
 from .figure_parts import numbers_in, stable_of, thinned, title, unit_of, words_of
 from .scatter_figure import scatter_matrix
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from synth.design import GainDesign
-    from synth.structure_design import StructureDesign
+    from synth.design.design import GainDesign
+    from synth.design.structure_design import StructureDesign
 
 __all__ = ["cumulative_share", "nyquist_cloud", "scatter_matrix", "sweep_figures", "violins"]
 

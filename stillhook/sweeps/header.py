@@ -16,14 +16,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from models.case import Case
-from models.checks import InputError
-from models.spreads import Spread
+from models.basics.checks import InputError
+from models.case.case import Case
+from models.spread import Spread
 
-from ..kept_lines import difference
+from ..keeper.digest import versions
+from ..keeper.kept_lines import difference
 from .pilots import pilot_from
 from .time_cases import TimeQuestion
-from .versions import versions
 
 __all__ = [
     "ATTRIBUTE",

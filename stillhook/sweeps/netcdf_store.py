@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from models.checks import InputError
-from models.files import replace_atomically
+from models.basics.checks import InputError
+from models.basics.files import replace_atomically
 
 from .header import ATTRIBUTE, FORMAT, differences
 from .time_metrics import STATUS

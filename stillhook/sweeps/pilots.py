@@ -14,18 +14,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from models.case import Case
-from models.checks import InputError
-from models.control import Controller
-from models.signals import pick
-from synth.design import GainDesign
-from synth.structure_design import StructureDesign
-from synth.tune import Tuning
+from models.basics.checks import InputError
+from models.basics.signals import pick
+from models.case.case import Case
+from models.sensing.control import Controller
+from synth.design.design import GainDesign
+from synth.design.structure_design import StructureDesign
+from synth.design.tuning import Tuning
 
-from ..compare_law import Law, design_law
-from ..compare_makers import given
-from ..contenders import contenders_of
-from ..controllers import controller_by_name, known_controllers
+from ..controllers.contenders import contenders_of
+from ..controllers.controllers import controller_by_name, known_controllers
+from ..controllers.law import Law, design_law
+from ..controllers.makers import given
 
 __all__ = ["Pilot", "pilot_from", "pilot_of"]
 
@@ -122,8 +122,8 @@ def pilot_of(wanted: object) -> Pilot:
     ----------
     wanted
         A `GainDesign`, `StructureDesign` or `Tuning`; the name of a controller
-        (`stillhook.controllers`); a controller; or a pair of a name and one of these or of a
-        function of the case that returns a controller.
+        (`stillhook.controllers.controllers`); a controller; or a pair of a name and one of these or
+        of a function of the case that returns a controller.
 
     Raises
     ------

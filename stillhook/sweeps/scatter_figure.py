@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from models.checks import InputError
-from models.intervals import share
+from models.basics.checks import InputError
+from models.basics.intervals import share
 
-from ..style import AFTER, BROKEN, new_figure, styled, typeset
+from ..text.style import AFTER, BROKEN, new_figure, styled, typeset
 from .figure_parts import OWN, numbers_in, shown, stable_of, thinned, unit_of, words_of
 
 if TYPE_CHECKING:

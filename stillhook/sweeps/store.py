@@ -26,11 +26,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from models.checks import InputError
+from models.basics.checks import InputError
 
-from ..folder import OutputFolder
+from ..keeper.journal import Journal
+from ..text.folder import OutputFolder
 from .header import ATTRIBUTE, differences, read_header
-from .journal import Journal
 from .time_metrics import STATUS
 
 if TYPE_CHECKING:

@@ -18,17 +18,17 @@ from typing import Any
 
 import numpy as np
 
-from models.case import Case
-from models.checks import StillhookError
-from models.control import Controller
-from models.faults import with_faults
-from models.physics_warning import PhysicsWarning
-from models.run import Run
-from models.scenarios import scenario_named
-from synth.threads import one_thread
+from models.basics.checks import StillhookError
+from models.basics.physics_warning import PhysicsWarning
+from models.basics.threads import one_thread
+from models.case.case import Case
+from models.operation.faults import with_faults
+from models.operation.scenarios import scenario_named
+from models.run.run import Run
+from models.sensing.control import Controller
 
-from ..compare_worker import Task
-from ..series import Progress, Series
+from ..keeper.worker import Task
+from ..runs.series import Progress, Series
 from .pilots import Pilot
 from .time_metrics import numbers_of, status_of
 from .trim import Shift, shift_between, static_of, trimmed

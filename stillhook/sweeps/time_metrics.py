@@ -12,11 +12,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from models.run import Run
-from models.signals import pick
+from models.basics.signals import pick
+from models.run.run import Run
 
-from ..run_window import error_of
-from ..runs import TRIPS
+from ..runs.runs import TRIPS
+from ..runs.window import error_of
 
 __all__ = ["METRICS", "STATUS", "Metric", "names_of", "numbers_of", "status_of"]
 
@@ -48,7 +48,7 @@ class Metric:
     Attributes
     ----------
     quantity
-        Its name in `models.run_summary`, or a signal whose standard deviation it is.
+        Its name in `models.run.summary`, or a signal whose standard deviation it is.
     unit
         SI unit.
     text

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from models.checks import InputError
-from models.faults import FAULTS, PREFIX
-from models.scenarios import scenario_named
-from models.spreads import Spread
+from models.basics.checks import InputError
+from models.operation.faults import FAULTS, PREFIX
+from models.operation.scenarios import scenario_named
+from models.spread import Spread
 
 from .engines import Engine, engine_of
 from .header import ATTRIBUTE, Draw, header_of, text_of

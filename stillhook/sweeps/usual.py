@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from models.case import Case
-from models.signals import pick
-from models.spreads import Distribution, Spread, Uniform
+from models.basics.signals import pick
+from models.case.case import Case
+from models.spread import Distribution, Spread, Uniform
 
 __all__ = ["FAULT_SPREADS", "fault_spread", "usual_spread"]
 

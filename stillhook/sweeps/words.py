@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.case import Case
-from models.checks import InputError, check_range
-from models.intervals import Share, share
-from models.physics_warning import PhysicsWarning
-from models.signals import pick
-from models.spreads import Samples, Spread
+from models.basics.checks import InputError, check_range
+from models.basics.intervals import Share, share
+from models.basics.physics_warning import PhysicsWarning
+from models.basics.signals import pick
+from models.case.case import Case
+from models.spread import Samples, Spread
 
 from .header import ATTRIBUTE
 from .time_metrics import STATUS

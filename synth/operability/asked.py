@@ -9,19 +9,19 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.case import Case
-from models.checks import InputError
-from models.linear import LinearPlant
-from models.physics_warning import PhysicsWarning
-from models.plant_data import PlantData
+from models.basics.checks import InputError
+from models.basics.physics_warning import PhysicsWarning
+from models.case.case import Case
+from models.plant.linear import LinearPlant
+from models.plant.plant_data import PlantData
 
-from ..controller import Controller
-from ..design import GainDesign
-from ..disturbance import Disturbance
-from ..element import DragElement
-from ..question import HOOK, PAYLOAD, pose
-from ..structure_design import StructureDesign
-from ..structure_question import pose_structure
+from ..design.design import GainDesign
+from ..design.structure_design import StructureDesign
+from ..loop.controller import Controller
+from ..loop.disturbance import Disturbance
+from ..loop.element import DragElement
+from ..question.question import HOOK, PAYLOAD, pose
+from ..question.structure_question import pose_structure
 from .criteria import STABILITY, Criterion, case_criteria, outputs_of
 from .systems import VELOCITY, HeldSystem, LoopSystem, PerfectSystem, System
 

@@ -22,10 +22,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.checks import read_only
-from models.quadrature import Quadrature
+from models.basics.checks import read_only
+from models.basics.quadrature import Quadrature
 
-from ..signal_limits import Continuous, Peak, Power
+from ..limits.signal_limits import Continuous, Peak, Power
 from .criteria import Criterion
 from .systems import PerfectSystem
 

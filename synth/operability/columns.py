@@ -13,22 +13,22 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from models.case import Case
-from models.checks import InputError
-from models.hook import HookMotion
-from models.physics_warning import PhysicsWarning
-from models.quadrature import Quadrature, adaptive_nodes
+from models.basics.checks import InputError
+from models.basics.physics_warning import PhysicsWarning
+from models.basics.quadrature import Quadrature, adaptive_nodes
+from models.case.case import Case
+from models.hook.hook import HookMotion
 
-from ..assess import integration_band
-from ..disturbance import Disturbance, disturbances
-from ..question import HOOK
+from ..loop.assess import integration_band
+from ..loop.disturbance import Disturbance, disturbances
+from ..question.question import HOOK
 from .systems import ComplexArray, System
 
 __all__ = ["SeaColumn", "has_headings", "has_period", "own_period", "sea_column"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_RTOL = 1e-8  # of every variance, as in `synth.assess`
+_RTOL = 1e-8  # of every variance, as in `synth.loop.assess`
 _SAME = 1e-9  # relative, of densities that scale with H_s^2
 _WITHOUT_PERIOD = ("pierson-moskowitz", "sum", "measured")
 _HEIGHTS = (0.25, 2.0, 5.0, 14.0)  # at which that is looked at [m]
@@ -123,8 +123,8 @@ class SeaColumn:
     def nodes(self, system: System) -> Quadrature:
         """Return nodes on which every variance of a system is accurate, for any H_s and drag.
 
-        As `synth.assess.Assessment.quadrature`, for three drag coefficients from that of a payload
-        that hardly moves to that of one that moves at metres per second.
+        As `synth.loop.assess.Assessment.quadrature`, for three drag coefficients from that of a
+        payload that hardly moves to that of one that moves at metres per second.
         """
         coefficients = self._coefficients(system)
         poles = np.concatenate([_off_axis(system.poles(c)) for c in coefficients])
@@ -229,8 +229,8 @@ def _period_changes(case: Case, period: float) -> dict[str, float | None]:
             "that could be changed; leave the periods out for a limit in its own shape"
         )
     if sea.spectrum == "bretschneider-1975":
-        # It peaks at 0.9 T_S / 0.54^(1/4), see `models.sea_section.Sea`.  Where height and period
-        # came from the wind they are taken apart.
+        # It peaks at 0.9 T_S / 0.54^(1/4), see `models.sea.sea_section.Sea`.  Where height and
+        # period came from the wind they are taken apart.
         return {
             "sea.wind_speed": None,
             "sea.significant_height": sea.significant_height,

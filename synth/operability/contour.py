@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from models.checks import InputError, read_only
+from models.basics.checks import InputError, read_only
 
 from .columns import SeaColumn
 from .criteria import Criterion

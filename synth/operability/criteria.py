@@ -1,6 +1,6 @@
 """What an operation must keep: limits of the drive and the rope, and how still the load must be.
 
-A `Criterion` is a limit of `synth.signal_limits` that can be looked at in many sea states at
+A `Criterion` is a limit of `synth.limits.signal_limits` that can be looked at in many sea states at
 once: variances come as arrays, one entry for each sea state, and so does the verdict.
 """
 
@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.case import Case
-from models.checks import InputError, check_range
-from models.linear import LinearPlant
-from models.units import parse_quantity
+from models.basics.checks import InputError, check_range
+from models.basics.units import parse_quantity
+from models.case.case import Case
+from models.plant.linear import LinearPlant
 
-from ..case_limits import PAYLOAD, drive_limits
-from ..limits import Limit
-from ..signal_limits import Continuous, Least, Peak, Rms
+from ..limits.case_limits import PAYLOAD, drive_limits
+from ..limits.limits import Limit
+from ..limits.signal_limits import Continuous, Least, Peak, Rms
 
 __all__ = ["STABILITY", "Criterion", "Moments", "case_criteria", "payload_criteria"]
 
@@ -59,7 +59,7 @@ class Moments:
     def peak(self, output: str, duration: float) -> FloatArray:
         """Return the most probable maximum in `duration` [s] without the mean (r,).
 
-        As `models.metrics.peak_factor`, sigma sqrt(2 ln(T/T_z)), held at one sigma.
+        As `models.basics.metrics.peak_factor`, sigma sqrt(2 ln(T/T_z)), held at one sigma.
         """
         m0, m2 = self.m0[output], self.m2[output]
         still = (m0 <= 0.0) | (m2 <= 0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from models.case import Case
+from models.case.case import Case
 
 __all__ = ["RopeState", "rope_state"]
 

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from scipy.special import ndtr
 
-from models.seas.scatter import Scatter
+from models.sea.scatter import Scatter
 
 __all__ = ["EXAMPLE", "example_scatter"]
 

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import elementwise
 
-from models.checks import SolverError, read_only
+from models.basics.checks import SolverError, read_only
 
 from .columns import SeaColumn
 from .criteria import Criterion, Moments

@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.case import Case
-from models.physics_warning import PhysicsWarning
-from models.plant_data import PlantData
+from models.basics.physics_warning import PhysicsWarning
+from models.case.case import Case
+from models.plant.plant_data import PlantData
 
-from ..assess import Assessment
-from ..design import GainDesign
-from ..question import pose
-from ..structure_question import pose_structure
+from ..design.design import GainDesign
+from ..loop.assess import Assessment
+from ..question.question import pose
+from ..question.structure_question import pose_structure
 
 if TYPE_CHECKING:
     from .asked import Design

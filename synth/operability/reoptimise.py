@@ -2,7 +2,7 @@
 
     sea -> best gains without the drive's limits -> largest sea that any gains can do -> its limit
 
-The largest sea is the programme of `synth.infeasible`, with the payload's criteria among the
+The largest sea is the programme of `synth.design.infeasible`, with the payload's criteria among the
 limits; the gains that it ends with are then looked at like those of any design.
 """
 
@@ -14,17 +14,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.case import Case
-from models.checks import SolverError
-from models.physics_warning import PhysicsWarning
+from models.basics.checks import SolverError
+from models.basics.physics_warning import PhysicsWarning
+from models.basics.threads import one_thread
+from models.case.case import Case
 
-from ..design import GainDesign
-from ..infeasible import shortfall
-from ..limits import Limit
-from ..question import Question, pose
-from ..search import search
-from ..threads import one_thread
-from ..tune import tuning_of
+from ..design.design import GainDesign
+from ..design.infeasible import shortfall
+from ..design.tuning import tuning_of
+from ..limits.limits import Limit
+from ..question.question import Question, pose
+from ..search.multistart import search
 from .asked import Asked
 from .columns import SeaColumn
 from .contour import Contour

@@ -24,8 +24,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from models.checks import read_only
-from models.quadrature import Quadrature
+from models.basics.checks import read_only
+from models.basics.quadrature import Quadrature
 
 __all__ = ["DragResponses"]
 

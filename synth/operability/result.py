@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from models.case import Case
-from models.checks import InputError
-from models.seas.scatter import Scatter
+from models.basics.checks import InputError
+from models.case.case import Case
+from models.sea.scatter import Scatter
 
 from .capability import Capability
 from .columns import SeaColumn

@@ -16,14 +16,14 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from models.case import Case
-from models.checks import InputError, check_ascending, check_range
-from models.physics_warning import PhysicsWarning
-from models.seas.scatter import Scatter, read_scatter
+from models.basics.checks import InputError, check_ascending, check_range
+from models.basics.physics_warning import PhysicsWarning
+from models.basics.threads import one_thread
+from models.case.case import Case
+from models.sea.scatter import Scatter, read_scatter
 
-from ..assess import Assessment
-from ..design import GainDesign
-from ..threads import one_thread
+from ..design.design import GainDesign
+from ..loop.assess import Assessment
 from .asked import Asked, Design, asked_of
 from .capability import capability
 from .columns import SeaColumn, has_headings, has_period, sea_column

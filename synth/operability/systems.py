@@ -18,19 +18,19 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import override
 
-from models.line import rope_transfers
-from models.linear import LinearPlant
-from models.plant_data import PlantData
-from models.quadrature import Quadrature
-from models.rope import fixed_top_modes
-from models.sensors import MRU
+from models.basics.quadrature import Quadrature
+from models.plant.line import rope_transfers
+from models.plant.linear import LinearPlant
+from models.plant.plant_data import PlantData
+from models.plant.rope import fixed_top_modes
+from models.rig.sensors import MRU
 
-from ..assess import Assessment
-from ..controller import Controller
-from ..disturbance import Disturbance
-from ..element import DragElement
-from ..loop import closed_loop, numeric_blocks
-from ..question import HOOK, PAYLOAD
+from ..loop.assess import Assessment
+from ..loop.controller import Controller
+from ..loop.disturbance import Disturbance
+from ..loop.element import DragElement
+from ..loop.loop import closed_loop, numeric_blocks
+from ..question.question import HOOK, PAYLOAD
 from .responses import DragResponses
 
 __all__ = ["HeldSystem", "LoopSystem", "PerfectSystem", "System"]
@@ -84,7 +84,7 @@ class System(ABC):
         ----------
         rms
             Standard deviations of the hook's heave (r,) [m]; the error is a floor or a share of
-            it, whichever is greater (`models.mru.MruModel.error_rms`).
+            it, whichever is greater (`models.sensing.mru.MruModel.error_rms`).
         """
         if self.mru is None:
             return np.ones_like(rms)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.seas.scatter import Scatter
+from models.sea.scatter import Scatter
 
 from .contour import Contour, over_headings
 from .rules import RULES, Rule

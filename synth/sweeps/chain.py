@@ -4,8 +4,8 @@ The rope is a recursion from the payload up, x_0 = 1 at the payload: for every m
 
     delta <- delta - zeta x,   x <- x + delta,     zeta = -s^2 m h / (EA (1 + tau s))
 
-(piece h, its mass m; `models.rope.lump_rope`), which ends at the drum with Y/P = y and T/P = f.
-Around it stand the winch's own equations, as in `models.line`,
+(piece h, its mass m; `models.plant.rope.lump_rope`), which ends at the drum with Y/P = y and T/P =
+f. Around it stand the winch's own equations, as in `models.plant.line`,
 
     open = W y + g h e f,    closed = open + h phi G,    G = q(s) low-passes exp(-s delay).
 
@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.rope import RopeLumps
+from models.plant.rope import RopeLumps
 
 from .numbers import PlantNumbers
 

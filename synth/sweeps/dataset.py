@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from models.case import Case
-from models.checks import InputError
-from models.spreads import Samples, Spread
-from models.yaml_lines import read_yaml
+from models.basics.checks import InputError
+from models.case.case import Case
+from models.casefile.yaml_lines import read_yaml
+from models.spread import Samples, Spread
 
-from ..design import GainDesign
-from ..structure_design import StructureDesign
+from ..design.design import GainDesign
+from ..design.structure_design import StructureDesign
 from .metrics import Metric
 
 if TYPE_CHECKING:

@@ -1,7 +1,8 @@
 """Drag that agrees with each loop's own response, for many loops at once.
 
-C = q sqrt(8/pi) sigma_v(C), by the secant rule on logarithms, as `synth.loop_stack` does.  More
-drag means less motion, so that the right side falls; where a loop is unstable it is given more.
+C = q sqrt(8/pi) sigma_v(C), by the secant rule on logarithms, as `synth.robust.loop_stack` does.
+More drag means less motion, so that the right side falls; where a loop is unstable it is given
+more.
 """
 
 from __future__ import annotations

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from models.case import Case
-from models.checks import InputError, check_range
-from models.quadrature import Quadrature
-from models.spreads import Spread
-from models.spreads.fields import FAULTS
+from models.basics.checks import InputError, check_range
+from models.basics.quadrature import Quadrature
+from models.basics.threads import one_thread
+from models.case.case import Case
+from models.spread import Spread
+from models.spread.fields import FAULTS
 
-from ..design import GainDesign
-from ..structure_design import StructureDesign
-from ..threads import one_thread
+from ..design.design import GainDesign
+from ..design.structure_design import StructureDesign
 from .dataset import dataset_of
 from .gain_rows import GainRows
 from .metrics import chosen_metrics
@@ -187,7 +187,7 @@ def frequency_sweep(
     design
         A design of three gains, or of any structure.
     spread
-        What varies, see `models.spreads.Spread`.
+        What varies, see `models.spread.Spread`.
     samples
         Number of cases; None for ``corners`` and ``given``.
     sampling

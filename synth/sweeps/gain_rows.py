@@ -17,13 +17,13 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from models.checks import InputError
-from models.quadrature import Quadrature
-from models.rope import lump_rope
-from models.spreads import Spread
-from models.spreads.fields import GAINS
+from models.basics.checks import InputError
+from models.basics.quadrature import Quadrature
+from models.plant.rope import lump_rope
+from models.spread import Spread
+from models.spread.fields import GAINS
 
-from ..design import GainDesign
+from ..design.design import GainDesign
 from .calming import calming_drag
 from .chain import ChainLoops
 from .drag_rows import Velocity, agreeing_drag

@@ -9,7 +9,7 @@ polynomials in s over one common denominator,
     W = (I s^2 + B_v s) e + beta s (motor and drive),  e its lag,  B the sensors' low-passes,
     h = r/n, g = h (1/eta + eta)/2,  phi torque per command,  beta torque per speed
 
-(the equations of `models.line` with the rope's closed form put in).  What costs time is
+(the equations of `models.plant.line` with the rope's closed form put in).  What costs time is
 1/\|Den\|^2 at every node of every loop; it is made in real arithmetic, in chunks that stay in the
 cache.  All variances then are its products with a few powers of the frequency, as every
 \|numerator\|^2 is a polynomial in omega^2: one matrix product for all outputs together.

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.checks import InputError
-from models.messages import suggestion
+from models.basics.checks import InputError
+from models.casefile.messages import suggestion
 
 __all__ = ["DEFAULT", "METRICS", "Metric", "chosen_metrics", "finished"]
 
@@ -219,7 +219,8 @@ def finished(
                 found[metric.name] = sigma
                 continue
             period = 2.0 * np.pi * np.sqrt(variance / moments[metric.output, 2])
-            # The most probable maximum of a Gaussian signal (Rice 1945), as `models.metrics`.
+            # The most probable maximum of a Gaussian signal (Rice 1945), as
+            # `models.basics.metrics`.
             factor = np.sqrt(2.0 * np.log(np.maximum(exposure / period, np.exp(0.5))))
         rest = static.get(metric.output, np.zeros(1))
         found[metric.name] = {

@@ -1,8 +1,8 @@
 """The plant's numbers of many cases at once: columns of a spread -> columns of `PlantData`.
 
 A thousand checked cases take seconds, a thousand columns of arithmetic microseconds.  So what
-`models.plant_data.PlantData.from_case` does to one case is done here to whole columns, for those
-paths that it is known for, and compared with the checked cases of some of the rows; any other
+`models.plant.plant_data.PlantData.from_case` does to one case is done here to whole columns, for
+those paths that it is known for, and compared with the checked cases of some of the rows; any other
 path, and any difference, sends every row through its own checked case.
 """
 
@@ -15,11 +15,11 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import numpy.typing as npt
 
-from models.case import Case
-from models.checks import InputError
-from models.plant_data import PlantData
-from models.spreads import Spread
-from models.spreads.fields import DRAG, GAINS
+from models.basics.checks import InputError
+from models.case.case import Case
+from models.plant.plant_data import PlantData
+from models.spread import Spread
+from models.spread.fields import DRAG, GAINS
 
 __all__ = ["PlantNumbers", "numbers_of"]
 

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.case import Case
-from models.hook import HookMotion
-from models.physics_warning import PhysicsWarning
-from models.spreads import Spread
+from models.basics.physics_warning import PhysicsWarning
+from models.case.case import Case
+from models.hook.hook import HookMotion
+from models.spread import Spread
 
 __all__ = ["SeaRows"]
 

@@ -2,7 +2,7 @@
 
 Slower than the columns of `synth.sweeps.gain_rows` by three orders of magnitude, but with no
 assumption about structure, sensors or disturbances: the question of every case is posed anew and
-assessed as `synth.structure_design` does, with the design's own parameters.
+assessed as `synth.design.structure_design` does, with the design's own parameters.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from models.checks import InputError, SolverError
-from models.metrics import peak_factor
-from models.physics_warning import PhysicsWarning
-from models.quadrature import Quadrature
-from models.spreads import Spread
+from models.basics.checks import InputError, SolverError
+from models.basics.metrics import peak_factor
+from models.basics.physics_warning import PhysicsWarning
+from models.basics.quadrature import Quadrature
+from models.spread import Spread
 
-from ..assess import Assessment
-from ..structure_design import StructureDesign
-from ..structure_question import pose_structure
+from ..design.structure_design import StructureDesign
+from ..loop.assess import Assessment
+from ..question.structure_question import pose_structure
 from .metrics import Metric
 
 __all__ = ["StructureRows"]

@@ -1,8 +1,8 @@
 r"""Nodes on which the variances of all loops of a sweep are integrated, with an error of each.
 
-Nodes made for one loop (`models.quadrature.adaptive_nodes`) do not suit a thousand others.  So
-every panel gets a Gauss-Kronrod pair: the nodes of the longer rule hold those of the shorter one,
-and a second column of weights tells for each loop how far the two differ, at no further
+Nodes made for one loop (`models.basics.quadrature.adaptive_nodes`) do not suit a thousand others.
+So every panel gets a Gauss-Kronrod pair: the nodes of the longer rule hold those of the shorter
+one, and a second column of weights tells for each loop how far the two differ, at no further
 evaluation.  Loops for which that is too far (a resonance narrower than the panels) go on to the
 next level, of panels half as long.
 """
@@ -16,9 +16,9 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from models.checks import read_only
-from models.panels import FrequencyAxis, cut_panels, longest_panel
-from models.quadrature import Quadrature
+from models.basics.checks import read_only
+from models.basics.panels import FrequencyAxis, cut_panels, longest_panel
+from models.basics.quadrature import Quadrature
 
 __all__ = ["SweepNodes", "sweep_nodes"]
 

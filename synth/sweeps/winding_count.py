@@ -8,8 +8,8 @@ small on the arc and, by the maximum principle, beyond it.
 
 All loops begin with the same kind of grid, eight points for each axial mode of the rope; where
 phase or size jumps between neighbours, the interval is halved, for all loops in one call, as
-`synth.winding.trace` does for one.  So delays, waves and light damping are followed exactly; a
-phase that cannot be followed means a pole on the axis, and counts as unstable.
+`synth.verify.winding.trace` does for one.  So delays, waves and light damping are followed exactly;
+a phase that cannot be followed means a pole on the axis, and counts as unstable.
 """
 
 from __future__ import annotations

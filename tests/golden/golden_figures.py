@@ -8,6 +8,7 @@ no evaluation.  `figures.csv` and `commands.csv` hold what they were, `make.py` 
 from __future__ import annotations
 
 import math
+import sys
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -19,18 +20,18 @@ import numpy as np
 
 import stillhook as sh
 from models import HookMotion, SeaSpectrum, build_plant, fixed_top_modes, line_response
-from models.drag import consistent_drag, energy_equivalent, stochastic_equivalent
-from models.excitation import SpectrumMotion
-from models.extremes import gumbel_maximum, pareto_maximum
-from models.metrics import most_probable_maximum, peak_factor
-from models.plant import MEAN_LOSSES
-from models.quadrature import spectral_nodes
-from models.seas.spreading import Spreading
-from models.vessels.convention import Convention
-from stillhook.controllers import controller_by_name
-from synth.assess import Assessment
-from synth.question import pose
-from synth.structure_question import pose_structure
+from models.basics.metrics import most_probable_maximum, peak_factor
+from models.basics.quadrature import spectral_nodes
+from models.operation.excitation import SpectrumMotion
+from models.plant.drag import consistent_drag, energy_equivalent, stochastic_equivalent
+from models.plant.plant import MEAN_LOSSES
+from models.run.extremes import gumbel_maximum, pareto_maximum
+from models.sea.spreading import Spreading
+from models.vessel.convention import Convention
+from stillhook.controllers.controllers import controller_by_name
+from synth.loop.assess import Assessment
+from synth.question.question import pose
+from synth.question.structure_question import pose_structure
 
 HERE = Path(__file__).parent
 
@@ -218,7 +219,10 @@ def thesis(found: Figures) -> None:
     own = pose(changed("thesis-1975", payload__drag={"method": "stochastic"}))
     found.put("thesis.own_drag_before", own.drag_before)
     found.put("thesis.own_payload_before", own.payload_rms_before)
-    study = sh.cable_study(one)
+    sys.path.insert(0, str(HERE.parents[1] / "notebooks"))
+    from cables import cable_study
+
+    study = cable_study(one)
     for number, cable in enumerate(study.cables):
         found.put(f"thesis.cables.{number}.stiffness", cable.case.rope.stiffness)
         found.put(f"thesis.cables.{number}.mass", cable.case.moving_mass)

@@ -1,0 +1,56 @@
+"""Wave number of a linear wave at any depth.
+
+Source: omega^2 = g k tanh(k d), Airy's theory.  The start is Guo's explicit formula (2002), within
+0.75 % at any depth; three Newton steps then reach the last digit.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from .tables import GRAVITY
+
+__all__ = ["wave_number"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def wave_number(omega: npt.ArrayLike, depth: float = math.inf) -> FloatArray:
+    """Return the wave number.
+
+    Parameters
+    ----------
+    omega
+        Frequencies, at least zero, any shape [rad/s].
+    depth
+        Water depth, infinite if left out [m].
+
+    Returns
+    -------
+    FloatArray
+        Wave numbers, same shape [rad/m].
+
+    Examples
+    --------
+    >>> round(float(wave_number(0.5)), 5), round(float(wave_number(0.5, depth=30.0)), 5)
+    (0.02549, 0.03342)
+    """
+    frequency = np.asarray(omega, dtype=np.float64)
+    deep = frequency**2 / GRAVITY
+    if math.isinf(depth):
+        return deep
+    # Scaled: y = k d solves x^2 = y tanh y, with x^2 = omega^2 d / g.
+    squared = deep * depth
+    x = np.sqrt(squared)
+    deficit = -np.expm1(-(np.maximum(x, 1e-100) ** 2.4908))
+    y = np.where(x > 0.0, squared / np.maximum(deficit, 1e-300) ** (1.0 / 2.4908), 0.0)
+    for _ in range(3):
+        t = np.tanh(y)
+        slope = t + y * (1.0 - t**2)
+        step = np.divide(y * t - squared, slope, out=np.zeros_like(y), where=slope > 0.0)
+        y = y - step
+    result: FloatArray = y / depth
+    return result

@@ -1,0 +1,221 @@
+"""How well a few repetitions know a mean, a probability or a rate: confidence intervals.
+
+The mean of independent values has Student's interval; a share the exact one of Clopper and Pearson
+(1934); the time until something happens, with some runs ended before it did, the product-limit
+curve of Kaplan and Meier (1958), and at a constant rate the chi-square interval of Epstein and
+Sobel (1953).  `models/run/metrics.py` applies them to runs that differ in their seed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .checks import InputError, check_finite, check_range, read_only
+
+__all__ = ["FallTime", "Interval", "Share", "fall_time", "mean_interval", "share"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Interval:
+    """A mean over seeds with its confidence interval, in `unit`.
+
+    Attributes
+    ----------
+    mean, low, high
+        The mean and the ends of its interval; the ends are NaN with a single value.
+    standard_deviation
+        Of the values, with n - 1 in the denominator; NaN with a single value.
+    count
+        Number of values; runs in which the quantity did not occur have none.
+    unit
+        The unit.
+    """
+
+    mean: float
+    low: float
+    high: float
+    standard_deviation: float
+    count: int
+    unit: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Share:
+    """How many of `total` runs something happened in, with the interval of its probability."""
+
+    count: int
+    total: int
+    low: float
+    high: float
+
+    @property
+    def value(self) -> float:
+        """The share itself, 0 to 1."""
+        return self.count / self.total
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FallTime:
+    """How long runs keep lock.
+
+    Attributes
+    ----------
+    falls
+        Number of runs that lost lock.
+    exposure
+        Time that all runs together kept it [s].
+    rate, rate_low, rate_high
+        Falls per second if they come at a constant rate, and its interval [1/s].
+    times, kept, kept_low, kept_high
+        Kaplan-Meier: at each time of a fall [s], the share of runs that still keep lock, and its
+        pointwise interval; NaN where it does not exist, as when all runs have fallen.
+    """
+
+    falls: int
+    exposure: float
+    rate: float
+    rate_low: float
+    rate_high: float
+    times: FloatArray
+    kept: FloatArray
+    kept_low: FloatArray
+    kept_high: FloatArray
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for name in ("times", "kept", "kept_low", "kept_high"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def mean(self) -> tuple[float, float, float]:
+        """Mean time to a fall at a constant rate, and its interval [s]; may be infinite."""
+        mean, low, high = (
+            1.0 / rate if rate > 0.0 else math.inf
+            for rate in (self.rate, self.rate_high, self.rate_low)
+        )
+        return mean, low, high
+
+
+def mean_interval(
+    values: Sequence[float] | FloatArray, *, unit: str = "", confidence: float = 0.95
+) -> Interval:
+    """Return the mean of independent values with Student's interval; NaN values are left out.
+
+    Examples
+    --------
+    >>> found = mean_interval([9.0, 10.0, 11.0])
+    >>> print(f"{found.mean:g} ({found.low:.3f} to {found.high:.3f})")
+    10 (7.516 to 12.484)
+    """
+    x = np.asarray(values, dtype=np.float64)
+    x = x[~np.isnan(x)]
+    n = x.size
+    mean = float(x.mean()) if n else math.nan
+    if n < 2 or not np.isfinite(x).all():
+        half = deviation = math.nan
+    else:
+        from scipy.special import stdtrit
+
+        deviation = float(x.std(ddof=1))
+        half = float(stdtrit(n - 1, 0.5 + 0.5 * confidence)) * deviation / math.sqrt(n)
+    return Interval(
+        mean=mean,
+        low=mean - half,
+        high=mean + half,
+        standard_deviation=deviation,
+        count=n,
+        unit=unit,
+    )
+
+
+def share(count: int, total: int, *, confidence: float = 0.95) -> Share:
+    """Return a share with the exact interval of Clopper and Pearson, which covers at least that.
+
+    Examples
+    --------
+    >>> found = share(2, 10)
+    >>> print(f"{found.value:g} ({found.low:.4f} to {found.high:.4f})")
+    0.2 (0.0252 to 0.5561)
+    """
+    from scipy.special import betaincinv
+
+    check_range("share", "total", total, low=1)
+    check_range("share", "count", count, low=0, high=total)
+    tail = 0.5 * (1.0 - confidence)
+    low = betaincinv(count, total - count + 1, tail) if count else 0.0
+    high = betaincinv(count + 1, total - count, 1.0 - tail) if count < total else 1.0
+    return Share(count=count, total=total, low=float(low), high=float(high))
+
+
+def fall_time(times: npt.ArrayLike, fell: npt.ArrayLike, *, confidence: float = 0.95) -> FallTime:
+    """Return how long runs keep lock, those that kept it to their end taken as censored.
+
+    The interval of the rate is that of falls counted over a fixed exposure, from chi-square with
+    2 r degrees of freedom at the low end and 2 r + 2 at the high one; without any fall the high
+    end alone says something (three falls in the exposure, roughly).
+
+    Parameters
+    ----------
+    times
+        Time that each run kept lock [s]: until it fell, or until it ended.
+    fell
+        Whether it fell.
+
+    Raises
+    ------
+    InputError
+        If there is no run, or a time is negative.
+
+    Examples
+    --------
+    >>> found = fall_time([300.0, 1200.0, 900.0, 1200.0], [True, False, True, False])
+    >>> print(f"{found.rate:.2e} per second, {found.rate_low:.2e} to {found.rate_high:.2e}")
+    5.56e-04 per second, 6.73e-05 to 2.01e-03
+    >>> found.times.tolist(), found.kept.tolist()
+    ([300.0, 900.0], [0.75, 0.5])
+    """
+    from scipy.special import chdtri, ndtri
+
+    kept = check_finite("fall time", "times", times)
+    falls = np.asarray(fell, dtype=np.bool_)
+    if kept.ndim != 1 or kept.size == 0 or kept.shape != falls.shape or kept.min() < 0.0:
+        raise InputError(
+            "fall time: times must be at least 0 s, one for each run of at least one, "
+            f"got {kept!r} and {falls!r}"
+        )
+    r, exposure = int(falls.sum()), float(kept.sum())
+    tail = 0.5 * (1.0 - confidence)
+    if exposure > 0.0:
+        rate = r / exposure
+        low = float(chdtri(2 * r, 1.0 - tail)) / (2.0 * exposure) if r else 0.0
+        high = float(chdtri(2 * r + 2, tail)) / (2.0 * exposure)
+    else:
+        rate, low, high = (math.inf, 0.0, math.inf) if r else (0.0, 0.0, math.inf)
+    at = np.unique(kept[falls])
+    there = (kept >= at[:, np.newaxis]).sum(axis=1)  # still running just before
+    fallen = ((kept == at[:, np.newaxis]) & falls).sum(axis=1)
+    remain = np.cumprod(1.0 - fallen / there)
+    # Greenwood's variance of ln(-ln S); where none remain it does not exist, and the ends are NaN.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        variance = np.cumsum(fallen / (there * (there - fallen)))
+        half = float(ndtri(1.0 - tail)) * np.sqrt(variance) / np.abs(np.log(remain))
+        kept_low, kept_high = remain ** np.exp(half), remain ** np.exp(-half)
+    nothing = remain == 0.0
+    return FallTime(
+        falls=r,
+        exposure=exposure,
+        rate=rate,
+        rate_low=low,
+        rate_high=high,
+        times=at,
+        kept=remain,
+        kept_low=np.where(nothing, math.nan, kept_low),
+        kept_high=np.where(nothing, math.nan, kept_high),
+    )

@@ -1,0 +1,210 @@
+"""The statistics of a spectrum: moments, periods, significant and extreme values.
+
+A zero-mean Gaussian process is known by its one-sided variance density S(omega).  Its spectral
+moments m_n, the integrals of omega^n S, give its rms sqrt(m0), its mean zero-up-crossing period
+T_z = 2 pi sqrt(m0 / m2) (Rice 1944) and, with maxima taken as Rayleigh distributed, the most
+probable maximum in a given time, sigma sqrt(2 ln(T / T_z)) (Longuet-Higgins 1952; DNV-RP-C205,
+3.3.4).  "rms" is the standard deviation, "significant" is 4 sigma for a height (double amplitude)
+and 2 sigma for an amplitude.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .checks import check_range
+from .quadrature import Quadrature
+
+__all__ = [
+    "THREE_HOURS",
+    "SpectrumStatistics",
+    "moments",
+    "most_probable_maximum",
+    "peak_factor",
+    "spectrum_statistics",
+    "zero_crossing_period",
+]
+
+FloatArray = npt.NDArray[np.float64]
+Density = Callable[[FloatArray], npt.ArrayLike]
+
+THREE_HOURS = 10800.0
+"""The usual exposure of a sea state [s]."""
+
+
+def moments(
+    quadrature: Quadrature, density: Density | npt.ArrayLike, orders: Sequence[float] = (0, 1, 2, 4)
+) -> FloatArray:
+    """Return spectral moments, the integrals of omega^n S(omega).
+
+    Parameters
+    ----------
+    quadrature
+        Nodes and weights; the moments are those of the band that the nodes cover.
+    density
+        One-sided variance density [u^2 s/rad]: a function of omega, or its values at the nodes.
+    orders
+        The orders n.
+
+    Returns
+    -------
+    FloatArray
+        One moment per order [u^2 (rad/s)^n].
+    """
+    values = density(quadrature.omega) if callable(density) else density
+    powers = quadrature.omega ** np.asarray(orders, dtype=np.float64)[:, np.newaxis]
+    return quadrature.integrate(powers * np.asarray(values, dtype=np.float64))
+
+
+def zero_crossing_period(m0: float, m2: float) -> float:
+    """Return the mean zero-up-crossing period T_z = 2 pi sqrt(m0 / m2) [s].
+
+    A signal that does not move (m2 = 0) never crosses zero: its period is infinite.
+
+    Examples
+    --------
+    A sine of 0.5 rad/s has m2 = 0.25 m0 and a period of 4 pi.
+
+    >>> round(zero_crossing_period(2.0, 0.5) / math.pi, 12)
+    4.0
+    >>> zero_crossing_period(0.0, 0.0)
+    inf
+    """
+    first = check_range("spectrum", "m0", m0, low=0.0)
+    second = check_range("spectrum", "m2", m2, low=0.0)
+    return math.inf if second == 0.0 else 2.0 * math.pi * math.sqrt(first / second)
+
+
+def peak_factor(t_z: float, duration: float = THREE_HOURS) -> float:
+    r"""Return the most probable maximum in units of sigma, :math:`k = \sqrt{2 \ln(T / T_z)}`.
+
+    The formula is asymptotic in the number of crossings, T / T_z.  It is held at one sigma where
+    that number is below :math:`e^{1/2}`: there is then no maximum worth the name, and no jump.
+
+    Parameters
+    ----------
+    t_z
+        Mean zero-crossing period [s], above zero; infinite for a signal at rest.
+    duration
+        Exposure time T [s], above zero.
+
+    Raises
+    ------
+    InputError
+        If a period or a duration is not above zero.
+
+    Examples
+    --------
+    Three hours, that is exp(k^2/2) crossings:
+
+    >>> for t_z in (4.0, 6.0, 8.0, 10.8, 15.0):
+    ...     print(f"T_z {t_z:4.1f} s, k {peak_factor(t_z):.4f}")
+    T_z  4.0 s, k 3.9752
+    T_z  6.0 s, k 3.8718
+    T_z  8.0 s, k 3.7968
+    T_z 10.8 s, k 3.7169
+    T_z 15.0 s, k 3.6275
+    >>> peak_factor(math.inf)
+    1.0
+    """
+    time = check_range("extremes", "duration", duration, low=0.0, unit="s", open_low=True)
+    if t_z == math.inf:
+        return 1.0
+    period = check_range("extremes", "t_z", t_z, low=0.0, unit="s", open_low=True)
+    return math.sqrt(max(2.0 * math.log(time / period), 1.0))
+
+
+def most_probable_maximum(sigma: float, t_z: float, duration: float = THREE_HOURS) -> float:
+    """Return the most probable maximum of a Gaussian signal [the unit of `sigma`].
+
+    Parameters
+    ----------
+    sigma
+        Standard deviation.
+    t_z, duration
+        As in :func:`peak_factor` [s].
+
+    Examples
+    --------
+    >>> round(most_probable_maximum(0.5, 10.8), 4)
+    1.8585
+    """
+    return check_range("extremes", "sigma", sigma, low=0.0) * peak_factor(t_z, duration)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpectrumStatistics:
+    """What a spectrum says about its signal, in the signal's unit u.
+
+    Attributes
+    ----------
+    m0, m1, m2, m4
+        Spectral moments over `band` [u^2 (rad/s)^n].  The m4 of a wave spectrum with an omega^-5
+        tail grows with the logarithm of the band's upper end, so it means nothing without it.
+    band
+        The band of the integrals [rad/s].
+    """
+
+    m0: float
+    m1: float
+    m2: float
+    m4: float
+    band: tuple[float, float]
+
+    @property
+    def rms(self) -> float:
+        """Standard deviation [u]."""
+        return math.sqrt(self.m0)
+
+    @property
+    def significant_height(self) -> float:
+        """Significant double amplitude, 4 sigma [u]."""
+        return 4.0 * self.rms
+
+    @property
+    def significant_amplitude(self) -> float:
+        """Significant amplitude, 2 sigma [u]."""
+        return 2.0 * self.rms
+
+    @property
+    def zero_crossing_period(self) -> float:
+        """Mean zero-up-crossing period T_z [s]."""
+        return zero_crossing_period(self.m0, self.m2)
+
+    @property
+    def mean_period(self) -> float:
+        """Mean period T_1 = 2 pi m0 / m1 [s]."""
+        return math.inf if self.m1 == 0.0 else 2.0 * math.pi * self.m0 / self.m1
+
+    @property
+    def crest_period(self) -> float:
+        """Mean period between crests, 2 pi sqrt(m2 / m4) [s]; depends on the band, see `m4`."""
+        return zero_crossing_period(self.m2, self.m4)
+
+    def most_probable_maximum(self, duration: float = THREE_HOURS) -> float:
+        """Most probable maximum in `duration` [s], in three hours unless told otherwise [u]."""
+        return most_probable_maximum(self.rms, self.zero_crossing_period, duration)
+
+
+def spectrum_statistics(
+    quadrature: Quadrature, density: Density | npt.ArrayLike, band: tuple[float, float]
+) -> SpectrumStatistics:
+    """Return the statistics of a spectrum over a band that `quadrature` covers.
+
+    Examples
+    --------
+    White noise of density 3 u^2 s/rad up to 2 rad/s:
+
+    >>> from models.basics.quadrature import spectral_nodes
+    >>> q = spectral_nodes(1e-9, 2.0)
+    >>> s = spectrum_statistics(q, lambda omega: 3.0 + 0.0 * omega, (0.0, 2.0))
+    >>> round(s.m0, 6), round(s.m2, 6), round(s.rms, 6)
+    (6.0, 8.0, 2.44949)
+    """
+    m0, m1, m2, m4 = (float(m) for m in moments(quadrature, density))
+    return SpectrumStatistics(m0=m0, m1=m1, m2=m2, m4=m4, band=band)

@@ -1,0 +1,134 @@
+"""The axis on which quadrature panels live, and how it is cut into panels.
+
+Behind :mod:`models.basics.quadrature`: log-frequency, optionally continued to zero and to infinity,
+cut at kinks and refined towards poles.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from .checks import InputError, check_range
+
+__all__ = ["FrequencyAxis", "cut_panels", "distance", "longest_panel"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class FrequencyAxis:
+    """The axis t on which panels live: t = ln(omega / low), continued smoothly to 0 and infinity.
+
+    Below `low` the map is omega = low (1 + t), above `high` it is omega = high / (1 - t + t_high);
+    both join the logarithm with the same slope, and each panel lies in one piece only.
+    """
+
+    def __init__(self, low: float, high: float, half_line: bool) -> None:
+        self.low = check_range("quadrature", "low", low, low=0.0, unit="rad/s", open_low=True)
+        self.high = check_range(
+            "quadrature", "high", high, low=self.low, unit="rad/s", open_low=True
+        )
+        self.end = math.log(self.high / self.low)
+        self.half_line = half_line
+
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """Where the axis begins, changes its map and ends."""
+        return (-1.0, 0.0, self.end, self.end + 1.0) if self.half_line else (0.0, self.end)
+
+    def cut(self, omega: complex) -> complex:
+        """Return t at a (complex) frequency."""
+        size = abs(omega)
+        if self.half_line and size < self.low:
+            return omega / self.low - 1.0
+        if self.half_line and size > self.high:
+            return self.end + 1.0 - self.high / omega
+        return cmath.log(omega / self.low)
+
+    def rule(self, a: float, b: float, count: int) -> tuple[FloatArray, FloatArray]:
+        """Return nodes [rad/s] and weights [rad/s] of one panel."""
+        x, w = _gauss_legendre(count)
+        t = 0.5 * (a + b) + 0.5 * (b - a) * x
+        if b <= 0.0:
+            omega, slope = self.low * (1.0 + t), np.full_like(t, self.low)
+        elif a >= self.end:
+            inverse = 1.0 / (1.0 - (t - self.end))
+            omega, slope = self.high * inverse, self.high * inverse**2
+        else:
+            omega = self.low * np.exp(t)
+            slope = omega
+        return omega, 0.5 * (b - a) * w * slope
+
+    def poles(self, poles: Iterable[complex]) -> list[complex]:
+        """Return poles s as points t with a positive imaginary part."""
+        marks = []
+        for pole in poles:
+            s = complex(pole)
+            if s == 0.0:
+                continue
+            if s.real == 0.0 or not math.isfinite(abs(s)):
+                raise InputError(
+                    "quadrature: poles must be finite and off the imaginary axis, or the "
+                    f"integral diverges; got {s:.6g} rad/s"
+                )
+            marks.append(self.cut(complex(abs(s.imag), abs(s.real))))
+        return marks
+
+
+def cut_panels(
+    axis: FrequencyAxis,
+    splits: Iterable[float],
+    marks: Sequence[complex],
+    longest: float,
+    clearance: float,
+) -> list[tuple[float, float]]:
+    """Cut the axis into panels: at the splits, at most `longest`, and short near the poles.
+
+    A panel's half-length is at most `clearance` times its distance from each pole.
+    """
+    first, last = axis.edges[0], axis.edges[-1]
+    cuts = {*axis.edges, *(p.real for p in marks)}
+    for omega in splits:
+        value = check_range("quadrature", "splits", omega, low=0.0, unit="rad/s")
+        if value > 0.0:
+            cuts.add(axis.cut(complex(value)).real)
+    inside: list[float] = []
+    for t in sorted(c for c in cuts if first <= c <= last):
+        # Two cuts closer than rounding would only make an empty panel; the axis's own stay.
+        if not inside or t - inside[-1] > 1e-10 or t in axis.edges:
+            inside.append(t)
+    stack = []
+    for a, b in pairwise(inside):
+        edges = np.linspace(a, b, math.ceil((b - a) / longest) + 1)
+        stack += [(float(x), float(y)) for x, y in pairwise(edges)]
+    done = []
+    while stack:
+        a, b = stack.pop()
+        if any(0.5 * (b - a) > clearance * distance(a, b, p) * (1 + 1e-9) for p in marks):
+            stack += [(a, 0.5 * (a + b)), (0.5 * (a + b), b)]
+        else:
+            done.append((a, b))
+    return sorted(done)
+
+
+def distance(a: float, b: float, mark: complex) -> float:
+    """Return how far a point of the complex t plane lies from the panel [a, b]."""
+    return math.hypot(max(a - mark.real, mark.real - b, 0.0), mark.imag)
+
+
+def longest_panel(panels_per_decade: float) -> float:
+    """Return the length of a panel on the axis, given how many make a decade."""
+    check_range("quadrature", "panels_per_decade", panels_per_decade, low=1.0, high=1000.0)
+    return math.log(10.0) / panels_per_decade
+
+
+@lru_cache(maxsize=64)
+def _gauss_legendre(count: int) -> tuple[FloatArray, FloatArray]:
+    x, w = np.polynomial.legendre.leggauss(count)
+    return x, w

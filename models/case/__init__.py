@@ -1,0 +1,1 @@
+"""The case: all sections of a case file together, read, checked and written again."""

@@ -1,0 +1,197 @@
+"""`Case`: one vessel, one sea, one rope, one payload, one winch, and what a design must respect.
+
+A case is the frozen image of a case file.  It is made through one door, `Case.from_dict`, which
+checks everything, words every error for the user, and warns about implausible physics;
+`replace` changes fields by their dotted paths and goes through the same door again.  Quantities
+that hang on several sections (static tension and torque, the drum's radius for the rope paid
+out) are properties here.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path as FilePath
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
+
+from ..basics.checks import InputError
+from ..basics.physics_warning import PhysicsWarning
+from ..casefile.data_file import FOLDER
+from ..casefile.messages import Path, describe, line_of, message_line
+from ..casefile.paths import plain, replaced
+from ..casefile.section import Section, problems
+from ..casefile.yaml_lines import yaml_text
+from ..rig.limits import GainBounds, Gains, Limits
+from ..rig.rig import Payload, Rope
+from ..rig.sensors import Sensors
+from ..rig.winch import Winch
+from .environment import Sea, Vessel
+from .plausibility import contradictions, remarks
+
+__all__ = ["Case", "PhysicsWarning"]
+
+
+class Case(Section):
+    """A case: all that a design needs to know, checked and frozen."""
+
+    stillhook: Literal[1]
+    """Version of the case format."""
+    name: Annotated[str, Field(min_length=1, max_length=100)]
+    """Name of the case."""
+    description: str = ""
+    """What the case is, in a sentence or two."""
+    sources: dict[str, str] | None = None
+    """Where the figures come from: free text under free keys."""
+    sea: Sea
+    """The sea state."""
+    vessel: Vessel
+    """The vessel: the heave of its hook, or its RAOs and the hook's place."""
+    rope: Rope
+    """The rope between the drum and the payload."""
+    payload: Payload
+    """The load at the lower end of the rope."""
+    winch: Winch
+    """Drum, gearbox, motor and drive."""
+    sensors: Sensors = Sensors()
+    """What is measured, and how."""
+    limits: Limits = Limits()
+    """What a design has to respect."""
+    gains: Gains | None = None
+    """Gains in use, if any: command = set-point - A (a P'' + a1 P' + a2 P), P in metres, the
+    command in V (DC motor), rad/s (AC with a speed regulator) or N m (AC without)."""
+    gain_bounds: GainBounds | None = None
+    """Lowest and highest value of the gains, if bounded."""
+
+    _source: str = PrivateAttr(default="")
+
+    @model_validator(mode="after")
+    def _check(self) -> Case:
+        found = contradictions(self)
+        if found:
+            raise problems(*found)
+        return self
+
+    @classmethod
+    def from_dict(
+        cls,
+        data: Mapping[str, Any],
+        *,
+        source: str = "case",
+        lines: Mapping[Path, int] | None = None,
+        folder: str | PathLike[str] | None = None,
+    ) -> Case:
+        """Make a case from the contents of a case file.
+
+        Parameters
+        ----------
+        data
+            Sections and fields, as in the file: quantities in SI or as text with a unit.
+        source
+            Name of the file, for the messages.
+        lines
+            Line number of each path in the file, where known.
+        folder
+            Folder that relative paths of files in the case start from; the working directory if
+            left out.
+
+        Raises
+        ------
+        InputError
+            One line for each error, all at once.
+
+        Warns
+        -----
+        PhysicsWarning
+            For each implausible figure.
+        """
+        try:
+            context = {FOLDER: None if folder is None else FilePath(folder)}
+            case = cls.model_validate(data, context=context)
+        except ValidationError as error:
+            raise InputError(describe(error, cls, source=source, lines=lines)) from error
+        case._source = source
+        for path, text in remarks(case):
+            where = tuple(path.split("."))
+            message = message_line(source, line_of(where, lines), where, text)
+            warnings.warn(message, PhysicsWarning, stacklevel=2)
+        return case
+
+    def replace(self, changes: Mapping[str, Any]) -> Case:
+        """Return a case with some fields changed, checked like a file.
+
+        Parameters
+        ----------
+        changes
+            New values by dotted path: `{"limits.max_sensitivity": 2.0}`.  A value may be a
+            number in SI, a text with a unit, or a whole section as a dict; None takes the field
+            back to its default; an entry of a list is addressed by its index
+            (`vessel.heave_rao.amplitude.3`).  Where a section offers alternatives
+            (`rope.modulus` or `rope.axial_stiffness`), setting one drops the other.
+
+        Raises
+        ------
+        InputError
+            If a path is unknown, or the changed case is not valid.
+
+        Examples
+        --------
+        >>> from models import load_case
+        >>> case = load_case("thesis-1975").replace({"rope.length": "1000 m"})
+        >>> round(case.rope.stiffness)
+        160000
+        """
+        source = self.source or self.name
+        return Case.from_dict(replaced(self.to_dict(), Case, changes, source), source=source)
+
+    @property
+    def source(self) -> str:
+        """Name of the file or bundled case that this came from, for messages."""
+        return self._source
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the case as plain dicts, lists, texts and SI numbers, without empty fields."""
+        tree: dict[str, Any] = plain(self)
+        return tree
+
+    def to_yaml(self) -> str:
+        """Return the case as YAML text in SI; reading it gives an equal case."""
+        return yaml_text(self.to_dict())
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the contents agree, wherever the two cases came from."""
+        return isinstance(other, Case) and self.to_dict() == other.to_dict()
+
+    def __hash__(self) -> int:
+        return hash(self.model_dump_json())
+
+    @property
+    def drum_radius(self) -> float:
+        """Pitch radius of the drum with the rope paid out [m]."""
+        return self.winch.drum.radius_at(self.rope.length, self.rope.diameter)
+
+    @property
+    def static_tension(self) -> float:
+        """Rope tension at the winch at rest: payload and rope in water [N]."""
+        return self.payload.submerged_weight + self.rope.submerged_weight
+
+    @property
+    def static_torque(self) -> float:
+        """Motor torque that holds the static tension, without losses [N m]."""
+        return self.static_tension * self.drum_radius / self.winch.gearbox.ratio
+
+    @property
+    def static_torque_budget(self) -> float:
+        """Motor torque that raises the static tension through the gear's losses [N m]."""
+        return self.static_torque / self.winch.gearbox.efficiency
+
+    @property
+    def moving_mass(self) -> float:
+        """Mass of the one-spring model: payload, added mass, and the rope's share [kg].
+
+        A third of the rope, or all of it with the thesis's lumping.
+        """
+        share = 1.0 if self.rope.lumping == "thesis" else 1.0 / 3.0
+        return self.payload.virtual_mass + share * self.rope.mass

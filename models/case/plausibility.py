@@ -1,0 +1,123 @@
+"""Checks across sections: what cannot be (errors), and what can hardly be (warnings).
+
+The static load comes first: a drive whose rating lies below it can hold nothing, and no gains
+will change that.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from ..basics.checks import InputError
+from ..rig.winch import DCMotor
+
+if TYPE_CHECKING:
+    from .case import Case
+
+__all__ = ["contradictions", "remarks"]
+
+Finding = tuple[str, str]
+
+
+def contradictions(case: Case) -> list[Finding]:
+    """Return what makes the case impossible, as pairs of a dotted path and a sentence."""
+    try:
+        overloads = _overloads(case)
+    except InputError as error:
+        return [("winch.drum", str(error))]
+    found = _static_limits(case)
+    if case.limits.drive == "enforce":
+        found += [(at, f"must be at least {load}, got {rating}") for at, load, rating in overloads]
+    return found
+
+
+def remarks(case: Case) -> list[Finding]:
+    """Return what is implausible, as pairs of a dotted path and a sentence."""
+    found: list[Finding] = []
+    sea, delay = case.sea, case.sensors.telemetry.delay
+    if sea.steepness > sea.breaking_steepness:
+        text = (
+            f"{sea.significant_height:g} m with a peak period of {sea.spectral_peak_period:.3g} s "
+            f"is steeper than breaking: steepness 2 pi H_s/(g T_p^2) is {sea.steepness:.3f}, seas "
+            f"stay below {sea.breaking_steepness:.3f} (DNV-RP-C205)"
+        )
+        found.append(("sea.significant_height", text))
+    if delay > sea.spectral_peak_period / 4.0:
+        text = (
+            f"{delay:g} s is more than a quarter of the sea's peak period, "
+            f"{sea.spectral_peak_period:.3g} s: feedback cannot act on the waves"
+        )
+        found.append(("sensors.telemetry.delay", text))
+    table = case.vessel.heave_rao
+    phase = (table.phase if table is not None else None) or ()
+    if any(abs(angle) > 2.0 * math.pi for angle in phase):
+        largest = max(phase, key=abs)
+        text = (
+            f"{largest:g} rad is more than a turn: numbers are in radians, write '{largest:g} deg' "
+            "for degrees"
+        )
+        found.append(("vessel.heave_rao.phase", text))
+    motor, drive = case.winch.motor, case.winch.drive
+    if isinstance(motor, DCMotor):
+        back_emf = motor.back_emf_constant * case.winch.speed_limit
+        if drive.voltage is not None and drive.voltage < back_emf:
+            text = (
+                f"{drive.voltage:g} V is below the back-EMF at the highest speed, "
+                f"{back_emf:.4g} V: the motor cannot reach it"
+            )
+            found.append(("winch.drive.voltage", text))
+    brake = case.winch.brake
+    if brake is not None and brake.torque is not None and brake.torque < case.static_torque:
+        text = (
+            f"{brake.torque / 1e3:.4g} kN m is below the static torque at the motor, "
+            f"{case.static_torque / 1e3:.4g} kN m: the brake slips under the load"
+        )
+        found.append(("winch.brake.torque", text))
+    if case.limits.drive == "report":
+        found += [(at, f"{rating} is below {load}") for at, load, rating in _overloads(case)]
+    return found
+
+
+def _overloads(case: Case) -> list[tuple[str, str, str]]:
+    """Return the drive ratings below the static load: field, the static load, the rating."""
+    drive, constant = case.winch.drive, case.winch.torque_constant
+    gear, static = case.winch.gearbox, case.static_torque_budget
+    why = (
+        f"rope tension {case.static_tension / 1e3:.4g} kN on a drum radius of "
+        f"{case.drum_radius:.4g} m through a gear of {gear.ratio:g}"
+        + (f" and efficiency {gear.efficiency:g}" if gear.efficiency < 1.0 else "")
+    )
+    found = []
+    for name in ("torque_continuous", "torque_peak"):
+        rating = getattr(drive, name)
+        if rating < static:
+            load = f"the static motor torque, {static / 1e3:.4g} kN m ({why})"
+            found.append((f"winch.drive.{name}", load, f"{rating / 1e3:.4g} kN m"))
+    for name in ("current_continuous", "current_peak"):
+        rating = getattr(drive, name)
+        if rating is not None and rating < static / constant:
+            load = f"the static motor current, {static / constant:.4g} A ({why})"
+            found.append((f"winch.drive.{name}", load, f"{rating:.4g} A"))
+    return found
+
+
+def _static_limits(case: Case) -> list[Finding]:
+    """Return the rope tension limits that the tension at rest breaks already."""
+    found = []
+    limits, tension = case.limits, case.static_tension / 1e3
+    if limits.rope_tension_peak is not None and limits.rope_tension_peak / 1e3 < tension:
+        text = (
+            f"must be at least the static rope tension at the winch, {tension:.4g} kN, "
+            f"got {limits.rope_tension_peak / 1e3:.4g} kN"
+        )
+        found.append(("limits.rope_tension_peak", text))
+    if limits.minimum_tension is not None:
+        lowest = case.payload.submerged_weight / 1e3
+        if limits.minimum_tension / 1e3 > lowest:
+            text = (
+                f"must be at most the static tension at the payload, {lowest:.4g} kN, "
+                f"got {limits.minimum_tension / 1e3:.4g} kN"
+            )
+            found.append(("limits.minimum_tension", text))
+    return found

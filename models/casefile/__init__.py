@@ -1,0 +1,1 @@
+"""What a case file is made of: quantities with units, sections, messages, paths, YAML and TOML."""

@@ -1,0 +1,1 @@
+"""The hook's motion: spectra, numbers and time series from vessel and sea."""

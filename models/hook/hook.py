@@ -1,0 +1,319 @@
+r"""The hook's motion: sea times vessel, as spectra, as numbers and as a time series.
+
+Third room in the data's way: what the hook does before any winch acts on it.  The displacement's
+spectrum is |RAO|^2 S; velocity and acceleration follow by omega^2 and omega^4.  All three use the
+same band, and so does the time series, so that statistics of a long record meet the spectrum's.
+Sea and RAO are functions of the waves' own frequency; on a vessel that moves through the water the
+hook's spectra are functions of the frequency at which it meets them (`models.hook.encounter`).
+
+A record is a sum of harmonics with random amplitude, that is independent Gaussian cosine and sine
+parts of variance S(omega) d omega each (Rice 1944; Tucker, Challenor and Carter 1984): the record
+is then an exact sample of the Gaussian process, groups and extremes included, which harmonics of
+fixed amplitude and random phase are not.  Their spacing is 2 pi over a period of at least twice
+the record's length, so the record does not repeat itself.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError, check_range, read_only
+from ..basics.metrics import SpectrumStatistics, spectrum_statistics
+from ..basics.physics_warning import PhysicsWarning
+from ..basics.quadrature import Quadrature, adaptive_nodes
+from ..sea.sea import SeaSpectrum
+from ..vessel.hook_operator import speed_remark
+from ..vessel.vessel import HeaveRao, OutsideShare
+from .encounter import Encounter, MetSpectrum
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+
+__all__ = ["HookMotion", "HookRecord"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_MOTIONS = ("displacement", "velocity", "acceleration")
+
+# A Fourier transform whose length has a larger prime factor takes up to twenty times as long.
+_LARGEST_FACTOR = 300
+
+# Above this share of the displacement variance from outside the RAO's table the user is told.
+_SHARE_TO_WARN = 0.05
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HookRecord:
+    """A time series of the hook's vertical motion, positive up.
+
+    Attributes
+    ----------
+    time
+        Times from zero in equal steps (n,) [s].
+    displacement, velocity, acceleration
+        The motion and its exact derivatives (n,) [m], [m/s], [m/s2].
+    seed
+        The seed that it was drawn with.
+    """
+
+    time: FloatArray
+    displacement: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    seed: int
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for name in ("time", *_MOTIONS):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def step(self) -> float:
+        """Time step [s]."""
+        return float(self.time[1] - self.time[0])
+
+    @property
+    def duration(self) -> float:
+        """Time from the first sample to the last [s]."""
+        return float(self.time[-1] - self.time[0])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HookMotion:
+    """Vertical motion of the hook in a sea.
+
+    Attributes
+    ----------
+    sea
+        The sea's spectrum.
+    rao
+        Heave of the hook per metre of wave.
+    encounter
+        How the waves are met on a vessel that moves through the water, if it does.
+
+    Examples
+    --------
+    >>> sea = SeaSpectrum(kind="bretschneider-1975", significant_height=2.0, significant_period=8.0)
+    >>> still = HeaveRao(omega=[0.3, 2.0], amplitude=[0.5, 0.5], beyond="hold", below="hold")
+    >>> motion = HookMotion(sea=sea, rao=still)
+    >>> round(motion.displacement.rms / sea.statistics.rms, 9)
+    0.5
+    """
+
+    sea: SeaSpectrum
+    rao: HeaveRao
+    encounter: Encounter | None = None
+
+    @classmethod
+    def from_case(cls, case: Case, *, warn: bool = True) -> HookMotion:
+        """Return the hook motion of a case.
+
+        Parameters
+        ----------
+        case
+            The case.
+        warn
+            Whether to warn if much of the motion lies outside the RAO's table; not where the
+            case's user has been told before.
+        """
+        motion = cls(
+            sea=SeaSpectrum.from_case(case),
+            rao=HeaveRao.from_case(case),
+            encounter=Encounter.from_case(case),
+        )
+        if warn:
+            remark = speed_remark(case)
+            if remark is not None:
+                warnings.warn(f"{case.source or case.name}: {remark}", PhysicsWarning, stacklevel=2)
+            motion.warn_if_outside()
+        return motion
+
+    def scaled(self, significant_height: float) -> HookMotion:
+        """Return the motion in the same sea at another H_s [m]."""
+        return replace(self, sea=self.sea.scaled(significant_height))
+
+    def density(self, omega: npt.ArrayLike) -> FloatArray:
+        """Return the displacement's one-sided variance density [m^2 s/rad] at `omega` [rad/s]."""
+        if self.met is not None:
+            return self.met.density(omega)
+        result: FloatArray = self.rao.gain(omega) ** 2 * self.sea.density(omega)
+        return result
+
+    def __call__(self, omega: npt.ArrayLike) -> FloatArray:
+        """Return :meth:`density`."""
+        return self.density(omega)
+
+    def velocity_density(self, omega: npt.ArrayLike) -> FloatArray:
+        """Return the velocity's variance density [(m/s)^2 s/rad] at `omega` [rad/s]."""
+        return self._density(omega, 1)
+
+    def acceleration_density(self, omega: npt.ArrayLike) -> FloatArray:
+        """Return the acceleration's variance density [(m/s2)^2 s/rad] at `omega` [rad/s]."""
+        return self._density(omega, 2)
+
+    @cached_property
+    def met(self) -> MetSpectrum | None:
+        """The displacement's spectrum over the frequency of encounter; None on a vessel at rest."""
+        if self.encounter is None:
+            return None
+        rao = self.rao if self.encounter.operators is None else None
+        return self.encounter.met(
+            self.sea.density, self.sea.band, rao=rao, splits=self._wave_splits
+        )
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Band of the spectra and of the time series: the sea's, or what is met of it [rad/s]."""
+        return self.sea.band if self.met is None else self.met.band
+
+    @property
+    def splits(self) -> tuple[float, ...]:
+        """Frequencies at which a quadrature has to begin a new panel [rad/s]."""
+        return self._wave_splits if self.met is None else self.met.splits
+
+    @property
+    def _wave_splits(self) -> tuple[float, ...]:
+        low, high = self.sea.band
+        return tuple(sorted(w for w in {*self.sea.splits, *self.rao.splits} if low < w < high))
+
+    @cached_property
+    def quadrature(self) -> Quadrature:
+        """Nodes on which the moments of all three motions are accurate to 1e-9."""
+        powers = np.array([[0.0], [1.0], [2.0], [3.0], [4.0], [5.0], [6.0], [8.0]])
+        return adaptive_nodes(
+            lambda omega: omega**powers * self.density(omega),
+            *self.band,
+            splits=self.splits,
+            rtol=1e-9,
+        )
+
+    @cached_property
+    def displacement(self) -> SpectrumStatistics:
+        """Statistics of the displacement [m]."""
+        return spectrum_statistics(self.quadrature, self.density, self.band)
+
+    @cached_property
+    def velocity(self) -> SpectrumStatistics:
+        """Statistics of the velocity [m/s]."""
+        return spectrum_statistics(self.quadrature, self.velocity_density, self.band)
+
+    @cached_property
+    def acceleration(self) -> SpectrumStatistics:
+        """Statistics of the acceleration [m/s2].
+
+        Its periods are set by the band's upper end where the RAO does not fall off beyond its
+        table: the omega^-5 tail of a sea leaves an acceleration spectrum that falls with 1/omega.
+        """
+        return spectrum_statistics(self.quadrature, self.acceleration_density, self.band)
+
+    @cached_property
+    def outside(self) -> dict[str, OutsideShare]:
+        """Share of each variance from outside the RAO's table, by the motion's name."""
+        return {
+            name: self.rao.share_outside(self.sea, derivative=order)
+            for order, name in enumerate(_MOTIONS)
+        }
+
+    def warn_if_outside(self) -> None:
+        """Warn with a :class:`PhysicsWarning` if over 5 % of the variance is outside the table."""
+        share = self.outside["displacement"]
+        if share.total <= _SHARE_TO_WARN:
+            return
+        first, last = self.rao.splits[0], self.rao.splits[-1]
+        parts = [
+            f"{part:.1%} {side} {edge:g} rad/s is "
+            + ("cut" if choice == "zero" else f"extrapolated ({choice})")
+            for part, side, edge, choice in (
+                (share.below, "below", first, self.rao.below),
+                (share.beyond, "above", last, self.rao.beyond),
+            )
+            if part >= 0.0005
+        ]
+        warnings.warn(
+            f"{self.rao.owner}: {share.total:.1%} of the hook's displacement variance lies outside "
+            f"the table ({first:g} to {last:g} rad/s): {'; '.join(parts)}",
+            PhysicsWarning,
+            stacklevel=3,
+        )
+
+    def record(self, duration: float, *, step: float = 0.05, seed: int) -> HookRecord:
+        """Draw a time series of the motion.
+
+        The same seed gives the same waves on every vessel, the same motion at every step that
+        divides ten seconds, and the same beginning at every duration up to 100 peak periods.
+
+        Parameters
+        ----------
+        duration
+            Length [s]; the first and the last sample are at 0 and `duration`.
+        step
+            Time step [s].  The samples are those of the continuous motion whatever the step:
+            nothing of the band is lost or folded.
+        seed
+            Seed of the random numbers, not negative.
+
+        Raises
+        ------
+        InputError
+            If the duration is shorter than a step, or the seed is negative.
+        """
+        check_range("hook record", "step", step, low=0.0, unit="s", open_low=True)
+        check_range("hook record", "duration", duration, low=step, unit="s")
+        if seed < 0:
+            raise InputError(f"hook record: seed must be at least 0, got {seed!r}")
+        # Twice the length, so that it does not repeat; 200 lines below the peak resolve its shape.
+        peak = self.sea.peak_frequency if self.met is None else self.met.peak_frequency
+        wanted = max(2.0 * duration, 200.0 * 2.0 * math.pi / peak)
+        steps = math.ceil(10.0 * _transformable(math.ceil(wanted / 10.0)) / step - 1e-6)
+        # The transform's own step has to resolve the band's upper end.
+        finer = math.floor(self.band[1] * step / math.pi) + 1
+        spacing = 2.0 * math.pi / (steps * step)
+        lines = math.floor(self.band[1] / spacing)
+        omega = spacing * np.arange(1.0, lines + 1.0)
+        parts = np.random.default_rng(seed).standard_normal((lines, 2))
+        noise = parts[:, 0] - 1j * parts[:, 1]
+        if self.encounter is None:
+            wave = np.sqrt(self.sea.density(omega) * spacing) * noise
+            heave = self.rao.response(omega) * wave
+        else:
+            phase = np.angle(self.rao.response(self.encounter.wave_frequency(omega)))
+            heave = np.sqrt(self.density(omega) * spacing) * np.exp(1j * phase) * noise
+        count = math.floor(duration / step + 1e-9) + 1
+
+        def series(derivative: int) -> FloatArray:
+            size = steps * finer
+            half = np.zeros(lines + 1, dtype=np.complex128)  # above the band there is nothing
+            half[1:] = 0.5 * size * heave * (1j * omega) ** derivative
+            # A copy, so that the rest of the period is not kept.
+            return np.fft.irfft(half, size)[: count * finer : finer].copy()
+
+        return HookRecord(
+            time=step * np.arange(float(count)),
+            displacement=series(0),
+            velocity=series(1),
+            acceleration=series(2),
+            seed=seed,
+        )
+
+    def _density(self, omega: npt.ArrayLike, derivative: int) -> FloatArray:
+        frequency = np.asarray(omega, dtype=np.float64)
+        return frequency ** (2 * derivative) * self.density(frequency)
+
+
+def _transformable(length: int) -> int:
+    """Return the next length, itself included, that has no prime factor above the largest."""
+    while True:
+        rest = length
+        for factor in range(2, _LARGEST_FACTOR + 1):
+            while rest % factor == 0:
+                rest //= factor
+        if rest == 1:
+            return length
+        length += 1

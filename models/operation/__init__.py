@@ -1,0 +1,1 @@
+"""Operations in time: scenarios, what excites them, contact, payout, faults."""

@@ -1,0 +1,222 @@
+"""Scenarios in which the payload meets something: the seabed, a deck, the water's surface.
+
+Recipes of the library in `models.operation.scenarios`.  Lifts from and onto a deck are made in air,
+with little rope out and the payload's whole weight on it: those are changes of the case, and
+feedback gains for the case in deep water are not gains for it.  In the splash zone, also with
+little rope out, the case keeps its submerged payload, and the surroundings take off what is not in
+the water.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..basics.checks import InputError
+from ..basics.tables import GRAVITY
+from ..case.case import Case
+from ..casefile.quantity import Quantity
+from ..plant.surroundings import Deck, Seabed, SplashZone, Surroundings
+from ..sea.sea import SeaSpectrum
+from .excitation import MotionSource
+from .options import (
+    Choice,
+    Option,
+    Recipe,
+    Values,
+    acceleration_option,
+    begin,
+    duration_after,
+    length_option,
+    lifting_speed,
+    lowering_speed,
+    move,
+    payload_height,
+    payload_side,
+    speed_option,
+    time_option,
+    wave_height,
+    weight_in_air,
+)
+from .schedule import Profile
+from .second_bodies import boat_motion, surface_motion
+
+__all__ = ["CONTACT_SCENARIOS"]
+
+
+def _landing(case: Case, values: Values) -> dict[str, Any]:
+    del case
+    height, stop = values["height"], values["stop"]
+    if stop >= height:
+        raise InputError(
+            f"scenario landing: stop must be below height, {height:g} m, got {stop:g} m"
+        )
+    down = move(values, begin(values), stop - height)
+    touch = move(
+        values, down.end + values["wait"], -stop - values["slack"], values["landing_speed"]
+    )
+    profile = Profile(moves=(down, touch))
+    seabed = Seabed(below=height, stiffness=values["stiffness"], damping=values["damping"])
+    return {
+        "duration": duration_after(profile),
+        "profile": profile,
+        # A payload that stands can no longer be lowered: a feedback from it would pay out rope
+        # for ever.
+        "disengage_at": profile.end,
+        "surroundings": Surroundings(seabed=seabed),
+    }
+
+
+def _lift_off(case: Case, values: Values) -> dict[str, Any]:
+    profile = Profile(moves=(move(values, begin(values), values["height"]),))
+    weight = weight_in_air(case)
+    # The rope carries nothing at the start: the drum has let out its stretch, and the slack.
+    stretch = weight * values["rope"] / case.rope.ea
+    return {
+        "duration": duration_after(profile),
+        "profile": profile,
+        "initial_haul": -(stretch + values["slack"]),
+        **_on_deck(case, values, -weight / values["stiffness"]),
+    }
+
+
+def _set_down(case: Case, values: Values) -> dict[str, Any]:
+    down = -values["height"] - values["slack"]
+    profile = Profile(moves=(move(values, begin(values), down),))
+    return {
+        "duration": duration_after(profile),
+        "profile": profile,
+        **_on_deck(case, values, values["height"]),
+    }
+
+
+def _on_deck(case: Case, values: Values, below: float) -> dict[str, Any]:
+    """Return what a lift in air from or onto a deck has in common."""
+    source: MotionSource | None = None
+    if values["deck"] == "boat":
+        source = boat_motion(case)
+    elif values["deck"] != "platform":
+        source = values["deck"]
+    deck = Deck(below=below, stiffness=values["stiffness"], moving=source is not None)
+    return {
+        "surroundings": Surroundings(deck=deck),
+        "motions": {} if source is None else {"deck": source},
+        "case_changes": {
+            "rope.length": values["rope"],
+            "payload.submerged_weight": weight_in_air(case),
+            "payload.added_mass": 0.0,
+            "payload.drag_coefficient": 0.0,
+        },
+    }
+
+
+def _splash(case: Case, values: Values) -> dict[str, Any]:
+    profile = Profile(moves=(move(values, begin(values), -values["height"] - values["depth"]),))
+    payload = case.payload
+    water = SplashZone(
+        below=values["height"],
+        height=payload_height(case),
+        buoyancy=max(0.0, weight_in_air(case) - payload.submerged_weight),
+        added_mass=payload.hydrodynamic_mass,
+        slamming_area=payload.area,
+        slamming_coefficient=values["slamming_coefficient"],
+        water_density=payload.water_density,
+        wave_number=SeaSpectrum.from_case(case).peak_frequency ** 2 / GRAVITY,
+    )
+    surroundings = Surroundings(water=water)
+    return {
+        "duration": duration_after(profile),
+        "profile": profile,
+        "surroundings": surroundings,
+        "motions": {"surface": surface_motion(case, payload_side(case))},
+        # Hauled in by what the rope stretches more under the weight in air, so that P is 0.
+        "initial_haul": -surroundings.rest_force * values["rope"] / case.rope.ea,
+        "case_changes": {"rope.length": values["rope"]},
+    }
+
+
+_WAIT = time_option(60.0, "time at rest before it, with the controller engaged")
+
+_DECK: Mapping[str, Option | Choice] = {
+    "deck": Choice(words=("boat", "platform"), text="what the deck is part of", motion=True),
+    "stiffness": Option(
+        quantity=Quantity("stiffness", 1e3, 1e9), default=5e6, text="stiffness of the deck"
+    ),
+    "rope": length_option(40.0, "rope from the drum to the payload at the start", low=1.0),
+    "speed": speed_option(lifting_speed),
+    "acceleration": acceleration_option(0.5),
+}
+
+CONTACT_SCENARIOS: Mapping[str, Recipe] = {
+    "landing": Recipe(
+        description="lower the payload to above the seabed, wait, and land it",
+        build=_landing,
+        options={
+            # University of Agder, MAS409: hold 7.5 m above the seabed, lower to 5 m, land
+            "height": length_option(7.5, "height of the payload above the seabed at the start"),
+            "stop": length_option(5.0, "height at which it waits before it lands"),
+            # Less than the hook may rise, and the payload would be lifted again.
+            "slack": length_option(wave_height, "rope paid out beyond touchdown"),
+            "landing_speed": speed_option(
+                lambda case: 0.5 * lowering_speed(case), "speed of the set-point at touchdown"
+            ),
+            "stiffness": Option(
+                quantity=Quantity("stiffness", 1e3, 1e9),
+                default=1.8e6,
+                text="stiffness of the seabed",
+            ),
+            "damping": Option(
+                quantity=Quantity("number", 0.0, 1e9),
+                default=6.5e5,
+                text="damping of the seabed [N s/m^1.5]",
+            ),
+            "speed": speed_option(lowering_speed),
+            "acceleration": acceleration_option(0.1),
+            "wait": _WAIT,
+        },
+        ramp=2.0,
+    ),
+    "lift-off": Recipe(
+        description="lift the payload, in air, off a supply boat or a platform",
+        build=_lift_off,
+        options={
+            "height": length_option(6.0, "how far the payload is raised"),
+            # Less than the boat may sink from under it, and it would be lifted too early.
+            "slack": length_option(wave_height, "slack rope at the start"),
+            **_DECK,
+            "wait": time_option(10.0, "time at rest before it, with the controller engaged"),
+        },
+        warm_up=10.0,
+        ramp=5.0,
+    ),
+    "set-down": Recipe(
+        description="set the payload, in air, down on a supply boat or a platform",
+        build=_set_down,
+        options={
+            "height": length_option(5.0, "height of the payload above the deck at the start"),
+            "slack": length_option(wave_height, "rope paid out beyond the deck's mean height"),
+            **_DECK,
+            "wait": _WAIT,
+        },
+    ),
+    "splash": Recipe(
+        description="lower the payload through the splash zone",
+        build=_splash,
+        options={
+            "height": length_option(
+                lambda case: 1.5 * wave_height(case), "height above still water at the start"
+            ),
+            "depth": length_option(
+                lambda case: payload_height(case) + 2.0 * wave_height(case),
+                "depth of the payload's underside at the end",
+            ),
+            "rope": length_option(30.0, "rope from the drum to the payload at the start", low=1.0),
+            "slamming_coefficient": Option(
+                quantity=Quantity("ratio", 0.0, 50.0), default=5.0, text="slamming coefficient"
+            ),
+            "speed": speed_option(lowering_speed),
+            "acceleration": acceleration_option(0.1),
+            "wait": _WAIT,
+        },
+    ),
+}

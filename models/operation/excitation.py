@@ -1,0 +1,294 @@
+r"""What moves the hook, and whatever else moves by itself, as motions over time.
+
+A `MotionSource` says where a motion comes from: a spectrum, a sine or nothing (this file), a
+measured record (`models.operation.record_file`), six degrees of freedom
+(`models.operation.six_dof`).  Asked for a duration and a time step it gives a `Motion`, which is
+read in blocks: 24 hours at 5 ms would be 17 million rows, and nobody needs them all at once.
+
+Displacement, velocity and acceleration are consistent: between equally spaced nodes the
+displacement is the polynomial of fifth degree that has the displacements, velocities and
+accelerations of both nodes (quintic Hermite interpolation), and the other two are its derivatives.
+For a harmonic its error is at most (omega Delta)^6/46080 of the amplitude, so the nodes' distance
+Delta follows from the spectrum alone, and the motion is the same at every step of the integrator.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError, check_range
+from ..basics.draws import check_seed
+from ..hook.hook import HookMotion
+from .hermite import MotionBlock, interpolated
+from .long_record import LongRecord, seed_for
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+
+__all__ = [
+    "HOOK",
+    "SECOND_BODY",
+    "SURFACE",
+    "Motion",
+    "MotionBlock",
+    "MotionSource",
+    "SineMotion",
+    "SpectrumMotion",
+    "StillMotion",
+    "interpolated",
+    "seed_for",
+]
+
+FloatArray = npt.NDArray[np.float64]
+
+HOOK = None
+"""Purpose of a random motion that is drawn with the run's own seed."""
+SECOND_BODY, SURFACE = 4, 5
+"""Purposes of motions in waves of their own; `models.basics.draws` has 1 to 3."""
+
+# What the interpolation may add to a random motion, as a standard deviation.  A hundredth of it
+# would take nodes twice as close, and of a motion held to 60 rad/s millions of them.
+_ERROR = 1e-7  # [m]
+
+# All of them divide five seconds: then `HookMotion.record` draws the same waves with each.
+_NODE_STEPS = (0.1, 0.05, 0.04, 0.025, 0.02, 0.0125, 0.01, 0.00625, 0.005)  # [s]
+
+
+class MotionSource(Protocol):
+    """Where a motion comes from."""
+
+    @property
+    def description(self) -> str:
+        """What it is, in a few words."""
+        ...
+
+    def motion(self, duration: float, step: float, seed: int) -> Motion:
+        """Return the motion over a duration [s] at a time step [s].
+
+        Raises
+        ------
+        InputError
+            If it does not last that long, or cannot be that fine.
+        """
+        ...
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Motion:
+    """A vertical motion, up positive, that is read in blocks.
+
+    Attributes
+    ----------
+    source
+        What it is, in a few words.
+    duration
+        From the first row to the last [s].
+    step
+        Time from row to row [s].
+    seed
+        The seed that it was drawn with, None if nothing was drawn.
+    evaluate
+        Gives displacement, velocity and acceleration at `count` rows from row `start` on.
+    """
+
+    source: str
+    duration: float
+    step: float
+    seed: int | None = None
+    evaluate: Callable[[int, int], MotionBlock]
+
+    @property
+    def rows(self) -> int:
+        """Number of rows; the last is at `duration` or less than a step before it."""
+        return math.floor(self.duration / self.step * (1.0 + 1e-12) + 1e-9) + 1
+
+    def block(self, start: int, count: int) -> MotionBlock:
+        """Return rows, the same whatever was read before.
+
+        Parameters
+        ----------
+        start, count
+            The first row, from 0, and their number.
+
+        Returns
+        -------
+        MotionBlock
+            Displacement [m], velocity [m/s] and acceleration [m/s2], each (count,).
+
+        Raises
+        ------
+        InputError
+            If the motion does not have these rows.
+        """
+        if start < 0 or count < 0 or start + count > self.rows:
+            raise InputError(
+                f"motion ({self.source}): has rows 0 to {self.rows - 1}, asked for rows {start} "
+                f"to {start + count - 1}"
+            )
+        return self.evaluate(start, count)
+
+    def time(self, start: int, count: int) -> FloatArray:
+        """Return the times of rows (count,) [s]."""
+        return self.step * np.arange(start, start + count, dtype=np.float64)
+
+    def eased(self, duration: float) -> Motion:
+        """Return the motion growing smoothly out of rest over a duration [s].
+
+        It is multiplied by 10 r^3 - 15 r^4 + 6 r^5 of r = time/duration; velocity and
+        acceleration are the derivatives of the product.  A run that starts at rest then starts
+        without a jerk.
+        """
+        if duration <= 0.0:
+            return self
+
+        def evaluate(start: int, count: int) -> MotionBlock:
+            z, v, a = self.evaluate(start, count)
+            if start * self.step >= duration:
+                return z, v, a
+            r = np.minimum(self.time(start, count) / duration, 1.0)
+            share = r**3 * (10.0 - 15.0 * r + 6.0 * r**2)
+            rate = 30.0 * (r * (1.0 - r)) ** 2 / duration
+            change = 60.0 * r * (1.0 - r) * (1.0 - 2.0 * r) / duration**2
+            return share * z, share * v + rate * z, share * a + 2.0 * rate * v + change * z
+
+        return replace(self, evaluate=evaluate)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StillMotion:
+    """No motion at all."""
+
+    @property
+    def description(self) -> str:
+        """What it is."""
+        return "still"
+
+    def motion(self, duration: float, step: float, seed: int) -> Motion:
+        """Return zeros; the seed plays no part."""
+        del seed
+        _check("still motion", duration, step)
+
+        def evaluate(start: int, count: int) -> MotionBlock:
+            del start
+            return np.zeros(count), np.zeros(count), np.zeros(count)
+
+        return Motion(source=self.description, duration=duration, step=step, evaluate=evaluate)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SineMotion:
+    """A sine, z = amplitude sin(2 pi t/period + phase).
+
+    Attributes
+    ----------
+    amplitude
+        Amplitude [m].
+    period
+        Period [s].
+    phase
+        Phase at the start [rad].
+    """
+
+    amplitude: float
+    period: float
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_range("sine motion", "amplitude", self.amplitude, low=0.0, unit="m")
+        check_range("sine motion", "period", self.period, low=0.0, unit="s", open_low=True)
+        check_range("sine motion", "phase", self.phase, unit="rad")
+
+    @property
+    def description(self) -> str:
+        """What it is."""
+        return f"sine of {self.amplitude:g} m and {self.period:g} s"
+
+    def motion(self, duration: float, step: float, seed: int) -> Motion:
+        """Return the sine, exact at every row; the seed plays no part."""
+        del seed
+        _check("sine motion", duration, step)
+        omega = 2.0 * math.pi / self.period
+
+        def evaluate(start: int, count: int) -> MotionBlock:
+            turns = step * np.arange(start, start + count, dtype=np.float64) / self.period
+            angle = 2.0 * math.pi * (turns % 1.0) + self.phase
+            sine, cosine = self.amplitude * np.sin(angle), self.amplitude * np.cos(angle)
+            return sine, omega * cosine, -(omega**2) * sine
+
+        return Motion(source=self.description, duration=duration, step=step, evaluate=evaluate)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SpectrumMotion:
+    """A random motion drawn from a spectrum: the hook's in a sea, or another body's.
+
+    Up to three hours and ten minutes it is `HookMotion.record` of the same duration and seed,
+    interpolated to 1e-7 m; beyond that `models.operation.long_record` joins records of an hour.
+
+    Attributes
+    ----------
+    hook
+        The spectrum.
+    purpose
+        None to draw with the run's own seed: bodies with the same purpose in the same sea meet
+        the same waves.  `SECOND_BODY` and `SURFACE` draw waves of their own.
+    """
+
+    hook: HookMotion
+    purpose: int | None = HOOK
+
+    @classmethod
+    def from_case(cls, case: Case) -> SpectrumMotion:
+        """Return the motion of a case's hook."""
+        return cls(hook=HookMotion.from_case(case))
+
+    @property
+    def description(self) -> str:
+        """What it is."""
+        sea = self.hook.sea
+        period = 2.0 * math.pi / sea.peak_frequency
+        return f"{sea.kind} sea, H_s {sea.significant_height:g} m, T_p {period:.3g} s"
+
+    @cached_property
+    def node_step(self) -> float:
+        """Distance of the nodes between which the record is interpolated [s]."""
+        nodes = self.hook.quadrature
+        density = self.hook.density(nodes.omega)
+        for step in _NODE_STEPS:
+            # Far beyond its range the bound is too large; the interpolant itself never is.
+            error = np.minimum((nodes.omega * step) ** 6 / 46080.0, 2.0)
+            if nodes.integrate(density * error**2) <= _ERROR**2:
+                return step
+        return _NODE_STEPS[-1]
+
+    def motion(self, duration: float, step: float, seed: int) -> Motion:
+        """Return the motion; a block of it is only computed when it is read.
+
+        Raises
+        ------
+        InputError
+            If the duration is shorter than a step, or the seed is negative.
+        """
+        _check("random motion", duration, step)
+        check_seed("random motion", seed)
+        own = seed if self.purpose is None else seed_for(seed, self.purpose)
+        pieces = LongRecord(self.hook, duration, self.node_step, own)
+        return Motion(
+            source=self.description,
+            duration=duration,
+            step=step,
+            seed=seed,
+            evaluate=interpolated(pieces, pieces.last, self.node_step, step),
+        )
+
+
+def _check(owner: str, duration: float, step: float) -> None:
+    check_range(owner, "step", step, low=0.0, unit="s", open_low=True)
+    check_range(owner, "duration", duration, low=step, unit="s")

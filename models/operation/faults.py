@@ -1,0 +1,197 @@
+"""Faults in mid-run by name: what may fail, how far, and the scenario in which it does.
+
+    names and sizes (a row of a spread) --> with_faults --> Scenario --> simulation
+
+A fault has a path like a field of the case (``fault.delay_step``), so that it can be varied, drawn
+and named like one.  What is wrong during the whole run is a field of the case itself: the share
+of lost messages is ``sensors.telemetry.dropout``, the bias of a payload sensor
+``sensors.payload.displacement_bias``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+from ..basics.checks import InputError, check_range
+from ..case.case import Case
+from ..casefile.messages import suggestion
+from ..plant.drive import DriveLimits
+from .scenario import Scenario
+
+__all__ = ["FAULTS", "PREFIX", "FaultField", "fault_of", "with_faults"]
+
+PREFIX = "fault."
+"""What the path of a fault begins with."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FaultField:
+    """One number of a fault.
+
+    Attributes
+    ----------
+    kind
+        A key of `models.basics.units.KINDS`.
+    nominal
+        Its value where nothing is said: none of the faults, or the usual time.
+    low, high
+        The range that is allowed.
+    text
+        What it is.
+    """
+
+    kind: str
+    nominal: float
+    low: float
+    high: float
+    text: str
+
+
+def _field(kind: str, nominal: float, low: float, high: float, text: str) -> FaultField:
+    return FaultField(kind=kind, nominal=nominal, low=low, high=high, text=text)
+
+
+_LONG = 86400.0
+
+FAULTS: Mapping[str, FaultField] = MappingProxyType(
+    {
+        "at": _field("time", 120.0, 0.0, _LONG, "when the faults begin"),
+        "lasting": _field("time", 60.0, 0.0, _LONG, "how long steps, biases and cuts last"),
+        "telemetry_outage": _field("time", 0.0, 0.0, _LONG, "how long no message comes"),
+        "sensor_outage": _field(
+            "time", 0.0, 0.0, _LONG, "how long the payload's sensor gives no numbers"
+        ),
+        "mru_outage": _field(
+            "time", 0.0, 0.0, _LONG, "how long the motion reference unit gives no numbers"
+        ),
+        "brake_trip": _field("time", 0.0, 0.0, _LONG, "how long the brake is on"),
+        "delay_step": _field("time", 0.0, 0.0, 60.0, "by how much the messages are later"),
+        "mru_heave_bias": _field("length", 0.0, -100.0, 100.0, "how much the heave shows too much"),
+        "mru_rate_bias": _field(
+            "speed", 0.0, -100.0, 100.0, "how much the heave rate shows too much"
+        ),
+        "torque_limit": _field(
+            "ratio", 1.0, 1e-3, 1.0, "share of the drive's torque and current that is left"
+        ),
+        "power_limit": _field("ratio", 1.0, 1e-3, 1.0, "share of the drive's power that is left"),
+    }
+)
+"""Every fault by its name, without the prefix."""
+
+_PERIODS = {
+    "telemetry_outage": "telemetry_outages",
+    "sensor_outage": "sensor_failures",
+    "mru_outage": "mru_outages",
+    "brake_trip": "brake_trips",
+}
+
+
+def fault_of(path: str) -> FaultField:
+    """Return the fault that a path such as ``fault.delay_step`` means.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    name = path.removeprefix(PREFIX)
+    if not path.startswith(PREFIX) or name not in FAULTS:
+        raise InputError(f"{path} is unknown; {suggestion(name, list(FAULTS))}")
+    return FAULTS[name]
+
+
+def with_faults(
+    scenario: Scenario, faults: Mapping[str, float], case: Case, duration: float
+) -> Scenario:
+    """Return a scenario in which something fails.
+
+    Parameters
+    ----------
+    scenario
+        The operation.
+    faults
+        Sizes by path (``fault.delay_step``); a size that is no fault changes nothing.
+    case
+        The case that is simulated, for the drive's limits.
+    duration
+        Length of the run, in which the faults have to begin [s].
+
+    Raises
+    ------
+    InputError
+        If a path is unknown, a size out of its range, or the faults begin after the run.
+
+    Examples
+    --------
+    >>> from models import load_case
+    >>> from models.operation.scenarios import scenario_named
+    >>> case = load_case("thesis-1975")
+    >>> found = with_faults(
+    ...     scenario_named("hold", case), {"fault.delay_step": 0.1, "fault.at": 30.0}, case, 120.0)
+    >>> found.telemetry_delays
+    ((30.0, 90.0, 0.1),)
+    """
+    if not faults:
+        return scenario
+    size = {name: field.nominal for name, field in FAULTS.items()}
+    for path, value in faults.items():
+        field = fault_of(path)
+        size[path.removeprefix(PREFIX)] = check_range(
+            "faults", path, value, low=field.low, high=field.high
+        )
+    at, until = size["at"], size["at"] + size["lasting"]
+    if at >= duration:
+        raise InputError(
+            f"faults: fault.at must be before the end of the run, {duration:g} s, got {at:g} s"
+        )
+    changes: dict[str, Any] = {}
+    for name, periods in _PERIODS.items():
+        if size[name] > 0.0:
+            changes[periods] = (*getattr(scenario, periods), (at, at + size[name]))
+    if until > at:
+        if size["delay_step"] > 0.0:
+            late = (at, until, size["delay_step"])
+            changes["telemetry_delays"] = (*scenario.telemetry_delays, late)
+        if size["mru_heave_bias"] or size["mru_rate_bias"]:
+            bias = (at, until, size["mru_heave_bias"], size["mru_rate_bias"])
+            changes["mru_biases"] = (*scenario.mru_biases, bias)
+        changes |= _limits(scenario, size, case, at, until)
+    return replace(scenario, **changes) if changes else scenario
+
+
+def _limits(
+    scenario: Scenario, size: Mapping[str, float], case: Case, at: float, until: float
+) -> dict[str, Any]:
+    """Return the changes of a scenario in which the drive's limits are cut for a while."""
+    cut: dict[str, float] = {}
+    own = DriveLimits.from_case(scenario.case_for(case)).parameters
+    changed: dict[str, Any] = dict(scenario.case_changes)
+    if size["torque_limit"] < 1.0:
+        for name in ("drive.torque_limit", "drive.current_limit"):
+            if name in own:
+                cut[name] = size["torque_limit"] * own[name]
+    if size["power_limit"] < 1.0:
+        power = case.winch.power_limit
+        if math.isinf(power):
+            # A drive without a limit of its power gets one that it cannot reach, to be lowered.
+            power = case.winch.drive.torque_peak * case.winch.speed_limit
+            changed["winch.drive.power"] = power
+        cut["drive.power_limit"] = size["power_limit"] * power
+    if not cut:
+        return {}
+    before, after = (
+        scenario.parameter_changes.get(at, {}),
+        scenario.parameter_changes.get(until, {}),
+    )
+    return {
+        "parameter_changes": {
+            **scenario.parameter_changes,
+            at: {**before, **cut},
+            until: {**after, **dict.fromkeys(cut, None)},
+        },
+        "case_changes": changed,
+    }

@@ -1,0 +1,193 @@
+"""What is asked of a run: the operation, as data.
+
+A scenario knows nothing of the controller and of the hook's motion; it says what the operator asks
+of the payload over time, when the controller is engaged, what fails, and what the payload meets on
+its way.  `models.operation.scenarios` is a library of them, by name, with figures that fit a case;
+`models.operation.schedule` turns one into the rows that a simulation reads.
+
+Times count from the start of the run.  The payload's set-point is a displacement from where it
+hangs at rest at the start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError, check_range
+from ..plant.surroundings import Surroundings
+from ..sensing.mru import Bias, check_biases
+from ..sensing.telemetry import Late, check_late
+from .schedule import Period, Profile, Schedule, check_periods, events
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+    from .excitation import MotionSource
+
+__all__ = ["Scenario"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def _nothing() -> Mapping[str, object]:
+    return MappingProxyType({})
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scenario:
+    """An operation.
+
+    Attributes
+    ----------
+    name, description
+        What it is called, and what it is in one line.
+    duration
+        How long it takes unless the run says otherwise [s].
+    profile
+        What is asked of the payload.
+    warm_up
+        Time with the brake on, in which sensors and filters settle [s].
+    ramp
+        Time in which the controller's command is ramped in, and out [s].
+    settle
+        Time from which statistics of the run count [s].
+    disengage_at
+        When the controller begins to ramp out, after which the brake is set [s]; None: never.
+    brake_trips
+        Periods in which the brake is on although nobody asked for it [s].
+    telemetry_outages, sensor_failures, mru_outages
+        Periods without messages from the payload, with a payload sensor that gives no numbers,
+        and without the motion reference unit [s].
+    telemetry_delays
+        (start, end, extra) [s]: messages that the payload sends in the period are late by so much
+        more.
+    mru_biases
+        (start, end, heave, rate) [s], [m], [m/s]: what the motion reference unit shows too much.
+    parameter_changes
+        New values of plant parameters by the time from which they hold [s] and by name; None
+        takes a parameter back to its own value.
+    surroundings
+        What the payload meets.
+    motions
+        Sources of the motions that the surroundings need: ``deck``, ``surface``.
+    initial_haul
+        Where the drum stands at the start, in metres of rope hauled in from where it holds the
+        submerged payload at P = 0; negative for a payload that stands, with slack rope.
+    case_changes
+        Fields of the case that belong to the operation, by dotted path: a lift in air has less
+        rope out and no water around it.
+
+    Raises
+    ------
+    InputError
+        If a time is out of order, or a motion is missing or not needed.
+    """
+
+    name: str
+    description: str
+    duration: float
+    profile: Profile = field(default_factory=Profile)
+    warm_up: float = 0.0
+    ramp: float = 0.0
+    settle: float = 0.0
+    disengage_at: float | None = None
+    brake_trips: tuple[Period, ...] = ()
+    telemetry_outages: tuple[Period, ...] = ()
+    sensor_failures: tuple[Period, ...] = ()
+    mru_outages: tuple[Period, ...] = ()
+    telemetry_delays: tuple[Late, ...] = ()
+    mru_biases: tuple[Bias, ...] = ()
+    parameter_changes: Mapping[float, Mapping[str, float | None]] = field(
+        default_factory=lambda: MappingProxyType({})
+    )
+    surroundings: Surroundings | None = None
+    motions: Mapping[str, MotionSource] = field(default_factory=lambda: MappingProxyType({}))
+    initial_haul: float = 0.0
+    case_changes: Mapping[str, object] = field(default_factory=_nothing)
+
+    def __post_init__(self) -> None:
+        owner = f"scenario {self.name}"
+        check_range(owner, "duration", self.duration, low=0.0, unit="s", open_low=True)
+        check_range(owner, "warm_up", self.warm_up, low=0.0, unit="s")
+        check_range(owner, "ramp", self.ramp, low=0.0, unit="s")
+        check_range(owner, "settle", self.settle, low=0.0, unit="s")
+        check_range(owner, "initial_haul", self.initial_haul, unit="m")
+        if self.disengage_at is not None:
+            check_range(owner, "disengage_at", self.disengage_at, low=self.warm_up, unit="s")
+        for name in ("brake_trips", "telemetry_outages", "sensor_failures", "mru_outages"):
+            checked = check_periods(owner, name.replace("_", " "), getattr(self, name))
+            object.__setattr__(self, name, checked)
+        late = check_late(owner, "telemetry delays", self.telemetry_delays)
+        object.__setattr__(self, "telemetry_delays", late)
+        biases = check_biases(owner, "MRU biases", self.mru_biases)
+        object.__setattr__(self, "mru_biases", biases)
+        changes: dict[float, Mapping[str, float | None]] = {}
+        for time, values in self.parameter_changes.items():
+            check_range(owner, "time of a parameter change", time, low=0.0, unit="s")
+            for name, value in values.items():
+                if value is not None:
+                    check_range(owner, f"{name} at {time:g} s", value)
+            changes[float(time)] = MappingProxyType(dict(values))
+        object.__setattr__(self, "parameter_changes", MappingProxyType(changes))
+        for name in ("motions", "case_changes"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+        needed = self.surroundings.motions if self.surroundings is not None else ()
+        if set(self.motions) != set(needed):
+            raise InputError(
+                f"{owner}: its surroundings need the motions {', '.join(needed) or 'none'}, "
+                f"got {', '.join(self.motions) or 'none'}"
+            )
+
+    @property
+    def events(self) -> tuple[tuple[float, str, str], ...]:
+        """What happens by itself: time [s], kind and sentence, in order of time."""
+        return events(self)
+
+    def initial_displacements(self, springs: npt.ArrayLike, compliance: float) -> FloatArray:
+        """Return where the rope's masses and the payload are at rest at the start.
+
+        The payload is at P = 0.  The masses above it have moved with the drum, and by what the
+        rope's tension differs from that of the submerged payload, `Surroundings.rest_force` F:
+        x_j = initial_haul + F L/EA times the share of the springs above mass j.
+
+        Parameters
+        ----------
+        springs
+            Share of each spring in the rope's compliance, from the drum down (n,).
+        compliance
+            L/EA of the rope [m/N].
+
+        Returns
+        -------
+        FloatArray
+            From the drum down, the payload's last (n,) [m].
+        """
+        force = self.surroundings.rest_force if self.surroundings is not None else 0.0
+        shares = np.cumsum(np.asarray(springs, dtype=np.float64))
+        result: FloatArray = self.initial_haul + force * compliance * shares
+        result[-1] = 0.0
+        return result
+
+    def case_for(self, case: Case) -> Case:
+        """Return the case as it is during the operation.
+
+        Raises
+        ------
+        InputError
+            If the case cannot be that, such as a drive that cannot hold the load in air.
+        """
+        if not self.case_changes:
+            return case
+        try:
+            return case.replace(self.case_changes)
+        except InputError as error:
+            raise InputError(f"scenario {self.name}: {error}") from error
+
+    def schedule(self, sample_time: float) -> Schedule:
+        """Return the scenario as rows at a sample time [s]."""
+        return Schedule(scenario=self, sample_time=sample_time)

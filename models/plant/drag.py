@@ -1,0 +1,184 @@
+"""Linear drag that stands for quadratic drag, in a sine and in a random sea.
+
+The payload's drag is q v|v|, q = 1/2 rho C_D A, and its slope at rest is zero; a linear plant
+needs a coefficient C [N s/m] in its place.  The case says which: a given C, that of equal
+energy in a given sine (the 1975 thesis), or that of the least mean square error in the
+Gaussian motion that the plant itself makes with it (stochastic linearisation), for which C and
+the motion have to be found together: `consistent_drag`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from scipy.optimize import brentq
+from scipy.special import erf
+
+from ..basics.checks import SolverError, check_range
+
+__all__ = [
+    "consistent_drag",
+    "energy_equivalent",
+    "gaussian_gain",
+    "gaussian_mean",
+    "stochastic_equivalent",
+]
+
+_OWNER = "drag"
+
+
+def energy_equivalent(quadratic: float, amplitude: float, frequency: float) -> float:
+    """Return the C that takes as much energy as q v|v| from a sine [N s/m].
+
+    C = 8/(3 pi) q omega Y = 4/(3 pi) rho C_D A omega Y (1975 thesis, eq. 13).
+
+    Parameters
+    ----------
+    quadratic
+        q [N s2/m2].
+    amplitude
+        Amplitude Y of the displacement [m].
+    frequency
+        omega [rad/s].
+
+    Raises
+    ------
+    InputError
+        If an argument is negative or not finite.
+    """
+    check_range(_OWNER, "quadratic", quadratic, low=0.0, unit="N s2/m2")
+    check_range(_OWNER, "amplitude", amplitude, low=0.0, unit="m")
+    check_range(_OWNER, "frequency", frequency, low=0.0, unit="rad/s")
+    return 8.0 / (3.0 * math.pi) * quadratic * frequency * amplitude
+
+
+def gaussian_gain(sigma: float, current: float = 0.0) -> float:
+    """Return E[d/dv |v + U|(v + U)], v Gaussian: the equivalent gain of v|v| [m/s].
+
+    2 (sigma sqrt(2/pi) exp(-U^2 / 2 sigma^2) + U erf(U / (sqrt(2) sigma))), which is
+    sqrt(8/pi) sigma without a current and 2|U| without motion.  For a Gaussian v it is also
+    E[f v]/sigma^2, the least-mean-square gain (Price's theorem).
+
+    Parameters
+    ----------
+    sigma
+        Standard deviation of the velocity [m/s].
+    current
+        Steady velocity U of the payload relative to the water [m/s].
+
+    Raises
+    ------
+    InputError
+        If `sigma` is negative or a number is not finite.
+    """
+    check_range(_OWNER, "sigma", sigma, low=0.0, unit="m/s")
+    check_range(_OWNER, "current", current, unit="m/s")
+    if sigma == 0.0:
+        return 2.0 * abs(current)
+    ratio = current / sigma
+    bell = math.sqrt(2.0 / math.pi) * math.exp(-0.5 * ratio * ratio)
+    return 2.0 * (sigma * bell + current * float(erf(ratio / math.sqrt(2.0))))
+
+
+def gaussian_mean(sigma: float, current: float) -> float:
+    """Return E[|v + U|(v + U)], v Gaussian: the mean force over q [m2/s2].
+
+    (U^2 + sigma^2) erf(U / (sqrt(2) sigma)) + U sigma sqrt(2/pi) exp(-U^2 / 2 sigma^2).
+
+    Raises
+    ------
+    InputError
+        If `sigma` is negative or a number is not finite.
+    """
+    check_range(_OWNER, "sigma", sigma, low=0.0, unit="m/s")
+    check_range(_OWNER, "current", current, unit="m/s")
+    if sigma == 0.0:
+        return abs(current) * current
+    ratio = current / sigma
+    bell = math.sqrt(2.0 / math.pi) * math.exp(-0.5 * ratio * ratio)
+    both = (current**2 + sigma**2) * float(erf(ratio / math.sqrt(2.0)))
+    return both + current * sigma * bell
+
+
+def stochastic_equivalent(quadratic: float, sigma: float, current: float = 0.0) -> float:
+    """Return the C of stochastic linearisation, q times `gaussian_gain` [N s/m].
+
+    Without a current C = q sqrt(8/pi) sigma (Borgman, J. Waterways Harbors 93, 1967).
+
+    Parameters
+    ----------
+    quadratic
+        q [N s2/m2].
+    sigma
+        Standard deviation of the payload's velocity [m/s].
+    current
+        Steady velocity of the payload relative to the water [m/s].
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range.
+    """
+    check_range(_OWNER, "quadratic", quadratic, low=0.0, unit="N s2/m2")
+    return quadratic * gaussian_gain(sigma, current)
+
+
+def consistent_drag(
+    quadratic: float,
+    velocity_rms: Callable[[float], float],
+    *,
+    current: float = 0.0,
+    tolerance: float = 1e-10,
+) -> float:
+    """Return the C that agrees with the motion it leads to [N s/m].
+
+    Solves C = q gain(sigma_v(C)).  More drag means less motion, so that the difference of
+    both sides changes sign once: a bracketing root finder cannot settle on the wrong root,
+    as the usual substitution C <- q gain(sigma_v(C)) can swing about it.
+
+    Parameters
+    ----------
+    quadratic
+        q [N s2/m2].
+    velocity_rms
+        Function of C [N s/m] that returns the rms of the payload's velocity [m/s]; infinite
+        where there is no stationary motion.
+    current
+        Steady velocity of the payload relative to the water [m/s].
+    tolerance
+        Relative tolerance of C [-].
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range.
+    SolverError
+        If the motion does not shrink however large the drag: the plant is unstable with any.
+    """
+    check_range(_OWNER, "quadratic", quadratic, low=0.0, unit="N s2/m2")
+    if quadratic == 0.0:
+        return 0.0
+
+    def target(C: float) -> float:
+        sigma = velocity_rms(C)
+        return math.inf if math.isinf(sigma) else stochastic_equivalent(quadratic, sigma, current)
+
+    low, high = 0.0, quadratic  # the drag of about 0.6 m/s rms
+    for _ in range(60):
+        if target(high) <= high:
+            break
+        low, high = high, 4.0 * high
+    else:
+        raise SolverError(
+            "drag: no linear drag coefficient agrees with the motion it leads to; at "
+            f"{high:.3g} N s/m the payload's velocity is still {velocity_rms(high):.3g} m/s rms"
+        )
+    if target(low) == low:
+        return low
+
+    # In ratios, as an infinite motion at low drag then is a finite number of the right sign.
+    def surplus(C: float) -> float:
+        return 1.0 if math.isinf(found := target(C)) else (found - C) / (found + C)
+
+    return float(brentq(surplus, low, high, xtol=1e-12 * high, rtol=max(tolerance, 1e-14)))

@@ -1,0 +1,337 @@
+"""The plant's equations of motion, written once in CasADi symbols.
+
+From the drum down: motor, gear and drum; the rope as springs with masses between them; the
+payload with its drag; the sensors' low-pass filters.  `models.plant.plant` describes signs and
+coordinates, wraps these functions and linearises them; nothing else should need this file.
+
+What a simulation has and a design has not comes in by arguments, and without them the equations
+are those of the design: limits of the drive (`models.plant.drive`), rope that grows and layers of
+the drum (`models.plant.payout`), and what acts on the payload from outside
+(`models.plant.surroundings`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi as ca
+
+from .drive import DriveLimits, motor_equations
+
+if TYPE_CHECKING:
+    from .payout import DrumTravel
+    from .plant_data import PlantData
+    from .rope import RopeLumps
+    from .surroundings import Surroundings
+
+__all__ = [
+    "DISTURBANCES",
+    "INPUTS",
+    "MEASUREMENTS",
+    "RATES",
+    "Equations",
+    "build_equations",
+    "displacement_names",
+    "parameter_values",
+]
+
+INPUTS = ("drive.command",)
+DISTURBANCES = ("hook.heave", "hook.heave_rate", "payload.force", "drive.set_point")
+MEASUREMENTS = ("payload.acceleration", "payload.velocity", "payload.displacement")
+RATES = {"hook.heave_rate": "hook.heave"}
+MOTION = ("displacement", "velocity", "acceleration")  # of whatever else moves: deck, surface
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Equations:
+    """Symbolic functions of the plant, and the names of what goes in and out.
+
+    Parameters
+    ----------
+    states, disturbances, outputs
+        Names of the entries of x, w and z.
+    parameters
+        Names and values of the entries of p.
+    function
+        (x, u, w, p) -> (xdot, y, z).
+    jacobians
+        (x, u, w, p) -> (A, B, E, C, D, F, Cz, Dz, Fz).
+    units
+        Unit of each signal by name.
+    """
+
+    states: tuple[str, ...]
+    disturbances: tuple[str, ...]
+    outputs: tuple[str, ...]
+    parameters: Mapping[str, float]
+    function: ca.Function
+    jacobians: ca.Function
+    units: Mapping[str, str]
+
+
+def build_equations(
+    data: PlantData,
+    lumps: RopeLumps,
+    *,
+    limits: DriveLimits | None = None,
+    travel: DrumTravel | None = None,
+    surroundings: Surroundings | None = None,
+) -> Equations:
+    """Return the equations for a lumping of the rope; the data decide which states exist.
+
+    Parameters
+    ----------
+    data, lumps
+        The plant's numbers, and lengths of the rope's springs and masses.
+    limits
+        Limits of the drive; None for a motor without any.
+    travel
+        Layers of the drum, for a rope that gets longer and shorter; None for a rope of one
+        length on a drum of one radius.
+    surroundings
+        What acts on the payload besides still water.
+    """
+    n = len(lumps.masses)
+    parameters = parameter_values(data)
+    if limits is not None:
+        parameters |= limits.parameters
+    if surroundings is not None:
+        parameters |= surroundings.parameters
+    symbols = ca.SX.sym("p", len(parameters))
+    p = {name: symbols[i] for i, name in enumerate(parameters)}
+
+    states = _state_names(data, n)
+    x = ca.SX.sym("x", len(states))
+    x_of = {name: x[i] for i, name in enumerate(states)}
+    u = ca.SX.sym("u", len(INPUTS))
+    moving = () if surroundings is None else surroundings.motions
+    disturbances = DISTURBANCES + tuple(f"{name}.{end}" for name in moving for end in MOTION)
+    w = ca.SX.sym("w", len(disturbances))
+    heave, heave_rate, force, set_point, *others = ca.vertsplit(w)
+
+    speed = x_of["motor.speed"]
+    radius, ratio = p["winch.drum_radius"], p["winch.gear_ratio"]
+    length: ca.SX = p["rope.length"]
+    haul = radius / ratio * x_of["motor.angle"]
+    if travel is not None:
+        haul, radius = travel.haul(x_of["motor.angle"], radius, ratio)
+        length = length - haul
+    r_over_n = radius / ratio
+    haul_rate = r_over_n * speed
+    command = u[0] + set_point
+    xdot: dict[str, ca.SX] = {"motor.angle": speed}
+
+    # Rope: position and velocity of the upper end, then of every mass.
+    position = [haul + heave, *(x_of[name] for name in displacement_names(n))]
+    velocity = [haul_rate + heave_rate, *(x_of[name] for name in _velocities(n))]
+    hanging = _hanging_weights(lumps, p)
+    tension = []
+    for j in range(n):
+        k = p["rope.axial_stiffness"] / (length * lumps.springs[j])
+        stretch = position[j] - position[j + 1]
+        rate = velocity[j] - velocity[j + 1]
+        # A rope that has grown has the stretch of the static rope at its new stiffness.
+        at_rest = hanging[j] if travel is None else hanging[j] * p["rope.length"] / length
+        whole = at_rest + k * (stretch + p["rope.damping_time"] * rate)
+        tension.append(ca.fmax(0, whole))
+    top = tension[0] + p["rope.submerged_weight_per_length"] * length * lumps.at_drum
+    acceleration = ca.SX(0)
+    outside: Mapping[str, ca.SX] = {}
+    for j, (shift, move) in enumerate(zip(displacement_names(n), _velocities(n), strict=True)):
+        share = length * lumps.masses[j]
+        weight = p["rope.submerged_weight_per_length"] * share
+        mass = p["rope.mass_per_length"] * share
+        below = tension[j + 1] if j + 1 < n else ca.SX(0)
+        other = ca.SX(0)
+        if j + 1 == n:
+            v, quadratic = velocity[-1], p["payload.quadratic_drag"]
+            mass += p["payload.virtual_mass"]
+            weight += p["payload.submerged_weight"]
+            if surroundings is not None:
+                triples = zip(others[0::3], others[1::3], others[2::3], strict=True)
+                motions = dict(zip(moving, triples, strict=True))
+                around = surroundings.build(position[-1], velocity[-1], motions, p)
+                v, quadratic = around.relative_velocity, quadratic * around.drag_factor
+                mass += around.virtual_mass_change
+                force, outside = force + around.force, around.outputs
+            other = force - quadratic * ca.fabs(v) * v - p["payload.linear_drag"] * v
+        acceleration = (tension[j] - below - weight + other) / mass
+        xdot[shift] = velocity[j + 1]
+        xdot[move] = acceleration
+
+    motor = motor_equations(data, p, x_of, command)
+    xdot |= motor.derivative
+    direction = p["winch.gear_direction"] + ca.tanh(p["winch.gear_switching"] * speed)
+    eta = p["winch.gear_efficiency"]
+    gear = 0.5 * ((1 + direction) / eta + (1 - direction) * eta)
+    friction = p["winch.viscous_friction"] * speed
+    if data.coulomb_friction > 0.0:
+        friction += p["winch.coulomb_friction"] * ca.tanh(speed / data.friction_speed)
+    xdot["motor.speed"] = (motor.torque - friction - gear * r_over_n * top) / p["winch.inertia"]
+
+    measured = (acceleration, velocity[-1], position[-1])
+    for stage in ("sensor", "telemetry"):
+        if f"{stage}.bandwidth" in p:
+            measured, filter_dot = _butterworth(stage, p[f"{stage}.bandwidth"], x_of, measured)
+            xdot |= filter_dot
+
+    z = {
+        "payload.displacement": position[-1],
+        "payload.velocity": velocity[-1],
+        "payload.acceleration": acceleration,
+        "drum.haul": haul,
+        "motor.torque": motor.torque,
+        "motor.speed": speed,
+        "motor.current": motor.current,
+        "rope.tension": top,
+    }
+    if data.motor == "dc":
+        z["motor.voltage"] = motor.applied
+    if limits is not None or travel is not None or surroundings is not None:  # a simulation
+        slackest = tension[0]
+        for other_tension in tension[1:]:
+            slackest = ca.fmin(slackest, other_tension)
+        z |= {
+            "rope.lower_tension": tension[-1],
+            "rope.minimum_tension": slackest,
+            "rope.length": length,
+            "drive.applied": motor.applied,
+            **outside,
+        }
+    y_out, z_out = ca.vertcat(*measured), ca.vertcat(*z.values())
+    rhs = ca.vertcat(*(xdot[name] for name in states))
+    arguments = [x, u, w, symbols]
+    derivatives = [ca.jacobian(f, v) for f in (rhs, y_out, z_out) for v in (x, u, w)]
+    signatures = ["x", "u", "w", "p"], ["xdot", "y", "z"]
+    units = _units(data, states, disturbances, tuple(z))
+    if surroundings is not None:
+        units |= {name: unit for name, unit in surroundings.output_units.items() if name in z}
+    return Equations(
+        states=states,
+        disturbances=disturbances,
+        outputs=tuple(z),
+        parameters=parameters,
+        function=ca.Function("plant", arguments, [rhs, y_out, z_out], *signatures),
+        jacobians=ca.Function("plant_jacobians", arguments, derivatives),
+        units=units,
+    )
+
+
+def _butterworth(
+    stage: str, bandwidth: ca.SX, x: Mapping[str, ca.SX], signals: tuple[ca.SX, ca.SX, ca.SX]
+) -> tuple[tuple[ca.SX, ca.SX, ca.SX], dict[str, ca.SX]]:
+    """Return (acceleration, velocity, displacement) behind one second-order low-pass.
+
+    The same filter on a signal and on its derivatives: two states hold all three, as the
+    filtered velocity is the derivative of the filtered displacement.
+    """
+    shown, moving = x[f"{stage}.displacement"], x[f"{stage}.velocity"]
+    rate = bandwidth**2 * (signals[2] - shown) - math.sqrt(2.0) * bandwidth * moving
+    return (rate, moving, shown), {f"{stage}.displacement": moving, f"{stage}.velocity": rate}
+
+
+def displacement_names(n: int) -> list[str]:
+    """Return the names of the displacements of the rope's masses from the drum down."""
+    return [*(f"rope.{j + 1}.displacement" for j in range(n - 1)), "payload.displacement"]
+
+
+def _velocities(n: int) -> list[str]:
+    return [*(f"rope.{j + 1}.velocity" for j in range(n - 1)), "payload.velocity"]
+
+
+def _state_names(data: PlantData, n: int) -> tuple[str, ...]:
+    names = ["motor.angle", "motor.speed"]
+    if data.motor == "dc" and data.inductance > 0.0:
+        names.append("motor.current")
+    if data.motor == "ac" and not math.isinf(data.torque_bandwidth):
+        names.append("motor.torque")
+    names += [*displacement_names(n), *_velocities(n)]
+    for stage, bandwidth in (
+        ("sensor", data.sensor_bandwidth),
+        ("telemetry", data.telemetry_bandwidth),
+    ):
+        if not math.isinf(bandwidth):
+            names += [f"{stage}.displacement", f"{stage}.velocity"]
+    return tuple(names)
+
+
+def parameter_values(data: PlantData) -> dict[str, float]:
+    """Return the plant's parameters p by name, in their order."""
+    values = {
+        "rope.axial_stiffness": data.axial_stiffness,
+        "rope.length": data.rope_length,
+        "rope.mass_per_length": data.mass_per_length,
+        "rope.submerged_weight_per_length": data.rope_weight,
+        "rope.damping_time": data.damping_time,
+        "payload.virtual_mass": data.payload_mass,
+        "payload.submerged_weight": data.payload_weight,
+        "payload.quadratic_drag": data.quadratic_drag,
+        "payload.linear_drag": 0.0,
+        "winch.drum_radius": data.drum_radius,
+        "winch.gear_ratio": data.gear_ratio,
+        "winch.gear_efficiency": data.gear_efficiency,
+        "winch.gear_direction": 0.0,
+        "winch.gear_switching": 0.0,
+        "winch.inertia": data.inertia,
+        "winch.viscous_friction": data.viscous_friction,
+    }
+    if data.coulomb_friction > 0.0:
+        # Zero here: its slope at rest, T_c/omega_f, is no friction of a drum that moves.
+        values["winch.coulomb_friction"] = 0.0
+    if data.motor == "dc":
+        values |= {
+            "motor.resistance": data.resistance,
+            "motor.torque_constant": data.torque_constant,
+            "motor.back_emf_constant": data.back_emf_constant,
+        }
+        if data.inductance > 0.0:
+            values["motor.inductance"] = data.inductance
+    else:
+        if data.speed_gain > 0.0:
+            values["motor.speed_gain"] = data.speed_gain
+        if not math.isinf(data.torque_bandwidth):
+            values["motor.torque_bandwidth"] = data.torque_bandwidth
+    if not math.isinf(data.sensor_bandwidth):
+        values["sensor.bandwidth"] = data.sensor_bandwidth
+    if not math.isinf(data.telemetry_bandwidth):
+        values["telemetry.bandwidth"] = data.telemetry_bandwidth
+    return values
+
+
+def _hanging_weights(lumps: RopeLumps, p: Mapping[str, ca.SX]) -> list[ca.SX]:
+    """Return the submerged weight below the top of each spring, its tension at rest [N]."""
+    rope = p["rope.submerged_weight_per_length"] * p["rope.length"]
+    return [p["payload.submerged_weight"] + rope * float(part) for part in lumps.hanging]
+
+
+def _units(
+    data: PlantData,
+    states: tuple[str, ...],
+    disturbances: tuple[str, ...],
+    outputs: tuple[str, ...],
+) -> dict[str, str]:
+    by_ending = {
+        "displacement": "m",
+        "velocity": "m/s",
+        "acceleration": "m/s2",
+        "haul": "m",
+        "heave": "m",
+        "heave_rate": "m/s",
+        "force": "N",
+        "tension": "N",
+        "lower_tension": "N",
+        "minimum_tension": "N",
+        "length": "m",
+        "angle": "rad",
+        "speed": "rad/s",
+        "torque": "N m",
+        "current": "A" if data.motor == "dc" else "N m",
+        "voltage": "V",
+    }
+    command = "V" if data.motor == "dc" else "rad/s" if data.speed_gain > 0.0 else "N m"
+    by_ending |= {"command": command, "set_point": command, "applied": command}
+    names = {*states, *INPUTS, *disturbances, *MEASUREMENTS, *outputs}
+    return {name: by_ending.get(name.rsplit(".", 1)[-1], "-") for name in sorted(names)}

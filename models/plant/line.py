@@ -1,0 +1,175 @@
+"""Exact frequency responses of the winch with a rope that is not lumped at all.
+
+The rope is the wave equation EA (1 + tau d/dt) u'' = m u_tt between the drum and the payload.
+Its responses at a point s of the complex plane are closed forms; closed with the winch's own
+equations they give the same blocks, by the same names, as the lumped `LinearPlant`.  They are
+the yardstick for the lumping, and what the final verification evaluates on its contours: a
+design that holds on the lumped rope only is not a design.
+
+For a rope of length L with payload equation D P = T_lower + F, D = M_1 s^2 + C s:
+
+    gamma = s L sqrt(m / (EA (1 + tau s))),   l = L / (EA (1 + tau s)),
+    P     = (Y + l sinh(gamma)/gamma F) / (cosh(gamma) + D l sinh(gamma)/gamma),
+    T_top = ((gamma sinh(gamma)/l + D cosh(gamma)) Y - F) / (the same denominator).
+
+The first is 1/(cosh gamma + Gamma sinh gamma) with Gamma = D l / gamma.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError, check_finite, check_range
+from .equations import DISTURBANCES, INPUTS, MEASUREMENTS, RATES
+from .plant_data import PlantData, as_plant_data
+from .response import ComplexArray, PlantResponse
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+
+__all__ = ["line_response", "line_response_at", "rope_transfers"]
+
+_OWNER = "line response"
+
+
+def line_response(source: Case | PlantData, omega: npt.ArrayLike, *, drag: float) -> PlantResponse:
+    """Return the exact response of a case's plant at real frequencies.
+
+    Parameters
+    ----------
+    source
+        A case, or the plant's numbers.
+    omega
+        Frequencies [rad/s], (k,), not zero: the drum's angle is an integrator.
+    drag
+        Equivalent linear drag coefficient C of the payload [N s/m].
+
+    Raises
+    ------
+    InputError
+        If a frequency is zero or not finite, or `drag` is negative.
+    """
+    frequencies = check_finite(_OWNER, "omega", omega).reshape(-1)
+    return line_response_at(source, 1j * frequencies, drag=drag)
+
+
+def line_response_at(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) -> PlantResponse:
+    """Return the exact response at points of the complex plane, as a Nyquist contour needs it.
+
+    Safe from overflow for any Re s >= 0: every hyperbolic function is carried as its product
+    with exp(-gamma).
+
+    Parameters
+    ----------
+    source
+        A case, or the plant's numbers.
+    s
+        Points [1/s], (k,), none of them a pole (s = 0 is one).
+    drag
+        Equivalent linear drag coefficient C of the payload [N s/m].
+
+    Raises
+    ------
+    InputError
+        If a point is a pole or not finite, or `drag` is negative.
+    """
+    data = as_plant_data(source)
+    check_range(_OWNER, "drag", drag, low=0.0, unit="N s/m")
+    points = np.array(s, dtype=np.complex128).reshape(-1)
+    check_finite(_OWNER, "s", points.view(np.float64))
+    if np.any(points == 0.0):
+        raise InputError(f"{_OWNER}: s must not be 0, where the drum's angle integrates")
+    s = points
+    P_Y, P_F, T_Y, T_F = rope_transfers(data, s, drag)
+
+    # Motor: torque = forward command - back s theta, both with the drive's dynamics in them.
+    if data.motor == "dc":
+        forward = data.torque_constant / (data.resistance + data.inductance * s)
+        back = forward * data.back_emf_constant
+    else:
+        lag = 1.0 / (1.0 + s / data.torque_bandwidth)  # 1 for an infinite bandwidth
+        speed_mode = data.speed_gain > 0.0
+        forward = lag * data.speed_gain if speed_mode else lag
+        back = lag * data.speed_gain
+    h = data.drum_radius / data.gear_ratio
+    load = data.mean_gear_factor * h
+    shaft = data.inertia * s**2 + (data.viscous_friction + back) * s + load * h * T_Y
+    # columns: command, heave, force on the payload, set-point
+    zero = np.zeros_like(s)
+    one = np.ones_like(s)
+    drive = forward + zero
+    angle = np.stack([drive, -load * T_Y, -load * T_F, drive]) / shaft
+    command = np.stack([one, zero, zero, one])
+    heave = np.stack([zero, one, zero, zero])
+    force = np.stack([zero, zero, one, zero])
+    top = h * angle + heave
+    payload = P_Y * top + P_F * force
+    torque = forward * command - back * s * angle
+    z = {
+        "payload.displacement": payload,
+        "payload.velocity": s * payload,
+        "payload.acceleration": s**2 * payload,
+        "drum.haul": h * angle,
+        "motor.torque": torque,
+        "motor.speed": s * angle,
+        "motor.current": torque / data.torque_constant,
+        "rope.tension": T_Y * top + T_F * force,
+    }
+    if data.motor == "dc":
+        z["motor.voltage"] = command
+    sensor = np.exp(-s * data.delay)
+    for bandwidth in (data.sensor_bandwidth, data.telemetry_bandwidth):
+        if not math.isinf(bandwidth):
+            sensor = sensor / (1.0 + math.sqrt(2.0) * (s / bandwidth) + (s / bandwidth) ** 2)
+    z_rows = np.stack(list(z.values())).transpose(2, 0, 1)
+    y_rows = np.stack([sensor * z[name] for name in MEASUREMENTS]).transpose(2, 0, 1)
+    return PlantResponse(
+        omega=points.imag,
+        s=points,
+        zw=z_rows[:, :, 1:],
+        zu=z_rows[:, :, :1],
+        yw=y_rows[:, :, 1:],
+        yu=y_rows[:, :, :1],
+        inputs=INPUTS,
+        disturbances=tuple(name for name in DISTURBANCES if name not in RATES),
+        measurements=MEASUREMENTS,
+        outputs=tuple(z),
+    )
+
+
+def rope_transfers(
+    data: PlantData, s: ComplexArray, drag: float
+) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+    """Return P/Y, P/F, T_top/Y and T_top/F of the rope with its payload, each (k,).
+
+    Y is the motion of the rope's upper end, F a force on the payload, T_top the tension at
+    the drum, as deviations from rest.  By reciprocity T_top/F = -P/Y.
+
+    Parameters
+    ----------
+    data
+        The plant's numbers; rope and payload matter.
+    s
+        Points [1/s], (k,), Re s >= 0 for safety from overflow.
+    drag
+        Equivalent linear drag coefficient C of the payload [N s/m].
+    """
+    stiffness = data.axial_stiffness * (1.0 + s * data.damping_time)
+    compliance = data.rope_length / stiffness
+    gamma = s * data.rope_length * np.sqrt(data.mass_per_length / stiffness)
+    # All functions are even in gamma: take the root whose exponential does not grow.
+    gamma = np.where(gamma.real < 0.0, -gamma, gamma)
+    decay = np.exp(-gamma)
+    cosh = 0.5 * (1.0 + decay**2)  # times exp(-gamma), as the next one
+    safe = np.where(gamma == 0.0, 1.0, gamma)
+    sinh_over_gamma = np.where(gamma == 0.0, 1.0, -0.5 * np.expm1(-2.0 * safe) / safe)
+    D = data.payload_mass * s**2 + drag * s
+    below = cosh + D * compliance * sinh_over_gamma
+    P_Y = decay / below
+    P_F = compliance * sinh_over_gamma / below
+    T_Y = (gamma**2 / compliance * sinh_over_gamma + D * cosh) / below
+    return P_Y, P_F, T_Y, -P_Y

@@ -1,0 +1,364 @@
+"""The linear plant: the one thing that gain synthesis and linear MPC know of the world.
+
+Any plant with named signals will do, a user's own included::
+
+    x' = A x + B u + E w          w: disturbances, u: inputs
+    y  = C x + D u + F w          measured, y_i late by delays[i]
+    z  = Cz x + Dz u + Fz w       performance outputs
+
+`Plant.linearise` makes one of the winch; synthesis takes its frequency responses
+(`PlantResponse`), the verification its poles, MPC its sampled form (`DiscretePlant`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+
+from ..basics.checks import InputError, check_finite, check_range, read_only
+from ..basics.signals import pick, signal_delays, signal_names, signal_rates
+from .discrete import DiscretePlant, zero_order_hold
+from .pade import pade_bank
+from .response import ComplexArray, PlantResponse, state_space_response
+
+if TYPE_CHECKING:
+    import control
+
+__all__ = ["LinearPlant", "PlantResponse"]
+
+FloatArray = npt.NDArray[np.float64]
+_OWNER = "linear plant"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, init=False)
+class LinearPlant:
+    """A linear, time-invariant plant with named signals and delayed measurements.
+
+    Parameters
+    ----------
+    A, B, E
+        State matrices, (n, n), (n, nu), (n, nw).
+    C, D, F
+        Measurement matrices, (ny, n), (ny, nu), (ny, nw); D and F default to zero.
+    Cz, Dz, Fz
+        Matrices of the performance outputs, (nz, n), (nz, nu), (nz, nw); without Cz there
+        are no outputs, Dz and Fz default to zero.
+    states, inputs, disturbances, measurements, outputs
+        Names, by default x1.., u1.., w1.., y1.., z1..
+    delays
+        Delay of each measurement [s], in order or by name; default 0.
+    rates
+        Disturbances that are the time derivative of another one, {"rate": "of"}: their
+        column times s is added to that of the other one in every response.
+    units
+        Unit of a signal by name, for reports.
+    static
+        Value of a signal at the operating point by name, in its unit.
+
+    Raises
+    ------
+    InputError
+        If shapes disagree, a number is not finite, a name is repeated or unknown, or a
+        delay is negative.
+    """
+
+    A: FloatArray
+    B: FloatArray
+    E: FloatArray
+    C: FloatArray
+    D: FloatArray
+    F: FloatArray
+    Cz: FloatArray
+    Dz: FloatArray
+    Fz: FloatArray
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    disturbances: tuple[str, ...]
+    measurements: tuple[str, ...]
+    outputs: tuple[str, ...]
+    delays: tuple[float, ...]
+    rates: Mapping[str, str]
+    units: Mapping[str, str]
+    static: Mapping[str, float]
+
+    def __init__(
+        self,
+        *,
+        A: npt.ArrayLike,
+        B: npt.ArrayLike,
+        E: npt.ArrayLike,
+        C: npt.ArrayLike,
+        D: npt.ArrayLike | None = None,
+        F: npt.ArrayLike | None = None,
+        Cz: npt.ArrayLike | None = None,
+        Dz: npt.ArrayLike | None = None,
+        Fz: npt.ArrayLike | None = None,
+        states: Sequence[str] = (),
+        inputs: Sequence[str] = (),
+        disturbances: Sequence[str] = (),
+        measurements: Sequence[str] = (),
+        outputs: Sequence[str] = (),
+        delays: Sequence[float] | Mapping[str, float] = (),
+        rates: Mapping[str, str] | None = None,
+        units: Mapping[str, str] | None = None,
+        static: Mapping[str, float] | None = None,
+    ) -> None:
+        A, B, E, C = (_matrix(n, v) for n, v in (("A", A), ("B", B), ("E", E), ("C", C)))
+        Cz = np.zeros((0, A.shape[0])) if Cz is None else _matrix("Cz", Cz)
+        n, nu, nw, ny, nz = A.shape[0], B.shape[1], E.shape[1], C.shape[0], Cz.shape[0]
+        shapes = {"A": (n, n), "B": (n, nu), "E": (n, nw), "C": (ny, n), "D": (ny, nu)}
+        shapes |= {"F": (ny, nw), "Cz": (nz, n), "Dz": (nz, nu), "Fz": (nz, nw)}
+        given = {"A": A, "B": B, "E": E, "C": C, "D": D, "F": F, "Cz": Cz, "Dz": Dz, "Fz": Fz}
+        for name, shape in shapes.items():
+            value = given[name]
+            matrix = np.zeros(shape) if value is None else _matrix(name, value)
+            if matrix.shape != shape:
+                raise InputError(
+                    f"{_OWNER}: {name} must have the shape {shape} that A, B, E, C and Cz "
+                    f"ask for, got {matrix.shape}"
+                )
+            object.__setattr__(self, name, read_only(matrix))
+        taken: dict[str, str] = {}
+        for kind, names, letter, count in (
+            ("states", states, "x", n),
+            ("inputs", inputs, "u", nu),
+            ("disturbances", disturbances, "w", nw),
+            ("measurements", measurements, "y", ny),
+            ("outputs", outputs, "z", nz),
+        ):
+            object.__setattr__(self, kind, signal_names(_OWNER, kind, names, letter, count))
+        for kind in ("inputs", "disturbances"):
+            for name in getattr(self, kind):
+                if name in taken:
+                    raise InputError(
+                        f"{_OWNER}: names of inputs and disturbances must differ, got "
+                        f"{name!r} in both"
+                    )
+                taken[name] = kind
+        object.__setattr__(self, "delays", signal_delays(_OWNER, self.measurements, delays))
+        object.__setattr__(self, "rates", signal_rates(_OWNER, self.disturbances, rates or {}))
+        known = {*self.states, *self.inputs, *self.disturbances}
+        known |= {*self.measurements, *self.outputs}
+        for kind, mapping in (("units", units or {}), ("static", static or {})):
+            pick(_OWNER, f"signal (in {kind})", sorted(known), list(mapping))
+        object.__setattr__(self, "units", MappingProxyType(dict(units or {})))
+        values = {k: check_range(_OWNER, f"static {k}", v) for k, v in (static or {}).items()}
+        object.__setattr__(self, "static", MappingProxyType(values))
+
+    @property
+    def independent_disturbances(self) -> tuple[str, ...]:
+        """Names of the disturbances that are not the rate of another one."""
+        return tuple(name for name in self.disturbances if name not in self.rates)
+
+    def response(self, omega: npt.ArrayLike) -> PlantResponse:
+        """Return the frequency response at `omega` [rad/s], (k,), delays exact.
+
+        Raises
+        ------
+        InputError
+            If a frequency is not finite or is that of an undamped pole (0 of an integrator).
+        """
+        return self.response_at(1j * check_finite(_OWNER, "omega", omega).reshape(-1))
+
+    def response_at(self, s: npt.ArrayLike) -> PlantResponse:
+        """Return the response at points `s` of the complex plane [1/s], (k,).
+
+        Raises
+        ------
+        InputError
+            If a point is not finite or is a pole of the plant.
+        """
+        return state_space_response(self, s)
+
+    @cached_property
+    def triangular(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """T, U, V with A = V T U, T upper triangular and U = V^-1, (n, n) each.
+
+        The balanced Schur form: with it a response costs one back-substitution per
+        frequency.  Unlike the eigenvectors it does no harm near a defective A (a drum in
+        torque mode is a chain of two integrators).
+        """
+        if not len(self.A):
+            return (np.zeros((0, 0), dtype=np.complex128),) * 3
+        balanced, (scale, _) = scipy.linalg.matrix_balance(self.A, permute=False, separate=True)
+        T, Q = scipy.linalg.schur(balanced, output="complex")
+        return np.asarray(T), Q.conj().T / scale, scale[:, None] * Q
+
+    def poles(self) -> ComplexArray:
+        """Return the eigenvalues of A [1/s], (n,); delays have none."""
+        return np.asarray(np.linalg.eigvals(self.A), dtype=np.complex128)
+
+    def select(
+        self,
+        *,
+        outputs: Sequence[str] | None = None,
+        measurements: Sequence[str] | None = None,
+    ) -> LinearPlant:
+        """Return the plant with some outputs and measurements only, in the order given.
+
+        Raises
+        ------
+        InputError
+            If a name is unknown.
+        """
+        outputs = self.outputs if outputs is None else tuple(outputs)
+        measurements = self.measurements if measurements is None else tuple(measurements)
+        z = pick(_OWNER, "output", self.outputs, outputs)
+        y = pick(_OWNER, "measurement", self.measurements, measurements)
+        known = {*self.states, *self.inputs, *self.disturbances, *outputs, *measurements}
+        return replace(
+            self,
+            C=self.C[y],
+            D=self.D[y],
+            F=self.F[y],
+            Cz=self.Cz[z],
+            Dz=self.Dz[z],
+            Fz=self.Fz[z],
+            outputs=outputs,
+            measurements=measurements,
+            delays=tuple(self.delays[i] for i in y),
+            units={k: v for k, v in self.units.items() if k in known},
+            static={k: v for k, v in self.static.items() if k in known},
+        )
+
+    def without_delays(self, pade_order: int = 6, *, at: str = "auto") -> LinearPlant:
+        """Return a plant without delays, Pade models in their place.
+
+        Parameters
+        ----------
+        pade_order
+            Order of each Pade model, 1 to 12; 0 drops the delays.
+        at
+            ``"inputs"``: the models stand at the inputs, which needs equal delays and
+            fewest states.  What the loop does is the same: yu is that of the delayed plant
+            and every closed-loop response with it, while zu alone gains the delay and yw
+            alone loses it.  ``"measurements"``: one model for each delayed measurement, all
+            four blocks keep their meaning.  ``"auto"``: inputs if the delays are equal and
+            there are fewer inputs than measurements.
+
+        Raises
+        ------
+        InputError
+            If `pade_order` or `at` is out of range, or the delays differ at ``"inputs"``.
+        """
+        check_range(_OWNER, "pade_order", pade_order, low=0, high=12)
+        if at not in ("auto", "inputs", "measurements"):
+            raise InputError(f"{_OWNER}: at must be 'auto', 'inputs' or 'measurements', got {at!r}")
+        ny, nu = len(self.measurements), len(self.inputs)
+        equal = len(set(self.delays)) <= 1
+        if at == "inputs" and not equal:
+            raise InputError(
+                f"{_OWNER}: delays can stand at the inputs only if they are equal, got "
+                f"{self.delays} s"
+            )
+        plain = replace(self, delays=(0.0,) * ny)
+        if pade_order == 0 or not any(self.delays):
+            return plain
+        if at == "inputs" or (at == "auto" and equal and nu < ny):
+            late = (self.delays[0],) * nu
+            A2, B2, C2, D2 = pade_bank(late, pade_order)
+            return replace(
+                plain,
+                A=np.block([[self.A, self.B @ C2], [np.zeros((len(A2), len(self.A))), A2]]),
+                B=np.vstack([self.B @ D2, B2]),
+                E=np.vstack([self.E, np.zeros((len(A2), self.E.shape[1]))]),
+                C=np.hstack([self.C, self.D @ C2]),
+                D=self.D @ D2,
+                Cz=np.hstack([self.Cz, self.Dz @ C2]),
+                Dz=self.Dz @ D2,
+                states=(*self.states, *_delay_states(self.inputs, late, pade_order)),
+            )
+        A2, B2, C2, D2 = pade_bank(self.delays, pade_order)
+        return replace(
+            plain,
+            A=np.block([[self.A, np.zeros((len(self.A), len(A2)))], [B2 @ self.C, A2]]),
+            B=np.vstack([self.B, B2 @ self.D]),
+            E=np.vstack([self.E, B2 @ self.F]),
+            C=np.hstack([D2 @ self.C, C2]),
+            D=D2 @ self.D,
+            F=D2 @ self.F,
+            Cz=np.hstack([self.Cz, np.zeros((len(self.Cz), len(A2)))]),
+            states=(*self.states, *_delay_states(self.measurements, self.delays, pade_order)),
+        )
+
+    def discretise(self, dt: float) -> DiscretePlant:
+        """Return the plant sampled every `dt` [s], inputs and disturbances held.
+
+        Raises
+        ------
+        InputError
+            If `dt` is not above zero.
+        """
+        check_range(_OWNER, "dt", dt, low=0.0, unit="s", open_low=True)
+        Ad, BEd = zero_order_hold(self.A, np.hstack([self.B, self.E]), dt)
+        same: dict[str, Any] = {
+            field.name: getattr(self, field.name)
+            for field in fields(DiscretePlant)
+            if field.name not in ("dt", "A", "B", "E")
+        }
+        nu = self.B.shape[1]
+        return DiscretePlant(dt=float(dt), A=Ad, B=BEd[:, :nu], E=BEd[:, nu:], **same)
+
+    def to_control(self, pade_order: int = 6) -> control.StateSpace:
+        """Return a python-control system, inputs then disturbances to measurements then outputs.
+
+        Measurement delays become Pade models of `pade_order` (0 drops them).  A disturbance
+        that is the rate of another one stays an input of its own, as no proper system can
+        hold its derivative.  A signal that is measured and an output keeps its name in the
+        outputs, and is called ``measured_<name>`` among the measurements;
+        python-control allows no dots in names, they become underscores.
+        """
+        import control
+
+        plant = self.without_delays(pade_order, at="measurements")
+        measured = [f"measured_{n}" if n in self.outputs else n for n in self.measurements]
+        names = [
+            [name.replace(".", "_") for name in group]
+            for group in (
+                plant.states,
+                (*plant.inputs, *plant.disturbances),
+                (*measured, *plant.outputs),
+            )
+        ]
+        return control.ss(
+            plant.A,
+            np.hstack([plant.B, plant.E]),
+            np.vstack([plant.C, plant.Cz]),
+            np.block([[plant.D, plant.F], [plant.Dz, plant.Fz]]),
+            states=names[0],
+            inputs=names[1],
+            outputs=names[2],
+        )
+
+    def __str__(self) -> str:
+        """Return a small tree of sizes and names."""
+        late = [
+            f"{name} ({delay * 1e3:g} ms late)" if delay else name
+            for name, delay in zip(self.measurements, self.delays, strict=True)
+        ]
+        return (
+            f"LinearPlant with {len(self.states)} states\n"
+            f"├ inputs: {', '.join(self.inputs)}\n"
+            f"├ disturbances: {', '.join(self.independent_disturbances)}\n"
+            f"├ measurements: {', '.join(late)}\n"
+            f"└ outputs: {', '.join(self.outputs) or 'none'}"
+        )
+
+
+def _matrix(name: str, value: npt.ArrayLike) -> FloatArray:
+    matrix = check_finite(_OWNER, name, value)
+    if matrix.ndim != 2:
+        raise InputError(f"{_OWNER}: {name} must be a matrix, got an array of {matrix.ndim} axes")
+    return matrix
+
+
+def _delay_states(names: Sequence[str], delays: Sequence[float], order: int) -> list[str]:
+    late = [name for name, delay in zip(names, delays, strict=True) if delay > 0.0]
+    return [f"{name}.delay{i + 1}" for name in late for i in range(order)]

@@ -1,0 +1,88 @@
+"""Rope paid out and the drum's radius as functions of the motor's angle.
+
+Holding station the rope keeps its length and the drum its radius, which is what the linear
+plant assumes.  Over a lowering the rope grows, and the drum's radius falls from layer to layer.
+Within a layer the haul is proportional to the angle, so over several it is a continuous,
+piecewise linear function of it, written here with hinges max(0, angle - angle_j): exact, and
+differentiable wherever the radius is.  `models.plant.equations` uses it where the plant is asked to
+pay out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi as ca
+
+from ..basics.checks import check_range
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+
+__all__ = ["DrumTravel"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrumTravel:
+    """Where, seen from the static position, the rope's layer on the drum changes.
+
+    Parameters
+    ----------
+    outward
+        (haul at which it happens [m], radius from there on [m]) for hauling in, ascending.
+    inward
+        (haul paid out at which it happens, as a positive number [m], radius from there on [m])
+        for paying out, ascending.
+
+    Raises
+    ------
+    InputError
+        If a radius is not above zero or a haul is negative.
+    """
+
+    outward: tuple[tuple[float, float], ...] = ()
+    inward: tuple[tuple[float, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        for haul, radius in (*self.outward, *self.inward):
+            check_range("drum travel", "haul", haul, low=0.0, unit="m")
+            check_range("drum travel", "radius", radius, low=0.0, unit="m", open_low=True)
+
+    @classmethod
+    def from_case(cls, case: Case) -> DrumTravel:
+        """Return the layer changes around the rope length of a case."""
+        paid_out = case.rope.length
+        lays = case.winch.drum.lays(case.rope.diameter)  # innermost first, by falling rope paid out
+        here = next((i for i, (start, _) in enumerate(lays) if paid_out >= start), len(lays) - 1)
+        outward = tuple(
+            (paid_out - lays[i - 1][0], lays[i][1])
+            for i in range(here + 1, len(lays))
+            if lays[i - 1][0] > 0.0
+        )
+        inward = tuple((lays[i][0] - paid_out, lays[i][1]) for i in range(here - 1, -1, -1))
+        return cls(outward=outward, inward=inward)
+
+    def haul(self, angle: ca.SX, radius: ca.SX, ratio: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Return (rope hauled in [m], radius in use [m]) at a motor angle.
+
+        Parameters
+        ----------
+        angle
+            Motor angle from the static position [rad], positive hauling in.
+        radius
+            Radius at angle zero [m].
+        ratio
+            Turns of the motor per turn of the drum [-].
+        """
+        turned = angle / ratio  # of the drum [rad]
+        haul, in_use = radius * turned, radius
+        for sign, changes in ((1.0, self.outward), (-1.0, self.inward)):
+            at, before, last = ca.SX(0), radius, 0.0
+            for travel, after in changes:
+                at = at + (travel - last) / before
+                excess = ca.fmax(0, sign * turned - at)
+                haul = haul + sign * (after - before) * excess
+                in_use = in_use + (after - before) * (excess > 0)
+                before, last = ca.SX(after), travel
+        return haul, in_use

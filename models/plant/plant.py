@@ -1,0 +1,334 @@
+"""The winch, its rope and its load: one nonlinear plant, symbolic in CasADi.
+
+    command u --> motor --> gear, drum --(haul X)--+
+                                                    +--> rope: springs and masses --> payload P
+    hook heave Z, heave rate Z' --------------------+
+
+Everything moves in the vertical, positive up.  Displacements are measured from the static
+equilibrium, in which the state is zero but for the motor's current or torque.  Forces are
+whole, not deviations: every spring carries its share of the submerged weight and goes slack
+when its tension would fall below zero, and the motor holds the static load.
+
+`build_plant` makes it from a case; `Plant.operating_point` solves for rest,
+`Plant.linearise` differentiates there and gives the `LinearPlant` that synthesis works on.
+Limits of the drive, a rope that grows, a seabed or a deck are no part of it unless asked for:
+`build_plant` takes them for the simulation and for nonlinear prediction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import SolverError, check_range, read_only
+from ..basics.signals import pick
+from .equations import INPUTS, MEASUREMENTS, RATES, build_equations, displacement_names
+from .linear import LinearPlant
+from .plant_data import PlantData, as_plant_data
+from .rope import RopeLumps, lump_rope
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+    from .drive import DriveLimits
+    from .payout import DrumTravel
+    from .surroundings import Surroundings
+
+__all__ = ["MEAN_LOSSES", "OperatingPoint", "Plant", "build_plant"]
+
+FloatArray = npt.NDArray[np.float64]
+
+#: Parameters of a load that truly hangs at rest, neither hauled nor lowered: the gear has the mean
+#: of its two losses.  It is where a simulation starts and what a controller's command begins from;
+#: the torque to set against a rating is that of hauling, without them.
+MEAN_LOSSES: Mapping[str, float] = MappingProxyType({"winch.gear_direction": 0.0})
+
+RESIDUAL_TOLERANCE = 1e-9  # of the terms that cancel at rest [-]
+_QUIET = {"error_on_fail": False, "show_eval_warnings": False}  # we look at the residual
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OperatingPoint:
+    """The plant at rest.
+
+    Parameters
+    ----------
+    x, u, p
+        State, input and parameters, (nx,), (1,), (np,); the disturbances are zero.
+    command
+        Drive command that holds the load [V, rad/s or N m].
+    torque
+        Motor torque [N m].
+    tension
+        Rope tension at the drum [N].
+    elongations
+        Static elongation of each piece of rope from the drum down [m], (N,).
+    outputs
+        Every performance output by name.
+    residual
+        Largest derivative that is left, over the terms that cancel in it [-].
+    """
+
+    x: FloatArray
+    u: FloatArray
+    p: FloatArray
+    command: float
+    torque: float
+    tension: float
+    elongations: FloatArray
+    outputs: Mapping[str, float]
+    residual: float
+
+    def __str__(self) -> str:
+        """Return a small tree of the static values."""
+        return (
+            "OperatingPoint\n"
+            f"├ rope tension at the drum: {self.tension / 1e3:.4g} kN\n"
+            f"├ rope elongation: {self.elongations.sum():.4g} m\n"
+            f"├ motor torque: {self.torque / 1e3:.4g} kN m\n"
+            f"├ drive command: {self.command:.4g}\n"
+            f"└ residual: {self.residual:.1e}"
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Plant:
+    """The symbolic plant; `build_plant` makes it.
+
+    Parameters
+    ----------
+    data
+        The numbers it was built from.
+    lumps
+        The rope's lumping.
+    states, inputs, disturbances, measurements, outputs
+        Names of the entries of x, u, w, y and z.
+    parameters
+        Names and values of the entries of p.
+    function
+        casadi.Function (x, u, w, p) -> (xdot, y, z), smooth but for slack rope.
+    units
+        Unit of each signal by name.
+
+    Notes
+    -----
+    Parameters that choose rather than measure: ``payload.linear_drag`` is added to the
+    quadratic drag, whose own slope at rest is zero, and stands for it in a linear plant.
+    ``winch.gear_direction`` in [-1, 1] is +1 when the motor drives the load (it feels 1/eta
+    of its torque), -1 when the load drives the motor (eta), 0 the mean of both factors; with
+    ``winch.gear_switching`` [s/rad] above zero the direction follows the motor's speed, as
+    tanh(switching * speed).
+    """
+
+    data: PlantData
+    lumps: RopeLumps
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    disturbances: tuple[str, ...]
+    measurements: tuple[str, ...]
+    outputs: tuple[str, ...]
+    parameters: Mapping[str, float]
+    function: ca.Function
+    jacobians: ca.Function
+    units: Mapping[str, str]
+
+    @property
+    def masses(self) -> int:
+        """Number of masses along the rope, the payload's included."""
+        return len(self.lumps.masses)
+
+    def parameter_vector(self, changes: Mapping[str, float] | None = None) -> FloatArray:
+        """Return p, some of its entries replaced by name.
+
+        Raises
+        ------
+        InputError
+            If a name is unknown or a value is not finite.
+        """
+        changes = changes or {}
+        pick("plant", "parameter", tuple(self.parameters), tuple(changes))
+        values = {k: check_range("plant", k, v) for k, v in changes.items()}
+        return np.array([values.get(name, value) for name, value in self.parameters.items()])
+
+    def operating_point(self, parameters: Mapping[str, float] | None = None) -> OperatingPoint:
+        """Solve for the state and the command that hold the load at rest.
+
+        The drum's angle is free at rest and set to zero.  Newton's method starts at a rope
+        with half of its static stretch, so that the answer is found, not handed in.  The
+        motor holds the load as if hauling it (gear direction +1) unless `parameters` say
+        otherwise: that torque is the one to set against a rating.
+
+        Raises
+        ------
+        SolverError
+            If the solve leaves a residual.
+        """
+        p = self.parameter_vector({"winch.gear_direction": 1.0, **(parameters or {})})
+        values = dict(zip(self.parameters, p, strict=True))
+        nx = len(self.states)
+        unknown = ca.SX.sym("unknown", nx)  # the state but for the angle, and the command
+        x = ca.vertcat(0, unknown[: nx - 1])
+        symbols = ca.SX.sym("p", p.size)
+        xdot = self.function(x, unknown[nx - 1], np.zeros(len(self.disturbances)), symbols)[0]
+        # The angle's own equation says that the speed is zero; all nx are kept.
+        system = {"x": unknown, "p": symbols, "g": xdot}
+        solver = ca.rootfinder("static", "newton", system, _QUIET)
+        stretch = _elongations(self.lumps, values)
+        start = np.zeros(nx)
+        first = self.states.index(displacement_names(self.masses)[0]) - 1
+        start[first : first + self.masses] = 0.5 * np.cumsum(stretch)
+        try:
+            found = np.asarray(solver(x0=start, p=p)["x"], dtype=np.float64).ravel()
+        except RuntimeError as error:  # whatever CasADi says, ours is the error the user sees
+            raise SolverError(f"plant: no static operating point was found: {error}") from error
+        if not np.isfinite(found).all():
+            raise SolverError("plant: no static operating point was found: nothing holds the load")
+        state, u, w = np.append(0.0, found[:-1]), found[-1:], np.zeros(len(self.disturbances))
+        derivative, _, z = (np.asarray(v).ravel() for v in self.function(state, u, w, p))
+        A, B, *_ = (np.asarray(block) for block in self.jacobians(state, u, w, p))
+        terms = np.abs(A) @ np.abs(state) + np.abs(B) @ np.abs(u)
+        residual = float(np.max(np.abs(derivative) / np.maximum(1.0, terms)))
+        if not residual <= RESIDUAL_TOLERANCE:
+            raise SolverError(
+                f"plant: no static operating point was found, relative residual {residual:.3g} "
+                f"(allowed {RESIDUAL_TOLERANCE:g})"
+            )
+        outputs = dict(zip(self.outputs, (float(v) for v in z), strict=True))
+        at = [self.states.index(name) for name in displacement_names(self.masses)]
+        moved = -np.diff(np.append(0.0, state[at]))
+        return OperatingPoint(
+            x=read_only(state),
+            u=read_only(u),
+            p=read_only(p),
+            command=float(u[0]),
+            torque=outputs["motor.torque"],
+            tension=outputs["rope.tension"],
+            elongations=read_only(stretch + moved),
+            outputs=outputs,
+            residual=residual,
+        )
+
+    def linearise(
+        self, *, drag: float, parameters: Mapping[str, float] | None = None
+    ) -> LinearPlant:
+        """Return the plant linearised at rest, sensors and telemetry delay included.
+
+        Derivatives are automatic.  The gear has the mean of its two factors, (1/eta +
+        eta)/2; ``static`` holds the operating point with the motor hauling.
+
+        Parameters
+        ----------
+        drag
+            Equivalent linear drag coefficient C of the payload [N s/m].
+        parameters
+            Other parameters to change by name.
+
+        Raises
+        ------
+        InputError
+            If `drag` is negative or a parameter is unknown.
+        SolverError
+            If there is no static operating point.
+        """
+        check_range("plant", "drag", drag, low=0.0, unit="N s/m")
+        changes = {**(parameters or {}), "payload.linear_drag": drag}
+        rest = self.operating_point({**changes, **MEAN_LOSSES})
+        hauling = self.operating_point(changes)
+        w = np.zeros(len(self.disturbances))
+        blocks = [np.asarray(b) for b in self.jacobians(rest.x, rest.u, w, rest.p)]
+        A, B, E, C, D, F, Cz, Dz, Fz = blocks
+        return LinearPlant(
+            A=A,
+            B=B,
+            E=E,
+            C=C,
+            D=D,
+            F=F,
+            Cz=Cz,
+            Dz=Dz,
+            Fz=Fz,
+            states=self.states,
+            inputs=self.inputs,
+            disturbances=self.disturbances,
+            measurements=self.measurements,
+            outputs=self.outputs,
+            delays=(self.data.delay,) * len(self.measurements),
+            rates=RATES,
+            units=self.units,
+            static={**hauling.outputs, "drive.command": hauling.command},
+        )
+
+    def __str__(self) -> str:
+        """Return a small tree of what the plant is made of."""
+        data = self.data
+        return (
+            f"Plant with {len(self.states)} states\n"
+            f"├ rope: {data.rope_length:g} m as {self.masses} "
+            f"{'mass' if self.masses == 1 else 'masses'} ({data.lumping})\n"
+            f"├ payload: {data.payload_mass / 1e3:.4g} t with added mass, "
+            f"{data.payload_weight / 1e3:.4g} kN in water\n"
+            f"├ motor: {data.motor}, drum radius {data.drum_radius:.4g} m, "
+            f"gear {data.gear_ratio:g}\n"
+            f"└ outputs: {', '.join(self.outputs)}"
+        )
+
+
+def build_plant(
+    source: Case | PlantData,
+    masses: int | None = None,
+    *,
+    limits: DriveLimits | None = None,
+    travel: DrumTravel | None = None,
+    surroundings: Surroundings | None = None,
+) -> Plant:
+    """Return the symbolic plant of a case.
+
+    Parameters
+    ----------
+    source
+        A case, or the plant's numbers themselves.
+    masses
+        Masses along the rope, 1 to 40; by default those of the case, and where it says
+        ``auto`` as many as hold the axial modes below 40 rad/s.
+    limits
+        Limits of the drive; by default the motor has none.
+    travel
+        Layers of the drum, for a rope that is paid out and hauled in by much; by default the
+        rope keeps its length and the drum its radius.
+    surroundings
+        Seabed, deck or water surface; by default the payload hangs in still water.
+
+    Raises
+    ------
+    InputError
+        If `masses` is out of range, or the drum does not hold the rope that is paid out.
+    """
+    data = as_plant_data(source)
+    lumps = lump_rope(data.chosen_masses(masses), data.lumping)
+    equations = build_equations(
+        data, lumps, limits=limits, travel=travel, surroundings=surroundings
+    )
+    return Plant(
+        data=data,
+        lumps=lumps,
+        states=equations.states,
+        inputs=INPUTS,
+        disturbances=equations.disturbances,
+        measurements=MEASUREMENTS,
+        outputs=equations.outputs,
+        parameters=equations.parameters,
+        function=equations.function,
+        jacobians=equations.jacobians,
+        units=equations.units,
+    )
+
+
+def _elongations(lumps: RopeLumps, values: Mapping[str, float]) -> FloatArray:
+    rope = values["rope.submerged_weight_per_length"] * values["rope.length"]
+    carried = values["payload.submerged_weight"] + rope * lumps.hanging
+    return carried * values["rope.length"] * lumps.springs / values["rope.axial_stiffness"]

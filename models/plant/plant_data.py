@@ -1,0 +1,242 @@
+"""The physical numbers that the plant is made of, and nothing else.
+
+A case knows drum layers, shapes and units of input; the plant needs the radius, the mass and
+the drag that come out of them.  `PlantData.from_case` is the one place where the two meet, so
+that the symbolic plant, the exact rope and the tests share one flat list of numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..basics.checks import InputError, check_range
+from .rope import MAX_MASSES, damping_time, masses_for_bandwidth
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+
+__all__ = ["PlantData", "as_plant_data"]
+
+# Without a design there is no crossover yet.  A loop through a rope and a motor seldom
+# crosses above 8 rad/s; five times that is what `masses: auto` holds until told better.
+DEFAULT_BANDWIDTH = 40.0  # [rad/s]
+
+_POSITIVE = {
+    "axial_stiffness": "N",
+    "rope_length": "m",
+    "payload_mass": "kg",
+    "payload_weight": "N",
+    "drum_radius": "m",
+    "gear_ratio": "-",
+    "inertia": "kg m2",
+    "friction_speed": "rad/s",
+    "torque_constant": "N m/A",
+}
+_NOT_NEGATIVE = {
+    "mass_per_length": "kg/m",
+    "rope_weight": "N/m",
+    "quadratic_drag": "N s2/m2",
+    "viscous_friction": "N m s/rad",
+    "coulomb_friction": "N m",
+    "back_emf_constant": "V s/rad",
+    "inductance": "H",
+    "speed_gain": "N m s/rad",
+    "delay": "s",
+}
+_BANDWIDTHS = ("torque_bandwidth", "sensor_bandwidth", "telemetry_bandwidth")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlantData:
+    """Numbers of rope, payload, winch and sensors, in SI units.
+
+    Parameters
+    ----------
+    axial_stiffness, rope_length, mass_per_length
+        EA [N], length paid out [m], mass per length [kg/m].
+    rope_weight
+        Submerged weight of the rope per length [N/m].
+    damping_ratio
+        Fraction of critical damping of the first axial mode, Kelvin-Voigt [-].
+    masses
+        Masses along the rope, the payload's included, 1 to 40; None: chosen for 40 rad/s.
+    lumping
+        ``distributed`` or ``thesis``, see `lump_rope`.
+    payload_mass, payload_weight
+        Mass with added mass [kg], submerged weight [N].
+    quadratic_drag
+        q = 1/2 rho C_D A of the drag force q v|v| [N s2/m2].
+    drum_radius, gear_ratio, gear_efficiency
+        r to the rope's centre [m], n motor over drum [-], eta in (0, 1] [-].
+    inertia, viscous_friction
+        I [kg m2] and B [N m s/rad], everything referred to the motor shaft.
+    coulomb_friction, friction_speed
+        Dry friction T_c [N m] at the motor shaft, T_c tanh(speed / friction_speed [rad/s]).  A
+        linear plant leaves it out.
+    motor
+        ``dc``: command is the armature voltage.  ``ac``: command is the speed reference
+        [rad/s] if `speed_gain` is above zero, else the torque demand [N m].
+    resistance, torque_constant, back_emf_constant, inductance
+        DC motor: R [ohm], K_T [N m/A], K_omega [V s/rad], L [H].  The torque constant of an
+        AC motor is one: its current is its torque.
+    torque_bandwidth, speed_gain
+        AC motor: bandwidth of the torque loop [rad/s], inf for none; gain of the drive's
+        speed regulator [N m s/rad].
+    sensor_bandwidth, telemetry_bandwidth
+        Second-order Butterworth low-passes on the payload's signals [rad/s], inf for none.
+    delay
+        Delay of the payload's signals [s].
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range.
+    """
+
+    axial_stiffness: float
+    rope_length: float
+    mass_per_length: float
+    rope_weight: float = 0.0
+    damping_ratio: float = 0.002
+    masses: int | None = None
+    lumping: str = "distributed"
+    payload_mass: float
+    payload_weight: float
+    quadratic_drag: float = 0.0
+    drum_radius: float
+    gear_ratio: float
+    gear_efficiency: float = 1.0
+    inertia: float
+    viscous_friction: float = 0.0
+    coulomb_friction: float = 0.0
+    friction_speed: float = 1.0
+    motor: str = "dc"
+    resistance: float = math.nan
+    torque_constant: float = 1.0
+    back_emf_constant: float = 0.0
+    inductance: float = 0.0
+    torque_bandwidth: float = math.inf
+    speed_gain: float = 0.0
+    sensor_bandwidth: float = math.inf
+    telemetry_bandwidth: float = math.inf
+    delay: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, unit in _POSITIVE.items():
+            check_range("plant", name, getattr(self, name), low=0.0, unit=unit, open_low=True)
+        for name, unit in _NOT_NEGATIVE.items():
+            check_range("plant", name, getattr(self, name), low=0.0, unit=unit)
+        for name in _BANDWIDTHS:
+            if getattr(self, name) != math.inf:
+                check_range(
+                    "plant", name, getattr(self, name), low=0.0, unit="rad/s", open_low=True
+                )
+        check_range("plant", "damping_ratio", self.damping_ratio, low=0.0, high=1.0)
+        check_range(
+            "plant", "gear_efficiency", self.gear_efficiency, low=0.0, high=1.0, open_low=True
+        )
+        if self.masses is not None:
+            check_range("plant", "masses", self.masses, low=1, high=MAX_MASSES)
+        if self.motor == "dc":
+            check_range("plant", "resistance", self.resistance, low=0.0, unit="ohm", open_low=True)
+        elif self.motor != "ac":
+            raise InputError(f"plant: motor must be 'dc' or 'ac', got {self.motor!r}")
+        elif self.torque_constant != 1.0:
+            raise InputError(
+                "plant: torque_constant of an AC motor must be 1 (its current is its torque), "
+                f"got {self.torque_constant!r}"
+            )
+
+    @property
+    def stiffness(self) -> float:
+        """K = EA/L of the rope paid out [N/m]."""
+        return self.axial_stiffness / self.rope_length
+
+    @property
+    def rope_mass(self) -> float:
+        """Mass of the rope paid out [kg]."""
+        return self.mass_per_length * self.rope_length
+
+    @property
+    def static_tension(self) -> float:
+        """Rope tension at the drum at rest: payload and rope, submerged [N]."""
+        return self.payload_weight + self.rope_weight * self.rope_length
+
+    @property
+    def damping_time(self) -> float:
+        """Kelvin-Voigt time of the rope [s]."""
+        return damping_time(
+            self.damping_ratio,
+            self.axial_stiffness,
+            self.rope_length,
+            self.mass_per_length,
+            self.payload_mass,
+        )
+
+    @property
+    def mean_gear_factor(self) -> float:
+        """(1/eta + eta)/2: what one newton of rope costs the motor, mean of both ways [-].
+
+        The motor feels 1/eta of the load's torque when it hauls and eta of it when the load
+        drives it.  A linear plant has one factor; the mean of both meets the work of a cycle.
+        """
+        return 0.5 * (1.0 / self.gear_efficiency + self.gear_efficiency)
+
+    def chosen_masses(self, masses: int | None = None) -> int:
+        """Return `masses`, or the number in the data, or the one that holds 40 rad/s."""
+        if masses is not None:
+            return int(check_range("plant", "masses", masses, low=1, high=MAX_MASSES))
+        if self.masses is not None:
+            return self.masses
+        return masses_for_bandwidth(self, DEFAULT_BANDWIDTH)
+
+    @classmethod
+    def from_case(cls, case: Case) -> PlantData:
+        """Return the numbers of a case: radius of the layer in use, virtual mass, drag.
+
+        Raises
+        ------
+        InputError
+            If the drum does not hold the rope that is paid out.
+        """
+        rope, payload, winch, sensors = case.rope, case.payload, case.winch, case.sensors
+        motor = winch.motor
+        dc = motor if motor.type == "dc" else None
+        ac = motor if motor.type == "ac" else None
+        bandwidth, telemetry = sensors.payload.bandwidth, sensors.telemetry
+        return cls(
+            axial_stiffness=rope.ea,
+            rope_length=rope.length,
+            mass_per_length=rope.mass_per_length,
+            rope_weight=rope.submerged_weight / rope.length,
+            damping_ratio=rope.damping_ratio,
+            masses=None if rope.masses == "auto" else rope.masses,
+            lumping=rope.lumping,
+            payload_mass=payload.virtual_mass,
+            payload_weight=payload.submerged_weight,
+            quadratic_drag=payload.quadratic_drag,
+            drum_radius=winch.drum.radius_at(rope.length, rope.diameter),
+            gear_ratio=winch.gearbox.ratio,
+            gear_efficiency=winch.gearbox.efficiency,
+            inertia=winch.inertia,
+            viscous_friction=winch.viscous_friction,
+            coulomb_friction=getattr(motor, "coulomb_friction", 0.0),
+            friction_speed=getattr(motor, "friction_speed", 1.0),
+            motor=motor.type,
+            resistance=dc.resistance if dc else math.nan,
+            torque_constant=dc.torque_constant if dc else 1.0,
+            back_emf_constant=dc.back_emf_constant if dc else 0.0,
+            inductance=dc.inductance if dc else 0.0,
+            torque_bandwidth=ac.torque_bandwidth if ac else math.inf,
+            speed_gain=ac.speed_gain if ac else 0.0,
+            sensor_bandwidth=math.inf if bandwidth == "perfect" else bandwidth,
+            telemetry_bandwidth=telemetry.bandwidth or math.inf,
+            delay=telemetry.delay,
+        )
+
+
+def as_plant_data(source: Case | PlantData) -> PlantData:
+    """Return `source` itself, or the numbers of a case."""
+    return source if isinstance(source, PlantData) else PlantData.from_case(source)

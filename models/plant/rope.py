@@ -1,0 +1,232 @@
+"""The rope as masses and springs, and the axial modes that say how many are needed.
+
+A rope of N masses has N springs between the drum and the payload, the N-th mass being the
+payload with its share of rope.  `lump_rope` gives lengths only (of each spring, and of the
+rope that each mass stands for), so that the symbolic plant can multiply them by parameters.
+The exact modes, of a rope whose upper end is held, are the yardstick.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+from scipy.optimize import brentq
+
+from ..basics.checks import InputError, check_range, read_only
+
+if TYPE_CHECKING:
+    from .plant_data import PlantData
+
+__all__ = [
+    "MAX_MASSES",
+    "MODE_TOLERANCE",
+    "RopeLumps",
+    "damping_time",
+    "fixed_top_modes",
+    "lump_rope",
+    "lumped_modes",
+    "masses_for_bandwidth",
+]
+
+FloatArray = npt.NDArray[np.float64]
+MAX_MASSES = 40  # more states cost more in every eigenvalue than they add to any design
+MODE_TOLERANCE = 0.05  # a mode is "in the model" if its frequency is met this well [-]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RopeLumps:
+    """Lengths of rope that the springs and the masses stand for, from the drum down.
+
+    Parameters
+    ----------
+    springs
+        Length of rope in each spring, (N,), as a fraction of the rope [-]; they add to 1.
+    masses
+        Length of rope in each mass, (N,), as a fraction of the rope [-], the last being
+        the payload's share.
+    """
+
+    springs: FloatArray
+    masses: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "springs", read_only(self.springs))
+        object.__setattr__(self, "masses", read_only(self.masses))
+
+    @property
+    def hanging(self) -> FloatArray:
+        """Rope that hangs below the top of each spring and is carried by it, (N,) [-]."""
+        return np.cumsum(self.masses[::-1])[::-1]
+
+    @property
+    def at_drum(self) -> float:
+        """Rope whose weight the drum carries without a mass: 2/3 for one mass, else 0 [-]."""
+        return max(0.0, 1.0 - float(self.masses.sum()))
+
+
+def lump_rope(masses: int, lumping: str = "distributed") -> RopeLumps:
+    """Return the lumping of a rope into `masses` masses, the payload's included.
+
+    ``distributed``, two masses and more: N - 1 pieces of length h = L/(N - 1/2), each with
+    its mass in its middle, and half a piece at the payload.  So the uppermost spring is h/2
+    long, the others h.  All rope mass is there, frequencies *and* the tension at the drum
+    converge as 1/N^2, and nothing of the rope has to move with the drum (a mass at the
+    drum would need the hook's acceleration as an input).  One mass: a third of the rope at
+    the payload, the first term of the exact first mode.
+
+    ``thesis``: every piece of length L/N has its mass at its lower end.  One mass: the 1975
+    thesis, all rope mass at the payload.  Converges only as 1/N, the payload being heavier
+    by half a piece; kept to reproduce figures that were computed in this way.
+
+    Raises
+    ------
+    InputError
+        If `masses` is not 1 to 40 or `lumping` is unknown.
+    """
+    number = check_range("rope", "masses", masses, low=1, high=MAX_MASSES)
+    if number != int(number):
+        raise InputError(f"rope: masses must be a whole number, got {masses!r}")
+    n = int(number)
+    if lumping == "thesis":
+        return RopeLumps(springs=np.full(n, 1.0 / n), masses=np.full(n, 1.0 / n))
+    if lumping != "distributed":
+        raise InputError(f"rope: lumping must be 'distributed' or 'thesis', got {lumping!r}")
+    if n == 1:
+        return RopeLumps(springs=np.ones(1), masses=np.full(1, 1.0 / 3.0))
+    piece = 1.0 / (n - 0.5)
+    springs, shares = np.full(n, piece), np.full(n, piece)
+    springs[0] = shares[-1] = piece / 2.0
+    return RopeLumps(springs=springs, masses=shares)
+
+
+def fixed_top_modes(
+    axial_stiffness: float,
+    length: float,
+    mass_per_length: float,
+    payload_mass: float,
+    count: int,
+) -> FloatArray:
+    """Return the exact axial modes of a rope with a payload, its upper end held [rad/s].
+
+    The roots of nu tan nu = eps, eps = m L / M_1, with omega = (nu / L) sqrt(EA / m); one
+    root lies in each interval (j pi, j pi + pi/2), j = 0, 1, ...
+
+    Parameters
+    ----------
+    axial_stiffness
+        EA [N].
+    length
+        L [m].
+    mass_per_length
+        m [kg/m]; zero is a massless rope with one mode.
+    payload_mass
+        M_1, added mass included [kg].
+    count
+        How many modes, from the lowest.
+
+    Raises
+    ------
+    InputError
+        If a number is out of range, or more than one mode of a massless rope is asked for.
+    """
+    check_range("rope", "axial_stiffness", axial_stiffness, low=0.0, unit="N", open_low=True)
+    check_range("rope", "length", length, low=0.0, unit="m", open_low=True)
+    check_range("rope", "mass_per_length", mass_per_length, low=0.0, unit="kg/m")
+    check_range("rope", "payload_mass", payload_mass, low=0.0, unit="kg", open_low=True)
+    check_range("rope", "count", count, low=1)
+    if mass_per_length == 0.0:
+        if count > 1:
+            raise InputError(f"rope: a massless rope has one axial mode, got count {count}")
+        return np.array([math.sqrt(axial_stiffness / (length * payload_mass))])
+    eps = mass_per_length * length / payload_mass
+
+    def excess(nu: float) -> float:  # no poles, unlike the tangent
+        return nu * math.sin(nu) - eps * math.cos(nu)
+
+    roots = [brentq(excess, j * math.pi, (j + 0.5) * math.pi, xtol=1e-15) for j in range(count)]
+    return np.array(roots) / length * math.sqrt(axial_stiffness / mass_per_length)
+
+
+def damping_time(
+    damping_ratio: float,
+    axial_stiffness: float,
+    length: float,
+    mass_per_length: float,
+    payload_mass: float,
+) -> float:
+    """Return the Kelvin-Voigt time tau of EA (strain + tau strain rate) [s].
+
+    tau = 2 zeta / omega_1, so that the first exact axial mode with the upper end held has
+    the fraction zeta of critical damping; higher modes have zeta omega_j / omega_1.
+    """
+    check_range("rope", "damping_ratio", damping_ratio, low=0.0, high=1.0)
+    first = fixed_top_modes(axial_stiffness, length, mass_per_length, payload_mass, 1)
+    return 2.0 * damping_ratio / float(first[0])
+
+
+def lumped_modes(
+    lumps: RopeLumps,
+    axial_stiffness: float,
+    length: float,
+    mass_per_length: float,
+    payload_mass: float,
+) -> FloatArray:
+    """Return the undamped axial modes of a lumped rope, its upper end held, (N,) [rad/s]."""
+    k = axial_stiffness / (length * lumps.springs)
+    mass = mass_per_length * length * lumps.masses
+    mass[-1] += payload_mass
+    # K x = omega^2 M x in mass-scaled coordinates is a symmetric tridiagonal problem.
+    diagonal = (k + np.append(k[1:], 0.0)) / mass
+    beside = -k[1:] / np.sqrt(mass[1:] * mass[:-1])
+    return np.sqrt(scipy.linalg.eigvalsh_tridiagonal(diagonal, beside))
+
+
+def masses_for_bandwidth(data: PlantData, omega_max: float) -> int:
+    """Return the fewest masses that hold every axial mode below `omega_max`.
+
+    The rule: each exact mode (upper end held) below `omega_max` has its counterpart of the
+    same number in the lumped rope within 5 % of its frequency.  At least two masses, as one
+    has no second mode even to miss; a ``thesis`` lumping with its number of masses given is
+    left as it is.
+
+    Parameters
+    ----------
+    data
+        The plant's numbers.
+    omega_max
+        Highest frequency [rad/s] at which the rope matters, five times the crossover of
+        the loop in a design.
+
+    Raises
+    ------
+    InputError
+        If more than 40 masses would be needed.
+    """
+    check_range("rope", "omega_max", omega_max, low=0.0, unit="rad/s", open_low=True)
+    if data.lumping == "thesis" and data.masses is not None:
+        return data.masses
+    rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
+    if data.mass_per_length == 0.0:
+        return 2
+    # the modes' spacing tends to pi c / L from below
+    wave_speed = math.sqrt(data.axial_stiffness / data.mass_per_length)
+    count = int(omega_max * data.rope_length / (math.pi * wave_speed)) + 2
+    if count <= 2 * MAX_MASSES:
+        exact = fixed_top_modes(*rope, data.payload_mass, count)
+        exact = exact[exact < omega_max]
+        for n in range(max(2, exact.size), MAX_MASSES + 1):
+            lumped = lumped_modes(lump_rope(n, data.lumping), *rope, data.payload_mass)[
+                : exact.size
+            ]
+            if np.all(np.abs(lumped / exact - 1.0) <= MODE_TOLERANCE):
+                return n
+    raise InputError(
+        f"rope: {MAX_MASSES} masses hold fewer axial modes than lie below {omega_max:.4g} rad/s "
+        f"on {data.rope_length:g} m of rope (about {count - 1}); a loop as fast as that cannot be "
+        "designed on a lumped rope: lower its bandwidth or set rope.masses"
+    )

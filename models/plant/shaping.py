@@ -1,0 +1,184 @@
+r"""A stable filter whose white-noise response has a given spectrum: seas for time-domain models.
+
+A spectral integral is finite for an unstable loop too, and takes the delay as a mere phase.  A
+Lyapunov equation does neither: it needs states, for the sea as well.  This fits them,
+
+.. math::
+
+    H(s) = g\, s^m \Big/ \prod_{i=1}^{n/2} (s^2 + 2 \zeta_i \omega_i s + \omega_i^2),
+    \qquad S(\omega) \approx |H(i\omega)|^2 / \pi ,
+
+by least squares on the amplitude, the square root of the density, and a little on the logarithm
+of the tail, which a stiff loop is the first to feel (the classic second-order form with n = 2
+and m = 1 is that of Fossen, *Handbook of Marine Craft Hydrodynamics and Motion Control*, 2011,
+sec. 8.2).  The poles are stable by construction; the m zeros at the origin take the drift out
+of the waves.  White noise has intensity one, a one-sided density of 1/pi.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import least_squares
+
+from ..basics.checks import InputError, SolverError, check_range, read_only
+
+__all__ = ["ShapingFilter", "fit_shaping_filter"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+_NODES = 240
+_TAIL_WEIGHT = 0.03  # of the tail's logarithm against the amplitude
+_NEGLIGIBLE = 1e-9  # density over its peak's below which the tail does not matter
+_LEAST_DAMPING, _MOST_DAMPING = 0.01, 3.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ShapingFilter:
+    """x' = A x + B n, signal C x, its derivative C A x; n is white noise of intensity one.
+
+    Attributes
+    ----------
+    A, B, C
+        State matrices, (n, n), (n, 1), (1, n).
+    variance_error
+        Variance of the fitted spectrum over that of the given one, minus one, in the band.
+    shape_error
+        Integral of the difference's modulus over the given variance (an L1 measure).
+    """
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    variance_error: float
+    shape_error: float
+
+    def __post_init__(self) -> None:
+        """Make the matrices read-only."""
+        for name in ("A", "B", "C"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return len(self.A)
+
+    @property
+    def poles(self) -> ComplexArray:
+        """Poles of the filter [1/s]."""
+        return np.asarray(np.linalg.eigvals(self.A), dtype=np.complex128)
+
+    def density(self, omega: npt.ArrayLike) -> FloatArray:
+        """Return the one-sided density of the fitted spectrum per rad/s at `omega` [rad/s]."""
+        s = 1j * np.asarray(omega, dtype=np.float64).reshape(-1)
+        states = np.linalg.solve(
+            s[:, None, None] * np.eye(self.order) - self.A,
+            np.broadcast_to(self.B.astype(np.complex128), (s.size, self.order, 1)),
+        )
+        gain = (self.C @ states)[:, 0, 0]
+        return np.asarray((np.abs(gain) ** 2 / np.pi).reshape(np.shape(omega)))
+
+
+def fit_shaping_filter(
+    density: Callable[[FloatArray], FloatArray], band: tuple[float, float], order: int = 8
+) -> ShapingFilter:
+    """Return the filter that fits a one-sided density best.
+
+    Parameters
+    ----------
+    density
+        One-sided variance density per rad/s at omega [rad/s], (k,) -> (k,).
+    band
+        Band that holds the variance [rad/s].
+    order
+        Number of states: 4, 6 or 8.
+
+    Raises
+    ------
+    InputError
+        If the order is none of these, or the band is empty or holds no variance.
+    SolverError
+        If the fit does not converge.
+    """
+    if order not in (4, 6, 8):
+        raise InputError(f"shaping filter: order must be 4, 6 or 8, got {order!r}")
+    low = check_range("shaping filter", "band[0]", band[0], low=0.0, unit="rad/s", open_low=True)
+    high = check_range("shaping filter", "band[1]", band[1], low=low, unit="rad/s", open_low=True)
+    edges = np.geomspace(low, high, _NODES + 1)
+    omega, width = np.sqrt(edges[1:] * edges[:-1]), np.diff(edges)
+    target = np.asarray(density(omega), dtype=np.float64)
+    variance = float(target @ width)
+    if not (np.isfinite(variance) and variance > 0.0):
+        raise InputError(f"shaping filter: the band must hold variance, got {variance:g}")
+    cumulated = np.cumsum(target * width) / variance
+    peak = float(omega[np.argmax(target)])
+    sections = order // 2
+    # One section at each of as many quantiles of the variance.
+    quantiles = (np.arange(sections) + 0.5) / sections
+    begin_at = np.log(np.interp(quantiles, cumulated, omega) / peak)
+    begin = np.concatenate([begin_at, np.full(sections, np.log(0.2)), [0.0]])
+    lowest = np.full(2 * sections + 1, np.log(low / peak) - 1.0)
+    highest = np.full(2 * sections + 1, np.log(high / peak) + 1.0)
+    damping_range = slice(sections, 2 * sections)
+    lowest[damping_range], highest[damping_range] = np.log(_LEAST_DAMPING), np.log(_MOST_DAMPING)
+    lowest[-1], highest[-1] = -np.inf, np.inf
+    x, amplitude = omega / peak, np.sqrt(target * width / variance)
+    tail = (x > 1.0) & (target > _NEGLIGIBLE * target.max())
+    weight = _TAIL_WEIGHT / np.sqrt(max(1, int(tail.sum())))
+
+    def shape(values: FloatArray, zeros: int) -> FloatArray:
+        """Return sqrt(S d omega) of the filter."""
+        at = np.exp(values[:sections, None])
+        damping = np.exp(values[damping_range, None])
+        below = np.prod(np.hypot(at**2 - x**2, 2.0 * damping * at * x), axis=0)
+        return np.asarray(np.exp(values[-1]) * x**zeros / below * np.sqrt(width))
+
+    def misfit(values: FloatArray, zeros: int) -> FloatArray:
+        fitted = shape(values, zeros)
+        ratio = np.log(fitted[tail] / amplitude[tail])
+        return np.concatenate([fitted - amplitude, weight * ratio])
+
+    fits = []
+    # At most n - 2 zeros: the signal's derivative must be proper as well.
+    for zeros in range(max(1, sections - 1), order - 1):
+        start = begin.copy()
+        first = shape(start, zeros)
+        start[-1] = np.log(first @ amplitude / (first @ first))
+        found = least_squares(misfit, start, bounds=(lowest, highest), args=(zeros,), max_nfev=100)
+        if np.all(np.isfinite(found.x)):
+            fits.append((float(found.cost), zeros, found.x))
+    if not fits:
+        raise SolverError("shaping filter: no fit converged")
+    _, zeros, values = min(fits, key=lambda fit: fit[0])
+    A, B, C = _companion(values[:sections], values[damping_range], zeros)
+    spectrum = variance * shape(values, zeros) ** 2 / width
+    gain = np.exp(values[-1]) * np.sqrt(variance)
+    return ShapingFilter(
+        A=peak * A,
+        B=np.sqrt(peak) * B,
+        # Time in units of 1/peak becomes seconds: one root of the peak each in B and C.
+        C=gain * np.sqrt(np.pi * peak) * C,
+        variance_error=float(spectrum @ width) / variance - 1.0,
+        shape_error=float(np.abs(spectrum - target) @ width) / variance,
+    )
+
+
+def _companion(
+    log_frequency: FloatArray, log_damping: FloatArray, zeros: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the controllable form of s^zeros over the product of the sections."""
+    polynomial = np.ones(1)
+    for at, damping in zip(np.exp(log_frequency), np.exp(log_damping), strict=True):
+        polynomial = np.polymul(polynomial, [1.0, 2.0 * damping * at, at**2])
+    order = polynomial.size - 1
+    A = np.eye(order, k=1)
+    A[-1] = -polynomial[:0:-1]
+    B = np.zeros((order, 1))
+    B[-1] = 1.0
+    C = np.zeros((1, order))
+    C[0, zeros] = 1.0
+    return A, B, C

@@ -1,0 +1,119 @@
+"""Limits of the design, and the gains, as sections of the case file."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import model_validator
+
+from ..casefile.quantity import Quantity
+from ..casefile.section import Section, problems
+
+__all__ = ["GainBounds", "Gains", "Limits", "LowFrequencyLimit"]
+
+_Length = Annotated[float, Quantity("length", -12000.0, 12000.0)]
+
+
+class LowFrequencyLimit(Section):
+    """How still the payload must be held in slow motion of the hook (swell, tide)."""
+
+    below: Annotated[float, Quantity("frequency", 0.0, 10.0, open_low=True)]
+    """Frequency up to which the limit holds."""
+    ratio: Annotated[float, Quantity("gain", 0.0, 10.0, open_low=True)]
+    """Largest payload motion over hook motion, |P/Z|."""
+
+
+class Limits(Section):
+    """What a design has to respect."""
+
+    max_sensitivity: Annotated[float, Quantity("gain", 1.0, 100.0, open_low=True)] = 2.0
+    """Largest sensitivity peak M_s = max |1/(1 + L)|."""
+    gain_margin_up: Annotated[float, Quantity("gain", 1.0, 1000.0, open_low=True)] | None = None
+    """Factor by which the loop gain may grow without instability."""
+    gain_margin_down: Annotated[float, Quantity("gain", 0.0, 1.0, open_high=True)] | None = None
+    """Factor to which the loop gain may fall without instability (0.5 is 6 dB down)."""
+    delay_margin: Annotated[float, Quantity("time", 0.0, 60.0)] | None = None
+    """Delay that may be added to the loop without instability."""
+    low_frequency: LowFrequencyLimit | None = None
+    """How still the payload must be held in slow motion of the hook."""
+    roll_off: Annotated[float, Quantity("gain", 0.0, 1.0, open_low=True)] | None = None
+    """Largest loop gain |L| beyond the rope modes that the design plant holds."""
+    drive: Literal["enforce", "report"] = "enforce"
+    """Whether torque, speed, voltage, current and power limits bind the design or are only
+    reported."""
+    exposure_time: Annotated[float, Quantity("time", 60.0, 1e8)] = 10800.0
+    """Time for which most probable maxima are taken."""
+    minimum_tension: Annotated[float, Quantity("force", 0.0, 1e9)] | None = None
+    """Smallest rope tension, so that the rope does not go slack."""
+    rope_tension_peak: Annotated[float, Quantity("force", 0.0, 1e9, open_low=True)] | None = None
+    """Largest rope tension, such as the breaking load over a safety factor."""
+    stroke: tuple[_Length, _Length] | None = None
+    """Lowest and highest haul of the drum while it holds the load; negative is paid out. It is
+    for the simulation: a design does not know it."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Limits:
+        found = []
+        low, high = self.minimum_tension, self.rope_tension_peak
+        if low is not None and high is not None and low >= high:
+            text = f"must be below rope_tension_peak, {high:g} N, got {low:g} N"
+            found.append(("minimum_tension", text))
+        if self.stroke is not None:
+            lowest, highest = self.stroke
+            if not (lowest <= 0.0 <= highest and lowest < highest):
+                text = (
+                    "must be [low, high] with low < high and 0 within, "
+                    f"got [{lowest:g}, {highest:g}] m"
+                )
+                found.append(("stroke", text))
+        if found:
+            raise problems(*found)
+        return self
+
+
+_Number = Annotated[float, Quantity("number")]
+
+
+class Gains(Section):
+    """Gains in use: command = set-point - A (a P'' + a1 P' + a2 P).
+
+    With a DC motor in V s2/m, V s/m and V/m; with an AC motor the command is a speed [rad/s] or a
+    torque [N m] and takes the place of the volt.
+    """
+
+    A: _Number = 1.0
+    """Amplifier gain."""
+    a: _Number
+    """Gain on the payload's acceleration."""
+    a1: _Number
+    """Gain on the payload's velocity."""
+    a2: _Number
+    """Gain on the payload's displacement."""
+
+    @property
+    def products(self) -> tuple[float, float, float]:
+        """The products A a, A a1 and A a2, which alone the loop knows."""
+        return (self.A * self.a, self.A * self.a1, self.A * self.a2)
+
+
+class GainBounds(Section):
+    """Lowest and highest value of the products A a, A a1 and A a2."""
+
+    a: tuple[_Number, _Number] | None = None
+    """Bounds of A a."""
+    a1: tuple[_Number, _Number] | None = None
+    """Bounds of A a1."""
+    a2: tuple[_Number, _Number] | None = None
+    """Bounds of A a2."""
+
+    @model_validator(mode="after")
+    def _check(self) -> GainBounds:
+        found = []
+        for name in ("a", "a1", "a2"):
+            bounds = getattr(self, name)
+            if bounds is not None and bounds[0] >= bounds[1]:
+                text = f"must be [low, high] with low < high, got [{bounds[0]:g}, {bounds[1]:g}]"
+                found.append((name, text))
+        if found:
+            raise problems(*found)
+        return self

@@ -1,0 +1,291 @@
+"""Rope and payload: the sections of the case file, and what follows from them.
+
+A section holds what the file says; everything derived (stiffness, virtual mass, drag
+coefficients) is a property beside it, so that a changed field changes all that hangs on it.
+The formulas are those of the 1975 thesis, eq. 1, 5 and 13.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from ..basics.tables import (
+    DRAG_COEFFICIENTS,
+    GRAVITY,
+    SEA_WATER_DENSITY,
+    STEEL_DENSITY,
+    prism_added_mass,
+)
+from ..casefile.quantity import Quantity
+from ..casefile.section import Section, problems
+
+__all__ = [
+    "Drag",
+    "EnergyDrag",
+    "GivenDrag",
+    "Payload",
+    "Prism",
+    "Rope",
+    "StochasticDrag",
+]
+
+
+class Rope(Section):
+    """The rope between the drum and the payload."""
+
+    alternatives = (("modulus", "axial_stiffness"),)
+
+    diameter: Annotated[float, Quantity("length", 0.005, 0.3)]
+    """Nominal diameter."""
+    modulus: Annotated[float, Quantity("pressure", 1e8, 3e11)] | None = None
+    """Young's modulus on the nominal circle of the rope (not on its metal area), or give
+    `axial_stiffness`."""
+    axial_stiffness: Annotated[float, Quantity("force", 1e4, 1e11)] | None = None
+    """Axial stiffness EA of the rope, or give `modulus`."""
+    mass_per_length: Annotated[float, Quantity("mass per length", 0.01, 1000.0)]
+    """Mass of the rope per length, in air."""
+    submerged_weight_per_length: (
+        Annotated[float, Quantity("force per length", 0.0, 10000.0)] | None
+    ) = None
+    """Weight of the rope per length less its buoyancy; by default that of solid steel in sea
+    water."""
+    length: Annotated[float, Quantity("length", 1.0, 12000.0)]
+    """Length paid out, from the drum to the payload."""
+    damping_ratio: Annotated[float, Quantity("ratio", 0.0, 0.5)] = 0.002
+    """Internal damping as a fraction of critical at the first axial mode (Kelvin-Voigt)."""
+    masses: Annotated[int | Literal["auto"], Quantity("count", 1, 40, word="auto")] = "auto"
+    """Number of lumped masses that stand for the rope; `auto` takes as many as the bandwidth
+    of the loop needs."""
+    lumping: Literal["distributed", "thesis"] = "distributed"
+    """How the rope's mass is lumped: `distributed` along the rope (a single mass takes a third
+    of it), or `thesis`: all of it at the payload, with `masses: 1` only."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Rope:
+        found = []
+        if (self.modulus is None) == (self.axial_stiffness is None):
+            given = "both" if self.modulus is not None else "neither"
+            found.append(("", f"give either modulus or axial_stiffness, got {given}"))
+        if self.lumping == "thesis" and self.masses != 1:
+            text = (
+                f"'thesis' puts all of the rope at the payload: needs masses 1, got {self.masses!r}"
+            )
+            found.append(("lumping", text))
+        weight = self.submerged_weight_per_length
+        if weight is not None and weight > self.mass_per_length * GRAVITY:
+            found.append(
+                (
+                    "submerged_weight_per_length",
+                    f"must be at most the weight in air, {self.mass_per_length * GRAVITY:.4g} N/m "
+                    f"({self.mass_per_length:g} kg/m), got {weight:g} N/m",
+                )
+            )
+        if found:
+            raise problems(*found)
+        return self
+
+    @property
+    def area(self) -> float:
+        """Area of the nominal circle [m2]."""
+        return math.pi * self.diameter**2 / 4.0
+
+    @property
+    def ea(self) -> float:
+        """Axial stiffness EA [N]."""
+        if self.axial_stiffness is not None:
+            return self.axial_stiffness
+        return (self.modulus or 0.0) * self.area
+
+    @property
+    def stiffness(self) -> float:
+        """Stiffness K = EA/L of the rope paid out [N/m]."""
+        return self.ea / self.length
+
+    @property
+    def mass(self) -> float:
+        """Mass of the rope paid out [kg]."""
+        return self.mass_per_length * self.length
+
+    @property
+    def submerged_weight(self) -> float:
+        """Weight of the rope paid out less its buoyancy [N]."""
+        per_length = self.submerged_weight_per_length
+        if per_length is None:
+            buoyancy = 1.0 - SEA_WATER_DENSITY / STEEL_DENSITY
+            per_length = self.mass_per_length * GRAVITY * buoyancy
+        return per_length * self.length
+
+    @property
+    def wave_speed(self) -> float:
+        """Speed of axial waves along the rope, sqrt(EA / mass per length) [m/s]."""
+        return math.sqrt(self.ea / self.mass_per_length)
+
+    @property
+    def travel_time(self) -> float:
+        """Time that an axial wave takes from the drum to the payload [s]."""
+        return self.length / self.wave_speed
+
+
+class GivenDrag(Section):
+    """A linear drag coefficient that is given."""
+
+    method: Literal["given"]
+    """`given`: the linear drag coefficient is known."""
+    coefficient: Annotated[float, Quantity("damping", 0.0, 1e9)]
+    """Linear drag coefficient C of the payload."""
+
+    def linear_coefficient(self, quadratic: float) -> float:
+        """Return C [N s/m]; the `quadratic` coefficient [N s2/m2] plays no part."""
+        del quadratic
+        return self.coefficient
+
+
+class EnergyDrag(Section):
+    """Linear drag that takes the same energy from a sine of a given amplitude."""
+
+    method: Literal["energy"]
+    """`energy`: linear drag that dissipates what quadratic drag would in a sine."""
+    amplitude: Annotated[float, Quantity("length", 0.0, 100.0)]
+    """Amplitude of the payload's sine."""
+    frequency: Annotated[float, Quantity("frequency", 0.0, 100.0, open_low=True)]
+    """Frequency of the payload's sine."""
+
+    def linear_coefficient(self, quadratic: float) -> float:
+        """Return C = 4/(3 pi) rho C_D A omega Y [N s/m] (1975 thesis, eq. 13).
+
+        Parameters
+        ----------
+        quadratic
+            rho C_D A / 2, the factor of V|V| [N s2/m2].
+        """
+        return 8.0 / (3.0 * math.pi) * quadratic * self.frequency * self.amplitude
+
+
+class StochasticDrag(Section):
+    """Linear drag found together with the response that it belongs to."""
+
+    method: Literal["stochastic"] = "stochastic"
+    """`stochastic`: linear drag consistent with the payload's own speed in the sea."""
+
+    def linear_coefficient(self, quadratic: float, speed_rms: float) -> float:
+        """Return C = sqrt(8/pi) sigma_v rho C_D A / 2 [N s/m].
+
+        It is the coefficient with the least mean square error for a Gaussian speed (Borgman
+        1969; stochastic linearisation of |v| v).
+
+        Parameters
+        ----------
+        quadratic
+            rho C_D A / 2, the factor of V|V| [N s2/m2].
+        speed_rms
+            Standard deviation of the payload's speed through the water [m/s].
+        """
+        return math.sqrt(8.0 / math.pi) * quadratic * speed_rms
+
+
+Drag = Annotated[GivenDrag | EnergyDrag | StochasticDrag, Field(discriminator="method")]
+
+
+class Prism(Section):
+    """A square prism that stands for the payload's shape."""
+
+    prism_side: Annotated[float, Quantity("length", 0.1, 100.0)]
+    """Side a of the square."""
+    prism_height: Annotated[float, Quantity("length", 0.1, 200.0)]
+    """Height b along the motion; b/a from 1 to 10 (Table A-1)."""
+
+
+class Payload(Section):
+    """The load at the lower end of the rope."""
+
+    alternatives = (("added_mass", "shape"), ("drag_coefficient", "drag_shape"))
+
+    mass: Annotated[float, Quantity("mass", 1.0, 1e8)]
+    """Mass in air, without entrained water."""
+    added_mass: Annotated[float, Quantity("mass", 0.0, 1e9)] | None = None
+    """Hydrodynamic added mass in heave, or give `shape`."""
+    shape: Prism | None = None
+    """A square prism whose added mass is read from the 1975 thesis, Table A-1, or give
+    `added_mass`."""
+    area: Annotated[float, Quantity("area", 0.0, 1e4)]
+    """Area projected on the horizontal plane, for the drag."""
+    drag_coefficient: Annotated[float, Quantity("ratio", 0.0, 10.0)] | None = None
+    """Quadratic drag coefficient C_D, or give `drag_shape`."""
+    drag_shape: (
+        Literal[
+            "long-square-cylinder",
+            "square-cylinder",
+            "disc",
+            "hemisphere-open-to-flow",
+            "hemisphere-open-downstream",
+            "c-section-open-to-flow",
+            "c-section-open-downstream",
+        ]
+        | None
+    ) = None
+    """A shape whose drag coefficient is read from the 1975 thesis, Table 4, or give
+    `drag_coefficient`."""
+    water_density: Annotated[float, Quantity("density", 900.0, 1300.0)] = SEA_WATER_DENSITY
+    """Density of the water."""
+    submerged_weight: Annotated[float, Quantity("force", 1.0, 1e9)]
+    """Weight in water: what the rope's lower end carries at rest."""
+    drag: Drag = StochasticDrag()
+    """How quadratic drag is linearised for the design."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Payload:
+        found = []
+        for one, other in self.alternatives:
+            given = [getattr(self, name) is not None for name in (one, other)]
+            if sum(given) != 1:
+                word = "both" if all(given) else "neither"
+                found.append(("", f"give either {one} or {other}, got {word}"))
+        if self.shape is not None:
+            ratio = self.shape.prism_height / self.shape.prism_side
+            if not 1.0 <= ratio <= 10.0:
+                text = f"prism_height / prism_side must be in [1, 10] (Table A-1), got {ratio:.3g}"
+                found.append(("shape", text))
+        if self.submerged_weight > self.mass * GRAVITY:
+            text = (
+                f"must be at most the weight in air, {self.mass * GRAVITY:.4g} N "
+                f"({self.mass:g} kg), got {self.submerged_weight:g} N"
+            )
+            found.append(("submerged_weight", text))
+        if found:
+            raise problems(*found)
+        return self
+
+    @property
+    def hydrodynamic_mass(self) -> float:
+        """Added mass, given or from Table A-1 [kg]."""
+        if self.shape is None:
+            return self.added_mass or 0.0
+        shape = self.shape
+        return prism_added_mass(shape.prism_side, shape.prism_height, self.water_density)
+
+    @property
+    def virtual_mass(self) -> float:
+        """Mass and added mass [kg]."""
+        return self.mass + self.hydrodynamic_mass
+
+    @property
+    def c_d(self) -> float:
+        """Drag coefficient C_D, given or from Table 4 [-]."""
+        if self.drag_shape is not None:
+            return DRAG_COEFFICIENTS[self.drag_shape]
+        return self.drag_coefficient or 0.0
+
+    @property
+    def quadratic_drag(self) -> float:
+        """Factor of V|V| in the drag, rho C_D A / 2 [N s2/m2] (1975 thesis, eq. 5)."""
+        return 0.5 * self.water_density * self.c_d * self.area
+
+    @property
+    def fixed_drag(self) -> float | None:
+        """Linear drag coefficient [N s/m], or None where it depends on the response."""
+        if isinstance(self.drag, StochasticDrag):
+            return None
+        return self.drag.linear_coefficient(self.quadratic_drag)

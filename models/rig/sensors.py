@@ -1,0 +1,116 @@
+"""Sensors and telemetry, as sections of the case file.
+
+The payload's acceleration, velocity and displacement are measured at the payload and sent up;
+the design sees them through a low-pass filter and a delay.  Noise, bias, resolution, jitter and
+lost messages are for the simulation, as are motion reference unit, motor encoder and load cell:
+payload feedback does not use those, feed-forward and constant tension do.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from ..casefile.quantity import Quantity
+from ..casefile.section import Section
+
+__all__ = ["MRU", "Encoder", "LoadCell", "PayloadSensor", "Sensors", "Telemetry"]
+
+_BANDWIDTH_LOW, _BANDWIDTH_HIGH = 0.1, 1e5
+
+
+class PayloadSensor(Section):
+    """Acceleration, velocity and displacement of the payload."""
+
+    bandwidth: Annotated[
+        float | Literal["perfect"],
+        Quantity("frequency", _BANDWIDTH_LOW, _BANDWIDTH_HIGH, word="perfect"),
+    ] = "perfect"
+    """Bandwidth of the second-order Butterworth low-pass on all three signals; `perfect` for
+    none."""
+    acceleration_noise: Annotated[float, Quantity("acceleration noise", 0.0, 10.0)] = 0.0
+    """Noise of the acceleration (one-sided amplitude density, white)."""
+    velocity_noise: Annotated[float, Quantity("velocity noise", 0.0, 10.0)] = 0.0
+    """Noise of the velocity (one-sided amplitude density, white)."""
+    displacement_noise: Annotated[float, Quantity("displacement noise", 0.0, 10.0)] = 0.0
+    """Noise of the displacement (one-sided amplitude density, white)."""
+    acceleration_bias: Annotated[float, Quantity("acceleration", -10.0, 10.0)] = 0.0
+    """What the acceleration shows too much, at all times."""
+    velocity_bias: Annotated[float, Quantity("speed", -10.0, 10.0)] = 0.0
+    """What the velocity shows too much, at all times."""
+    displacement_bias: Annotated[float, Quantity("length", -100.0, 100.0)] = 0.0
+    """What the displacement shows too much, at all times."""
+    acceleration_resolution: Annotated[float, Quantity("acceleration", 0.0, 10.0)] = 0.0
+    """Step in which the acceleration is sent; 0 for none."""
+    velocity_resolution: Annotated[float, Quantity("speed", 0.0, 10.0)] = 0.0
+    """Step in which the velocity is sent; 0 for none."""
+    displacement_resolution: Annotated[float, Quantity("length", 0.0, 10.0)] = 0.0
+    """Step in which the displacement is sent; 0 for none."""
+
+
+class Telemetry(Section):
+    """The link from the payload to the winch."""
+
+    delay: Annotated[float, Quantity("time", 0.0, 60.0)] = 0.0
+    """Delay from the payload's motion to the drive's command."""
+    bandwidth: Annotated[float, Quantity("frequency", _BANDWIDTH_LOW, _BANDWIDTH_HIGH)] | None = (
+        None
+    )
+    """Bandwidth of the link (second-order Butterworth low-pass, after the sensor's); not given
+    for none."""
+    jitter: Annotated[float, Quantity("time", 0.0, 60.0)] = 0.0
+    """Largest extra delay of a message: each is late by anything between 0 and this, all equally
+    likely."""
+    dropout: Annotated[float, Quantity("ratio", 0.0, 1.0, open_high=True)] = 0.0
+    """Share of the messages that are lost."""
+    dropout_length: Annotated[float, Quantity("time", 0.0, 3600.0)] = 0.0
+    """Mean length of a run of lost messages; 0 where each is lost by itself."""
+
+
+class MRU(Section):
+    """The motion reference unit at the crane; payload feedback does not use it."""
+
+    heave_filter_period: Annotated[float, Quantity("time", 1.0, 1000.0)] | None = None
+    """Cut-off period of the high-pass filter on heave."""
+    noise_floor: Annotated[float, Quantity("length", 0.0, 1.0)] = 0.05
+    """Heave accuracy for small motions (one standard deviation)."""
+    noise_fraction: Annotated[float, Quantity("ratio", 0.0, 1.0)] = 0.05
+    """Heave accuracy as a fraction of the motion, for large motions."""
+    noise_bandwidth: Annotated[float, Quantity("frequency", 0.001, 1000.0)] = 1.0
+    """Frequency up to which the error of the heave reaches (second-order Butterworth
+    low-pass)."""
+    delay: Annotated[float, Quantity("time", 0.0, 10.0)] = 0.0
+    """Delay from the motion to the signal."""
+
+
+class Encoder(Section):
+    """The motor's encoder; payload feedback does not use it."""
+
+    counts_per_turn: Annotated[int, Quantity("count", 1, 10**9)]
+    """Counts per turn of the motor."""
+
+
+class LoadCell(Section):
+    """The load cell at the rope's upper end; payload feedback does not use it."""
+
+    bandwidth: Annotated[float, Quantity("frequency", _BANDWIDTH_LOW, _BANDWIDTH_HIGH)]
+    """Bandwidth of the tension signal."""
+    noise_fraction: Annotated[float, Quantity("ratio", 0.0, 1.0)] = 0.0
+    """Noise as a fraction of the static tension (one standard deviation)."""
+
+
+class Sensors(Section):
+    """What is measured, and how."""
+
+    payload: PayloadSensor = PayloadSensor()
+    """Motion sensors at the payload."""
+    telemetry: Telemetry = Telemetry()
+    """The link from the payload to the winch."""
+    mru: MRU | None = None
+    """The motion reference unit at the crane, for feed-forward and the simulation; payload
+    feedback does not use it. Not given: a perfect one."""
+    encoder: Encoder | None = None
+    """The motor's encoder, for the simulation; payload feedback does not use it. Not given: a
+    perfect one."""
+    load_cell: LoadCell | None = None
+    """The load cell at the rope's upper end, for constant tension and the simulation; payload
+    feedback does not use it. Not given: a perfect one."""

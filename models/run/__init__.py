@@ -1,0 +1,1 @@
+"""One run in time: its series, statistics, extremes and files."""

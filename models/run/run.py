@@ -1,0 +1,262 @@
+"""`Run`: what a simulation hands back, signals by name with their units, events and statistics.
+
+The last room in the data's way of `models`: the simulation fills it, `models/run/metrics.py`
+compares several over seeds, `models/run/files.py` writes it to files.  The time traces are
+decimated to what is worth looking at; the statistics come from every sample.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError
+from .summary import Statistics, unknown
+
+if TYPE_CHECKING:
+    import xarray
+
+    from ..case.case import Case
+
+__all__ = ["Event", "Run", "Timings"]
+
+FloatArray = npt.NDArray[np.float64]
+
+# Events printed with a run: the first few say what went wrong.
+_EVENTS_SHOWN = 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Event:
+    """Something that happened in a run.
+
+    Attributes
+    ----------
+    time
+        When [s].
+    kind
+        One word for programs, such as "slack" or "brake".
+    text
+        The sentence that a user reads.
+    """
+
+    time: float
+    kind: str
+    text: str
+
+    def __str__(self) -> str:
+        """Return the time and the sentence."""
+        return f"{self.time:.6g} s: {self.text}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timings:
+    """How fast a run was.
+
+    Attributes
+    ----------
+    wall_seconds
+        Time it took [s].
+    steps, steps_per_second
+        Integration steps, and how many in a second of wall time.
+    real_time_factor
+        Simulated time over wall time.
+    controller_median, controller_p99, controller_max
+        Wall time of one step of a controller in Python [s]; NaN for one compiled into the loop.
+    fallbacks
+        How often something had to be replaced (a late controller, a NaN), by its name.
+    """
+
+    wall_seconds: float
+    steps: int
+    steps_per_second: float
+    real_time_factor: float
+    controller_median: float = math.nan
+    controller_p99: float = math.nan
+    controller_max: float = math.nan
+    fallbacks: Mapping[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Make the mapping read-only."""
+        object.__setattr__(self, "fallbacks", MappingProxyType(dict(self.fallbacks)))
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        wall_seconds: float,
+        steps: int,
+        duration: float,
+        controller_seconds: npt.ArrayLike = (),
+        fallbacks: Mapping[str, int] | None = None,
+    ) -> Timings:
+        """Return the timings of a run of `duration` [s], from the time of each controller step."""
+        wall = max(wall_seconds, 1e-9)  # a clock can stand still over a very short run
+        seconds = np.asarray(controller_seconds, dtype=np.float64)
+        median, p99 = np.quantile(seconds, (0.5, 0.99)) if seconds.size else (math.nan, math.nan)
+        return cls(
+            wall_seconds=wall_seconds,
+            steps=steps,
+            steps_per_second=steps / wall,
+            real_time_factor=duration / wall,
+            controller_median=float(median),
+            controller_p99=float(p99),
+            controller_max=float(seconds.max()) if seconds.size else math.nan,
+            fallbacks=fallbacks or {},
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Run:
+    """A simulated run.
+
+    Attributes
+    ----------
+    case, controller, scenario, seed
+        What was simulated: the case, the controller's and the scenario's name, the seed.
+    sample_time
+        The controller's sample time [s].
+    step
+        The integration step [s].
+    duration
+        Simulated time that was asked for [s]; the run ends earlier if it did not complete.
+    compiled
+        Whether the loop ran as compiled C.
+    signals, units
+        Names of the columns of `values`, and their units.
+    time, values
+        Times from zero (n,) [s], and the signals at those times (n, signals).  The arrays are
+        taken, not copied, and can no longer be written to through the run.
+    statistics
+        Statistics of every sample, not only of those in `values`.
+    events
+        What happened, in the order of time.
+    status, message
+        "completed", "diverged", "interrupted" or another single word, and the sentence to read.
+    timings
+        How fast it was.
+
+    Raises
+    ------
+    InputError
+        If the shapes of `time`, `values` and `signals` do not agree.
+    """
+
+    case: Case
+    controller: str
+    scenario: str
+    seed: int
+    sample_time: float
+    step: float
+    duration: float
+    compiled: bool
+    signals: tuple[str, ...]
+    units: Mapping[str, str]
+    time: FloatArray
+    values: FloatArray
+    statistics: Statistics
+    events: tuple[Event, ...] = ()
+    status: str = "completed"
+    message: str = ""
+    timings: Timings
+
+    def __post_init__(self) -> None:
+        """Check the shapes and make everything read-only."""
+        for name in ("time", "values"):
+            view = np.asarray(getattr(self, name), dtype=np.float64).view()
+            view.setflags(write=False)
+            object.__setattr__(self, name, view)
+        object.__setattr__(self, "signals", tuple(self.signals))
+        object.__setattr__(self, "events", tuple(self.events))
+        units = {name: self.units.get(name, "") for name in self.signals}
+        object.__setattr__(self, "units", MappingProxyType(units))
+        wanted = (self.time.size, len(self.signals))
+        if self.time.ndim != 1 or self.values.shape != wanted:
+            raise InputError(
+                f"run: values must have a row for each time and a column for each signal, "
+                f"{wanted}, got {self.values.shape}"
+            )
+
+    @property
+    def completed(self) -> bool:
+        """Whether the run went to its end."""
+        return self.status == "completed"
+
+    @property
+    def store_step(self) -> float:
+        """Time between stored samples [s]; NaN with less than two."""
+        return float(self.time[1] - self.time[0]) if self.time.size > 1 else math.nan
+
+    def __contains__(self, name: object) -> bool:
+        """Return whether there is a signal of that name."""
+        return name in self.signals
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Return a signal (n,) by its name; an `InputError` names the closest there are."""
+        if name not in self.signals:
+            raise InputError(unknown("run", "signal", name, self.signals))
+        column: FloatArray = self.values[:, self.signals.index(name)]
+        return column
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the signals as an `xarray.Dataset` over time; see `models/run/files.py`."""
+        from .files import to_xarray
+
+        return to_xarray(self)
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write the signals as CSV, one column each, headed `name [unit]`."""
+        from .files import to_csv
+
+        return to_csv(self, path)
+
+    def to_parquet(self, path: str | Path) -> Path:
+        """Write the signals as Parquet, with units and the case in its metadata."""
+        from .files import to_parquet
+
+        return to_parquet(self, path)
+
+    def to_netcdf(self, path: str | Path) -> Path:
+        """Write the signals as NetCDF, with units and the case as attributes."""
+        from .files import to_netcdf
+
+        return to_netcdf(self, path)
+
+    def __str__(self) -> str:
+        """Return the run as a small tree."""
+        told = self.status + (f" ({self.message})" if self.message else "")
+        how = "compiled" if self.compiled else "not compiled"
+        lines = [
+            f"Run of {self.case.name}, {self.controller}, {self.scenario}, seed {self.seed}: "
+            f"{told}",
+            f"{len(self.signals)} signals, {self.time.size} times to "
+            f"{self.time[-1] if self.time.size else 0.0:.6g} of {self.duration:.6g} s",
+            f"step {1e3 * self.step:.4g} ms, sample {1e3 * self.sample_time:.4g} ms, {how}, "
+            f"{self.timings.real_time_factor:.4g} times real time",
+            *_said(self.statistics),
+            *(str(event) for event in self.events[:_EVENTS_SHOWN]),
+        ]
+        if len(self.events) > _EVENTS_SHOWN:
+            lines.append(f"and {len(self.events) - _EVENTS_SHOWN} more events")
+        marks = ["", *["├ "] * (len(lines) - 2), "└ "]
+        return "\n".join(mark + line for mark, line in zip(marks, lines, strict=True))
+
+
+def _said(statistics: Statistics) -> Sequence[str]:
+    """One line of what matters most."""
+    found = {name: q.value for name, q in statistics.quantities.items()}
+    parts = []
+    if "payload rms" in found:
+        parts.append(f"payload {1e3 * found['payload rms']:.4g} mm rms")
+    if "hook rms" in found:
+        parts.append(f"hook {1e3 * found['hook rms']:.4g} mm rms")
+    if "residual" in found:
+        parts.append(f"residual {found['residual']:.3g} % ({found['attenuation']:.1f} dB)")
+    return [", ".join(parts)] if parts else []

@@ -1,0 +1,338 @@
+"""The statistics of a run, gathered while it runs: `Accumulator` takes samples, `Statistics` tells.
+
+    blocks of samples --> Accumulator.update ... --> Accumulator.result() --> Statistics
+
+The simulation hands over every sample, in blocks of any length; what is kept is bounded, so a day
+costs no more memory than an hour.  Inside, samples are worked off in stretches of one fixed length,
+so the result is the same to the last bit however the run was cut into blocks.  Everything is
+counted from `settle` on, but for touch-down, which is an event of the whole run.
+
+A cycle runs from one up-crossing of a signal's level to the next (zero for motions, the static
+value for torque and tension); its height is crest minus trough.  "Significant" is the mean height
+of the highest third of the cycles (Sverdrup and Munk 1947), not four standard deviations; where
+the cycles were too many to be kept it is, and says so.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError, check_range
+from .online import BlockExtremes, Cycles, FirstTime, Flow, Moments, Slack, Touchdown
+from .summary import ERROR, Blocks, SignalStatistics, Statistics, quantities_of
+
+__all__ = ["ERROR", "Accumulator", "SignalStatistics", "Statistics"]
+
+FloatArray = npt.NDArray[np.float64]
+
+# Samples worked off at once: few enough to stay in the cache, many enough for numpy.
+_STRETCH = 4096
+_TILE = 256
+
+# Crossed about zero unless the caller names other levels.
+_MOTIONS = (
+    "hook.heave",
+    "hook.heave_rate",
+    "payload.displacement",
+    "payload.velocity",
+    "payload.acceleration",
+    "drum.haul",
+    "motor.speed",
+    ERROR,
+)
+_BLOCK_SIGNALS = ("hook.heave", "payload.displacement", ERROR, "motor.torque", "rope.tension")
+
+
+class Accumulator:
+    """Gathers the statistics of a run from consecutive blocks of all its samples.
+
+    Parameters
+    ----------
+    signals
+        Names of the signals, in the order of a block's columns.
+    sample_time
+        Time between samples [s].
+    settle
+        Samples before this time are not counted [s].
+    units
+        Units by signal, where known.
+    levels
+        Level whose up-crossings make the cycles, by signal: the static value of torque and
+        tension.  Motions are crossed about zero unless named here; other signals have no cycles
+        unless named here.  `payload.error` is payload.displacement less reference.displacement.
+    lock_limit
+        Beyond this size of `payload.error` lock is lost [m]; None: not watched.
+    slack_tension
+        At or below this smallest tension along the rope it counts as slack [N].
+    snap_window
+        A snap is the largest tension so long after slack [s].
+    block
+        Length of the blocks whose extremes are kept [s].
+    block_signals
+        Signals whose block extremes are kept.
+    thermal_time
+        Time constant of the motor's heating [s], ten samples or more, for the thermally
+        equivalent torque: the steady one that would heat the motor as far as it got, warm from
+        its static torque.  None: not wanted.
+    cycle_capacity
+        Largest number of cycles kept of a signal.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown or repeated, or a number is out of its range.
+
+    Examples
+    --------
+    >>> gather = Accumulator(["payload.displacement"], 0.1)
+    >>> time = 0.1 * np.arange(6001)
+    >>> gather.update(np.sin(0.8 * time)[:, np.newaxis])
+    >>> found = gather.result()
+    >>> payload = found["payload.displacement"]
+    >>> payload.cycles, round(payload.period * 0.8 / math.pi, 4), round(payload.significant, 2)
+    (75, 2.0, 2.0)
+    >>> round(found.value("payload rms"), 3)
+    0.707
+    """
+
+    def __init__(
+        self,
+        signals: Sequence[str],
+        sample_time: float,
+        *,
+        settle: float = 0.0,
+        units: Mapping[str, str] | None = None,
+        levels: Mapping[str, float] | None = None,
+        lock_limit: float | None = None,
+        slack_tension: float = 1.0,
+        snap_window: float = 1.0,
+        block: float = 1200.0,
+        block_signals: Sequence[str] | None = None,
+        thermal_time: float | None = None,
+        cycle_capacity: int = 100_000,
+    ) -> None:
+        owner = "run statistics"
+        self.signals = tuple(signals)
+        if len(set(self.signals)) != len(self.signals) or ERROR in self.signals:
+            raise InputError(f"{owner}: signals must be distinct names, got {self.signals!r}")
+        self.sample_time = check_range(
+            owner, "sample_time", sample_time, low=0.0, unit="s", open_low=True
+        )
+        self.settle = check_range(owner, "settle", settle, low=0.0, unit="s")
+        check_range(owner, "slack_tension", slack_tension, low=0.0, unit="N")
+        check_range(owner, "snap_window", snap_window, low=0.0, unit="s")
+        check_range(owner, "block", block, low=self.sample_time, unit="s")
+        if lock_limit is not None:
+            check_range(owner, "lock_limit", lock_limit, low=0.0, unit="m", open_low=True)
+        if thermal_time is not None:
+            check_range(owner, "thermal_time", thermal_time, low=10.0 * sample_time, unit="s")
+        self._error_of = (
+            (self.signals.index("payload.displacement"), self._find("reference.displacement"))
+            if "payload.displacement" in self.signals
+            else None
+        )
+        self.names = (*self.signals, ERROR) if self._error_of else self.signals
+        self._at = {name: i for i, name in enumerate(self.names)}
+        self.units = {name: (units or {}).get(name, "") for name in self.signals}
+        if self._error_of:
+            self.units[ERROR] = self.units["payload.displacement"]
+        crossed = {name: 0.0 for name in _MOTIONS if name in self._at} | dict(levels or {})
+        kept = block_signals if block_signals is not None else _present(_BLOCK_SIGNALS, self.names)
+        for name in (*crossed, *kept):
+            if name not in self._at:
+                raise InputError(
+                    f"{owner}: signal {name!r} is not among {', '.join(self.names) or 'none'}"
+                )
+        static_torque = crossed.get("motor.torque", 0.0)
+        self._first = 0  # number of the first sample not yet worked off
+        self._settled = 0  # number of the first sample that counts
+        self._start: float | None = None
+        self._waiting = np.empty((len(self.names), _STRETCH))
+        self._filled = 0
+        self._moments = Moments(len(self.names))
+        self._cycles = {
+            name: Cycles(check_range(owner, f"levels[{name!r}]", level), cycle_capacity)
+            for name, level in crossed.items()
+        }
+        self._blocks = BlockExtremes(len(kept), round(block / self.sample_time))
+        self._block_rows = np.array([self._at[name] for name in kept], dtype=np.intp)
+        self._block_names = tuple(kept)
+        self._power = Flow() if "motor.power" in self._at else None
+        self._slack = (
+            Slack(slack_tension, round(snap_window / self.sample_time))
+            if "rope.minimum_tension" in self._at
+            else None
+        )
+        self._lost = FirstTime(lock_limit) if lock_limit is not None and self._error_of else None
+        self._touch = Touchdown() if {"contact.gap", "contact.force"} & set(self._at) else None
+        self._thermal_time = thermal_time if "motor.torque" in self._at else None
+        self._heat = self._hottest = static_torque**2
+
+    def update(self, block: npt.ArrayLike, start_time: float | None = None) -> None:
+        """Take the next samples.
+
+        Parameters
+        ----------
+        block
+            Samples (n, signals), each a row, following those of the call before.
+        start_time
+            Time of the first row [s]; None: one sample time after the last row before it, or zero.
+
+        Raises
+        ------
+        InputError
+            If the block has the wrong shape or does not follow the one before.
+        """
+        rows = np.asarray(block, dtype=np.float64)
+        if rows.ndim != 2 or rows.shape[1] != len(self.signals):
+            raise InputError(
+                f"run statistics: a block must have shape (n, {len(self.signals)}), "
+                f"got {rows.shape}"
+            )
+        if self._start is None:
+            self._start = 0.0 if start_time is None else float(start_time)
+            self._settled = math.ceil((self.settle - self._start) / self.sample_time - 1e-6)
+        wanted = self._start + (self._first + self._filled) * self.sample_time
+        if start_time is not None and abs(start_time - wanted) > 0.5 * self.sample_time:
+            raise InputError(
+                f"run statistics: the next block must start at {wanted:g} s, got {start_time:g} s"
+            )
+        taken = 0
+        while taken < len(rows):
+            # A tile at a time: rows into columns goes fastest where both fit into the cache.
+            count = min(_TILE, _STRETCH - self._filled, len(rows) - taken)
+            into = self._waiting[: len(self.signals), self._filled : self._filled + count]
+            into[...] = rows[taken : taken + count].T
+            self._filled += count
+            taken += count
+            if self._filled == _STRETCH:
+                self._work_off()
+
+    def result(self) -> Statistics:
+        """Return the statistics of all samples so far; more may follow."""
+        end = copy.deepcopy(self)
+        end._work_off()
+        for cycles in end._cycles.values():
+            cycles.finish()
+        with np.errstate(invalid="ignore", over="ignore"):
+            return end._statistics()
+
+    def _work_off(self) -> None:
+        """Hand the waiting samples to every part."""
+        values = self._waiting[:, : self._filled]
+        if self._filled == 0:
+            return
+        if self._error_of:
+            payload, reference = self._error_of
+            values[-1] = values[payload] - (values[reference] if reference >= 0 else 0.0)
+        # A run that diverges goes through inf on its way; that is told, not warned about.
+        with np.errstate(invalid="ignore", over="ignore"):
+            self._touchdowns(values)
+            skipped = min(max(self._settled - self._first, 0), self._filled)
+            if skipped < self._filled:
+                self._count(values[:, skipped:], self._first + skipped)
+        self._first += self._filled
+        self._filled = 0
+
+    def _count(self, values: FloatArray, first: int) -> None:
+        self._moments.add(values, first)
+        for name, cycles in self._cycles.items():
+            cycles.add(values[self._at[name]], first)
+        if self._block_names:
+            self._blocks.add(values[self._block_rows])
+        if self._power:
+            self._power.add(values[self._at["motor.power"]])
+        if self._lost:
+            self._lost.add(values[self._at[ERROR]], first)
+        if self._slack:
+            smallest = values[self._at["rope.minimum_tension"]]
+            ends = _present(("rope.tension", "rope.lower_tension"), self.names)
+            tension = values[[self._at[name] for name in ends]].max(axis=0) if ends else smallest
+            self._slack.add(smallest, tension, first)
+        if self._thermal_time is not None:
+            self._heat_up(values[self._at["motor.torque"]], self._thermal_time)
+
+    def _heat_up(self, torque: FloatArray, thermal_time: float) -> None:
+        """Take the square of the torque through a first-order lag, as the winding's heat goes."""
+        # heat[k] = stay heat[k-1] + (1 - stay) u[k], summed up: all terms are positive, and the
+        # powers stay in range because the time constant is at least ten samples.
+        rate = self.sample_time / thermal_time
+        powers = np.exp(-rate * np.arange(1.0, torque.size + 1.0))
+        inflow = -math.expm1(-rate) * np.cumsum(torque**2 / powers)
+        heat = powers * (self._heat + inflow)
+        self._heat = float(heat[-1])
+        self._hottest = max(self._hottest, float(heat.max()))
+
+    def _touchdowns(self, values: FloatArray) -> None:
+        """Contact is a gap that has closed, or a force; what is touched may rise to meet it."""
+        if self._touch is None:
+            return
+        if "contact.gap" in self._at:
+            touching = values[self._at["contact.gap"]] <= 0.0
+        else:
+            touching = values[self._at["contact.force"]] > 0.0
+        if "contact.closing_speed" in self._at:
+            approach = values[self._at["contact.closing_speed"]]
+        elif "payload.velocity" in self._at:
+            approach = -values[self._at["payload.velocity"]]
+        else:
+            approach = np.full(values.shape[1], math.nan)
+        self._touch.add(touching, approach, self._first)
+
+    def _find(self, name: str) -> int:
+        return self.signals.index(name) if name in self.signals else -1
+
+    def _time(self, number: float) -> float:
+        """Time of sample `number` [s]; NaN for a sample that never came."""
+        return (self._start or 0.0) + number * self.sample_time if number >= 0 else math.nan
+
+    def _statistics(self) -> Statistics:
+        moments, found = self._moments, {}
+        deviation = moments.deviation
+        some = moments.samples > 0
+        for i, name in enumerate(self.names):
+            found[name] = SignalStatistics.of(
+                name=name,
+                unit=self.units[name],
+                mean=float(moments.mean[i]) if some else math.nan,
+                standard_deviation=float(deviation[i]),
+                minimum=float(moments.low[i]) if some else math.nan,
+                minimum_time=self._time(float(moments.low_at[i])),
+                maximum=float(moments.high[i]) if some else math.nan,
+                maximum_time=self._time(float(moments.high_at[i])),
+                cycles=self._cycles.get(name),
+                sample_time=self.sample_time,
+            )
+        maxima, minima = self._blocks.maxima(), self._blocks.minima()
+        return Statistics(
+            sample_time=self.sample_time,
+            settle=self.settle,
+            samples=moments.samples,
+            end=self._time(self._first - 1),
+            signals=found,
+            quantities=quantities_of(
+                found,
+                duration=moments.samples * self.sample_time,
+                time=self._time,
+                sample_time=self.sample_time,
+                power=self._power,
+                slack=self._slack,
+                lost=self._lost,
+                touch=self._touch,
+                hottest=None if self._thermal_time is None else self._hottest,
+            ),
+            block=self._blocks.length * self.sample_time,
+            blocks={
+                name: Blocks(maxima=maxima[:, i], minima=minima[:, i])
+                for i, name in enumerate(self._block_names)
+            },
+        )
+
+
+def _present(wanted: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    return tuple(name for name in wanted if name in names)

@@ -1,0 +1,342 @@
+"""Measured and hindcast seas: the records of a buoy or a wave model.
+
+    file -> reader of its format -> quality control -> `SeaRecords` -> seas, scatter diagram
+
+Text files of NDBC buoys have a reader of our own (`models.sea.ndbc`), because the library's takes
+missing codes for waves and the years of the 1990s for those of Augustus; all other formats are read
+by `wavespectra` (`models.sea.library_files`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError, check_range
+from .quality import QualityControl, Rejection, sift
+from .scatter import Scatter
+from .table import MOST_ROWS
+
+if TYPE_CHECKING:
+    from .sea import SeaSpectrum
+
+__all__ = ["RawRecords", "SeaRecords", "read_seas"]
+
+FloatArray = npt.NDArray[np.float64]
+TimeArray = npt.NDArray[np.datetime64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RawRecords:
+    """What a reader found, before quality control.
+
+    Attributes
+    ----------
+    file_format
+        Name of the format, for people.
+    time
+        Times, UTC (n,); NaT where the file has none.
+    frequency
+        Frequencies, strictly ascending (k,) [Hz].
+    density
+        Variance densities (n, k) [m^2/Hz], NaN where missing.
+    direction
+        Mean direction that the waves come from, clockwise from north (n,) [deg], or None.
+    place
+        Where each record is from (n,), or empty where there is one place only.
+    names
+        What to call each record in an account (n,), or empty to call it by its time.
+    rejections, notes
+        What the reader itself had to leave out, and what it noticed.
+    """
+
+    file_format: str
+    time: TimeArray
+    frequency: FloatArray
+    density: FloatArray
+    direction: FloatArray | None = None
+    place: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
+    rejections: tuple[Rejection, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SeaRecords:
+    """The sea states of a file, in the order of time.
+
+    Attributes
+    ----------
+    time
+        Times, UTC (n,); NaT where the file has none.
+    omega
+        Frequencies, strictly ascending (k,) [rad/s].
+    density
+        Variance densities (n, k) [m^2 s/rad].
+    direction
+        Mean direction that the waves come from, clockwise from north (n,) [rad], NaN where it is
+        unknown; None where the file has no directions.
+    place
+        Where each record is from (n,), or empty where there is one place only.
+    quality
+        The account of what was read and rejected.
+    source
+        The file.
+    file_format
+        Its format, for people.
+
+    Examples
+    --------
+    >>> records = SeaRecords.from_arrays([0.05, 0.1, 0.2, 0.3], [[0.0, 5.0, 1.0, 0.2]])
+    >>> round(float(records.significant_height[0]), 2), round(float(records.peak_period[0]), 1)
+    (2.79, 10.0)
+    >>> round(records.sea(0, beyond="zero").statistics.significant_height, 2)
+    2.79
+    """
+
+    time: TimeArray
+    omega: FloatArray
+    density: FloatArray
+    direction: FloatArray | None
+    place: tuple[str, ...]
+    quality: QualityControl
+    source: str
+    file_format: str
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for name in ("time", "omega", "density", "direction"):
+            array = getattr(self, name)
+            if array is not None:
+                array.setflags(write=False)
+
+    def __len__(self) -> int:
+        """Return the number of records."""
+        return int(self.time.size)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        frequency: npt.ArrayLike,
+        density: npt.ArrayLike,
+        *,
+        time: npt.ArrayLike | None = None,
+        source: str = "records",
+    ) -> SeaRecords:
+        """Return records from arrays, through the same quality control as a file's.
+
+        Parameters
+        ----------
+        frequency
+            Frequencies, strictly ascending (k,) [Hz].
+        density
+            Variance densities (n, k) [m^2/Hz].
+        time
+            Times, UTC (n,).
+        source
+            Name for the messages.
+        """
+        table = np.atleast_2d(np.asarray(density, dtype=np.float64))
+        when = np.full(len(table), "NaT") if time is None else np.asarray(time)
+        raw = RawRecords(
+            file_format="arrays",
+            time=when.astype("datetime64[s]"),
+            frequency=np.asarray(frequency, dtype=np.float64),
+            density=table,
+        )
+        return cls.from_raw(raw, source)
+
+    @classmethod
+    def from_raw(cls, raw: RawRecords, source: str) -> SeaRecords:
+        """Return what is left of a reader's records after quality control.
+
+        Raises
+        ------
+        InputError
+            If the frequencies are no table, or no record is left.
+        """
+        frequency, density, notes = _without_empty_columns(raw)
+        _check_frequencies(frequency, density, source)
+        omega = 2.0 * math.pi * frequency
+        per_radian = density / (2.0 * math.pi)
+        count = len(density)
+        times = [str(one).replace("T", " ") for one in raw.time]
+        names = raw.names or tuple(
+            f"record {index}" if name == "NaT" else name for index, name in enumerate(times)
+        )
+        places = raw.place or ("",) * count
+        same = [
+            None if when == "NaT" else (when, place)
+            for when, place in zip(times, places, strict=True)
+        ]
+        keep, rejections = sift(omega, per_radian, names, same)
+        quality = QualityControl(
+            read=count + sum(one.count for one in raw.rejections),
+            rejections=(*raw.rejections, *rejections),
+            notes=(*raw.notes, *notes),
+        )
+        if not np.any(keep):
+            raise InputError(f"{source}: no record is left after quality control: {quality}")
+        order = np.flatnonzero(keep)
+        order = order[np.argsort(raw.time[order], kind="stable")]
+        return cls(
+            time=raw.time[order],
+            omega=omega,
+            density=per_radian[order],
+            direction=None if raw.direction is None else np.radians(raw.direction[order]),
+            place=tuple(raw.place[i] for i in order) if raw.place else (),
+            quality=quality,
+            source=source,
+            file_format=raw.file_format,
+        )
+
+    @cached_property
+    def significant_height(self) -> FloatArray:
+        """H_s = 4 sqrt(m0) over the measured band (n,) [m]."""
+        return np.asarray(4.0 * np.sqrt(np.trapezoid(self.density, self.omega, axis=1)))
+
+    @property
+    def peak_period(self) -> FloatArray:
+        """T_p, of each record's highest frequency (n,) [s]."""
+        peak = self.omega[np.argmax(self.density, axis=1)]
+        return np.asarray(2.0 * math.pi / np.where(peak > 0.0, peak, 0.5 * self.omega[1]))
+
+    @property
+    def zero_crossing_period(self) -> FloatArray:
+        """T_z = 2 pi sqrt(m0 / m2) over the measured band (n,) [s]: no tail is added to m2."""
+        m0 = np.trapezoid(self.density, self.omega, axis=1)
+        m2 = np.trapezoid(self.density * self.omega**2, self.omega, axis=1)
+        return np.asarray(2.0 * math.pi * np.sqrt(m0 / m2))
+
+    def sea(self, record: int, *, beyond: str = "decay") -> SeaSpectrum:
+        """Return one record as a sea.
+
+        Parameters
+        ----------
+        record
+            Which, counted from 0 in the order of time.
+        beyond
+            What is above the last frequency: `decay`, falling as omega^-5, or `zero`.
+
+        Raises
+        ------
+        InputError
+            If there is no such record.
+        """
+        from .sea import SeaSpectrum
+
+        last = len(self) - 1
+        if not 0 <= record <= last:
+            raise InputError(f"record must be in [0, {last}] in {self.source}, got {record}")
+        return SeaSpectrum.from_table(self.omega, self.density[record], beyond=beyond)
+
+    def scatter(
+        self,
+        *,
+        height_step: float | None = 0.5,
+        period_step: float | None = 1.0,
+        vessel_heading: float | None = None,
+    ) -> Scatter:
+        """Return the scatter diagram of the records.
+
+        Parameters
+        ----------
+        height_step, period_step
+            Widths of the classes [m], [s]; None keeps every record as a state of its own.
+        vessel_heading
+            Compass heading of a vessel's bow, clockwise from north [rad].  Where it is given, each
+            state has the direction that its waves travel towards, counter-clockwise from the bow.
+
+        Raises
+        ------
+        InputError
+            If a vessel's heading is given and the file has no directions.
+        """
+        heading = None
+        if vessel_heading is not None:
+            bow = check_range("scatter diagram", "vessel_heading", vessel_heading, unit="rad")
+            if self.direction is None or np.any(np.isnan(self.direction)):
+                raise InputError(f"{self.source}: has no directions for a vessel_heading")
+            # Compass bearings run clockwise, headings relative to the bow counter-clockwise.
+            heading = np.mod(bow - (self.direction + math.pi), 2.0 * math.pi)
+        month: npt.NDArray[Any] | None = None
+        if not np.any(np.isnat(self.time)):
+            month = self.time.astype("datetime64[M]").astype(np.int64) % 12 + 1
+        return Scatter.from_records(
+            self.significant_height,
+            self.peak_period,
+            month=month,
+            heading=heading,
+            height_step=height_step,
+            period_step=period_step,
+            source=self.source,
+        )
+
+
+def read_seas(path: str | Path, *, file_format: str | None = None) -> SeaRecords:
+    """Read the spectra of a file, behind quality control.
+
+    Parameters
+    ----------
+    path
+        The file, plain or packed with gzip.
+    file_format
+        Name of its format, one of `models.sea.formats.FORMATS`; found out if left out.
+
+    Returns
+    -------
+    SeaRecords
+        The records that are spectra, in the order of time, and the account of the rest.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, its format is unknown or needs `stillhook[waves]`, or no record
+        is left after quality control.
+    """
+    try:
+        about = Path(path).stat()
+        stamp = (about.st_mtime_ns, about.st_size)
+    except (OSError, ValueError):
+        stamp = (0, 0)  # whoever reads it says what is wrong
+    return _read(str(path), file_format, stamp)
+
+
+@lru_cache(maxsize=4)
+def _read(path: str, file_format: str | None, stamp: tuple[int, int]) -> SeaRecords:
+    from .formats import read_raw
+
+    del stamp  # a part of the cache's key: a file may change under its name
+    return SeaRecords.from_raw(read_raw(path, file_format), path)
+
+
+def _without_empty_columns(raw: RawRecords) -> tuple[FloatArray, FloatArray, list[str]]:
+    """Drop frequencies at which no record has a value: another hull did not measure them."""
+    empty = ~np.isfinite(raw.density).any(axis=0)
+    # Where no record has any value, there is no column to tell from the others.
+    if not np.any(empty) or np.all(empty):
+        return raw.frequency, raw.density, []
+    gone = ", ".join(f"{f:.4g}" for f in raw.frequency[empty][:5])
+    note = f"{int(empty.sum())} frequencies without any value left out ({gone} Hz)"
+    return raw.frequency[~empty], raw.density[:, ~empty], [note]
+
+
+def _check_frequencies(frequency: FloatArray, density: FloatArray, source: str) -> None:
+    if density.ndim != 2 or density.shape[1] != frequency.size:
+        raise InputError(
+            f"{source}: must have one density per frequency ({frequency.size}), "
+            f"got shape {density.shape}"
+        )
+    if not 3 <= frequency.size <= MOST_ROWS:
+        raise InputError(f"{source}: must have 3 to {MOST_ROWS} frequencies, got {frequency.size}")
+    if not np.all(np.isfinite(frequency)) or np.any(np.diff(frequency) <= 0.0):
+        raise InputError(f"{source}: the frequencies must be strictly ascending numbers")
+    if frequency[0] < 0.0 or frequency[-1] > 9.5:
+        wrong = frequency[0] if frequency[0] < 0.0 else frequency[-1]
+        raise InputError(f"{source}: the frequencies must be in [0, 9.5] Hz, got {wrong:g}")

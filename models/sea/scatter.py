@@ -1,0 +1,339 @@
+"""Scatter diagrams: how often each sea state occurs.
+
+A diagram is a list of sea states with their share of the time, whether it came as a list, as a
+matrix of H_s against period, or from the records of a buoy.  `models.sea.scatter_files` reads
+and writes the files; operability studies and families of cases use the list.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError, check_finite, check_range, read_only
+
+__all__ = ["Scatter", "read_scatter", "zero_crossing_ratio"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scatter:
+    """Sea states and how often each occurs.
+
+    Attributes
+    ----------
+    significant_height
+        H_s (n,), n >= 1 [m].
+    peak_period
+        T_p (n,) [s].
+    occurrence
+        Share of the time (n,) [-]; given as shares, per cent or counts, kept so that they add up
+        to one.
+    month
+        Month of each state, 1 to 12 (n,), or None where the diagram is for the whole year.
+    heading
+        Direction that the waves travel towards, counter-clockwise from the bow (or, of a site,
+        from the axis that its file says) (n,) [rad], or None.
+    source
+        Where the diagram comes from.
+    total
+        What the occurrences added up to when they were given: the number of records, or 100.
+
+    Raises
+    ------
+    InputError
+        If the columns have unequal lengths, a value is out of range, or nothing occurs.
+
+    Examples
+    --------
+    >>> site = Scatter(significant_height=[1.0, 2.0], peak_period=[6.0, 8.0], occurrence=[30, 10])
+    >>> [round(float(p), 3) for p in site.occurrence]
+    [0.75, 0.25]
+    >>> round(site.share_below(1.5), 3)
+    0.75
+    """
+
+    significant_height: FloatArray
+    peak_period: FloatArray
+    occurrence: FloatArray
+    month: npt.NDArray[Any] | None = None
+    heading: FloatArray | None = None
+    source: str = "scatter diagram"
+    total: float = math.nan
+
+    def __post_init__(self) -> None:
+        """Check the columns, drop what never occurs and make the occurrences shares."""
+        columns = {
+            name: check_finite(self.source, name, getattr(self, name))
+            for name in ("significant_height", "peak_period", "occurrence", "month", "heading")
+            if getattr(self, name) is not None
+        }
+        rows = columns["significant_height"].size
+        for name, column in columns.items():
+            if column.shape != (rows,):
+                raise InputError(
+                    f"{self.source}: {name} must have as many entries as significant_height "
+                    f"({rows}), got {column.size}"
+                )
+        _check_all(self.source, "occurrence", columns["occurrence"], low=0.0)
+        happens = columns["occurrence"] > 0.0
+        if not np.any(happens):
+            raise InputError(
+                f"{self.source}: must have at least one row with an occurrence above 0"
+            )
+        columns = {name: column[happens] for name, column in columns.items()}
+        _check_all(self.source, "significant_height", columns["significant_height"], 0.0, 30.0, "m")
+        _check_all(self.source, "peak_period", columns["peak_period"], 0.0, 60.0, "s")
+        for name in ("significant_height", "peak_period"):
+            zero = np.flatnonzero(columns[name] <= 0.0)
+            if zero.size:
+                raise InputError(
+                    f"{self.source}: {name} must be above 0, got 0 in row {zero[0] + 1}"
+                )
+        total = float(columns["occurrence"].sum())
+        if not math.isfinite(total):
+            raise InputError(f"{self.source}: the occurrences must have a finite sum, got {total}")
+        columns["occurrence"] = columns["occurrence"] / total
+        for name, column in columns.items():
+            object.__setattr__(self, name, read_only(column))
+        if self.month is not None:
+            month = np.asarray(self.month)
+            if np.any(month != np.round(month)) or np.any(month < 1) or np.any(month > 12):
+                raise InputError(f"{self.source}: month must be whole numbers in [1, 12]")
+            whole = month.astype(np.int64)
+            whole.setflags(write=False)
+            object.__setattr__(self, "month", whole)
+        if math.isnan(self.total):
+            object.__setattr__(self, "total", total)
+
+    def __len__(self) -> int:
+        """Return the number of sea states."""
+        return int(self.significant_height.size)
+
+    def __iter__(self) -> Iterator[tuple[float, float, float]]:
+        """Yield H_s [m], T_p [s] and occurrence [-] of each state."""
+        columns = (self.significant_height, self.peak_period, self.occurrence)
+        for height, period, share in zip(*columns, strict=True):
+            yield float(height), float(period), float(share)
+
+    @property
+    def mean_significant_height(self) -> float:
+        """Mean H_s [m]."""
+        return float(self.occurrence @ self.significant_height)
+
+    def share_below(self, significant_height: float) -> float:
+        """Return the share of the time with an H_s of at most that given [m]."""
+        return float(self.occurrence[self.significant_height <= significant_height].sum())
+
+    def of_month(self, *months: int) -> Scatter:
+        """Return the diagram of some months alone, its occurrences again adding up to one.
+
+        Raises
+        ------
+        InputError
+            If the diagram has no months, or nothing in those asked for.
+        """
+        if self.month is None:
+            raise InputError(f"{self.source}: has no column of months")
+        return self._some(np.isin(self.month, months), f"month {', '.join(map(str, months))}")
+
+    def binned(self, *, height_step: float = 0.5, period_step: float = 1.0) -> Scatter:
+        """Return the diagram on classes of H_s and T_p, each state at the centre of its class.
+
+        Months and headings stay apart where there are months; headings fall into 30 degrees.
+
+        Parameters
+        ----------
+        height_step, period_step
+            Widths of the classes [m], [s], the first beginning at zero.
+        """
+        check_range(self.source, "height_step", height_step, low=0.0, unit="m", open_low=True)
+        check_range(self.source, "period_step", period_step, low=0.0, unit="s", open_low=True)
+        keys = [
+            np.floor(self.significant_height / height_step),
+            np.floor(self.peak_period / period_step),
+        ]
+        turn = math.pi / 6.0
+        if self.month is not None:
+            keys.append(self.month.astype(np.float64))
+        if self.heading is not None:
+            keys.append(np.round(np.mod(self.heading, 2.0 * math.pi) / turn) % 12)
+        classes, which = np.unique(np.stack(keys, axis=1), axis=0, return_inverse=True)
+        share = np.zeros(len(classes))
+        np.add.at(share, which.ravel(), self.occurrence)
+        at = 2
+        month = heading = None
+        if self.month is not None:
+            month, at = classes[:, at].astype(np.int64), at + 1
+        if self.heading is not None:
+            heading = turn * classes[:, at]
+        return Scatter(
+            significant_height=(classes[:, 0] + 0.5) * height_step,
+            peak_period=(classes[:, 1] + 0.5) * period_step,
+            occurrence=share,
+            month=month,
+            heading=heading,
+            source=self.source,
+            total=self.total,
+        )
+
+    @classmethod
+    def from_records(
+        cls,
+        significant_height: npt.ArrayLike,
+        peak_period: npt.ArrayLike,
+        *,
+        month: npt.ArrayLike | None = None,
+        heading: npt.ArrayLike | None = None,
+        height_step: float | None = 0.5,
+        period_step: float | None = 1.0,
+        source: str = "records",
+    ) -> Scatter:
+        """Return the diagram of equally long records; `SeaRecords.scatter` calls this.
+
+        Parameters
+        ----------
+        significant_height, peak_period
+            H_s and T_p of each record (n,) [m], [s]; a record where one is not a number is left
+            out.
+        month, heading
+            Month and heading [rad] of each record (n,).
+        height_step, period_step
+            Widths of the classes [m], [s]; None keeps every record as a state of its own.
+        source
+            Name for the messages.
+        """
+        height = np.asarray(significant_height, dtype=np.float64)
+        period = np.asarray(peak_period, dtype=np.float64)
+        keep = np.isfinite(height) & np.isfinite(period) & (height > 0.0) & (period > 0.0)
+        every = cls(
+            significant_height=height[keep],
+            peak_period=period[keep],
+            occurrence=np.ones(int(keep.sum())),
+            month=None if month is None else np.asarray(month, dtype=np.int64)[keep],
+            heading=None if heading is None else np.asarray(heading, dtype=np.float64)[keep],
+            source=source,
+        )
+        if height_step is None or period_step is None:
+            return every
+        return every.binned(height_step=height_step, period_step=period_step)
+
+    def matrix(
+        self, height_step: float = 0.5, period_step: float = 1.0
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the diagram as a matrix over all months and headings.
+
+        Parameters
+        ----------
+        height_step, period_step
+            Widths of the classes [m], [s].
+
+        Returns
+        -------
+        heights, periods, occurrence
+            Edges of the classes (r + 1,) [m] and (c + 1,) [s], and the shares (r, c) [-].
+        """
+        rows = math.floor(float(self.significant_height.max()) / height_step) + 1
+        first = math.floor(float(self.peak_period.min()) / period_step)
+        last = math.floor(float(self.peak_period.max()) / period_step) + 1
+        heights = height_step * np.arange(rows + 1.0)
+        periods = period_step * np.arange(float(first), last + 1.0)
+        table, _, _ = np.histogram2d(
+            self.significant_height,
+            self.peak_period,
+            bins=(heights, periods),
+            weights=self.occurrence,
+        )
+        return heights, periods, table
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write the list of states as CSV, in the form that :func:`read_scatter` reads."""
+        from .scatter_files import write_scatter
+
+        return write_scatter(path, self)
+
+    def _some(self, which: npt.NDArray[np.bool_], name: str) -> Scatter:
+        if not np.any(which):
+            raise InputError(f"{self.source}: has no sea state in {name}")
+        return Scatter(
+            significant_height=self.significant_height[which],
+            peak_period=self.peak_period[which],
+            occurrence=self.occurrence[which],
+            month=None if self.month is None else self.month[which],
+            heading=None if self.heading is None else self.heading[which],
+            source=f"{self.source}, {name}",
+        )
+
+
+def read_scatter(path: str | Path, *, gamma: float = 1.0) -> Scatter:
+    r"""Read a scatter diagram from a CSV file: a list of sea states, or a matrix.
+
+    A list has a header that names its columns and, after it, one row per state.  Names are
+    `significant_height` (or H_s, Hs, Hm0), `peak_period` (T_p, Tp) or `zero_crossing_period`
+    (T_z, Tz, Tm02), `occurrence` (count, share, probability, percent) and, where there are any,
+    `month` and `heading`.  A unit stands in brackets behind the name, or in a row of units under
+    the header; without one it is m and s.  Headings need theirs::
+
+        H_s [m], T_p [s], occurrence
+        0.5, 5.5, 1210
+        1.5, 6.5, 2380
+
+    A matrix has heights down and periods across, or the other way about, and its corner says
+    which.  Classes are given by their centres or as ranges::
+
+        H_s [m] \ T_z [s], 4-5, 5-6, 6-7
+        0-1, 120, 310, 85
+        1-2, 14, 402, 516
+
+    Separators are commas, semicolons (then with decimal commas, if the file has them) or tabs;
+    lines that begin with `#` are passed over.
+
+    Parameters
+    ----------
+    path
+        The file.
+    gamma
+        Peak enhancement of the JONSWAP spectrum by which zero-crossing periods become peak
+        periods [-]; 1 is Pierson-Moskowitz's, which published diagrams of T_z assume.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a column is missing, a figure is no number or out of range.
+    """
+    from .scatter_files import scatter_from_csv
+
+    return scatter_from_csv(path, gamma=gamma)
+
+
+def zero_crossing_ratio(gamma: float) -> float:
+    """Return T_z / T_p of a JONSWAP spectrum (DNV-RP-C205, 3.5.5.5).
+
+    Parameters
+    ----------
+    gamma
+        Peak enhancement, 1 to 7 [-].
+
+    Examples
+    --------
+    >>> round(zero_crossing_ratio(1.0), 4), round(zero_crossing_ratio(3.3), 4)
+    (0.7118, 0.7777)
+    """
+    g = check_range("sea", "gamma", gamma, low=1.0, high=7.0)
+    return 0.6673 + 0.05037 * g - 0.006230 * g**2 + 0.0003341 * g**3
+
+
+def _check_all(
+    owner: str, name: str, values: FloatArray, low: float, high: float = math.inf, unit: str = ""
+) -> None:
+    """Check a column, naming the first row that is out of range."""
+    for row, value in enumerate(values.tolist(), start=1):
+        if not low <= value <= high:
+            check_range(f"{owner}: row {row}", name, value, low=low, high=high, unit=unit)

@@ -1,0 +1,256 @@
+"""Scatter diagrams as CSV files: a list of states or a matrix, read and written.
+
+The forms are described at `models.sea.scatter.read_scatter`, the door to this module.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..basics.checks import InputError
+from ..basics.files import write_text_atomically
+from ..basics.text import read_text
+from ..basics.units import KINDS
+from .scatter import Scatter, zero_crossing_ratio
+
+__all__ = ["scatter_from_csv", "write_scatter"]
+
+_NAMES = {
+    "significant_height": ("significantheight", "significantwaveheight", "hs", "hm0", "swh"),
+    "peak_period": ("peakperiod", "tp"),
+    "zero_crossing_period": ("zerocrossingperiod", "tz", "tm02"),
+    "occurrence": (
+        "occurrence", "occurrences", "count", "counts", "n", "number", "share", "probability",
+        "percent", "p", "frequency", "hours",
+    ),
+    "month": ("month",),
+    "heading": ("heading", "direction"),
+}  # fmt: skip
+_KINDS = {
+    "significant_height": "length",
+    "peak_period": "time",
+    "zero_crossing_period": "time",
+    "heading": "angle",
+}
+_RANGE = re.compile(r"^\s*([0-9]*\.?[0-9]+)\s*(?:-|\u2013|to|\.\.)\s*([0-9]*\.?[0-9]+)\s*$")
+_MOST_ROWS = 200_000
+
+
+def scatter_from_csv(path: str | Path, *, gamma: float = 1.0) -> Scatter:
+    """Read a diagram; see :func:`models.sea.scatter.read_scatter`."""
+    ratio = zero_crossing_ratio(gamma)
+    owner = str(path)
+    rows = _rows(read_text(path), owner)
+    if not rows:
+        raise InputError(f"{owner}: is empty; a scatter diagram is wanted")
+    (line, header), body = rows[0], rows[1:]
+    corner = re.split(r"\\|/(?![^\[(]*[\])])|\|", header[0])
+    kinds = [_name(part)[0] for part in corner]
+    periods = {"peak_period", "zero_crossing_period"}
+    if len(corner) == 2 and "significant_height" in kinds and periods & set(kinds):
+        return _matrix(corner, header[1:], body, owner, line, ratio)
+    return _list(header, body, owner, line, ratio)
+
+
+def write_scatter(path: str | Path, scatter: Scatter) -> Path:
+    """Write a diagram as a list of states; occurrences are shares."""
+    names = ["significant_height [m]", "peak_period [s]", "occurrence"]
+    columns = [scatter.significant_height, scatter.peak_period, scatter.occurrence]
+    if scatter.month is not None:
+        names.append("month")
+        columns.append(scatter.month.astype(np.float64))
+    if scatter.heading is not None:
+        names.append("heading [deg]")
+        columns.append(np.degrees(scatter.heading))
+    lines = [f"# Scatter diagram: {scatter.source}".replace("\n", " "), ",".join(names)]
+    lines += [",".join(f"{value:.15g}" for value in row) for row in zip(*columns, strict=True)]
+    return write_text_atomically(path, "\n".join(lines) + "\n")
+
+
+def _rows(text: str, owner: str) -> list[tuple[int, list[str]]]:
+    """Split the text into cells, with the number of each line."""
+    kept = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), start=1)
+        if line.strip(" \t,;") and not line.lstrip().startswith("#")
+    ]
+    if not kept:
+        return []
+    if len(kept) > _MOST_ROWS:
+        raise InputError(f"{owner}: must have at most {_MOST_ROWS} rows, got {len(kept)}")
+    first = kept[0][1]
+    separator = max(",;\t", key=first.count)
+    if separator == ";" and "." not in "".join(line for _, line in kept[1:]):
+        kept = kept[:1] + [(number, line.replace(",", ".")) for number, line in kept[1:]]
+    found = []
+    for number, line in kept:
+        try:
+            cells = next(csv.reader([line], delimiter=separator, strict=True))
+        except (csv.Error, StopIteration) as error:
+            raise InputError(f"{owner}:{number}: is not a row of a CSV file: {error}") from None
+        found.append((number, [cell.strip() for cell in cells]))
+    return found
+
+
+def _name(header: str) -> tuple[str, str]:
+    """Return the column's name, ours if it is known, and its unit."""
+    match = re.match(r"^\s*([^\[(]*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*$", header)
+    name, unit = (match.group(1), match.group(2) or "") if match else (header, "")
+    plain = re.sub(r"[^a-z0-9]", "", name.lower())
+    if plain.endswith("deg") and plain.removesuffix("deg") in _NAMES["heading"]:
+        return "heading", "deg"
+    known = next((ours for ours, theirs in _NAMES.items() if plain in theirs), name)
+    return known, "%" if plain == "percent" else unit
+
+
+def _factor(name: str, unit: str, owner: str) -> float:
+    """Return the factor to SI of a column."""
+    kind = _KINDS.get(name)
+    if kind is None:
+        return 1.0  # occurrences are made shares whatever they are in
+    if not unit:
+        if name == "heading":
+            raise InputError(f"{owner}: the column of headings must say its unit: heading [deg]")
+        return 1.0
+    known = KINDS[kind].units
+    if unit not in known:
+        raise InputError(
+            f"{owner}: the unit of {name} must be one of {', '.join(known)}; got {unit!r}"
+        )
+    return known[unit]
+
+
+def _number(cell: str, owner: str, line: int, what: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        raise InputError(f"{owner}:{line}: {what} must be a number, got {cell!r:.40}") from None
+
+
+def _list(
+    header: Sequence[str],
+    body: list[tuple[int, list[str]]],
+    owner: str,
+    line: int,
+    ratio: float,
+) -> Scatter:
+    named = [_name(cell) for cell in header]
+    if body and _is_units_row(body[0][1]):
+        units = [cell.strip("[]() ") for cell in body[0][1]]
+        units += [""] * (len(named) - len(units))
+        named = [(name, unit or other) for (name, unit), other in zip(named, units, strict=False)]
+        body = body[1:]
+    at: dict[str, int] = {}
+    for index, (name, _) in enumerate(named):
+        if name in _NAMES:
+            if name in at:
+                raise InputError(f"{owner}:{line}: has two columns of {name}")
+            at[name] = index
+    period = "peak_period" if "peak_period" in at else "zero_crossing_period"
+    for name in ("significant_height", period, "occurrence"):
+        if name not in at:
+            wanted = "peak_period (or zero_crossing_period)" if name == period else name
+            raise InputError(
+                f"{owner}:{line}: must have the columns significant_height, peak_period (or "
+                f"zero_crossing_period) and occurrence; {wanted} is missing among "
+                f"{', '.join(header)!r:.80}"
+            )
+    if period == "peak_period":
+        at.pop("zero_crossing_period", None)
+    factors = {
+        name: _factor(name, named[index][1], f"{owner}:{line}") for name, index in at.items()
+    }
+    columns: dict[str, list[float]] = {name: [] for name in at}
+    for number, cells in body:
+        if len(cells) <= max(at.values()):
+            raise InputError(f"{owner}:{number}: must have {len(header)} columns, got {len(cells)}")
+        for name, index in at.items():
+            columns[name].append(_number(cells[index], owner, number, name) * factors[name])
+    arrays = {name: np.array(values) for name, values in columns.items()}
+    if period == "zero_crossing_period":
+        arrays["peak_period"] = arrays.pop("zero_crossing_period") / ratio
+    return Scatter(
+        significant_height=arrays["significant_height"],
+        peak_period=arrays["peak_period"],
+        occurrence=arrays["occurrence"],
+        month=arrays.get("month"),
+        heading=arrays.get("heading"),
+        source=owner,
+    )
+
+
+def _is_units_row(cells: Sequence[str]) -> bool:
+    """Whether a row holds no number at all, and something."""
+
+    def number(cell: str) -> bool:
+        try:
+            float(cell)
+        except ValueError:
+            return False
+        return True
+
+    return any(cells) and not any(number(cell) for cell in cells)
+
+
+def _matrix(
+    corner: Sequence[str],
+    across: Sequence[str],
+    body: list[tuple[int, list[str]]],
+    owner: str,
+    line: int,
+    ratio: float,
+) -> Scatter:
+    (down_name, down_unit), (across_name, across_unit) = (_name(part) for part in corner)
+    across = [cell for cell in across if cell.lower() not in ("", "sum", "total", "all")]
+    columns = [
+        _centre(cell, owner, line) * _factor(across_name, across_unit, f"{owner}:{line}")
+        for cell in across
+    ]
+    down, table = [], []
+    for number, cells in body:
+        if cells[0].lower() in ("sum", "total", "all"):
+            continue
+        if len(cells) <= len(columns):
+            raise InputError(
+                f"{owner}:{number}: must have {len(columns)} occurrences, got {len(cells) - 1}"
+            )
+        down.append(
+            _centre(cells[0], owner, number) * _factor(down_name, down_unit, f"{owner}:{number}")
+        )
+        # An empty cell of a diagram is one that never occurs.
+        table.append(
+            [
+                _number(cell, owner, number, "occurrence") if cell else 0.0
+                for cell in cells[1 : len(columns) + 1]
+            ]
+        )
+    if not table or not columns:
+        raise InputError(f"{owner}: the matrix must have at least one row and one column")
+    shares = np.array(table)
+    rows, cols = np.meshgrid(down, columns, indexing="ij")
+    by_name = {down_name: rows, across_name: cols}
+    if "zero_crossing_period" in by_name:
+        by_name["peak_period"] = by_name["zero_crossing_period"] / ratio
+    return Scatter(
+        significant_height=by_name["significant_height"].ravel(),
+        peak_period=by_name["peak_period"].ravel(),
+        occurrence=shares.ravel(),
+        source=owner,
+    )
+
+
+def _centre(cell: str, owner: str, line: int) -> float:
+    """Return the centre of a class, given as itself or as a range."""
+    match = _RANGE.match(cell)
+    if match:
+        return 0.5 * (float(match.group(1)) + float(match.group(2)))
+    value = _number(cell, owner, line, "a class of the matrix")
+    if not math.isfinite(value):
+        raise InputError(f"{owner}:{line}: a class of the matrix must be finite, got {cell!r}")
+    return value

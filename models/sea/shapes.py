@@ -1,0 +1,165 @@
+r"""The standard forms of a sea's spectrum, point by point.
+
+Those that the library `waveresponse` has (Bretschneider, JONSWAP, Ochi-Hubble, Torsethaugen) are
+evaluated by it: its formulas are pointwise, so they need no uniform grid.  TMA and the Gaussian
+swell are in `wavespectra` alone, an extra that needs a grid and labelled arrays and normalises on
+that grid (five milliseconds a call); they are a line each and are written here, and tested against
+it.  The 1975 form and its variables are described in `models.sea.sea`.
+
+Sources: DNV-RP-C205 (2021), 3.5.5 (JONSWAP, gamma from T_p and H_s); Bouws, Guenther, Rosenthal
+and Vincent, *J. Geophys. Res.* 90 (1985) 975 (TMA); Kitaigorodskii, Krasitskii and Zaslavskii,
+*J. Phys. Oceanogr.* 5 (1975) 410 (its depth function); Bunney, Saulter and Palmer, OMAE2014-24129
+(Gaussian swell); Pierson and Moskowitz, *J. Geophys. Res.* 69 (1964) 5181.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.dispersion import wave_number
+from ..basics.tables import GRAVITY
+
+__all__ = [
+    "depth_function",
+    "fully_developed_period",
+    "gaussian_density",
+    "jonswap_gamma",
+    "library_density",
+    "thesis_density",
+]
+
+FloatArray = npt.NDArray[np.float64]
+
+_PHILLIPS = 0.0081  # alpha of Pierson and Moskowitz
+
+
+def jonswap_gamma(peak_period: float, significant_height: float) -> float:
+    """Return the JONSWAP peak enhancement that belongs to T_p and H_s (DNV-RP-C205, 3.5.5.5).
+
+    Parameters
+    ----------
+    peak_period
+        T_p [s].
+    significant_height
+        H_s [m].
+
+    Examples
+    --------
+    >>> [round(jonswap_gamma(period, 4.0), 2) for period in (7.0, 9.0, 10.0)]
+    [5.0, 1.78, 1.0]
+    """
+    ratio = peak_period / math.sqrt(significant_height)
+    if ratio <= 3.6:
+        return 5.0
+    return math.exp(5.75 - 1.15 * ratio) if ratio < 5.0 else 1.0
+
+
+def fully_developed_period(significant_height: float) -> float:
+    r"""Return the peak period of a fully developed sea, by Pierson and Moskowitz [s].
+
+    Their spectrum :math:`\alpha g^2 \omega^{-5} \exp(-\tfrac54 (\omega_p/\omega)^4)` with alpha =
+    0.0081 has the variance :math:`\alpha g^2 / (5 \omega_p^4)`, so H_s alone gives its peak.
+
+    Parameters
+    ----------
+    significant_height
+        H_s [m].
+
+    Examples
+    --------
+    >>> round(fully_developed_period(4.0), 2)
+    10.0
+    """
+    squared = 4.0 * GRAVITY * math.sqrt(_PHILLIPS / 5.0) / significant_height
+    return 2.0 * math.pi / math.sqrt(squared)
+
+
+def thesis_density(omega: FloatArray, height: float, significant_period: float) -> FloatArray:
+    """Return the 1975 form, as a density of the elevation [m^2 s/rad]; see `models.sea.sea`."""
+    mean_height = 0.625 * height
+    period = 0.9 * significant_period
+    nu = omega * period / (2.0 * math.pi)
+    per_hertz = 3.434 * mean_height**2 * period * nu**-5 * np.exp(-0.675 * nu**-4)
+    result: FloatArray = per_hertz / 8.0 / (2.0 * math.pi)
+    return result
+
+
+def library_density(
+    kind: str, omega: FloatArray, height: float, period: float, *, gamma: float, order: float
+) -> FloatArray:
+    """Return a spectrum of the library `waveresponse` [m^2 s/rad].
+
+    Parameters
+    ----------
+    kind
+        A standard form.  Pierson and Moskowitz's is Bretschneider's with a period of its own, and
+        TMA's is JONSWAP's before the depth comes in.
+    omega
+        Frequencies above zero, any order (k,) [rad/s].
+    height, period
+        H_s [m] and T_p [s].
+    gamma, order
+        Peak enhancement of `jonswap` and `tma`, q of `ochi-hubble` [-].
+    """
+    import waveresponse  # here, because it loads pandas and more: 0.7 s
+
+    library: dict[str, tuple[Callable[..., Any], dict[str, float]]] = {
+        "bretschneider": (waveresponse.ModifiedPiersonMoskowitz, {}),
+        "pierson-moskowitz": (waveresponse.ModifiedPiersonMoskowitz, {}),
+        "jonswap": (waveresponse.JONSWAP, {"gamma": gamma}),
+        "tma": (waveresponse.JONSWAP, {"gamma": gamma}),
+        "ochi-hubble": (waveresponse.OchiHubble, {"q": order}),
+        "torsethaugen": (waveresponse.Torsethaugen, {}),
+    }
+    spectrum, shape = library[kind]
+    with np.errstate(invalid="ignore"):  # a NaN is caught, with words, on construction
+        _, values = spectrum(omega, freq_hz=False)(height, period, freq_hz=False, **shape)
+    return np.asarray(values, dtype=np.float64)
+
+
+def depth_function(omega: FloatArray, depth: float) -> FloatArray:
+    r"""Return what water of finite depth leaves of a spectrum [-]: Kitaigorodskii's function.
+
+    .. math:: \phi = \tanh^2(kd) / (1 + 2 k d / \sinh 2 k d), \qquad \omega^2 = g k \tanh k d
+
+    Parameters
+    ----------
+    omega
+        Frequencies above zero [rad/s].
+    depth
+        Water depth d [m].
+
+    Examples
+    --------
+    >>> depth_function(np.array([0.1, 1.0, 10.0]), 20.0).round(4)
+    array([0.0102, 0.8367, 1.    ])
+    """
+    kd = wave_number(omega, depth) * depth
+    # 2 kd / sinh(2 kd), without overflow in deep water.
+    ratio = 4.0 * kd * np.exp(-2.0 * kd) / -np.expm1(-4.0 * kd)
+    result: FloatArray = np.tanh(kd) ** 2 / (1.0 + ratio)
+    return result
+
+
+def gaussian_density(omega: FloatArray, height: float, peak: float, width: float) -> FloatArray:
+    """Return a swell whose energy is normally distributed over frequency [m^2 s/rad].
+
+    Parameters
+    ----------
+    omega
+        Frequencies [rad/s].
+    height
+        H_s [m].
+    peak, width
+        Mean and standard deviation of the frequency [rad/s].
+    """
+    z = (omega - peak) / width
+    result: FloatArray = (
+        height**2 / 16.0 / (width * math.sqrt(2.0 * math.pi)) * np.exp(-0.5 * z * z)
+    )
+    return result

@@ -1,0 +1,1 @@
+"""Sensors and telemetry between the plant and a controller, and the controller's protocol."""

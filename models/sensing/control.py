@@ -1,0 +1,185 @@
+"""What a controller is: a measurement in, a drive command out, once in a sample.
+
+    MEASURED --> Measurement --> Controller.step --> command --> drive
+
+A controller sees the vector `MEASURED` and nothing else: what sensors and telemetry made of
+the world (`models/sensing/sensing.py`), not the world itself.  A controller that is a `Recursion`,
+a CasADi function of its state and that vector, becomes part of the compiled loop; any other object
+with `reset` and `step` is called from Python, one sample at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Protocol, runtime_checkable
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError, check_finite, read_only
+from ..basics.signals import pick
+
+__all__ = [
+    "MEASURED",
+    "MEASURED_UNITS",
+    "Controller",
+    "Measurement",
+    "Recursion",
+    "holds_brake",
+    "recursion_of",
+]
+
+FloatArray = npt.NDArray[np.float64]
+
+MEASURED_UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        "payload.acceleration": "m/s2",
+        "payload.velocity": "m/s",
+        "payload.displacement": "m",
+        "payload.age": "s",
+        "payload.valid": "",
+        "mru.heave": "m",
+        "mru.heave_rate": "m/s",
+        "mru.valid": "",
+        "drum.haul": "m",
+        "motor.speed": "rad/s",
+        "rope.tension": "N",
+        "motor.torque": "N m",
+        "drive.applied": "of the command",
+        "reference.displacement": "m",
+        "reference.velocity": "m/s",
+        "reference.acceleration": "m/s2",
+    }
+)
+#: Names of the measurement vector, in its order.
+#:
+#: The payload's signals are those received last, `payload.age` their age (delay and time held)
+#: and `payload.valid` 1 where a message has just arrived.  `drive.applied` is the command that
+#: the drive has really followed over the last sample, within its limits.  The references are
+#: what the operator asks of the payload.
+MEASURED: tuple[str, ...] = tuple(MEASURED_UNITS)
+
+_AT = {name: i for i, name in enumerate(MEASURED)}
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Measurement:
+    """One sample of what a controller sees.
+
+    Parameters
+    ----------
+    values
+        Values in the order of `MEASURED`, (16,); not copied, as a loop makes thousands.
+
+    Examples
+    --------
+    >>> seen = Measurement.of({"rope.tension": 4.5e5, "payload.valid": 1.0})
+    >>> seen["rope.tension"], seen["payload.displacement"]
+    (450000.0, 0.0)
+    """
+
+    values: FloatArray
+
+    def __getitem__(self, name: str) -> float:
+        """Return one value by name.
+
+        Raises
+        ------
+        InputError
+            If there is no such measurement.
+        """
+        at = _AT.get(name)
+        if at is None:
+            at = pick("measurement", "signal", MEASURED, (name,))[0]
+        return float(self.values[at])
+
+    @classmethod
+    def of(cls, named: Mapping[str, float]) -> Measurement:
+        """Return the measurement with these values, zero where none is given.
+
+        Raises
+        ------
+        InputError
+            If a name is unknown.
+        """
+        values = np.zeros(len(MEASURED))
+        values[pick("measurement", "signal", MEASURED, tuple(named))] = list(named.values())
+        return cls(values)
+
+
+@runtime_checkable
+class Controller(Protocol):
+    """Anything that makes drive commands out of measurements.
+
+    Two attributes are optional: `recursion`, a `Recursion` that does what `step` does, lets
+    the whole loop be compiled; `brake`, true for a controller that holds the drum with its
+    brake instead of its motor.
+    """
+
+    @property
+    def name(self) -> str:
+        """What it is called in results."""
+
+    @property
+    def sample_time(self) -> float:
+        """Time from one `step` to the next [s]."""
+
+    def reset(self) -> None:
+        """Forget every earlier measurement."""
+
+    def step(self, measurement: Measurement, time: float) -> float:
+        """Return the drive command, its static part included [V, rad/s or N m].
+
+        The drive holds it until the next step.
+        """
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recursion:
+    """A controller as a function: (xc, m) -> (xc_next, u).
+
+    Parameters
+    ----------
+    function
+        casadi.Function of the state xc, (nxc, 1), which may be empty, and the measurements
+        m, (16, 1), in the order of `MEASURED`; returns the next state and the command.
+    initial
+        State before the first sample, (nxc,).
+
+    Raises
+    ------
+    InputError
+        If the function's shapes are others, or the initial state is not finite.
+    """
+
+    function: ca.Function
+    initial: FloatArray
+
+    def __post_init__(self) -> None:
+        initial = check_finite("recursion", "initial", self.initial)
+        object.__setattr__(self, "initial", read_only(initial.reshape(-1)))
+        f, n = self.function, self.initial.size
+        wanted = [[n, len(MEASURED)], [n, 1]]
+        got = [
+            [f.numel_in(i) for i in range(f.n_in())],
+            [f.numel_out(i) for i in range(f.n_out())],
+        ]
+        if got != wanted:
+            raise InputError(
+                f"recursion: function must take {wanted[0]} and return {wanted[1]} numbers "
+                f"(state and measurements, state and command), got {got[0]} and {got[1]}"
+            )
+
+
+def recursion_of(controller: Controller) -> Recursion | None:
+    """Return the controller's recursion; None if it has to be stepped from Python."""
+    found = getattr(controller, "recursion", None)
+    return found if isinstance(found, Recursion) else None
+
+
+def holds_brake(controller: Controller) -> bool:
+    """Return whether the controller holds the drum with its brake."""
+    return bool(getattr(controller, "brake", False))

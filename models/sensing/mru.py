@@ -1,0 +1,378 @@
+"""The motion reference unit: the hook's heave as it is reported, not as it is.
+
+Nothing that the winch does comes back to the hook, so what the unit shows is computed before the
+run, a chunk after the other, from the true motion of the hook:
+
+    heave Z --> high-pass --> + error --> delay --> reported heave and heave rate
+
+The high-pass takes the drift out of an integrated acceleration and puts a phase lead into slow
+heave; the error is what data sheets state as 5 cm or 5 %, whichever is greater.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError, check_finite, check_range, read_only
+from ..basics.draws import MRU_ERROR, check_seed, draw
+from ..rig.sensors import MRU
+from .lowpass import from_mode, integrate_to, low_pass_pole, mode_recursion, noise_root, to_mode
+from .telemetry import Interval, check_intervals, during
+
+__all__ = ["Bias", "MruBlock", "MruModel", "MruState", "check_biases"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+Bias = tuple[float, float, float, float]
+
+_SETTLED = 0.01  # share of the filter's transient that is left after the settling time
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MruBlock:
+    """What the unit shows in a stretch of samples.
+
+    Parameters
+    ----------
+    heave, heave_rate
+        Reported motion of the hook [m], [m/s], (n,); held where it is not valid.
+    valid
+        1 where the unit works, else 0 (n,).
+    """
+
+    heave: FloatArray
+    heave_rate: FloatArray
+    valid: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("heave", "heave_rate", "valid"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MruState:
+    """What one chunk hands to the next; `MruModel.initial` makes the first.
+
+    Parameters
+    ----------
+    sample
+        Number of the next sample.
+    last
+        Displacement and velocity at the sample before [m], [m/s], (2,).
+    filter, error
+        Modes of the high-pass and of the error, complex.
+    past
+        Earlier heave and heave rate, oldest first, that are still on their way (lag, 2).
+    held
+        Heave and heave rate shown last (2,).
+    """
+
+    sample: int
+    last: FloatArray
+    filter: complex
+    error: complex
+    past: FloatArray
+    held: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class MruModel:
+    """A motion reference unit; sample k is at k `sample_time`.
+
+    Parameters
+    ----------
+    mru
+        Its data; None for a perfect unit, which shows the hook's motion as it is.
+    sample_time
+        Time between samples [s].
+    heave_rms
+        Standard deviation of the hook's heave [m], which the relative error is of.
+    seed
+        Seed of the run.
+    outages
+        Intervals (start, end) [s] in which the unit is gone; it shows its last values, not valid.
+    biases
+        (start, end, heave, rate): what it shows too much in an interval [s], [m], [m/s].
+    heave_frequency
+        Mean frequency of the hook's heave [rad/s], such as rms velocity over rms displacement;
+        None if it is not known.
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range.
+
+    Notes
+    -----
+    High-pass: second-order Butterworth, s^2/(s^2 + sqrt(2) w s + w^2) with w = 2 pi over the
+    filter period, on displacement and velocity; exact for a motion that is the cubic between
+    samples with the given displacements and velocities (Hermite), so that the reported rate is
+    the derivative of the reported heave.
+
+    Error: a stationary Gaussian process, white noise behind a second-order Butterworth low-pass,
+    whose derivative exists and is the error of the rate; sampled exactly (Van Loan 1978).
+
+    Delay: linear interpolation between samples, so that it is exact on average.
+
+    A filter that begins with the run has not seen the waves before it.  With `heave_frequency`
+    it begins as if they had been a sine of that frequency that fits the first sample, without
+    as if the hook had come out of rest in its mean position.  Either way the rest of the
+    transient decays with exp(-w t/sqrt(2)): after `settling_time`, about one filter period, a
+    hundredth of it is left.
+    """
+
+    mru: MRU | None
+    sample_time: float
+    heave_rms: float
+    seed: int
+    outages: Sequence[Interval] = ()
+    heave_frequency: float | None = None
+    biases: Sequence[Bias] = ()
+
+    def __post_init__(self) -> None:
+        check_range("MRU", "sample_time", self.sample_time, low=0.0, unit="s", open_low=True)
+        check_range("MRU", "heave_rms", self.heave_rms, low=0.0, unit="m")
+        check_seed("MRU", self.seed)
+        if self.heave_frequency is not None:
+            frequency = self.heave_frequency
+            check_range("MRU", "heave_frequency", frequency, low=0, unit="rad/s", open_low=True)
+        object.__setattr__(self, "outages", check_intervals("MRU", "outages", self.outages))
+        object.__setattr__(self, "biases", check_biases("MRU", "biases", self.biases))
+
+    @property
+    def delay(self) -> float:
+        """Delay from the motion to the signal [s]."""
+        return 0.0 if self.mru is None else self.mru.delay
+
+    @property
+    def error_rms(self) -> float:
+        """Standard deviation of the error of the heave [m]."""
+        if self.mru is None:
+            return 0.0
+        return max(self.mru.noise_floor, self.mru.noise_fraction * self.heave_rms)
+
+    @property
+    def settling_time(self) -> float:
+        """Time after which a hundredth of the filter's transient is left, and the delay [s]."""
+        corner = self._corner
+        decay = 0.0 if corner is None else -math.log(_SETTLED) * math.sqrt(2.0) / corner
+        return decay + self.delay
+
+    def transfer(self, omega: npt.ArrayLike) -> ComplexArray:
+        """Return reported heave over heave [-] at `omega` [rad/s], without the error."""
+        s = 1j * np.asarray(omega, dtype=np.float64)
+        response = np.exp(-s * self.delay)
+        if self._corner is not None:
+            w = self._corner
+            response = response * (s**2 / (s**2 + math.sqrt(2.0) * w * s + w**2))
+        return np.asarray(response, dtype=np.complex128)
+
+    def noise_density(self, omega: npt.ArrayLike) -> FloatArray:
+        """Return the one-sided variance density of the heave's error [m2 s/rad].
+
+        That of the heave rate's error is `omega` squared times as large.
+        """
+        frequency = np.asarray(omega, dtype=np.float64)
+        w = 1.0 if self.mru is None else self.mru.noise_bandwidth
+        shape = 2.0 * math.sqrt(2.0) / math.pi * w**3 / (frequency**4 + w**4)
+        return np.asarray(self.error_rms**2 * shape)
+
+    def initial(self, displacement: float, velocity: float) -> MruState:
+        """Return the state before sample 0, given the hook's motion at it [m], [m/s]."""
+        wave = 0.0 + 0.0j  # complex amplitude at sample 0: Re(wave e^{i omega t})
+        omega = self.heave_frequency or 0.0
+        if omega > 0.0:
+            wave = complex(displacement, -velocity / omega)
+        mode = 0.0 + 0.0j
+        if self._corner is not None and omega > 0.0:
+            s, pole = 1j * omega, low_pass_pole(self._corner)
+            low = wave / (s**2 + math.sqrt(2.0) * self._corner * s + self._corner**2)
+            mode = complex(to_mode(low.real, (s * low).real, pole))
+        error = 0.0 + 0.0j
+        if self.error_rms > 0.0 and self.mru is not None:
+            # The first row of the table of draws begins the process; the others drive it.
+            n, rate = draw(self.seed, MRU_ERROR, 0, 1, 2)[0] * self.error_rms
+            width = self.mru.noise_bandwidth
+            error = complex(to_mode(n, width * rate, low_pass_pole(width)))
+        heave, rate = self._filtered(
+            np.array([mode]), np.array([displacement]), np.array([velocity])
+        ).T
+        # What is on its way at the start: the sine of the waves before, or the first value.
+        back = self.sample_time * np.arange(-len(self._delay_weights) + 1, 0)
+        cos, sin = np.cos(omega * back), np.sin(omega * back)
+        past = np.column_stack(
+            (
+                heave * cos + (rate / omega * sin if omega > 0.0 else 0.0),
+                rate * cos - heave * omega * sin,
+            )
+        )
+        return MruState(
+            sample=0,
+            last=read_only([displacement, velocity]),
+            filter=mode,
+            error=error,
+            past=read_only(past),
+            held=read_only([0.0, 0.0]),
+        )
+
+    def block(
+        self, state: MruState, displacement: npt.ArrayLike, velocity: npt.ArrayLike
+    ) -> tuple[MruBlock, MruState]:
+        """Return what the unit shows over the samples that follow a state, and the next state.
+
+        Parameters
+        ----------
+        state
+            What `initial` or the block before returned; it is not changed.
+        displacement, velocity
+            True motion of the hook at the samples [m], [m/s], (n,).
+
+        Raises
+        ------
+        InputError
+            If the two have different lengths, are empty or not finite.
+        """
+        z, v = _motions(displacement, velocity)
+        n, start = len(z), state.sample
+        if self.mru is None and not (self.outages or self.biases):
+            shown_as_it_is = MruBlock(heave=z, heave_rate=v, valid=np.ones(n))
+            last = read_only([z[-1], v[-1]])
+            return shown_as_it_is, replace(state, sample=start + n, last=last, held=last)
+        true = np.column_stack((z, v))
+        mode, error_mode = state.filter, state.error
+        shown = true
+        if self._corner is not None:
+            path = true if start == 0 else np.vstack((state.last, true))
+            modes = self._advance(mode, path)
+            mode = complex(modes[-1])
+            shown = self._filtered(modes[-n:], *true.T)
+        delayed, past = self._delayed(np.vstack((state.past, shown)), n)
+        if self.error_rms > 0.0 and self.mru is not None:
+            pole = low_pass_pole(self.mru.noise_bandwidth)
+            errors = self._errors(error_mode, start, n)
+            error_mode = complex(errors[-1])
+            delayed = delayed + np.column_stack(from_mode(errors, pole))
+        for since, until, *offset in self.biases:
+            inside = during([(since, until)], start + np.arange(n), self.sample_time)
+            delayed = delayed + inside[:, np.newaxis] * np.array(offset)
+        gone = during(self.outages, start + np.arange(n), self.sample_time)
+        last = np.maximum.accumulate(np.where(gone, 0, np.arange(1, n + 1)))
+        reported = np.vstack((state.held, delayed))[last]
+        after = MruState(
+            sample=start + n,
+            last=read_only(true[-1]),
+            filter=mode,
+            error=error_mode,
+            past=read_only(past),
+            held=read_only(reported[-1]),
+        )
+        valid = np.where(gone, 0.0, 1.0)
+        return MruBlock(heave=reported[:, 0], heave_rate=reported[:, 1], valid=valid), after
+
+    @property
+    def _corner(self) -> float | None:
+        """Corner frequency of the high-pass [rad/s]; None for no high-pass."""
+        period = None if self.mru is None else self.mru.heave_filter_period
+        return None if period is None else 2.0 * math.pi / period
+
+    @cached_property
+    def _delay_weights(self) -> FloatArray:
+        """Weights of the values from the oldest still on its way to the present one."""
+        samples = self.delay / self.sample_time
+        whole = math.floor(samples + 1e-6)
+        share = max(samples - whole, 0.0)
+        weights = np.zeros(whole + 2)
+        weights[0], weights[1] = share, 1.0 - share
+        return weights if share > 1e-6 else read_only([1.0, *np.zeros(whole)])
+
+    def _delayed(self, values: FloatArray, n: int) -> tuple[FloatArray, FloatArray]:
+        """Return the last n values late by the delay, and those still on their way."""
+        weights = self._delay_weights
+        late = weights[0] * values[:n]
+        if len(weights) > 1 and weights[1] > 0.0:
+            late = late + weights[1] * values[1 : n + 1]
+        return late, values[n:]
+
+    def _filtered(self, modes: ComplexArray, z: FloatArray, v: FloatArray) -> FloatArray:
+        """Return high-passed displacement and velocity (n, 2) from the filter's modes."""
+        if self._corner is None:
+            return np.column_stack((z, v))
+        w = self._corner
+        low, low_rate = from_mode(modes, low_pass_pole(w))
+        heave = z - math.sqrt(2.0) * w * low_rate - w**2 * low
+        rate = v - math.sqrt(2.0) * w * heave - w**2 * low_rate
+        return np.column_stack((heave, rate))
+
+    @cached_property
+    def _filter_step(self) -> tuple[complex, ComplexArray]:
+        """Factor of the mode over a sample, and gains of z, v before and z, v after it."""
+        T, pole = self.sample_time, low_pass_pole(self._corner or 1.0)
+
+        def integrand(t: FloatArray) -> ComplexArray:
+            x = t / T
+            hermite = (
+                (1.0 + 2.0 * x) * (1.0 - x) ** 2,
+                T * x * (1.0 - x) ** 2,
+                x**2 * (3.0 - 2.0 * x),
+                T * x**2 * (x - 1.0),
+            )
+            return np.asarray(np.exp(pole * (T - t)) * np.array(hermite), dtype=np.complex128)
+
+        return complex(np.exp(pole * T)), integrate_to(integrand, T, abs(pole))
+
+    def _advance(self, mode: complex, path: FloatArray) -> ComplexArray:
+        """Return the filter's mode at every sample of a path, given that at the first."""
+        factor, gains = self._filter_step
+        drive = path[:-1] @ gains[:2] + path[1:] @ gains[2:]
+        return mode_recursion(factor, mode, drive)
+
+    @cached_property
+    def _error_step(self) -> tuple[complex, FloatArray]:
+        """Factor of the error's mode over a sample, and the root of what a sample adds (2, 2)."""
+        width = 1.0 if self.mru is None else self.mru.noise_bandwidth
+        factor = complex(np.exp(low_pass_pole(width) * self.sample_time))
+        return factor, self.error_rms * noise_root(width, self.sample_time)
+
+    def _errors(self, mode: complex, start: int, n: int) -> ComplexArray:
+        """Return the error's mode at n samples; `mode` is that at the sample before."""
+        factor, root = self._error_step
+        pole = low_pass_pole(1.0 if self.mru is None else self.mru.noise_bandwidth)
+        # Sample 0 is the beginning itself, so that row k of the draws drives sample k.
+        first = max(start, 1)
+        pushes = draw(self.seed, MRU_ERROR, first, start + n - first, 2) @ root.T
+        modes = mode_recursion(factor, mode, to_mode(pushes[:, 0], pushes[:, 1], pole))
+        return modes if start == 0 else modes[1:]
+
+
+def check_biases(owner: str, name: str, biases: Sequence[Bias]) -> tuple[Bias, ...]:
+    """Return biases, each (start, end, heave, rate) in s, s, m and m/s.
+
+    Raises
+    ------
+    InputError
+        If one is no such row.
+    """
+    checked = []
+    for start, end, heave, rate in biases:
+        ((low, high),) = check_intervals(owner, name, [(start, end)])
+        check_range(owner, f"heave of {name}", heave, low=-100.0, high=100.0, unit="m")
+        check_range(owner, f"heave rate of {name}", rate, low=-100.0, high=100.0, unit="m/s")
+        checked.append((low, high, float(heave), float(rate)))
+    return tuple(checked)
+
+
+def _motions(displacement: npt.ArrayLike, velocity: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    z = check_finite("MRU", "displacement", displacement).reshape(-1)
+    v = check_finite("MRU", "velocity", velocity).reshape(-1)
+    if not 0 < len(z) == len(v):
+        raise InputError(
+            f"MRU: velocity must have as many samples as displacement, at least one, "
+            f"got {len(v)} and {len(z)}"
+        )
+    return z, v

@@ -1,0 +1,222 @@
+"""The linear plant of a case with every sensor that its winch has, and what disturbs them.
+
+    case -> plant -> + reference unit, encoder, load cell -> LinearPlant
+    case -> sea, error of the reference unit, sensors' noise -> spectra by name
+
+The thesis feeds back what the payload does; other structures (`synth.structures.winch_structures`)
+also hear the ship, the drum and the rope.  Everything of synthesis that takes a linear plant and
+spectra takes these.  The names are those of a simulation's measurements (`models.sensing.control`),
+so what is designed here runs there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..basics.checks import check_range
+from ..basics.white import White
+from ..case.case import Case
+from ..hook.hook import HookMotion
+from ..plant.equations import MEASUREMENTS
+from ..plant.linear import LinearPlant
+from ..plant.plant import build_plant
+from ..plant.plant_data import PlantData
+from ..rig.sensors import Sensors
+from .mru import MruModel
+
+__all__ = ["MEASURED", "NOISES", "sensed_plant", "sensed_spectra", "with_sensors"]
+
+#: What is measured, in the order of the plant's measurements.
+MEASURED = (
+    *MEASUREMENTS,
+    "mru.heave",
+    "mru.heave_rate",
+    "drum.haul",
+    "motor.speed",
+    "rope.tension",
+)
+#: What disturbs the sensors, besides the plant's own disturbances.
+NOISES = (
+    "mru.error",
+    "mru.error_rate",
+    *(f"{name}_noise" for name in MEASUREMENTS),
+    "rope.tension_noise",
+)
+SAMPLE_TIME = 0.01  # of the load cell's noise, which a data sheet gives per sample [s]
+
+
+def sensed_plant(
+    case: Case | PlantData,
+    *,
+    masses: int | None = None,
+    drag: float,
+    sensors: Sensors | None = None,
+) -> LinearPlant:
+    """Return the plant linearised at rest, with all that the winch's sensors show.
+
+    Parameters
+    ----------
+    case
+        The case; or the plant's numbers alone, with the `sensors` of a case.
+    masses
+        Masses along the rope; by default those of the case.
+    drag
+        Equivalent linear drag coefficient of the payload [N s/m].
+    sensors
+        The sensors, by default those of the case (`models.rig.sensors.Sensors`).
+
+    Returns
+    -------
+    LinearPlant
+        Outputs are those of `models.plant.plant`.  Measurements are `MEASURED`: the payload's
+        motion late by the telemetry, the hook's heave and its rate behind the high-pass of the
+        reference unit and late by its delay, haul and motor speed (encoder, taken as exact), and
+        the tension behind the load cell's low-pass.  Each of `NOISES` adds to its measurement; the
+        error of the heave rate is the derivative of that of the heave.
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range.
+    """
+    check_range("sensed plant", "drag", drag, low=0.0, unit="N s/m")
+    if isinstance(case, Case) and sensors is None:
+        sensors = case.sensors
+    return with_sensors(build_plant(case, masses).linearise(drag=drag), sensors)
+
+
+def with_sensors(plant: LinearPlant, sensors: Sensors | None) -> LinearPlant:
+    """Return a linear plant of `models.plant.plant` with the sensors besides the payload's own.
+
+    Every matrix of the answer is affine in those of `plant`.
+
+    Parameters
+    ----------
+    plant
+        The plant, as `Plant.linearise` gives it.
+    sensors
+        The sensors of a case; None for exact ones.
+
+    Returns
+    -------
+    LinearPlant
+        As `sensed_plant` describes it.
+    """
+    known = {name: k for k, name in enumerate(plant.outputs)}
+    n, nw = len(plant.states), len(plant.disturbances)
+    hook = [plant.disturbances.index(name) for name in ("hook.heave", "hook.heave_rate")]
+    period = sensors.mru.heave_filter_period if sensors is not None and sensors.mru else None
+    cell = sensors.load_cell if sensors is not None else None
+    filters = ["mru.low", "mru.low_rate"] if period is not None else []
+    states = [*plant.states, *filters, *(["load_cell.tension"] if cell is not None else [])]
+    more = len(states) - n
+
+    A = np.zeros((len(states), len(states)))
+    A[:n, :n] = plant.A
+    B = np.vstack([plant.B, np.zeros((more, plant.B.shape[1]))])
+    E = np.zeros((len(states), nw + len(NOISES)))
+    E[:n, :nw] = plant.E
+    C = np.zeros((len(MEASURED), len(states)))
+    D = np.zeros((len(MEASURED), len(plant.inputs)))
+    F = np.zeros((len(MEASURED), nw + len(NOISES)))
+    count = len(MEASUREMENTS)
+    C[:count, :n], D[:count], F[:count, :nw] = plant.C, plant.D, plant.F
+
+    at = {name: k for k, name in enumerate(MEASURED)}
+    heave, rate = at["mru.heave"], at["mru.heave_rate"]
+    F[heave, hook[0]] = F[rate, hook[1]] = 1.0
+    if period is not None:
+        # l'' + sqrt(2) w l' + w^2 l = Z; shown are Z - sqrt(2) w l' - w^2 l = l'' and l'''.
+        w, d = 2.0 * math.pi / period, math.sqrt(2.0)
+        low, low_rate = n, n + 1
+        A[low, low_rate] = 1.0
+        A[low_rate, [low, low_rate]] = -(w**2), -d * w
+        E[low_rate, hook[0]] = 1.0
+        C[heave, [low, low_rate]] = -(w**2), -d * w
+        C[rate] = -d * w * C[heave]
+        C[rate, low_rate] -= w**2
+        F[rate, hook[0]] = -d * w
+    for name in ("drum.haul", "motor.speed"):
+        row = known[name]
+        C[at[name], :n], D[at[name]], F[at[name], :nw] = plant.Cz[row], plant.Dz[row], plant.Fz[row]
+    row, tension = known["rope.tension"], at["rope.tension"]
+    if cell is None:
+        C[tension, :n], D[tension], F[tension, :nw] = plant.Cz[row], plant.Dz[row], plant.Fz[row]
+    else:
+        b = cell.bandwidth
+        A[-1, :n], A[-1, -1] = b * plant.Cz[row], -b
+        B[-1], E[-1, :nw] = b * plant.Dz[row], b * plant.Fz[row]
+        C[tension, -1] = 1.0
+    heard_by = {"mru.error": "mru.heave", "mru.error_rate": "mru.heave_rate"}
+    for k, name in enumerate(NOISES):
+        F[at[heard_by.get(name, name.removesuffix("_noise"))], nw + k] = 1.0
+
+    late_mru = sensors.mru.delay if sensors is not None and sensors.mru else 0.0
+    delays = dict.fromkeys(MEASUREMENTS, plant.delays[0])
+    delays |= {"mru.heave": late_mru, "mru.heave_rate": late_mru}
+    units = {"mru.heave": "m", "mru.heave_rate": "m/s", "mru.error": "m", "mru.error_rate": "m/s"}
+    units |= {f"{name}_noise": plant.units[name] for name in (*MEASUREMENTS, "rope.tension")}
+    return replace(
+        plant,
+        A=A,
+        B=B,
+        E=E,
+        C=C,
+        D=D,
+        F=F,
+        Cz=np.hstack([plant.Cz, np.zeros((len(plant.Cz), more))]),
+        Fz=np.hstack([plant.Fz, np.zeros((len(plant.Fz), len(NOISES)))]),
+        states=tuple(states),
+        disturbances=(*plant.disturbances, *NOISES),
+        measurements=MEASURED,
+        delays=tuple(delays.get(name, 0.0) for name in MEASURED),
+        rates={**plant.rates, "mru.error_rate": "mru.error"},
+        units={**plant.units, **units},
+    )
+
+
+def sensed_spectra(
+    case: Case, hook: HookMotion, *, sample_time: float = SAMPLE_TIME
+) -> Mapping[str, Any]:
+    """Return the spectra of what disturbs a case and its sensors, by name of the disturbance.
+
+    Parameters
+    ----------
+    case
+        The case.
+    hook
+        Motion of the hook.
+    sample_time
+        Time between samples [s], for the load cell, whose noise is given per sample.
+
+    Returns
+    -------
+    Mapping
+        The hook's motion, the error of the reference unit (`models.sensing.mru.MruModel`) and the
+        white noises, for `synth.design.tuning`; those that are zero are left out.  A one-sided
+        amplitude density N per root hertz is white noise of intensity N^2/2; an independent error
+        of rms s at every sample is one of intensity s^2 times the sample time.
+    """
+    sensors = case.sensors
+    found: dict[str, Any] = {"hook.heave": hook}
+    unit = MruModel(
+        mru=sensors.mru,
+        sample_time=sample_time,
+        heave_rms=float(hook.displacement.rms),
+        seed=0,
+    )
+    if unit.error_rms > 0.0:
+        found["mru.error"] = unit.noise_density
+    for name in MEASUREMENTS:
+        density = float(getattr(sensors.payload, f"{name.removeprefix('payload.')}_noise"))
+        if density > 0.0:
+            found[f"{name}_noise"] = White(0.5 * density**2)
+    if sensors.load_cell is not None and sensors.load_cell.noise_fraction > 0.0:
+        rms = sensors.load_cell.noise_fraction * case.static_tension
+        found["rope.tension_noise"] = White(rms**2 * sample_time)
+    return found

@@ -1,0 +1,334 @@
+"""What a controller sees of the plant: sensors and telemetry as a recursion, in CasADi symbols.
+
+    plant --> payload sensors --> telemetry: a register of messages --> held values --+
+          --> encoder, load cell, the drive's own torque -----------------------------+--> m
+    hook --> motion reference unit (computed before the run, a row of numbers) -------+
+
+All that depends on the plant is here, so that it becomes part of the compiled loop; all that does
+not (noise, which message arrives, the reference unit) is drawn before the run and comes in as a
+row: `models.sensing.telemetry`, `models.sensing.mru`.  The low-pass filters of the payload's
+sensors and of the link are states of the plant itself, as in the design.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError, check_finite, check_range
+from ..basics.draws import SENSOR_NOISE, check_seed, draw
+from ..basics.signals import pick
+from ..rig.sensors import Encoder, LoadCell, PayloadSensor, Telemetry
+from .control import MEASURED
+from .mru import MruBlock
+from .telemetry import Late, TelemetryBlock, TelemetrySchedule
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+
+__all__ = ["NOISE", "RAW", "SensorModel"]
+
+FloatArray = npt.NDArray[np.float64]
+
+#: What the sensors take from the plant, by name; the payload's signals behind its filters.
+RAW = (
+    "measured.acceleration",
+    "measured.velocity",
+    "measured.displacement",
+    "motor.angle",
+    "drum.haul",
+    "motor.speed",
+    "motor.torque",
+    "rope.tension",
+)
+#: Columns of the table of standard normal numbers that a run needs.
+NOISE = (
+    "noise.acceleration",
+    "noise.velocity",
+    "noise.displacement",
+    "noise.tension",
+)
+_SENT = ("acceleration", "velocity", "displacement")
+_MRU = ("mru.heave", "mru.heave_rate", "mru.valid")
+_REFERENCE = ("reference.displacement", "reference.velocity", "reference.acceleration")
+_SPEED_WINDOW = 0.01  # time over which a drive counts pulses for the speed [s]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SensorModel:
+    """Sensors and telemetry of a case at one sample time.
+
+    Parameters
+    ----------
+    sample_time
+        Time between control samples [s].
+    payload
+        Motion sensors at the payload.
+    lags
+        Ages in samples that a message may have when it is used (`TelemetrySchedule.lags`).
+    encoder, load_cell
+        None for perfect ones.
+    haul_per_angle
+        Haul of the drum per angle of the motor [m/rad].
+    static_tension
+        Rope tension at the drum at rest [N], which the load cell's noise is a fraction of.
+
+    Raises
+    ------
+    InputError
+        If the sample time is not above zero.
+
+    Notes
+    -----
+    Payload: bias and noise are added, the sum is rounded to the resolution and sent.  White noise
+    of one-sided density N per root hertz, sampled every Ts, has the standard deviation
+    N/sqrt(2 Ts).  The newest `lags.stop` messages are remembered; where something fresh has
+    arrived their weighted mean is what is known, else the last value is held.  A message of
+    weight zero is not touched, so that a broken sensor's NaN stays where it is.
+
+    Encoder: the angle is rounded to counts, and the haul is off by as much.  The drive counts
+    over 10 ms for the speed, whatever the controller's sample time: the speed is rounded to one
+    count per 10 ms.  (Differences of the rounded angle would be rougher the shorter the sample.)
+
+    Load cell: first-order low-pass, exact for a tension that is linear between samples, and
+    independent noise at every sample.
+    """
+
+    sample_time: float
+    payload: PayloadSensor
+    lags: range
+    encoder: Encoder | None
+    load_cell: LoadCell | None
+    haul_per_angle: float
+    static_tension: float
+
+    def __post_init__(self) -> None:
+        check_range("sensors", "sample_time", self.sample_time, low=0.0, unit="s", open_low=True)
+
+    @classmethod
+    def from_case(cls, case: Case, sample_time: float, late: Sequence[Late] = ()) -> SensorModel:
+        """Return the sensors of a case at a sample time [s], behind a link that may be late."""
+        sensors = case.sensors
+        return cls(
+            sample_time=sample_time,
+            payload=sensors.payload,
+            lags=_lags(sensors.telemetry, sample_time, late),
+            encoder=sensors.encoder,
+            load_cell=sensors.load_cell,
+            haul_per_angle=case.drum_radius / case.winch.gearbox.ratio,
+            static_tension=case.static_tension,
+        )
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states: messages remembered, values held, the load cell's filter."""
+        messages = (f"sent.{j}.{name}" for j in range(1, self.lags.stop) for name in _SENT)
+        cell = ("load_cell.tension", "load_cell.before") if self.load_cell is not None else ()
+        return (*messages, *(f"held.{name}" for name in _SENT), *cell)
+
+    @property
+    def row(self) -> tuple[str, ...]:
+        """Names of the numbers that a sample takes from outside."""
+        weights = (f"telemetry.weight.{j}" for j in self.lags)
+        return (*NOISE, *weights, "telemetry.fresh", "telemetry.age", *_MRU, *_REFERENCE)
+
+    @staticmethod
+    def raw(signals: Mapping[str, ca.SX]) -> ca.SX:
+        """Return the vector of `RAW` from the plant's signals by name."""
+        return ca.vertcat(*(signals[name] for name in RAW))
+
+    @cached_property
+    def noisy(self) -> bool:
+        """Whether any sensor has noise; else that of `noise` plays no part."""
+        weighed = self.load_cell is not None and self.load_cell.noise_fraction > 0.0
+        return weighed or any(self.noise_rms(name) > 0.0 for name in _SENT)
+
+    @staticmethod
+    def noise(seed: int, start: int, count: int) -> FloatArray:
+        """Return the noise of the samples from `start` on (count, 4), the columns of `NOISE`."""
+        return draw(check_seed("sensors", seed), SENSOR_NOISE, start, count, len(NOISE))
+
+    def rows(
+        self,
+        noise: FloatArray,
+        telemetry: TelemetryBlock,
+        mru: MruBlock,
+        references: npt.ArrayLike = 0.0,
+        out: FloatArray | None = None,
+    ) -> FloatArray:
+        """Return the rows of a stretch of samples (n, len(row)).
+
+        Parameters
+        ----------
+        noise, telemetry, mru
+            What was drawn for these samples.
+        references
+            Displacement, velocity and acceleration asked of the payload (n, 3).
+        out
+            Where to write the rows (n, len(row)); by default into a new array.
+
+        Raises
+        ------
+        InputError
+            If the parts are of different lengths.
+        """
+        n = len(noise)
+        lengths = {"telemetry": len(telemetry.fresh), "MRU": len(mru.valid)}
+        for name, length in lengths.items():
+            if length != n:
+                raise InputError(
+                    f"sensors: {name} must have {n} samples as noise has, got {length}"
+                )
+        table = np.empty((n, len(self.row))) if out is None else out
+        ages = len(NOISE) + len(self.lags)
+        table[:, : len(NOISE)] = noise
+        table[:, len(NOISE) : ages] = telemetry.weights
+        # Column by column: it takes half the time of stacking them first.
+        columns = (telemetry.fresh, telemetry.age, mru.heave, mru.heave_rate, mru.valid)
+        for at, values in enumerate(columns, ages):
+            table[:, at] = values
+        table[:, -len(_REFERENCE) :] = references
+        return table
+
+    def initial(self, raw: npt.ArrayLike) -> FloatArray:
+        """Return the state of sensors that have long seen the plant at rest.
+
+        Parameters
+        ----------
+        raw
+            Values of `RAW` at rest (8,).
+
+        Returns
+        -------
+        ndarray
+            (len(states),).
+
+        Raises
+        ------
+        InputError
+            If there are not eight finite values.
+        """
+        values = check_finite("sensors", "raw", raw).reshape(-1)
+        if len(values) != len(RAW):
+            raise InputError(f"sensors: raw must have {len(RAW)} values, got {len(values)}")
+        sent = [
+            float(self._shown(name, ca.SX(values[i]), ca.SX(0))) for i, name in enumerate(_SENT)
+        ]
+        tension = values[RAW.index("rope.tension")]
+        cell = [tension, tension] if self.load_cell is not None else []
+        return np.array([*(sent * self.lags.stop), *cell], dtype=np.float64)
+
+    @cached_property
+    def function(self) -> ca.Function:
+        """casadi.Function (s, raw, row, applied) -> (s_next, m), m in the order of `MEASURED`.
+
+        `applied` is the command that the drive has followed over the last sample.
+        """
+        s = ca.SX.sym("s", len(self.states))
+        raw = ca.SX.sym("raw", len(RAW))
+        row = ca.SX.sym("row", len(self.row))
+        applied = ca.SX.sym("applied")
+        state, plant, given = (
+            dict(zip(names, ca.vertsplit(values), strict=True))
+            for names, values in ((self.states, s), (RAW, raw), (self.row, row))
+        )
+        after: dict[str, ca.SX] = {}
+        seen: dict[str, ca.SX] = {
+            "payload.age": given["telemetry.age"],
+            "payload.valid": given["telemetry.fresh"],
+            "motor.torque": plant["motor.torque"],
+            "drive.applied": applied,
+            **{name: given[name] for name in (*_MRU, *_REFERENCE)},
+        }
+        for name in _SENT:
+            now = self._shown(name, plant[f"measured.{name}"], given[f"noise.{name}"])
+            messages = [now, *(state[f"sent.{j}.{name}"] for j in range(1, self.lags.stop))]
+            after |= {f"sent.{j}.{name}": messages[j - 1] for j in range(1, self.lags.stop)}
+            arrived = ca.SX(0)
+            for j in self.lags:
+                weight = given[f"telemetry.weight.{j}"]
+                arrived += ca.if_else(weight == 0, 0, weight * messages[j])
+            known = ca.if_else(given["telemetry.fresh"] == 0, state[f"held.{name}"], arrived)
+            after[f"held.{name}"] = seen[f"payload.{name}"] = known
+        seen |= self._encoded(plant)
+        tension = plant["rope.tension"]
+        if self.load_cell is not None:
+            filtered = self._weighed(state, tension)
+            after |= {"load_cell.tension": filtered, "load_cell.before": tension}
+            rms = self.load_cell.noise_fraction * self.static_tension
+            tension = filtered + rms * given["noise.tension"]
+        seen["rope.tension"] = tension
+        return ca.Function(
+            "sensors",
+            [s, raw, row, applied],
+            [
+                ca.densify(ca.vertcat(*(after[name] for name in self.states))),
+                ca.densify(ca.vertcat(*(seen[name] for name in MEASURED))),
+            ],
+            ["s", "raw", "row", "applied"],
+            ["s_next", "m"],
+        )
+
+    def noise_rms(self, name: str) -> float:
+        """Return the standard deviation of the noise on a payload signal, before rounding.
+
+        Parameters
+        ----------
+        name
+            ``acceleration``, ``velocity`` or ``displacement``.
+
+        Raises
+        ------
+        InputError
+            If it is another name.
+        """
+        pick("sensors", "signal", _SENT, (name,))
+        density = float(getattr(self.payload, f"{name}_noise"))
+        return density / math.sqrt(2.0 * self.sample_time)
+
+    def _shown(self, name: str, true: ca.SX, noise: ca.SX) -> ca.SX:
+        """Return what a payload sensor makes of a true value and a standard normal number."""
+        step = float(getattr(self.payload, f"{name}_resolution"))
+        value = true + float(getattr(self.payload, f"{name}_bias"))
+        rms = self.noise_rms(name)
+        if rms > 0.0:
+            value = value + rms * noise
+        return _rounded(value, step) if step > 0.0 else value
+
+    def _encoded(self, plant: Mapping[str, ca.SX]) -> dict[str, ca.SX]:
+        """Return haul and motor speed as the encoder shows them."""
+        angle, haul, speed = plant["motor.angle"], plant["drum.haul"], plant["motor.speed"]
+        if self.encoder is not None:
+            count = 2.0 * math.pi / self.encoder.counts_per_turn
+            haul = haul + self.haul_per_angle * (_rounded(angle, count) - angle)
+            speed = _rounded(speed, count / _SPEED_WINDOW)
+        return {"drum.haul": haul, "motor.speed": speed}
+
+    def _weighed(self, state: Mapping[str, ca.SX], tension: ca.SX) -> ca.SX:
+        """Return the tension behind the load cell's low-pass."""
+        x = (self.load_cell.bandwidth if self.load_cell is not None else 0.0) * self.sample_time
+        stays = math.exp(-x)
+        # Of a step and of a ramp over the sample; expm1 keeps the digits at short samples.
+        full = -math.expm1(-x)
+        new = 1.0 - full / x
+        before = full - new
+        return (
+            stays * state["load_cell.tension"] + before * state["load_cell.before"] + new * tension
+        )
+
+
+def _rounded(value: ca.SX, step: float) -> ca.SX:
+    """Return the nearest multiple of a step."""
+    return step * ca.floor(value / step + 0.5)
+
+
+def _lags(telemetry: Telemetry, sample_time: float, late: Sequence[Late]) -> range:
+    """Return the lags of the link's schedule; they are the same for every seed."""
+    return TelemetrySchedule(telemetry, sample_time, seed=0, late=late).lags

@@ -1,0 +1,339 @@
+"""The link from the payload to the winch over time: which message is known when.
+
+The payload sends a message at every control sample.  Each is late by the delay and the jitter,
+some are lost, and now and then the link or the sensor is gone for a while.  None of it depends on
+what is sent, so the whole schedule is drawn before the run; `models.sensing.sensing` applies it.
+
+The link is faster than the control samples.  A transit time that is no multiple of the sample
+time is therefore met by interpolation between two neighbouring messages: what is known at t is
+the signal at t - delay, not at the sample before it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError, check_range, read_only
+from ..basics.draws import TELEMETRY, check_seed, draw
+from ..rig.sensors import Telemetry
+
+__all__ = [
+    "Interval",
+    "Late",
+    "TelemetryBlock",
+    "TelemetrySchedule",
+    "check_intervals",
+    "check_late",
+    "during",
+]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+IntArray = npt.NDArray[np.int64]
+Interval = tuple[float, float]
+Late = tuple[float, float, float]
+
+_ROUNDING = 1e-6  # of a sample: 0.07 s is seven samples of 0.01 s, whatever the division says
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TelemetryBlock:
+    """What arrives in a stretch of samples.
+
+    Parameters
+    ----------
+    weights
+        Weights of the messages sent `lags` samples ago (count, len(lags)): at most two are not
+        zero, and they add up to 1 where something has arrived, else to 0.
+    fresh
+        1 where something new and usable has arrived since the sample before, else 0 (count,).
+    age
+        Time since what is known last was true [s], (count,).
+    """
+
+    weights: FloatArray
+    fresh: FloatArray
+    age: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("weights", "fresh", "age"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+@dataclass(frozen=True, eq=False)
+class TelemetrySchedule:
+    """The schedule of a link; sample k is at k `sample_time`.
+
+    Parameters
+    ----------
+    telemetry
+        Delay, jitter and dropouts.
+    sample_time
+        Time between control samples, and between messages [s].
+    seed
+        Seed of the run.
+    outages
+        Intervals (start, end) [s] in which nothing is sent.
+    broken
+        Intervals in which the messages come, but are marked as invalid.
+    late
+        (start, end, extra) [s]: messages sent in the interval are late by so much more.
+
+    Raises
+    ------
+    InputError
+        If the sample time, the seed or an interval makes no sense.
+
+    Notes
+    -----
+    A message sent at sample j arrives at t = j Ts + delay + U(0, jitter).  Messages may overtake
+    each other; an older one that comes late is thrown away.  Lost messages are independent, or
+    come in runs of mean length L by a Markov chain of two states (E. N. Gilbert, "Capacity of a
+    burst-noise channel", Bell Syst. Tech. J. 39, 1960), whose stationary share of lost messages
+    is `dropout`.  Single losses have a mean length of 1/(1 - dropout) messages already; a
+    shorter `dropout_length` means those.
+
+    Before sample 0 the link works as after it, and sends the values at rest.
+
+    Examples
+    --------
+    >>> link = TelemetrySchedule(Telemetry(delay=0.025), 0.01, seed=1)
+    >>> list(link.lags), [float(w) for w in link.block(0, 1).weights[0].round(9)]
+    ([2, 3], [0.5, 0.5])
+    """
+
+    telemetry: Telemetry
+    sample_time: float
+    seed: int
+    outages: Sequence[Interval] = ()
+    broken: Sequence[Interval] = ()
+    late: Sequence[Late] = ()
+
+    def __post_init__(self) -> None:
+        check_range("telemetry", "sample_time", self.sample_time, low=0, unit="s", open_low=True)
+        check_seed("telemetry", self.seed)
+        for name in ("outages", "broken"):
+            checked = check_intervals("telemetry", name, getattr(self, name))
+            object.__setattr__(self, name, checked)
+        object.__setattr__(self, "late", check_late("telemetry", "late", self.late))
+
+    @cached_property
+    def lags(self) -> range:
+        """Ages in samples that a message may have when it is used."""
+        low, high = self._transit
+        latest = max((extra for _, _, extra in self.late), default=0.0)
+        high = _snapped(high + latest / self.sample_time)
+        return range(math.floor(low), math.ceil(high) + 1)
+
+    @property
+    def taps(self) -> int:
+        """Number of messages to remember, the one sent at this very sample included."""
+        return self.lags.stop
+
+    def block(self, start: int, count: int) -> TelemetryBlock:
+        """Return what arrives at the samples from `start` on.
+
+        Parameters
+        ----------
+        start, count
+            First sample, not negative, and number of samples.
+        """
+        if self._steady and start >= self.taps:
+            return self._steady_block(count)
+        arrival, content, usable = self._messages(start - self.taps, start + count)
+        inside = usable & (arrival >= start) & (arrival < start + count)
+        best = np.full(count + 1, -math.inf)
+        best[0] = self._known_before(start)
+        np.maximum.at(best, arrival[inside] - start + 1, content[inside])
+        known = np.maximum.accumulate(best)
+        fresh = known[1:] > known[:-1]
+        age = start + np.arange(count) - known[1:]
+        weights = np.zeros((count, len(self.lags)))
+        row = np.flatnonzero(fresh)
+        whole = np.floor(age[row]).astype(np.int64)
+        share = age[row] - whole
+        weights[row, whole - self.lags.start] = 1.0 - share
+        split = share > 0.0
+        weights[row[split], whole[split] + 1 - self.lags.start] = share[split]
+        return TelemetryBlock(
+            weights=weights,
+            fresh=fresh.astype(np.float64),
+            age=np.asarray(age * self.sample_time, dtype=np.float64),
+        )
+
+    @property
+    def _steady(self) -> bool:
+        """Whether every message comes, and all after the same time."""
+        link = self.telemetry
+        return link.jitter == link.dropout == 0.0 and not (self.outages or self.broken or self.late)
+
+    def _steady_block(self, count: int) -> TelemetryBlock:
+        """Return what arrives on such a link, the first messages aside."""
+        transit, _ = self._transit
+        share = transit - self.lags.start
+        weights = np.zeros((count, len(self.lags)))
+        weights[:, 0] = 1.0 - share
+        if share > 0.0:
+            weights[:, 1] = share
+        age = np.full(count, transit * self.sample_time)
+        return TelemetryBlock(weights=weights, fresh=np.ones(count), age=age)
+
+    @cached_property
+    def _transit(self) -> tuple[float, float]:
+        """Shortest and longest transit time, in samples."""
+        delay, jitter = self.telemetry.delay, self.telemetry.jitter
+        shortest, longest = (_snapped(t / self.sample_time) for t in (delay, delay + jitter))
+        return shortest, longest
+
+    @cached_property
+    def _chain(self) -> tuple[float, float]:
+        """Probability of a lost message after one that came, and after a lost one."""
+        share = self.telemetry.dropout
+        length = self.telemetry.dropout_length / self.sample_time
+        if length <= 1.0 / (1.0 - share):
+            return share, share
+        return share / (length * (1.0 - share)), 1.0 - 1.0 / length
+
+    def _messages(self, first: int, stop: int) -> tuple[IntArray, FloatArray, BoolArray]:
+        """Return of the messages sent at samples `first` to `stop` when they arrive [sample].
+
+        Then the moment that their content is from [sample], and whether they are of any use.
+        """
+        sent = np.arange(first, stop)
+        usable = self._usable(first, stop + 1)
+        low, high = self._transit
+        transit = np.full(len(sent), low)
+        if self.telemetry.jitter > 0.0:
+            transit += (high - low) * self._uniform(first, stop)[:, 1]
+        for start, end, extra in self.late:
+            inside = during([(start, end)], sent, self.sample_time)
+            shifted = transit[inside] + extra / self.sample_time
+            nearest = np.round(shifted)
+            whole = np.abs(shifted - nearest) < _ROUNDING
+            transit[inside] = np.where(whole, nearest, shifted)
+        late = np.ceil(transit)
+        arrival = sent + late.astype(np.int64)
+        # The later neighbour of the interpolation may be lost: then the message stands alone.
+        alone = ~usable[1:] & (late > transit)
+        content = np.where(alone, sent.astype(np.float64), arrival - transit)
+        return arrival, content, usable[:-1]
+
+    def _usable(self, first: int, stop: int) -> BoolArray:
+        sent = np.arange(first, stop)
+        bad = self._lost(first, stop) if self.telemetry.dropout > 0.0 else sent < -self.taps
+        for intervals in (self.outages, self.broken):
+            bad = bad | during(intervals, sent, self.sample_time)
+        return np.asarray(~bad & (sent >= -self.taps))
+
+    def _lost(self, first: int, stop: int) -> BoolArray:
+        """Return which messages are lost.
+
+        One number decides on each message: below `after_one` it is lost and from `after_lost` on
+        it comes, whatever happened before; in between it shares the fate of its predecessor.  So
+        the chain is known from the last message that was decided, and needs no beginning.
+        """
+        after_one, after_lost = self._chain
+        back = 256
+        while True:
+            low = max(first - back, -self.taps)
+            number = self._uniform(low, stop)[:, 0]
+            lost = number < after_one
+            decided = lost | (number >= after_lost)
+            if low == -self.taps:
+                lost[0], decided[0] = number[0] < self.telemetry.dropout, True
+            at = np.maximum.accumulate(np.where(decided, np.arange(len(number)), -1))
+            if low == -self.taps or at[first - low] >= 0:
+                break
+            back *= 4
+        # Messages before the very first do not exist; `_usable` drops them.
+        ahead = np.ones(max(low - first, 0), dtype=np.bool_)
+        return np.concatenate((ahead, lost[np.maximum(at, 0)][max(first - low, 0) :]))
+
+    def _uniform(self, first: int, stop: int) -> FloatArray:
+        """Return the numbers of the messages `first` to `stop`; zero before the very first."""
+        skipped = max(-self.taps - first, 0)
+        begin = first + skipped + self.taps
+        numbers = draw(self.seed, TELEMETRY, begin, stop - first - skipped, 2, "uniform")
+        return np.concatenate((np.zeros((skipped, 2)), numbers)) if skipped else numbers
+
+    def _known_before(self, start: int) -> float:
+        """Return the moment [sample] of what is known just before a sample."""
+        stop, width = start, 2 * self.taps + 64
+        while stop > -self.taps:
+            first = max(stop - width, -self.taps)
+            arrival, content, usable = self._messages(first, stop)
+            found = content[usable & (arrival < start)]
+            if found.size:  # whatever was sent earlier is older
+                return float(found.max())
+            stop, width = first, min(4 * width, 65536)
+        return float(-self.taps)
+
+
+def check_intervals(owner: str, name: str, intervals: Sequence[Interval]) -> tuple[Interval, ...]:
+    """Return intervals of time as pairs of floats, each with its start before its end.
+
+    Raises
+    ------
+    InputError
+        If one is no such pair; the end may be infinite.
+    """
+    checked = []
+    for interval in intervals:
+        try:
+            start, end = (float(time) for time in interval)
+        except (TypeError, ValueError):
+            start, end = math.nan, math.nan
+        if not (math.isfinite(start) and start < end):
+            raise InputError(
+                f"{owner}: {name} must be pairs (start, end) in s with start < end, "
+                f"got {interval!r}"
+            )
+        checked.append((start, end))
+    return tuple(checked)
+
+
+def check_late(owner: str, name: str, late: Sequence[Late]) -> tuple[Late, ...]:
+    """Return intervals with an extra delay, each (start, end, extra) [s], extra at most 60 s.
+
+    Raises
+    ------
+    InputError
+        If one is no such triple.
+    """
+    checked = []
+    for start, end, extra in late:
+        ((low, high),) = check_intervals(owner, name, [(start, end)])
+        check_range(owner, f"extra delay of {name}", extra, low=0.0, high=60.0, unit="s")
+        checked.append((low, high, float(extra)))
+    return tuple(checked)
+
+
+def during(intervals: Sequence[Interval], samples: IntArray, sample_time: float) -> BoolArray:
+    """Return which samples lie within one of the intervals, start included, end not.
+
+    Parameters
+    ----------
+    intervals
+        Pairs (start, end) [s].
+    samples
+        Numbers k of samples at k `sample_time` (n,).
+    sample_time
+        Time between samples [s].
+    """
+    inside = np.zeros(len(samples), dtype=np.bool_)
+    for start, end in intervals:
+        position = samples + _ROUNDING
+        inside |= (position >= start / sample_time) & (position < end / sample_time)
+    return inside
+
+
+def _snapped(samples: float) -> float:
+    """Return a number of samples, whole if it is so but for rounding."""
+    nearest = round(samples)
+    return float(nearest) if abs(samples - nearest) < _ROUNDING else samples

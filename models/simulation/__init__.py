@@ -1,0 +1,1 @@
+"""Simulation in time: the closed loop as one recursion, compiled and run."""

@@ -1,0 +1,283 @@
+r"""One sample of plant, sensors, drive and brake as one recursion, in CasADi symbols.
+
+                 row: motions, noise, telemetry, engage, brake
+                                  |
+    state s --> sensors --> m --> controller --> u --> drive, plant: n steps --> state s'
+                                  |                        |
+                          (or from Python)                 +--> log
+
+Everything that feeds back within a sample is in here, so that compiled code and CasADi's virtual
+machine compute the same numbers; everything that does not (the motion of the hook, noise, which
+message of the telemetry arrives) is drawn in advance and comes in as a row
+(`models.simulation.rows`). `models.simulation.simulate` runs the recursion.
+
+The controller either is part of it, or is called in between: then the recursion falls in two,
+`measure` and `advance`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, cast
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+
+from ..plant.equations import MOTION
+from ..plant.plant import Plant
+from ..sensing.control import Recursion
+from ..sensing.sensing import SensorModel
+from .braked_step import braked_step, disturbances
+from .integrate import StepChoice
+from .rows import FLAGS
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+
+__all__ = ["HOOK", "ClosedLoop", "build_closed_loop"]
+
+FloatArray = npt.NDArray[np.float64]
+
+HOOK = "hook"
+_SATURATED = 1e-9  # relative difference of asked and applied command that is no rounding [-]
+_OWN = ("drive.hold", "brake.torque", "motor.continuous_torque", "motor.rated_rise", "motor.share")
+_FROM_ROW = {
+    "payload.age": "telemetry.age",
+    "payload.valid": "telemetry.fresh",
+    "reference.displacement": "reference.displacement",
+}
+_UNITS = {
+    "hook.heave": "m",
+    "hook.heave_rate": "m/s",
+    "motor.power": "W",
+    "motor.temperature": "K",
+    "payload.age": "s",
+    "reference.displacement": "m",
+}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ClosedLoop:
+    """The recursion of a closed loop and the names of all that goes through it.
+
+    Parameters
+    ----------
+    fused
+        (s, r, p) -> (s', log), with the controller inside; None for a controller in Python.
+    measure, advance
+        (s, r, p) -> (s', m) and (s, [r, u], p) -> (s', log); one after the other they are one
+        sample.
+    states, row, signals
+        Names of s, r and the log.
+    motions
+        Names of what moves, the hook first; of each the row holds displacement, velocity and
+        acceleration at the ends of every integration step.
+    units
+        Unit of each signal of the log.
+    parameters
+        Names and values of p.
+    step
+        The integration step and what set it.
+    sample_time
+        The controller's [s].
+    initial
+        State at rest.
+    """
+
+    fused: ca.Function | None
+    measure: ca.Function
+    advance: ca.Function
+    states: tuple[str, ...]
+    row: tuple[str, ...]
+    signals: tuple[str, ...]
+    motions: tuple[str, ...]
+    units: Mapping[str, str]
+    parameters: Mapping[str, float]
+    step: StepChoice
+    sample_time: float
+    initial: FloatArray
+
+
+def build_closed_loop(
+    case: Case,
+    plant: Plant,
+    sensors: SensorModel,
+    *,
+    step: StepChoice,
+    parameters: Mapping[str, float],
+    start: FloatArray,
+    hold: float,
+    recursion: Recursion | None = None,
+) -> ClosedLoop:
+    """Return the recursion of one control sample.
+
+    Parameters
+    ----------
+    case
+        For the thermal and the brake's data.
+    plant
+        The plant with its drive limits; its first disturbances are hook.heave and
+        hook.heave_rate.
+    sensors
+        What the controller sees of it.
+    step
+        Integration step; its sample time is the controller's.
+    parameters
+        Values of the plant's parameters by name.
+    start
+        State of the plant at rest (nx,).
+    hold
+        Command that holds the load at rest, which an engaging controller is ramped in from.
+    recursion
+        The controller, if it is one.
+    """
+    motions = (HOOK, *dict.fromkeys(name.split(".")[0] for name in plant.disturbances[4:]))
+    nx, ns = len(plant.states), len(sensors.states)
+    begin = np.zeros(0) if recursion is None else recursion.initial
+    names = (
+        *(f"plant.{name}" for name in plant.states),
+        *(f"sensor.{name}" for name in sensors.states),
+        "drive.last_command",
+        "motor.temperature",
+        *(f"controller.{i}" for i in range(begin.size)),
+    )
+    points = [
+        (j, name, end) for j in range(step.substeps + 1) for name in motions for end in MOTION
+    ]
+    row = (*(f"{n}.{e}.{j}" for j, n, e in points), *sensors.row, *FLAGS)
+    values = {**parameters, **_own_parameters(case, step.sample_time, hold)}
+
+    # Many steps as calls of one function compile many times faster than written out, and run
+    # faster too; one or two are faster written out.
+    # (The two kinds of symbol have the same methods; the type of one stands for both.)
+    kind = cast("type[ca.SX]", ca.SX if step.substeps <= 2 else ca.MX)
+    s, r = kind.sym("s", len(names)), kind.sym("r", len(row))
+    p, asked = kind.sym("p", len(values)), kind.sym("u")
+    x, of_sensors, of_controller = s[:nx], s[nx : nx + ns], s[nx + ns + 2 :]
+    last, rise = s[nx + ns], s[nx + ns + 1]
+    width = 3 * len(motions)
+    moved, sensed, flags = r[:width], r[len(points) : len(row) - len(FLAGS)], r[-len(FLAGS) :]
+
+    look = _look(plant, sensors, tuple(values), len(motions))
+    logged, signals = _log(plant, sensors, tuple(values), len(motions))
+    one_step = braked_step(plant, tuple(values), len(motions), step.step)
+    raw, applied = look(x, last, moved, p)
+    seen, m = sensors.function(of_sensors, raw, sensed, applied)
+
+    def sample(command: ca.SX, seen: ca.SX, controller: ca.SX) -> list[ca.SX]:
+        """Return the state after the sample and the log at its start."""
+        u, warmer, log = logged(x, command, rise, moved, sensed, flags, p)
+        after = x
+        for j in range(step.substeps):
+            ends = r[j * width : (j + 2) * width]
+            after = one_step(after, u, ends, flags[FLAGS.index("brake")], p)
+        return [ca.vertcat(after, seen, u, warmer, controller), log]
+
+    fused = None
+    if recursion is not None:
+        following, command = recursion.function(of_controller, m)
+        fused = _function("sample", [s, r, p], sample(command, seen, following))
+    numbers = np.array(list(values.values()))
+    at_rest = look(start, hold, np.zeros(width), numbers)[0]
+    units = {**plant.units, **_UNITS, "drive.command": plant.units["drive.command"]}
+    return ClosedLoop(
+        fused=fused,
+        measure=_function("measure", [s, r, p], [ca.vertcat(x, seen, s[nx + ns :]), m]),
+        advance=_function(
+            "advance", [s, ca.vertcat(r, asked), p], sample(asked, of_sensors, of_controller)
+        ),
+        states=names,
+        row=row,
+        signals=signals,
+        motions=motions,
+        units={name: units.get(name, "-") for name in signals},
+        parameters=values,
+        step=step,
+        sample_time=step.sample_time,
+        initial=np.concatenate(
+            [start, sensors.initial(np.asarray(at_rest).ravel()), [hold, 0.0], begin]
+        ),
+    )
+
+
+def _look(plant: Plant, sensors: SensorModel, names: Sequence[str], motions: int) -> ca.Function:
+    """Return (x, u, moved, p) -> what the sensors take from the plant, and the command applied.
+
+    The motor is still at the last command when the next is thought about.
+    """
+    x, u = ca.SX.sym("x", len(plant.states)), ca.SX.sym("u")
+    moved, p = ca.SX.sym("moved", 3 * motions), ca.SX.sym("p", len(names))
+    _, y, z = _plant(plant, x, u, moved, p)
+    signals = _named(plant.outputs, z) | {"motor.angle": x[plant.states.index("motor.angle")]}
+    signals |= {f"measured.{end}": y[i] for i, end in enumerate(reversed(MOTION))}
+    raw, applied = ca.cse([sensors.raw(signals), signals["drive.applied"]])
+    return ca.Function("look", [x, u, moved, p], [ca.densify(raw), ca.densify(applied)])
+
+
+def _log(
+    plant: Plant, sensors: SensorModel, names: Sequence[str], motions: int
+) -> tuple[ca.Function, tuple[str, ...]]:
+    """Return (x, asked, rise, moved, sensed, flags, p) -> (u, warmer, log), and the log's names.
+
+    What the drive is told, the motor's temperature after the sample, and what is worth knowing
+    at the sample's start.
+    """
+    x, asked, rise = ca.SX.sym("x", len(plant.states)), ca.SX.sym("asked"), ca.SX.sym("rise")
+    moved, p = ca.SX.sym("moved", 3 * motions), ca.SX.sym("p", len(names))
+    sensed, flags = ca.SX.sym("sensed", len(sensors.row)), ca.SX.sym("flags", len(FLAGS))
+    p_of, flag = _named(names, p), _named(FLAGS, flags)
+    u = p_of["drive.hold"] + flag["engaged"] * (asked - p_of["drive.hold"])
+    _, _, z = _plant(plant, x, u, moved, p)
+    now = _named(plant.outputs, z)
+    loss = (now["motor.torque"] / p_of["motor.continuous_torque"]) ** 2
+    warmer = rise + p_of["motor.share"] * (p_of["motor.rated_rise"] * loss - rise)
+    cut = ca.fabs(u - now["drive.applied"])
+    log = {
+        "hook.heave": moved[0],
+        "hook.heave_rate": moved[1],
+        **now,
+        "drive.command": u,
+        "drive.saturated": cut > _SATURATED * (ca.fabs(u) + ca.fabs(now["drive.applied"])),
+        "motor.power": now["motor.torque"] * now["motor.speed"],
+        "motor.temperature": rise,
+        **{name: sensed[sensors.row.index(column)] for name, column in _FROM_ROW.items()},
+        "brake.on": flag["brake"],
+        "engaged": flag["engaged"],
+    }
+    outputs = [ca.densify(v) for v in ca.cse([u, warmer, ca.vertcat(*log.values())])]
+    return ca.Function("log", [x, asked, rise, moved, sensed, flags, p], outputs), tuple(log)
+
+
+def _plant(plant: Plant, x: ca.SX, u: ca.SX, moved: ca.SX, p: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    triples = [(moved[k], moved[k + 1], moved[k + 2]) for k in range(0, moved.numel(), 3)]
+    rate, measured, outputs = plant.function(
+        x, u, disturbances(triples), p[: len(plant.parameters)]
+    )
+    return rate, measured, outputs
+
+
+def _named(names: Sequence[str], values: ca.SX) -> dict[str, ca.SX]:
+    return dict(zip(names, ca.vertsplit(values), strict=True))
+
+
+def _function(name: str, inputs: list[ca.SX], outputs: list[ca.SX]) -> ca.Function:
+    """Return the function with common subexpressions computed once, all outputs dense."""
+    dense = [ca.densify(value) for value in ca.cse(outputs)]
+    return ca.Function(name, inputs, dense, ["s", "r", "p"], ["s_next", "out"])
+
+
+def _own_parameters(case: Case, sample_time: float, hold: float) -> dict[str, float]:
+    motor, brake = case.winch.motor, case.winch.brake
+    capacity = None if brake is None else brake.torque
+    # "holds whatever comes": ten times the largest torque that motor or static load can make
+    strongest = max(case.winch.drive.torque_peak, case.static_torque)
+    values = (
+        hold,
+        10.0 * strongest if capacity is None else capacity,
+        case.winch.drive.torque_continuous,
+        motor.temperature_rise,
+        -np.expm1(-sample_time / motor.thermal_time_constant),
+    )
+    return dict(zip(_OWN, (float(value) for value in values), strict=True))

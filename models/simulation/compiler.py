@@ -1,0 +1,226 @@
+"""From C source to a loaded library, compiled once and kept.
+
+A simulation spends its time in one recursion (`models.simulation.kernel`); CasADi writes it as C,
+and this file turns that into a shared library with whatever C compiler the machine has. Libraries
+are kept in the user's cache folder under a name made of a digest of everything they depend on and a
+digest of their own bytes, so the next run finds its own and a file that was cut short is seen
+before it is loaded.  No file is ever changed in place: several processes may build the same library
+at once.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import ctypes
+import functools
+import hashlib
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..basics.checks import SolverError
+
+__all__ = ["Compiler", "cache_folder", "find_compiler", "load_library"]
+
+# No fast-math and no fused multiply-add: the compiled recursion must give the same numbers as
+# CasADi's virtual machine.  Hidden symbols cannot clash with those of another library.
+FLAGS = ("-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
+LONG_SOURCE = 500_000  # [characters] beyond it -O2 takes far longer than -O1 and gains nothing
+TIME_LIMIT = 600.0  # [s] for one compilation
+KEPT = 256  # libraries kept in the cache; the ones longest unused go first
+_SOURCE_NAME = "kernel.c"  # the same for all: it ends up in the library's bytes
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compiler:
+    """A C compiler.
+
+    Parameters
+    ----------
+    command
+        Program and arguments that come before ours.
+    version
+        The first line it says about its version; part of every library's name.
+    """
+
+    command: tuple[str, ...]
+    version: str
+
+
+def find_compiler() -> Compiler | None:
+    """Return the C compiler: ``$CC``, else cc, gcc or clang; None if there is none to use.
+
+    The environment variable ``STILLHOOK_COMPILE=0`` says that none may be used.
+    """
+    if os.environ.get("STILLHOOK_COMPILE", "").strip() == "0":
+        return None
+    for text in (os.environ.get("CC", ""), "cc", "gcc", "clang"):
+        try:
+            words = shlex.split(text, posix=os.name == "posix")
+        except ValueError:  # quotes that do not close
+            continue
+        program = shutil.which(words[0]) if words else None
+        if program:
+            command = (program, *words[1:])
+            stamp = os.stat(program)
+            version = _version(command, stamp.st_mtime_ns, stamp.st_size)
+            if version is not None:
+                return Compiler(command=command, version=version)
+    return None
+
+
+@functools.lru_cache(maxsize=8)
+def _version(command: tuple[str, ...], changed: int, size: int) -> str | None:
+    """Return what a compiler says it is; `changed` and `size` tell one that was replaced."""
+    del changed, size
+    try:
+        answer = _run((*command, "--version"), None, 60.0)
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return _first_line(answer.stdout) if answer.returncode == 0 else None
+
+
+def cache_folder() -> Path:
+    """Return the folder for compiled libraries; it need not exist yet.
+
+    ``$STILLHOOK_CACHE`` if set; else the system's usual place for a user's cache.
+    """
+    given = os.environ.get("STILLHOOK_CACHE")
+    if given:
+        return Path(given).expanduser()
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        given = os.environ.get("XDG_CACHE_HOME", "")
+        base = Path(given) if os.path.isabs(given) else Path.home() / ".cache"
+    return base / "stillhook"
+
+
+def load_library(source: str, compiler: Compiler) -> ctypes.CDLL:
+    """Return a C source as a loaded library, from the cache if it was compiled before.
+
+    Parameters
+    ----------
+    source
+        The whole C source; symbols to be found must be exported, the rest stays hidden.
+    compiler
+        From `find_compiler`.
+
+    Raises
+    ------
+    SolverError
+        If the compiler fails or its library cannot be loaded; its first words are quoted.
+    """
+    flags = FLAGS if len(source) < LONG_SOURCE else ("-O1", *FLAGS[1:])
+    machine = f"{platform.system()} {platform.machine()}"  # homes are shared between machines
+    parts = (source, machine, compiler.version, *compiler.command, *flags)
+    key = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:40]
+    reason: object = "no folder can be written to"
+    for place in (cache_folder, _own_folder):
+        try:
+            folder = place()
+            found = _load_kept(folder, key)
+            if found is not None:
+                return found
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(prefix="build-", dir=folder) as scratch:
+                built = _build(source, compiler, flags, Path(scratch))
+                library = folder / _name(key, built.read_bytes())
+                os.replace(built, library)
+            _tidy(folder)
+            return ctypes.CDLL(str(library))
+        # A folder that may not be written, or not be run from; a user without a home.
+        except (OSError, RuntimeError) as error:
+            reason = error
+    raise SolverError(f"C compiler: the library can be kept or loaded nowhere: {reason}")
+
+
+def _load_kept(folder: Path, key: str) -> ctypes.CDLL | None:
+    """Return the library of that key if the folder holds it whole; remove spoilt ones."""
+    try:
+        kept = sorted(folder.glob(f"{key}-*{_suffix()}"))
+    except OSError:
+        return None
+    for path in kept:
+        try:
+            # Loading a file that was cut short can end the process, so look first.
+            if path.name == _name(key, path.read_bytes()):
+                library = ctypes.CDLL(str(path))
+                with contextlib.suppress(OSError):
+                    os.utime(path)  # used today: the last to be tidied away
+                return library
+        except OSError:
+            pass
+        with contextlib.suppress(OSError):
+            path.unlink()
+    return None
+
+
+def _build(source: str, compiler: Compiler, flags: tuple[str, ...], folder: Path) -> Path:
+    """Return the library, compiled in a folder that holds nothing else."""
+    (folder / _SOURCE_NAME).write_text(source, encoding="utf-8", newline="\n")
+    built = folder / f"kernel{_suffix()}"
+    command = (*compiler.command, *flags, "-o", built.name, _SOURCE_NAME, "-lm")
+    try:
+        answer = _run(command, folder, TIME_LIMIT)
+    except (OSError, subprocess.SubprocessError) as error:
+        raise SolverError(f"C compiler: {compiler.command[0]} failed: {error}") from error
+    if answer.returncode != 0 or not built.exists():
+        said = _first_line(answer.stderr) or f"it ended with code {answer.returncode}"
+        raise SolverError(f"C compiler: {compiler.command[0]} failed: {said}")
+    return built
+
+
+def _run(
+    command: tuple[str, ...], folder: Path | None, limit: float
+) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command,
+        cwd=folder,
+        env={**os.environ, "LC_ALL": "C"},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        encoding="utf-8",
+        errors="replace",
+        timeout=limit,
+        check=False,
+    )
+
+
+def _tidy(folder: Path) -> None:
+    """Remove the libraries that were longest unused, beyond `KEPT`."""
+    with contextlib.suppress(OSError):
+        kept = sorted(folder.glob(f"*{_suffix()}"), key=lambda path: path.stat().st_mtime)
+        for path in kept[:-KEPT]:
+            path.unlink()
+
+
+@functools.lru_cache(maxsize=1)
+def _own_folder() -> Path:
+    """Return a temporary folder of this process, for when the cache cannot be written."""
+    folder = tempfile.mkdtemp(prefix="stillhook-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
+
+
+def _name(key: str, content: bytes) -> str:
+    return f"{key}-{hashlib.sha256(content).hexdigest()[:16]}{_suffix()}"
+
+
+def _suffix() -> str:
+    return {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+
+
+def _first_line(text: str) -> str:
+    """Return the first line that says something, the one with an error if there is one."""
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    return next((line for line in lines if "error" in line.lower()), lines[0] if lines else "")

@@ -1,0 +1,306 @@
+"""`simulate`: a controller on the nonlinear plant, behind real sensors, in a real sea.
+
+    Case, controller, scenario --> Simulation --> rows, chunk by chunk --> recursion --> Run
+
+The plant is that of the case with everything a design leaves out: quadratic drag, slack rope,
+limits of the drive, dry friction, losses of the gear both ways, the brake.  A controller that is
+a recursion runs inside the compiled loop; any other object with `step` is called from Python once
+in a sample (`models.simulation.steppers`).  Either way every random number is drawn in advance,
+from the seed alone, so that a run can be repeated to the last bit.
+
+Whatever happens on the way (the end of the stroke, a controller that returns no number, a
+diverging plant, Ctrl-C) ends in a `Run` that says what happened and when, with everything
+simulated up to then.
+"""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import check_range
+from ..basics.draws import check_seed
+from ..run.run import Event, Run, Timings
+from ..run.statistics import Accumulator
+from ..sensing.control import holds_brake
+from .simulation import Simulation, prepare
+from .steppers import stepper_for
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+    from ..operation.excitation import MotionSource
+    from ..operation.scenario import Scenario
+    from ..plant.drive import DriveLimits
+    from ..sensing.control import Controller
+
+__all__ = ["run_simulation", "simulate"]
+
+FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[float], None]
+
+CHUNK = 8192  # samples between two looks at trips, Ctrl-C and progress
+STORED = 40_000  # samples that a run keeps unless told otherwise
+
+
+def simulate(
+    case: Case,
+    controller: Controller,
+    *,
+    scenario: Scenario | str | None = None,
+    hook: MotionSource | None = None,
+    duration: float | None = None,
+    seed: int = 0,
+    step: float | None = None,
+    masses: int | None = None,
+    limits: DriveLimits | None = None,
+    parameters: Mapping[str, float] | None = None,
+    settle: float | None = None,
+    store_step: float | None = None,
+    lock_limit: float | None = None,
+    deadline: float | None = None,
+    compiled: bool | None = None,
+    progress: Progress | None = None,
+) -> Run:
+    """Simulate one run.
+
+    Parameters
+    ----------
+    case
+        Vessel, sea, rope, payload, winch and sensors.
+    controller
+        What makes the drive's commands; it is reset first.
+    scenario
+        What is asked of it, or the name of a scenario; by default to hold station.
+    hook
+        Motion of the hook; by default drawn from the case's sea.
+    duration
+        Length [s]; by default the scenario's own.
+    seed
+        Seed of the sea, the noise and the telemetry, not negative.
+    step
+        Integration step [s]; by default the longest that the plant's fastest mode allows.
+    masses
+        Masses along the rope; by default those of the case.
+    limits
+        Limits of the drive; by default those of the case, `DriveLimits()` for none.
+    parameters
+        Values of plant parameters by name, such as ``{"payload.quadratic_drag": 0.0}``.
+    settle
+        Time from which statistics count [s]; by default the scenario's own, or the 30 s in which
+        the hook's motion grows and ten peak periods of the sea; at most a tenth of the run, but
+        not before a controller that warms up is engaged.
+    store_step
+        Time between stored samples [s]; by default such that at most 40 000 are kept.
+    lock_limit
+        Size of the payload's error beyond which it counts as having lost lock [m]; by default
+        not watched.
+    deadline
+        Wall time that a controller in Python may take for a step [s]; a later command is not
+        used, the one before is held.
+    compiled
+        True: as C; False: in CasADi's virtual machine; None: as C if there is a compiler.
+    progress
+        Called now and then with the share that is done.
+
+    Returns
+    -------
+    Run
+        Also of a run that diverged or was interrupted; its status says so.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range, or the step is too long for the plant.
+    SolverError
+        If there is no static operating point, or the controller's recursion fails.
+    """
+    began = clock.perf_counter()
+    simulation = prepare(
+        case,
+        controller,
+        scenario=scenario,
+        hook=hook,
+        step=step,
+        masses=masses,
+        limits=limits,
+        parameters=parameters,
+        compiled=compiled,
+    )
+    return run_simulation(
+        simulation,
+        seed=seed,
+        duration=duration,
+        settle=settle,
+        store_step=store_step,
+        lock_limit=lock_limit,
+        deadline=deadline,
+        progress=progress,
+        began=began,
+    )
+
+
+def run_simulation(
+    simulation: Simulation,
+    *,
+    seed: int,
+    duration: float | None = None,
+    settle: float | None = None,
+    store_step: float | None = None,
+    lock_limit: float | None = None,
+    deadline: float | None = None,
+    progress: Progress | None = None,
+    began: float | None = None,
+) -> Run:
+    """Run a prepared simulation with one seed; the arguments are those of `simulate`."""
+    began = clock.perf_counter() if began is None else began
+    loop, scenario, case = simulation.loop, simulation.scenario, simulation.case
+    owner, dt = "simulation", loop.sample_time
+    wanted = scenario.duration if duration is None else duration
+    check_range(owner, "duration", wanted, low=dt, unit="s")
+    samples = simulation.samples(wanted)
+    if settle is None:
+        waves = simulation.ease + 10.0 * case.sea.spectral_peak_period
+        settle = min(max(scenario.settle, waves), 0.1 * wanted)
+        # not before the controller is at work, however short the run
+        settle = max(settle, min(scenario.warm_up + scenario.ramp, 0.5 * wanted))
+    static = simulation.rest.outputs
+    torque = 0.0 if holds_brake(simulation.controller) else static["motor.torque"]
+    levels = {"motor.torque": torque, "rope.tension": static["rope.tension"]}
+    accumulator = Accumulator(
+        loop.signals,
+        dt,
+        settle=check_range(owner, "settle", settle, low=0.0, high=wanted, unit="s"),
+        units=loop.units,
+        levels=levels,
+        lock_limit=lock_limit,
+        thermal_time=case.winch.motor.thermal_time_constant,
+    )
+    store = _Store(dt, samples, store_step)
+    rows = simulation.rows(check_seed(owner, seed), wanted)
+    stepper = stepper_for(simulation, deadline)
+    foresee = getattr(simulation.controller, "foresee", None)
+    if foresee is not None:  # a controller with perfect preview, for reference
+        foresee(rows.motions[0])
+    events = [Event(time=t, kind=kind, text=text) for t, kind, text in scenario.events]
+    status, message = "completed", ""
+    state, mru, trip_time = simulation.start(rows), rows.start(), math.nan
+    breaks = simulation.schedule.breaks
+    progress = progress or _silent
+    try:
+        while store.seen < samples:
+            first = store.seen
+            until = min([samples, first + CHUNK, *(row for row in breaks if row > first)])
+            p = _parameters(simulation, first)
+            chunk, mru = rows.block(first, until - first, mru)
+            if not math.isnan(trip_time):
+                rows.trip(chunk, first, trip_time)
+            while len(chunk):
+                at = store.seen
+                watching = simulation.trips if math.isnan(trip_time) else ()
+                state, log, trip = stepper.run(state, chunk, p, at, watching)
+                chunk = chunk[len(log) :]
+                good = _finite(log)
+                accumulator.update(log[:good], at * dt)
+                store.add(log[:good])
+                if good < len(log):
+                    raise _DivergedError(store.seen * dt)
+                if trip is not None:
+                    trip_time = trip.time
+                    events.append(trip.event)
+                    rows.trip(chunk, store.seen, trip_time)
+            progress(store.seen / samples)
+    except KeyboardInterrupt:
+        status, message = "interrupted", f"interrupted at {store.seen * dt:.6g} s"
+    except _DivergedError as error:
+        status, message = "diverged", str(error)
+        events.append(Event(time=store.seen * dt, kind="diverged", text=message))
+    events += stepper.events
+    time, values = store.arrays(len(loop.signals))
+    wall = clock.perf_counter() - began
+    return Run(
+        case=case,
+        controller=simulation.controller.name,
+        scenario=scenario.name,
+        seed=seed,
+        sample_time=dt,
+        step=loop.step.step,
+        duration=float(wanted),
+        compiled=simulation.compiled,
+        signals=loop.signals,
+        units=loop.units,
+        time=time,
+        values=values,
+        statistics=accumulator.result(),
+        events=tuple(sorted(_until(events, store.seen * dt), key=lambda event: event.time)),
+        status=status,
+        message=message,
+        timings=Timings.of(
+            wall_seconds=wall,
+            steps=store.seen * loop.step.substeps,
+            duration=store.seen * dt,
+            controller_seconds=stepper.seconds,
+            fallbacks=stepper.fallbacks,
+        ),
+    )
+
+
+class _DivergedError(Exception):
+    """The plant's state is no longer a number."""
+
+    def __init__(self, time: float) -> None:
+        super().__init__(
+            f"the simulation diverged at {time:.6g} s: the loop is unstable and nothing limits it"
+        )
+
+
+class _Store:
+    """Keeps every so manieth sample."""
+
+    def __init__(self, sample_time: float, samples: int, store_step: float | None) -> None:
+        if store_step is None:
+            self._every = max(1, math.ceil(samples / STORED))
+        else:
+            check_range("simulation", "store_step", store_step, low=sample_time, unit="s")
+            self._every = max(1, round(store_step / sample_time))
+        self._dt = sample_time
+        self._kept: list[FloatArray] = []
+        self.seen = 0
+
+    def add(self, log: FloatArray) -> None:
+        """Take the next samples (n, signals)."""
+        first = -self.seen % self._every
+        self._kept.append(log[first :: self._every].copy())
+        self.seen += len(log)
+
+    def arrays(self, signals: int) -> tuple[FloatArray, FloatArray]:
+        """Return times (n,) and values (n, signals)."""
+        values = np.concatenate(self._kept) if self._kept else np.zeros((0, signals))
+        return self._dt * self._every * np.arange(len(values), dtype=np.float64), values
+
+
+def _parameters(simulation: Simulation, row: int) -> FloatArray:
+    """Return the recursion's parameters in force at a row."""
+    changes = simulation.schedule.parameters_at(row)
+    values = {**simulation.loop.parameters, **changes}
+    return np.array(list(values.values()))
+
+
+def _finite(log: FloatArray) -> int:
+    """Return how many rows come before the first that is not finite."""
+    if math.isfinite(log.sum()):  # one pass, and the usual case
+        return len(log)
+    bad = ~np.isfinite(log.sum(axis=1))
+    return int(np.argmax(bad)) if bad.any() else len(log)
+
+
+def _until(events: list[Event], end: float) -> list[Event]:
+    return [event for event in events if event.time <= end]
+
+
+def _silent(share: float) -> None:
+    """Tell nobody how far the run is."""

@@ -1,0 +1,324 @@
+"""A prepared simulation: everything about a run that does not hang on its seed.
+
+    Case, controller, scenario --> prepare --> Simulation --> run(seed) --> Run
+
+Preparing solves for rest, chooses the integration step, writes the closed loop as one recursion
+and compiles it; that takes a second or less, and every seed uses it again.
+`models.simulation.simulate` does both in one call.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError, check_range
+from ..case.case import Case
+from ..operation.excitation import MotionSource, SpectrumMotion
+from ..operation.scenario import Scenario
+from ..operation.schedule import Schedule
+from ..plant.drive import SPEED_BAND, DriveLimits
+from ..plant.equations import displacement_names
+from ..plant.payout import DrumTravel
+from ..plant.plant import MEAN_LOSSES, OperatingPoint, Plant, build_plant
+from ..plant.surroundings import Surroundings
+from ..sensing.control import Controller, holds_brake, recursion_of
+from ..sensing.mru import MruModel
+from ..sensing.sensing import SensorModel
+from ..sensing.telemetry import TelemetrySchedule
+from .closed_loop import HOOK, ClosedLoop, build_closed_loop
+from .integrate import StepChoice, choose_step
+from .kernel import Kernel
+from .rows import RowMaker
+from .trips import TripLimit, trip_limits
+
+__all__ = ["EASE", "Simulation", "prepare"]
+
+FloatArray = npt.NDArray[np.float64]
+
+EASE = 30.0  # in which the hook's motion grows where the controller is engaged from the start [s]
+_CLOSING_TIME = 0.3  # of a brake that the case says nothing about [s]
+_TRAVELS = 1.0  # a payload that is moved by more takes up rope and layers of the drum [m]
+_HEAVE_SAMPLE = (600.0, 0.1)  # what a record's rms is taken over: duration and step [s]
+_GEAR_TURN = 1.0  # motor speed over which the gear's losses change sides [rad/s]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Simulation:
+    """A controller on a plant, ready to run; `prepare` makes it.
+
+    Parameters
+    ----------
+    case, controller, scenario
+        What is simulated.
+    hook
+        Where the hook's motion comes from.
+    loop
+        The recursion of one sample.
+    kernels
+        What runs it: one kernel with the controller inside, or two, of what comes before the
+        controller and of what comes after.
+    sensors
+        What the controller sees.
+    trips
+        What ends its work in mid-run.
+    rest
+        The plant at rest.
+    """
+
+    case: Case
+    controller: Controller
+    scenario: Scenario
+    hook: MotionSource
+    loop: ClosedLoop
+    kernels: tuple[Kernel, ...]
+    sensors: SensorModel
+    schedule: Schedule
+    trips: tuple[TripLimit, ...]
+    rest: OperatingPoint
+
+    @property
+    def fused(self) -> bool:
+        """Whether the controller is part of the recursion."""
+        return len(self.kernels) == 1
+
+    @property
+    def compiled(self) -> bool:
+        """Whether the recursion runs as C."""
+        return all(kernel.compiled for kernel in self.kernels)
+
+    @property
+    def ease(self) -> float:
+        """Time in which the motions of hook, deck and surface grow out of rest [s].
+
+        A controller that is engaged from the start has to find the load at rest: a payload that
+        is off by the height of a wave would saturate the drive at once.  One that is engaged
+        after a warm-up meets the sea as it is.
+        """
+        engaged_at_once = self.scenario.warm_up <= 0.0 and not holds_brake(self.controller)
+        return EASE if engaged_at_once else 0.0
+
+    def rows(self, seed: int, duration: float) -> RowMaker:
+        """Return what makes the rows of one run of a duration [s]."""
+        loop, scenario, case = self.loop, self.scenario, self.case
+        h = loop.step.step
+        length = (self.samples(duration) - 1) * loop.sample_time
+        sources = [self.hook, *(scenario.motions[name] for name in loop.motions[1:])]
+        rms, frequency = self._heave(duration)
+        brake = case.winch.brake
+        return RowMaker(
+            motions=tuple(source.motion(length, h, seed).eased(self.ease) for source in sources),
+            substeps=loop.step.substeps,
+            sensors=self.sensors,
+            telemetry=TelemetrySchedule(
+                case.sensors.telemetry,
+                loop.sample_time,
+                seed,
+                outages=scenario.telemetry_outages,
+                broken=scenario.sensor_failures,
+                late=scenario.telemetry_delays,
+            ),
+            mru=MruModel(
+                case.sensors.mru,
+                loop.sample_time,
+                rms,
+                seed,
+                outages=scenario.mru_outages,
+                biases=scenario.mru_biases,
+                heave_frequency=frequency,
+            ),
+            schedule=self.schedule,
+            seed=seed,
+            closing_time=_CLOSING_TIME if brake is None else brake.closing_time,
+            always_braked=holds_brake(self.controller),
+        )
+
+    def samples(self, duration: float) -> int:
+        """Return the number of samples in a duration [s], both ends included."""
+        return math.floor(duration / self.loop.sample_time * (1.0 + 1e-12) + 1e-9) + 1
+
+    def start(self, rows: RowMaker) -> FloatArray:
+        """Return the state at the start: everything moves with the hook, as if it always had.
+
+        A payload that stands on a deck moves with that instead.
+        """
+        state = self.loop.initial.copy()
+        states = self.loop.states
+        ends = [motion.block(0, 1) for motion in rows.motions]
+        moves = {
+            name: (float(z[0]), float(v[0]))
+            for name, (z, v, _) in zip(self.loop.motions, ends, strict=True)
+        }
+        deck = self.scenario.surroundings.deck if self.scenario.surroundings else None
+        standing = deck is not None and deck.below < 0.0
+        for at, name in enumerate(states):
+            part, _, signal = name.partition(".")
+            if part not in ("plant", "sensor") or signal.startswith("motor"):
+                continue
+            below = not signal.startswith("rope.")
+            z, v = moves.get("deck", (0.0, 0.0)) if standing and below else moves[HOOK]
+            if signal.endswith("displacement"):
+                state[at] += z
+            elif signal.endswith("velocity"):
+                state[at] += v
+        return state
+
+    def _heave(self, duration: float) -> tuple[float, float]:
+        """Return standard deviation [m] and mean frequency [rad/s] of the hook's heave."""
+        if isinstance(self.hook, SpectrumMotion):
+            hook = self.hook.hook
+            rms = hook.displacement.rms
+            return rms, hook.velocity.rms / rms
+        longest, step = _HEAVE_SAMPLE
+        motion = self.hook.motion(min(longest, duration), min(step, duration), 0)
+        z, v, _ = motion.block(0, motion.rows)
+        rms, rate = float(z.std()), float(v.std())
+        return (rms, rate / rms) if rms > 0.0 and rate > 0.0 else (0.0, 1.0)
+
+
+def prepare(
+    case: Case,
+    controller: Controller,
+    *,
+    scenario: Scenario | str | None = None,
+    hook: MotionSource | None = None,
+    step: float | None = None,
+    masses: int | None = None,
+    limits: DriveLimits | None = None,
+    parameters: Mapping[str, float] | None = None,
+    compiled: bool | None = None,
+) -> Simulation:
+    """Prepare a simulation; the arguments are those of `simulate`.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range, or the step is too long for the plant.
+    SolverError
+        If there is no static operating point, or C was demanded and there is no compiler.
+    """
+    if not isinstance(scenario, Scenario):
+        from ..operation.scenarios import (
+            scenario_named,  # the library of them is only needed by name
+        )
+
+        scenario = scenario_named(scenario or "hold", case)
+    case = scenario.case_for(case)
+    sample_time = check_range(
+        controller.name, "sample_time", controller.sample_time, low=0.0, unit="s", open_low=True
+    )
+    limits = DriveLimits.from_case(case) if limits is None else limits
+    surroundings = scenario.surroundings
+    farthest = (
+        max(abs(move.distance) for move in scenario.profile.moves)
+        if scenario.profile.moves
+        else 0.0
+    )
+    travels = max(farthest, abs(scenario.initial_haul)) > _TRAVELS
+    travel = DrumTravel.from_case(case) if travels else None
+    plant = build_plant(case, masses, limits=limits, travel=travel, surroundings=surroundings)
+    rest = _rest(case, masses, surroundings)
+    values = _parameters(case, plant, parameters or {})
+    choice = _choose_step(plant, rest, values, sample_time, step, surroundings)
+    sensors = SensorModel.from_case(case, sample_time, scenario.telemetry_delays)
+    recursion = recursion_of(controller)
+    loop = build_closed_loop(
+        case,
+        plant,
+        sensors,
+        step=choice,
+        parameters=values,
+        start=_initial_state(plant, rest, scenario),
+        hold=rest.command,
+        recursion=recursion,
+    )
+    functions = (loop.measure, loop.advance) if loop.fused is None else (loop.fused,)
+    return Simulation(
+        case=case,
+        controller=controller,
+        scenario=scenario,
+        hook=SpectrumMotion.from_case(case) if hook is None else hook,
+        loop=loop,
+        kernels=tuple(Kernel(function, compiled=compiled) for function in functions),
+        sensors=sensors,
+        schedule=Schedule(scenario=scenario, sample_time=sample_time),
+        trips=trip_limits(case),
+        rest=rest,
+    )
+
+
+def _rest(case: Case, masses: int | None, surroundings: Surroundings | None) -> OperatingPoint:
+    """Return the load at rest, the gear with the mean of its losses, the drive without limits.
+
+    A payload that stands on a deck, or hangs in air, has another weight than in the water.
+
+    Raises
+    ------
+    InputError
+        If the drive cannot hold the load.
+    """
+    lifted = 0.0 if surroundings is None else surroundings.rest_force
+    weight = {"payload.submerged_weight": case.payload.submerged_weight - lifted}
+    rest = build_plant(case, masses).operating_point({**MEAN_LOSSES, **weight})
+    peak = case.winch.drive.torque_peak
+    if abs(rest.torque) > peak:
+        raise InputError(
+            f"{case.source or case.name}: winch.drive.torque_peak must be at least the static "
+            f"torque, {rest.torque:.4g} N m, got {peak:g} N m: the motor cannot hold the load"
+        )
+    return rest
+
+
+def _parameters(case: Case, plant: Plant, changes: Mapping[str, float]) -> dict[str, float]:
+    """Return the plant's parameters by name: losses and friction in, then the changes."""
+    losses: dict[str, float] = {}
+    if case.winch.gearbox.efficiency < 1.0:
+        losses["winch.gear_switching"] = 1.0 / _GEAR_TURN
+    if "winch.coulomb_friction" in plant.parameters:
+        losses["winch.coulomb_friction"] = case.winch.motor.coulomb_friction
+    vector = plant.parameter_vector({**losses, **changes})
+    return dict(zip(plant.parameters, (float(value) for value in vector), strict=True))
+
+
+def _choose_step(
+    plant: Plant,
+    rest: OperatingPoint,
+    values: Mapping[str, float],
+    sample_time: float,
+    step: float | None,
+    surroundings: Surroundings | None,
+) -> StepChoice:
+    """Return the integration step for everything that is fast: modes, motor, limits, contact."""
+    p = np.array(list(values.values()))
+    w = np.zeros(len(plant.disturbances))
+    A = np.asarray(plant.jacobians(rest.x, rest.u, w, p)[0])
+    rates = []
+    if "drive.speed_limit" in values:
+        # beyond the highest speed the torque falls to the other side within a narrow band
+        peak = values.get("drive.torque_limit", 0.0)
+        if "drive.current_limit" in values:
+            current = values["motor.torque_constant"] * values["drive.current_limit"]
+            peak = min(peak or math.inf, current)
+        rates.append(peak / (SPEED_BAND * values["drive.speed_limit"]) / values["winch.inertia"])
+    if surroundings is not None:
+        rates += surroundings.stiffness_rates(values["payload.virtual_mass"])
+    return choose_step(A, sample_time, step, extra_rates=rates)
+
+
+def _initial_state(plant: Plant, rest: OperatingPoint, scenario: Scenario) -> FloatArray:
+    """Return the plant at rest where the scenario has it, before anything moves."""
+    state = np.array(rest.x)
+    p, states = plant.parameters, plant.states
+    # A drum that truly stands, not at the solver's 1e-16 rad/s: the brake is to hold it.
+    state[states.index("motor.speed")] = 0.0
+    turned = scenario.initial_haul / p["winch.drum_radius"] * p["winch.gear_ratio"]
+    state[states.index("motor.angle")] = turned
+    compliance = p["rope.length"] / p["rope.axial_stiffness"]
+    hanging = scenario.initial_displacements(plant.lumps.springs, compliance)
+    for name, displacement in zip(displacement_names(plant.masses), hanging, strict=True):
+        state[states.index(name)] = displacement
+    return state

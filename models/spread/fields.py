@@ -1,0 +1,153 @@
+"""What stands at a dotted path of a case: its kind, its range, its value, its short names.
+
+A spread speaks of fields of a case, of gains of a design (``gains.a``) and of the design's linear
+drag coefficient (``drag``); this module is where their units are looked up.
+"""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..basics.checks import InputError
+from ..basics.units import KINDS
+from ..case.case import Case
+from ..casefile.messages import suggestion
+from ..casefile.quantity import Quantity
+from ..operation.faults import PREFIX as FAULTS
+from ..operation.faults import fault_of
+
+__all__ = ["ALIASES", "DRAG", "FAULTS", "GAINS", "Field", "field_of"]
+
+#: Short names of what is most often varied.
+ALIASES: Mapping[str, str] = {
+    "depth": "rope.length",
+    "length": "rope.length",
+    "payload": "payload.mass",
+    "added_mass": "payload.added_mass",
+    "stiffness": "rope.axial_stiffness",
+    "radius": "winch.drum.radius",
+    "delay": "sensors.telemetry.delay",
+}
+DRAG = "drag"  # linear drag coefficient of the design [N s/m]
+GAINS = "gains."
+
+# Fields that may be left out, and what then stands in their place.
+_DERIVED: Mapping[str, Callable[[Case], float]] = {
+    "rope.axial_stiffness": lambda case: case.rope.ea,
+    "rope.modulus": lambda case: case.rope.ea / case.rope.area,
+    "rope.submerged_weight_per_length": lambda case: case.rope.submerged_weight / case.rope.length,
+    "payload.added_mass": lambda case: case.payload.hydrodynamic_mass,
+    "payload.drag_coefficient": lambda case: case.payload.c_d,
+    "winch.drum.radius": lambda case: case.drum_radius,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Field:
+    """One number that may vary.
+
+    Attributes
+    ----------
+    path
+        Its dotted path, without aliases.
+    kind
+        A key of `models.basics.units.KINDS`.
+    nominal
+        Its value in the case or the design.
+    low, high
+        The range that the field allows.
+    """
+
+    path: str
+    kind: str
+    nominal: float
+    low: float
+    high: float
+
+    @property
+    def unit(self) -> str:
+        """Its SI unit; empty for a pure number."""
+        return KINDS[self.kind].unit
+
+
+def field_of(case: Case, name: str, gains: Mapping[str, float], drag: float | None) -> Field:
+    """Return the field of a name.
+
+    Parameters
+    ----------
+    case
+        The case.
+    name
+        A dotted path, an alias, ``gains.`` and the name of a gain, or ``drag``.
+    gains
+        The design's gains by name.
+    drag
+        The design's linear drag coefficient [N s/m], None if there is no design.
+
+    Raises
+    ------
+    InputError
+        If there is no number of that name.
+    """
+    path = ALIASES.get(name, name)
+    if path == DRAG:
+        if drag is None:
+            raise InputError(
+                "drag is a number of a design, and there is none; vary payload.drag_coefficient"
+            )
+        return Field(path=path, kind="damping", nominal=drag, low=0.0, high=float("inf"))
+    if path.startswith(GAINS):
+        own = path.removeprefix(GAINS)
+        if own not in gains:
+            raise InputError(f"{path} is unknown; {suggestion(own, list(gains))}")
+        wide = float("inf")
+        return Field(path=path, kind="number", nominal=float(gains[own]), low=-wide, high=wide)
+    if path.startswith(FAULTS):  # of the time domain, see models/operation/faults.py
+        fault = fault_of(path)
+        return Field(
+            path=path, kind=fault.kind, nominal=fault.nominal, low=fault.low, high=fault.high
+        )
+    quantity, found = _walk(case, path)
+    if found is None and path in _DERIVED:
+        found = _DERIVED[path](case)
+    if quantity is None or isinstance(found, str | bool) or not isinstance(found, int | float):
+        raise InputError(f"there is no number at {path!r} in this case, got {found!r}")
+    return Field(
+        path=path,
+        kind=quantity.kind,
+        nominal=float(found),
+        low=quantity.low,
+        high=quantity.high,
+    )
+
+
+def _walk(case: Case, path: str) -> tuple[Quantity | None, Any]:
+    """Return the quantity that a path's field is declared as, and its value."""
+    found: Any = case
+    quantity: Quantity | None = None
+    for key in path.split("."):
+        if isinstance(found, tuple | list):
+            if not key.isdigit() or int(key) >= len(found):
+                raise InputError(f"{path} is unknown: entries go from 0 to {len(found) - 1}")
+            found = found[int(key)]
+            continue
+        fields = getattr(type(found), "model_fields", None)
+        if fields is None:
+            raise InputError(f"{path} is unknown: {key!r} has nothing above it")
+        if key not in fields:
+            raise InputError(f"{path} is unknown; {suggestion(key, list(fields))}")
+        quantity = _quantity((fields[key].annotation, *fields[key].metadata))
+        found = getattr(found, key)
+    return quantity, found
+
+
+def _quantity(annotation: Any) -> Quantity | None:
+    """Return the first quantity within an annotation."""
+    if isinstance(annotation, Quantity):
+        return annotation
+    parts = annotation if isinstance(annotation, tuple) else typing.get_args(annotation)
+    inner = (*parts, *getattr(annotation, "__metadata__", ()))
+    return next((q for part in inner if (q := _quantity(part)) is not None), None)

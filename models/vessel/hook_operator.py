@@ -1,0 +1,242 @@
+"""From the six motions of a vessel to the heave of its hook: the operators that a case asks for.
+
+    case.vessel (file, hook, heading) + case.sea (spreading) -> VesselRaos -> heave at the hook
+
+The wave of zero phase is the one at the hook, as everywhere after this file.  In a short-crested
+sea there is one operator for each heading of the sea; :func:`equivalent` makes the one of them
+that gives the hook the same spectrum.
+
+A case is read, changed and asked for its hook's motion again and again: files are read once, as
+long as they stay as they are, and the operators of a place and a sea are kept.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError
+from ..sea.spreading import Spreading
+from .crane import Point
+from .raos import VesselRaos
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+
+__all__ = [
+    "case_raos",
+    "equivalent",
+    "heave_operators",
+    "hook_operators",
+    "sea_directions",
+    "speed_remark",
+]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+_ALIKE = 3.0
+"""Difference of speeds that hardly matters to the motions [m/s]: a Froude number of 0.1 on 80 m."""
+
+
+def case_raos(case: Case) -> VesselRaos:
+    """Return the six motions that a case names, at the vessel's speed where the file has it.
+
+    Raises
+    ------
+    InputError
+        If the case has no `raos`, or the file is not what it should be; the field is named.
+    """
+    name = case.vessel.raos
+    if name is None:
+        raise InputError(f"{_owner(case)}: vessel.raos: is missing: the case has heave_rao only")
+    try:
+        raos = _read(name, *_stamp(name))
+    except InputError as error:
+        raise InputError(
+            f"{_owner(case)}: vessel.raos: {error}; `stillhook vessel import` reads a file with "
+            "options, shows what is in it, and writes one that a case can name"
+        ) from error
+    speed = case.vessel.speed or 0.0
+    if abs(raos.speed - speed) > 1e-3:
+        return _read_at(name, *_stamp(name), speed) or raos
+    return raos
+
+
+def speed_remark(case: Case) -> str | None:
+    """Return a sentence if the operators are those of quite another speed than the vessel's."""
+    if case.vessel.raos is None:
+        return None
+    at, speed = case_raos(case).speed, case.vessel.speed or 0.0
+    if abs(at - speed) <= _ALIKE:
+        return None
+    return (
+        f"vessel.speed: the RAOs of {case.vessel.raos} hold for {at:.3g} m/s, the vessel makes "
+        f"{speed:.3g} m/s: what the speed does to its motions in a wave is not in them"
+    )
+
+
+def sea_directions(case: Case, heading: float) -> tuple[FloatArray, FloatArray]:
+    """Return the headings of a case's sea and their shares; one heading if it is long-crested.
+
+    Parameters
+    ----------
+    case
+        The case: its sea's spreading.
+    heading
+        The mean heading [rad].
+
+    Returns
+    -------
+    headings, weights
+        (n,) [rad], (n,).
+    """
+    return _nodes(heading, _spreading(case))
+
+
+def heave_operators(raos: VesselRaos, point: Point, headings: FloatArray) -> ComplexArray:
+    """Return the heave of a point per wave elevation at that point.
+
+    Between two headings of the table the six motions are interpolated about the table's own
+    origin, where they change slowly with the heading, and then taken to the point: the wave's
+    phase between the two places, k d cos b, would turn by a radian from one heading to the next.
+
+    Parameters
+    ----------
+    raos
+        The vessel.
+    point
+        The point, in the frame of `raos` (3,) [m].
+    headings
+        Where the waves travel to (n,) [rad].
+
+    Returns
+    -------
+    ComplexArray
+        Operators at the rows of `raos` (k, n) [m/m].
+
+    Raises
+    ------
+    InputError
+        If the vessel has not been computed near a heading.
+    """
+    motions = raos.response(raos.omega[:, None], headings)
+    x, y = point[0] - raos.origin[0], point[1] - raos.origin[1]
+    heave, roll, pitch = motions[..., 2], motions[..., 3], motions[..., 4]
+    ahead, abeam = point[0] - raos.phase_origin[0], point[1] - raos.phase_origin[1]
+    way = ahead * np.cos(headings) + abeam * np.sin(headings)
+    turn = np.exp(1j * np.multiply.outer(raos.wave_number(raos.omega), way))
+    found: ComplexArray = (heave - x * pitch + y * roll) * turn
+    return found
+
+
+def hook_operators(case: Case) -> tuple[FloatArray, ComplexArray, FloatArray, FloatArray]:
+    """Return the heave of a case's hook in each heading of its sea.
+
+    Returns
+    -------
+    omega, operators, headings, weights
+        Frequencies (k,) [rad/s], operators (k, n) [m/m], headings (n,) [rad], weights (n,).
+
+    Raises
+    ------
+    InputError
+        If the file is wrong, or the vessel has not been computed in these headings.
+    """
+    raos = case_raos(case)
+    point, heading = case.vessel.hook_point, case.vessel.heading
+    if point is None or heading is None:  # the section's own check comes first
+        raise InputError(f"{_owner(case)}: vessel: raos need hook (or crane) and heading")
+    try:
+        operators, headings, weights = _kept(raos, point, heading, _spreading(case))
+    except InputError as error:
+        raise InputError(f"{_owner(case)}: vessel.heading: {error}") from error
+    return raos.omega, operators, headings, weights
+
+
+def equivalent(operators: ComplexArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the one operator that gives a hook the spectrum of many headings.
+
+    The amplitude is the root of the weighted mean of squares.  The phase is that of the weighted
+    mean, which is the phase of the cross-spectrum of the hook and the wave at the hook: for narrow
+    spreading it is the operator's own.
+
+    Parameters
+    ----------
+    operators
+        Operators (k, n).
+    weights
+        Shares of the headings (n,), adding up to one.
+
+    Returns
+    -------
+    amplitude, phase
+        Of the equivalent operator (k,) [m/m], [rad].
+    """
+    amplitude: FloatArray = np.sqrt(np.abs(operators) ** 2 @ weights)
+    return amplitude, np.angle(operators @ weights)
+
+
+@lru_cache(maxsize=16)
+def _read(name: str, modified: int, size: int) -> VesselRaos:
+    del modified, size  # they only tell whether the file is the one that was read before
+    from .readers.files import read_raos
+
+    return read_raos(name)
+
+
+def _stamp(name: str) -> tuple[int, int]:
+    """Return when a file was changed and its size; nothing for a bundled name."""
+    try:
+        found = os.stat(name)
+    except OSError:
+        return 0, 0
+    return found.st_mtime_ns, found.st_size
+
+
+def _spreading(case: Case) -> Spreading | None:
+    section = case.sea.spreading
+    return None if section is None else Spreading(kind=section.kind, exponent=section.exponent)
+
+
+@lru_cache(maxsize=64)
+def _read_at(name: str, modified: int, size: int, speed: float) -> VesselRaos | None:
+    """Return the operators of a speed; None if the file does not have them."""
+    del modified, size
+    from .readers.files import read_raos
+
+    try:
+        return read_raos(name, speed=speed)
+    except InputError:
+        return None
+
+
+@lru_cache(maxsize=256)
+def _nodes(heading: float, spreading: Spreading | None) -> tuple[FloatArray, FloatArray]:
+    if spreading is None:
+        return _frozen(np.array([heading % (2.0 * np.pi)])), _frozen(np.array([1.0]))
+    headings, weights = spreading.nodes(heading)
+    return _frozen(headings), _frozen(weights)
+
+
+@lru_cache(maxsize=256)
+def _kept(
+    raos: VesselRaos, point: Point, heading: float, spreading: Spreading | None
+) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    headings, weights = _nodes(heading, spreading)
+    operators = heave_operators(raos, point, headings)
+    operators.setflags(write=False)
+    return operators, headings, weights
+
+
+def _frozen(array: FloatArray) -> FloatArray:
+    array.setflags(write=False)
+    return array
+
+
+def _owner(case: Case) -> str:
+    return case.source or case.name

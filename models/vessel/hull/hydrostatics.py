@@ -1,0 +1,308 @@
+"""What a hull floats like: volume, centres, metacentric heights, and the stiffness they make.
+
+All of it is integrals over the panels, by the divergence theorem and exact for flat triangles.
+Mass and stiffness are made about one point that is given, never about a point that a library
+picked: matrices about two different points in one equation of motion are an error that no number
+betrays.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ...basics.checks import InputError, check_range
+from ...basics.tables import GRAVITY, SEA_WATER_DENSITY
+from .hull import Hull, panel_integral
+
+__all__ = [
+    "Loading",
+    "Waterplane",
+    "centre_of_mass",
+    "mass_matrix",
+    "moved",
+    "stiffness_matrix",
+    "transport",
+    "undamped_period",
+]
+
+FloatArray = npt.NDArray[np.float64]
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Waterplane:
+    """Displaced volume and waterplane of a hull.
+
+    Attributes
+    ----------
+    volume
+        Displaced volume [m3].
+    centre_of_buoyancy
+        Its centre [m].
+    area
+        Area of the waterplane [m2].
+    first
+        First moments of the waterplane: integrals of x and of y [m3].
+    second
+        Second moments: integrals of x^2, y^2 and x y [m4].
+    length, beam, draught
+        Of what is wet [m].
+    """
+
+    volume: float
+    centre_of_buoyancy: Point
+    area: float
+    first: tuple[float, float]
+    second: tuple[float, float, float]
+    length: float
+    beam: float
+    draught: float
+
+    @classmethod
+    def of(cls, hull: Hull) -> Waterplane:
+        """Return that of a hull.
+
+        The waterplane closes the surface, so that integrals of n_z over it are those over the
+        hull with the sign turned.
+        """
+
+        def vertical(function: Callable[[FloatArray], FloatArray]) -> float:
+            return float(panel_integral(hull.panels, function)[2])
+
+        volume = vertical(lambda p: p[..., 2])
+        return cls(
+            volume=volume,
+            centre_of_buoyancy=(
+                vertical(lambda p: p[..., 0] * p[..., 2]) / volume,
+                vertical(lambda p: p[..., 1] * p[..., 2]) / volume,
+                vertical(lambda p: 0.5 * p[..., 2] ** 2) / volume,
+            ),
+            area=-vertical(lambda p: np.ones(p.shape[:-1])),
+            first=(-vertical(lambda p: p[..., 0]), -vertical(lambda p: p[..., 1])),
+            second=(
+                -vertical(lambda p: p[..., 0] ** 2),
+                -vertical(lambda p: p[..., 1] ** 2),
+                -vertical(lambda p: p[..., 0] * p[..., 1]),
+            ),
+            length=hull.length,
+            beam=hull.beam,
+            draught=hull.draught,
+        )
+
+    @property
+    def block(self) -> float:
+        """Block coefficient: volume over length x beam x draught [-]."""
+        return self.volume / (self.length * self.beam * self.draught)
+
+    @property
+    def centre_of_flotation(self) -> tuple[float, float]:
+        """Centre of the waterplane [m]."""
+        return self.first[0] / self.area, self.first[1] / self.area
+
+    @property
+    def metacentric_radii(self) -> tuple[float, float]:
+        """Of roll and of pitch, from the waterplane's moments about its own centre [m]."""
+        x, y = self.centre_of_flotation
+        return (
+            (self.second[1] - self.area * y**2) / self.volume,
+            (self.second[0] - self.area * x**2) / self.volume,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loading:
+    """How the mass of a floating vessel is distributed.
+
+    Attributes
+    ----------
+    mass
+        That of the displaced water [kg].
+    centre
+        Centre of gravity [m], above the centre of buoyancy.
+    radii
+        Radii of gyration about axes through it, of roll, pitch and yaw [m].
+    """
+
+    mass: float
+    centre: Point
+    radii: Point
+
+    @classmethod
+    def of(
+        cls,
+        waterplane: Waterplane,
+        *,
+        kg: float | None = None,
+        gm: float | None = None,
+        radii: tuple[float | None, float | None, float | None] = (None, None, None),
+        density: float = SEA_WATER_DENSITY,
+    ) -> Loading:
+        """Return the loading of a vessel that floats upright and level.
+
+        Parameters
+        ----------
+        waterplane
+            Of the hull.
+        kg
+            Height of the centre of gravity above the keel, the lowest point [m].
+        gm
+            Or: transverse metacentric height [m].
+        radii
+            Radii of gyration of roll, pitch, yaw [m]; usual values where left out: 0.37 of the
+            beam, and a quarter of the length.
+        density
+            Of the water [kg/m3].
+
+        Raises
+        ------
+        InputError
+            If not exactly one of `kg` and `gm` is given, the vessel would not float upright, or
+            a figure is out of range.
+        """
+        if (kg is None) == (gm is None):
+            came = "neither" if kg is None else "both"
+            raise InputError(
+                "hull: give either the height of the centre of gravity above the keel (kg) or the "
+                f"metacentric height (gm), got {came}"
+            )
+        check_range("hull", "density", density, low=900.0, high=1100.0, unit="kg/m3")
+        buoyancy = waterplane.centre_of_buoyancy
+        metacentre = buoyancy[2] + waterplane.metacentric_radii[0]
+        if gm is not None:
+            check_range("hull", "gm", gm, low=0.0, high=1000.0, unit="m", open_low=True)
+            height = metacentre - gm
+        else:
+            assert kg is not None
+            check_range("hull", "kg", kg, low=0.0, high=1000.0, unit="m")
+            height = kg - waterplane.draught
+            if height >= metacentre:
+                raise InputError(
+                    f"hull: kg must be below the metacentre, {metacentre + waterplane.draught:.3f} "
+                    f"m above the keel, for the vessel to float upright; got {kg:g} m"
+                )
+        usual = 0.37 * waterplane.beam, 0.25 * waterplane.length, 0.25 * waterplane.length
+        found = []
+        for name, given, value in zip(("roll", "pitch", "yaw"), radii, usual, strict=True):
+            size = max(waterplane.length, waterplane.beam)
+            check_range(
+                "hull",
+                f"radius of gyration of {name}",
+                value if given is None else given,
+                low=0.01 * size,
+                high=2.0 * size,
+                unit="m",
+            )
+            found.append(float(value if given is None else given))
+        return cls(
+            mass=density * waterplane.volume,
+            centre=(buoyancy[0], buoyancy[1], height),
+            radii=(found[0], found[1], found[2]),
+        )
+
+    def metacentric_heights(self, waterplane: Waterplane) -> tuple[float, float]:
+        """Return those of roll and of pitch [m]."""
+        above = self.centre[2] - waterplane.centre_of_buoyancy[2]
+        roll, pitch = waterplane.metacentric_radii
+        return roll - above, pitch - above
+
+
+def transport(point: Point) -> FloatArray:
+    """Return T (6, 6): motions at the origin of small motions about `point` are T times those.
+
+    With the motions x_P at P = `point`, those at the origin O are x_O = T x_P: the translation
+    loses the rotation's cross product with the arm from O to P.
+
+    Examples
+    --------
+    >>> [float(v) for v in transport((0.0, 0.0, 2.0)) @ [0, 0, 0, 0, 0.1, 0]]
+    [-0.2, 0.0, 0.0, 0.0, 0.1, 0.0]
+    """
+    x, y, z = point
+    found = np.eye(6)
+    # u_O = u_P - theta x (P - O)
+    found[:3, 3:] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+    return found
+
+
+def moved(matrix: FloatArray, origin: Point, point: Point) -> FloatArray:
+    """Return a matrix of mass, damping or stiffness that held about `origin`, about `point`.
+
+    A congruence T' M T, with x_origin = T x_point; forces then move along with motions.
+
+    Parameters
+    ----------
+    matrix
+        (..., 6, 6).
+    origin, point
+        The two points [m].
+    """
+    arm = (point[0] - origin[0], point[1] - origin[1], point[2] - origin[2])
+    T = transport(arm)
+    return np.asarray(T.T @ matrix @ T)
+
+
+def mass_matrix(loading: Loading, point: Point = (0.0, 0.0, 0.0)) -> FloatArray:
+    """Return the rigid body's mass matrix about a point (6, 6) [kg, kg m, kg m2]."""
+    about_centre = loading.mass * np.diag([1.0, 1.0, 1.0, *(r**2 for r in loading.radii)])
+    return moved(about_centre, loading.centre, point)
+
+
+def centre_of_mass(mass: FloatArray, point: Point = (0.0, 0.0, 0.0)) -> Point:
+    """Return the centre of gravity that a mass matrix about `point` tells [m].
+
+    Examples
+    --------
+    >>> loading = Loading(mass=2.0, centre=(1.0, 0.5, -3.0), radii=(1.0, 1.0, 1.0))
+    >>> centre_of_mass(mass_matrix(loading))
+    (1.0, 0.5, -3.0)
+    """
+    m = float(mass[0, 0])
+    if m == 0.0:
+        return point
+    arm = mass[1, 5] / m, -mass[0, 5] / m, mass[0, 4] / m
+    return point[0] + float(arm[0]), point[1] + float(arm[1]), point[2] + float(arm[2])
+
+
+def stiffness_matrix(
+    waterplane: Waterplane,
+    loading: Loading,
+    point: Point = (0.0, 0.0, 0.0),
+    *,
+    density: float = SEA_WATER_DENSITY,
+    gravity: float = GRAVITY,
+) -> FloatArray:
+    """Return the hydrostatic stiffness of a freely floating body about a point (6, 6).
+
+    Newman, Marine Hydrodynamics (1977), section 6.16, with weight equal to buoyancy.  Heave, roll
+    and pitch only; [N/m, N, N m].
+    """
+    x, y, z = point
+    area = waterplane.area
+    sx, sy = waterplane.first
+    xx, yy, xy = waterplane.second
+    # Second moments of the waterplane about the point; the moment of volume and mass is the same
+    # about any height, as weight and buoyancy are equal.
+    moment = waterplane.volume * waterplane.centre_of_buoyancy[2]
+    moment -= loading.mass / density * loading.centre[2]
+    surplus = waterplane.volume - loading.mass / density
+    moment -= surplus * z
+    found = np.zeros((6, 6))
+    found[2, 2] = area
+    found[2, 3] = found[3, 2] = sy - y * area
+    found[2, 4] = found[4, 2] = -(sx - x * area)
+    found[3, 3] = yy - 2.0 * y * sy + y**2 * area + moment
+    found[4, 4] = xx - 2.0 * x * sx + x**2 * area + moment
+    found[3, 4] = found[4, 3] = -(xy - x * sy - y * sx + x * y * area)
+    return density * gravity * found
+
+
+def undamped_period(inertia: float, stiffness: float) -> float:
+    """Return 2 pi sqrt(inertia / stiffness) [s]; infinite without stiffness."""
+    if stiffness <= 0.0:
+        return math.inf
+    return 2.0 * math.pi * math.sqrt(inertia / stiffness)

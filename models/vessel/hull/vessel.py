@@ -1,0 +1,333 @@
+"""From a hull and how it is loaded to the motions of a vessel.
+
+    hull --panels--> coefficients --mass, stiffness, damping of roll--> motions --> VesselRaos
+
+The motions are those of the frame's origin: amidships, on the centreline, in the waterline for a
+hull of our own lines.  Coefficients are computed on few frequencies, as they are smooth; the
+motions are tabulated wherever they bend, above all around the resonance of roll, so that straight
+lines between the rows are as good as the table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ...basics.checks import InputError, check_ascending, check_range
+from ...basics.tables import GRAVITY, SEA_WATER_DENSITY
+from ..raos import VesselRaos
+from .bem import Progress, shortest_wave, versions
+from .bem_cache import cached_hydrodynamics
+from .hull import Hull
+from .hydrodynamics import FloatingBody, NaturalPeriods
+from .hydrostatics import Loading, Waterplane, mass_matrix, stiffness_matrix
+
+__all__ = ["HullVessel", "usual_frequencies", "vessel_from_hull", "well_spaced"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+_BEND = 0.005  # of a motion's largest value that a straight line between two rows may be off
+_ROWS = 160  # of the table of motions, at most
+_ENERGY = 0.1  # by which the waves made and felt may disagree before it is told
+_TURN = 1.6  # rad that forces may turn from one frequency to the next for a spline to follow
+_CLOSEST = 0.006  # rad/s between two of them: a motion that passes zero bends at any scale
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HullVessel:
+    """A hull, how it floats and how it moves.
+
+    Attributes
+    ----------
+    hull
+        Its wetted surface.
+    waterplane, loading
+        Volume and waterplane; mass, centre of gravity, radii of gyration.
+    body
+        Coefficients, mass and stiffness about the frame's origin.
+    raos
+        The motions of the frame's origin.
+    warnings
+        What the figures should be taken with care for.
+    kept
+        Whether the coefficients came from the cache.
+    """
+
+    hull: Hull
+    waterplane: Waterplane
+    loading: Loading
+    body: FloatingBody
+    raos: VesselRaos
+    warnings: tuple[str, ...] = ()
+    kept: bool = False
+
+    @property
+    def natural_periods(self) -> NaturalPeriods:
+        """Undamped natural periods [s]."""
+        return self.body.natural_periods()
+
+    @property
+    def metacentric_heights(self) -> tuple[float, float]:
+        """Of roll and of pitch [m]."""
+        return self.loading.metacentric_heights(self.waterplane)
+
+
+def vessel_from_hull(
+    hull: Hull,
+    *,
+    kg: float | None = None,
+    gm: float | None = None,
+    radii: tuple[float | None, float | None, float | None] = (None, None, None),
+    roll_damping: float = 0.05,
+    omega: npt.ArrayLike | None = None,
+    heading_step: float = math.radians(15.0),
+    depth: float = math.inf,
+    density: float = SEA_WATER_DENSITY,
+    lid: bool = True,
+    name: str | None = None,
+    command: str = "",
+    threads: int | None = None,
+    cache: bool = True,
+    progress: Progress | None = None,
+) -> HullVessel:
+    """Compute the motions of a hull in waves.
+
+    Parameters
+    ----------
+    hull
+        A box, a ship of our own lines, or a mesh.
+    kg, gm
+        One of them: height of the centre of gravity above the lowest point, or transverse
+        metacentric height [m].
+    radii
+        Radii of gyration of roll, pitch and yaw [m]; usual values where left out.
+    roll_damping
+        Damping of roll beyond that of the waves it makes, over the critical [-].
+    omega
+        Frequencies of the coefficients [rad/s]; :func:`usual_frequencies` if left out.
+    heading_step
+        Headings all round at this step [rad].
+    depth, density
+        Of the water [m], [kg/m3].
+    lid
+        Whether to keep irregular frequencies out.
+    name, command
+        What the vessel is called, and how it was made, for the file.
+    threads, cache, progress
+        As for :func:`models.vessel.hull.bem_cache.cached_hydrodynamics`.
+
+    Returns
+    -------
+    HullVessel
+        Hydrostatics, coefficients and motions.
+
+    Raises
+    ------
+    InputError
+        If a figure is out of range, the vessel would not float upright, or Capytaine is missing.
+    SolverError
+        If Capytaine fails.
+    """
+    check_range("hull", "roll_damping", roll_damping, low=0.0, high=1.0)
+    check_range(
+        "hull", "heading_step", heading_step, low=math.radians(1.0), high=math.pi / 2.0, unit="rad"
+    )
+    count = round(2.0 * math.pi / heading_step)
+    if abs(count * heading_step - 2.0 * math.pi) > 1e-6:
+        raise InputError(
+            f"hull: heading_step must divide the circle, got {math.degrees(heading_step):g} deg"
+        )
+    frequencies = np.atleast_1d(
+        check_ascending(
+            "hull", "omega", usual_frequencies(hull) if omega is None else np.asarray(omega)
+        )
+    )
+    if frequencies.size < 4:
+        raise InputError(f"hull: omega must have at least 4 rows, got {frequencies.size}")
+    waterplane = Waterplane.of(hull)
+    loading = Loading.of(waterplane, kg=kg, gm=gm, radii=radii, density=density)
+    headings = np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)
+    # A ship with two like sides needs only the waves from one of them.
+    alike = hull.symmetric and abs(loading.centre[1]) < 1e-6 * hull.beam
+    solved, kept = cached_hydrodynamics(
+        hull,
+        omega=frequencies,
+        heading=headings[headings <= math.pi + 1e-9] if alike else headings,
+        depth=depth,
+        density=density,
+        lid=lid,
+        threads=threads,
+        progress=progress,
+        cache=cache,
+    )
+    water = solved.mirrored() if alike else solved
+    body = FloatingBody(
+        hydrodynamics=water,
+        mass=mass_matrix(loading),
+        stiffness=stiffness_matrix(waterplane, loading, density=density),
+        centre=loading.centre,
+        roll_damping=roll_damping,
+    )
+    rows = well_spaced(body)
+    raos = VesselRaos(
+        name=name or hull.name,
+        omega=rows,
+        heading=water.heading,
+        values=body.motions(rows),
+        depth=depth,
+        source=f"Capytaine {versions()['capytaine']}",
+        notes=_provenance(hull, loading, body, frequencies, density, lid, command),
+    )
+    return HullVessel(
+        hull=hull,
+        waterplane=waterplane,
+        loading=loading,
+        body=body,
+        raos=raos,
+        warnings=_warnings(hull, loading, body, waterplane, radii),
+        kept=kept,
+    )
+
+
+def usual_frequencies(hull: Hull, low: float = 0.15, high: float = 2.0) -> FloatArray:
+    """Return frequencies for the coefficients of a hull (k,) [rad/s].
+
+    At equal steps of 0.05 rad/s or less, so that the wave's phase at the ends of the hull turns by
+    no more than a radian from one to the next: what is between them is interpolated.
+
+    Parameters
+    ----------
+    hull
+        For its length.
+    low, high
+        The first and the last [rad/s].
+    """
+    step = min(0.05, GRAVITY / (high * hull.length))
+    return np.linspace(low, high, max(4, 1 + math.ceil((high - low) / step - 1e-9)))
+
+
+def well_spaced(body: FloatingBody, *, most: int = _ROWS) -> FloatArray:
+    """Return frequencies at which the motions tell all their bends.
+
+    Beginning with those of the coefficients, the middle of two rows is added wherever a motion
+    there differs from what straight lines of amplitude and phase would give.
+
+    Parameters
+    ----------
+    body
+        With its coefficients.
+    most
+        Rows at most.
+    """
+    rows = np.array(body.hydrodynamics.omega)
+    values = body.motions(rows)
+    scale = np.abs(values).max(axis=(0, 1))
+    scale = np.where(scale > 0.0, scale, 1.0)
+    for _ in range(8):
+        middle = 0.5 * (rows[:-1] + rows[1:])
+        exact = body.motions(middle)
+        a, b = values[:-1], values[1:]
+        amplitude = 0.5 * (np.abs(a) + np.abs(b))
+        straight = amplitude * np.exp(1j * (np.angle(a) + 0.5 * np.angle(b * np.conj(a))))
+        off = (np.abs(exact - straight) / scale).max(axis=(1, 2))
+        wanted = np.flatnonzero((off > _BEND) & (np.diff(rows) > 2.0 * _CLOSEST))
+        wanted = wanted[np.argsort(off[wanted])[::-1][: max(0, most - rows.size)]]
+        if not wanted.size:
+            break
+        order = np.argsort(np.concatenate([rows, middle[wanted]]))
+        values = np.concatenate([values, exact[wanted]])[order]
+        rows = np.concatenate([rows, middle[wanted]])[order]
+    return np.round(rows, 9)
+
+
+def _provenance(
+    hull: Hull,
+    loading: Loading,
+    body: FloatingBody,
+    frequencies: FloatArray,
+    density: float,
+    lid: bool,
+    command: str,
+) -> tuple[str, ...]:
+    """Return what the numbers were made from, a sentence each."""
+    inputs = ", ".join(f"{key} {_told(value)}" for key, value in hull.inputs.items())
+    x, y, z = (round(v, 3) + 0.0 for v in loading.centre)
+    roll, pitch, yaw = loading.radii
+    packages = ", ".join(f"{name} {version}" for name, version in versions().items())
+    found = [
+        f"hull: {inputs}; {hull.count} panels, digest {hull.digest[:16]}",
+        f"loading: {loading.mass:.6g} kg, centre of gravity at ({x:g}, {y:g}, {z:g}) m from the "
+        f"origin in the waterline, radii of gyration {roll:.4g}, {pitch:.4g}, {yaw:.4g} m",
+        f"roll: {100.0 * body.roll_damping:g} % of critical damping added to that of the waves",
+        f"water: {density:g} kg/m3, "
+        + ("deep" if math.isinf(body.hydrodynamics.depth) else f"{body.hydrodynamics.depth:g} m")
+        + f"; coefficients at {frequencies.size} frequencies, {frequencies[0]:g} to "
+        f"{frequencies[-1]:g} rad/s, {'with' if lid else 'without'} a lid against irregular ones",
+        f"by linear potential theory at zero speed: {packages}",
+    ]
+    if command:
+        found.append(f"made by: {command}")
+    return tuple(found)
+
+
+def _told(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _warnings(
+    hull: Hull,
+    loading: Loading,
+    body: FloatingBody,
+    waterplane: Waterplane,
+    radii: Sequence[float | None],
+) -> tuple[str, ...]:
+    """Return what the figures should be taken with care for."""
+    found = []
+    omega = body.hydrodynamics.omega
+    last = float(omega[-1])
+    reach = shortest_wave(hull, body.hydrodynamics.depth)
+    if reach < last:
+        found.append(
+            f"above {reach:.3g} rad/s a wave is shorter than four panels ({hull.panel_size:.3g} "
+            "m): take more panels, or those figures for rough ones"
+        )
+    turn = float(np.diff(body.hydrodynamics.omega**2).max()) / GRAVITY * hull.length / 2.0
+    if turn > _TURN:
+        found.append(
+            f"from one frequency to the next the wave turns by {turn:.2g} rad at the ends of the "
+            f"hull: take {usual_frequencies(hull, float(omega[0]), last).size} frequencies, or "
+            "those between them for rough ones"
+        )
+    if body.roll_damping == 0.0:
+        found.append(
+            "no damping of roll but that of the waves: near its natural period the vessel rolls "
+            "several times as far as a real one; 0.03 to 0.10 of critical is usual"
+        )
+    period = body.natural_periods().roll
+    if not 2.0 * math.pi / period >= float(body.hydrodynamics.omega[0]):
+        found.append(
+            f"roll has its natural period, {period:.3g} s, beyond the table's lowest frequency: "
+            "its resonance is not in the table"
+        )
+    if loading.metacentric_heights(waterplane)[0] < 0.15:
+        found.append(
+            f"a metacentric height of {loading.metacentric_heights(waterplane)[0]:.3g} m is less "
+            "than the 0.15 m that any seagoing vessel must have"
+        )
+    error = body.hydrodynamics.energy_error(body.roll_damping * body.critical_roll_damping)
+    if error > _ENERGY:
+        found.append(
+            f"waves made and waves felt disagree by {100.0 * error:.0f} %: take more panels"
+        )
+    missing = [n for n, r in zip(("roll", "pitch", "yaw"), radii, strict=True) if r is None]
+    if missing:
+        found.append(
+            f"radii of gyration of {', '.join(missing)}: usual values taken (0.37 of the beam for "
+            "roll, 0.25 of the length for pitch and yaw)"
+        )
+    return tuple(found)

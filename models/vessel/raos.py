@@ -1,0 +1,322 @@
+"""The motions of a vessel in waves: six complex operators over frequency and heading.
+
+What every reader of a RAO file returns and what the hook's motion is made of.  Convention, fixed:
+
+* vessel frame: x forward, y to port, z up.  Angles by the right-hand rule: positive roll lifts
+  the port side, positive pitch lowers the bow, positive yaw turns the bow to port;
+* time factor e^{+i omega t}; a positive phase leads the wave;
+* heading b: where the waves travel towards, counter-clockwise seen from above relative to the
+  bow: 0 following, 90 deg towards port (coming from starboard), 180 deg head sea;
+* wave elevation at (x, y):  Re[a exp(i (omega t - k (x cos b + y sin b)))], so that long waves
+  give heave -> 1, pitch -> +i k cos b, roll -> -i k sin b at the point of zero phase;
+* small angles: the point at (x, y, z) from the origin heaves heave - x pitch + y roll.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError, check_ascending, check_finite, check_range, read_only
+from ..basics.dispersion import wave_number
+from .rao_table import between_headings, between_rows
+
+if TYPE_CHECKING:
+    from waveresponse import RAO
+
+__all__ = ["MODES", "VesselRaos"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+MODES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+"""The six motions, in the order of the last axis of every table."""
+
+MIRRORED = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+"""Sign of each motion in a mirror that swaps port and starboard."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VesselRaos:
+    """Response amplitude operators (RAOs) of a vessel's six motions.
+
+    Attributes
+    ----------
+    name
+        What the vessel is called.
+    omega
+        Wave frequencies as felt by a vessel at rest, strictly ascending, above zero (k,) [rad/s].
+    heading
+        Where the waves travel towards, strictly ascending in [0, 2 pi) (h,) [rad].
+    values
+        Motion per wave amplitude (k, h, 6), modes in the order of :data:`MODES` [m/m, rad/m].
+    origin
+        The point whose motions these are, in the vessel frame of the file [m].
+    phase_origin
+        Where in plan the wave has zero phase [m].
+    depth
+        Water depth, infinite for deep water [m].
+    speed
+        Forward speed at which the operators hold [m/s].
+    source
+        The file or program they come from.
+    notes
+        What the reader found and converted, a sentence each.
+
+    Raises
+    ------
+    InputError
+        If a table is unsorted, out of range, NaN or of another shape than the two axes ask for.
+
+    Examples
+    --------
+    >>> buoy = VesselRaos(name="raft", omega=[0.5, 1.0], heading=[0.0, math.pi],
+    ...                   values=np.tile([0, 0, 1, 0, 0, 0], (2, 2, 1)))
+    >>> complex(buoy.response(0.7, math.pi)[2])
+    (1+0j)
+    """
+
+    name: str
+    omega: FloatArray
+    heading: FloatArray
+    values: ComplexArray
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    phase_origin: tuple[float, float] = (0.0, 0.0)
+    depth: float = math.inf
+    speed: float = 0.0
+    source: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check the tables and make them read-only."""
+        owner = self.source or self.name or "RAOs"
+        omega = np.atleast_1d(check_ascending(owner, "omega", self.omega))
+        heading = np.atleast_1d(check_ascending(owner, "heading", self.heading))
+        if omega.ndim != 1 or omega.size < 2:
+            raise InputError(f"{owner}: omega must have at least 2 rows, got {omega.size}")
+        if heading.ndim != 1 or heading.size < 1:
+            raise InputError(f"{owner}: heading must have at least 1 row, got {heading.size}")
+        check_range(owner, "omega", omega[0], low=0.0, open_low=True, unit="rad/s")
+        check_range(owner, "heading", heading[0], low=0.0, unit="rad")
+        check_range(
+            owner, "heading", heading[-1], low=0.0, high=2.0 * math.pi, open_high=True, unit="rad"
+        )
+        values = np.array(self.values, dtype=np.complex128)
+        wanted = (omega.size, heading.size, len(MODES))
+        if values.shape != wanted:
+            raise InputError(
+                f"{owner}: values must have the shape (frequencies, headings, 6) = {wanted}, "
+                f"got {values.shape}"
+            )
+        bad = np.argwhere(~np.isfinite(values))
+        if bad.size:
+            row, column, mode = (int(i) for i in bad[0])
+            raise InputError(
+                f"{owner}: values must be finite numbers, got {values[row, column, mode]} for "
+                f"{MODES[mode]} at {omega[row]:g} rad/s, heading "
+                f"{math.degrees(heading[column]):g} deg"
+            )
+        values.setflags(write=False)
+        for name, size in (("origin", 3), ("phase_origin", 2)):
+            point = check_finite(owner, name, getattr(self, name))
+            if point.shape != (size,):
+                raise InputError(
+                    f"{owner}: {name} must be {size} numbers [m], got {point.tolist()}"
+                )
+            object.__setattr__(self, name, tuple(float(x) for x in point))
+        if not (math.isinf(self.depth) and self.depth > 0.0):
+            check_range(owner, "depth", self.depth, low=0.0, open_low=True, unit="m")
+        check_range(owner, "speed", self.speed, low=-50.0, high=50.0, unit="m/s")
+        object.__setattr__(self, "omega", read_only(omega))
+        object.__setattr__(self, "heading", read_only(heading))
+        object.__setattr__(self, "values", values)
+        object.__setattr__(self, "notes", tuple(self.notes))
+
+    @property
+    def heading_deg(self) -> FloatArray:
+        """The headings (h,) [deg]."""
+        return np.degrees(self.heading)
+
+    def mode(self, name: str) -> ComplexArray:
+        """Return one motion at the table's rows (k, h) [m/m or rad/m].
+
+        Raises
+        ------
+        InputError
+            If there is no such motion.
+        """
+        if name not in MODES:
+            raise InputError(f"{self.name}: a motion is one of {', '.join(MODES)}; got {name!r}")
+        found: ComplexArray = self.values[:, :, MODES.index(name)]
+        return found
+
+    def wave_number(self, omega: npt.ArrayLike) -> FloatArray:
+        """Return the wave number at the water depth of the table, same shape [rad/m]."""
+        return wave_number(omega, self.depth)
+
+    def response(self, omega: npt.ArrayLike, heading: npt.ArrayLike) -> ComplexArray:
+        """Return the six operators at any frequency and heading.
+
+        Between two frequencies amplitude and unwrapped phase are each linear, as in
+        :class:`models.vessel.vessel.HeaveRao` and for its reasons.  Between two headings the
+        complex number is linear, round the circle: in heading a motion such as roll passes
+        *through* zero, where amplitude and phase have a cusp and a jump and the complex number is
+        smooth. What does turn the complex number with heading is the wave's own phase between the
+        point of zero phase and the origin, k d cos(b - b0); it is taken out before and put back
+        after. At the rows the table comes back exactly.
+
+        Below the table heave tends linearly to 1 with zero phase, the angles keep their ratio to
+        the wave slope, the other motions their first value; above, amplitudes fall with omega^-2.
+
+        Parameters
+        ----------
+        omega, heading
+            Frequencies, at least zero [rad/s], and headings [rad]; they are broadcast.
+
+        Returns
+        -------
+        ComplexArray
+            Motions (..., 6) [m/m, rad/m].
+
+        Raises
+        ------
+        InputError
+            If a heading lies in a gap of the table wider than a quarter of the circle: nobody
+            has computed the vessel there.
+        """
+        frequency, direction = np.broadcast_arrays(
+            np.asarray(omega, dtype=np.float64), np.asarray(heading, dtype=np.float64)
+        )
+        owner = self.source or self.name
+        frequency = check_finite(owner, "omega", frequency)
+        direction = check_finite(owner, "heading", direction)
+        shape = frequency.shape
+        frequency, direction = frequency.ravel(), direction.ravel()
+        centred = self.values / self._wave_phase(self.omega[:, None], self.heading)[..., None]
+        rows, back = np.unique(frequency, return_inverse=True)
+        table = between_rows(self.omega, centred, rows, self.wave_number)
+        found = between_headings(owner, self.heading, table, back, direction)
+        found = found * self._wave_phase(frequency, direction)[:, None]
+        return found.reshape(*shape, len(MODES))
+
+    def at(self, point: Sequence[float]) -> VesselRaos:
+        """Return the motions of another point of the same rigid vessel.
+
+        Small angles; complex, so that every motion keeps its phase.  The point of zero wave
+        phase stays where it is.
+
+        Parameters
+        ----------
+        point
+            The point, in the same frame as `origin` (3,) [m].
+
+        Raises
+        ------
+        InputError
+            If the point is not three finite numbers.
+        """
+        target = check_finite(self.name, "point", list(point))
+        if target.shape != (3,):
+            raise InputError(f"{self.name}: point must be 3 numbers [m], got {target.tolist()}")
+        x, y, z = target - np.asarray(self.origin)
+        surge, sway, heave, roll, pitch, yaw = np.moveaxis(self.values, -1, 0)
+        moved = np.stack(
+            [
+                surge - y * yaw + z * pitch,
+                sway + x * yaw - z * roll,
+                heave - x * pitch + y * roll,
+                roll,
+                pitch,
+                yaw,
+            ],
+            axis=-1,
+        )
+        place = (float(target[0]), float(target[1]), float(target[2]))
+        return replace(self, values=moved, origin=place)
+
+    def heave_at(self, point: Sequence[float], heading: float) -> ComplexArray:
+        """Return the heave of a point at the table's frequencies (k,) [m/m].
+
+        Parameters
+        ----------
+        point
+            The point, in the same frame as `origin` (3,) [m].
+        heading
+            Where the waves travel towards [rad].
+        """
+        moved: ComplexArray = self.at(point).response(self.omega, heading)[:, 2]
+        return moved
+
+    def with_phase_origin(self, place: Sequence[float]) -> VesselRaos:
+        """Return the same motions against a wave of zero phase at another place in plan.
+
+        Elevation at P1 over that at P0 is exp(-i k (P1 - P0) . (cos b, sin b)); motion per
+        elevation is divided by it.
+
+        Parameters
+        ----------
+        place
+            Where the wave has zero phase, in the same frame as `origin` (2,) [m].
+        """
+        new = (float(place[0]), float(place[1]))
+        dx, dy = new[0] - self.phase_origin[0], new[1] - self.phase_origin[1]
+        along = dx * np.cos(self.heading) + dy * np.sin(self.heading)
+        turn = np.exp(1j * self.wave_number(self.omega)[:, None] * along)
+        return replace(self, values=self.values * turn[..., None], phase_origin=new)
+
+    def mirrored(self) -> VesselRaos:
+        """Return the mirror image of the vessel: port and starboard swapped."""
+        heading = np.mod(-self.heading, 2.0 * math.pi)
+        order = np.argsort(heading)
+        x, y, z = self.origin
+        return replace(
+            self,
+            heading=heading[order],
+            values=(self.values * MIRRORED)[:, order],
+            origin=(x, -y, z),
+            phase_origin=(self.phase_origin[0], -self.phase_origin[1]),
+        )
+
+    def to_waveresponse(self) -> dict[str, RAO]:
+        """Return the six motions as :class:`waveresponse.RAO` objects, named by :data:`MODES`."""
+        from .readers.waveresponse_bridge import to_waveresponse
+
+        return to_waveresponse(self)
+
+    @classmethod
+    def from_waveresponse(
+        cls, raos: Mapping[str, RAO], *, name: str = "vessel", depth: float = math.inf
+    ) -> VesselRaos:
+        """Return six :class:`waveresponse.RAO` objects as one table.
+
+        Parameters
+        ----------
+        raos
+            One object per motion, under the names of :data:`MODES`; what is missing is zero.
+            Their own wave conventions are read from them.
+        name
+            What the vessel is called.
+        depth
+            Water depth [m].
+
+        Raises
+        ------
+        InputError
+            If a motion is unknown, or two of them have different frequencies or headings.
+        """
+        from .readers.waveresponse_bridge import from_waveresponse
+
+        return from_waveresponse(raos, name=name, depth=depth)
+
+    def _wave_phase(self, omega: FloatArray, heading: FloatArray) -> ComplexArray:
+        """Return the elevation at the origin over that at the phase origin (...,)."""
+        dx = self.origin[0] - self.phase_origin[0]
+        dy = self.origin[1] - self.phase_origin[1]
+        along = dx * np.cos(heading) + dy * np.sin(heading)
+        phase: ComplexArray = np.exp(-1j * self.wave_number(omega) * along)
+        return phase

@@ -1,0 +1,1 @@
+"""RAO files of other programs and our own, each read into one convention."""

@@ -1,0 +1,337 @@
+"""RAOs as text that anybody can write: the project's CSV file.
+
+Lines that start with `#` say what the table means, as `# key: value`; then a header line and one
+line for each frequency and heading, in any order:
+
+    # name: supply vessel
+    # origin: -5.4, 0, 0
+    # rotations: deg/m
+    # phase: lags
+    period [s], heading, heave_amplitude, heave_phase, roll_amplitude, roll_phase, ...
+    25.0, 180, 0.985, -2.1, 0.01, 3.0, ...
+
+The keys are those of :class:`models.vessel.convention.Convention`, and `name`, `origin`,
+`phase_origin`, `depth`, `speed`, `symmetry`, `source` and `note`; what is not told is the
+project's own convention.  The first column is `omega` [rad/s], `frequency` [Hz] or `period` [s],
+the second `heading` [deg]; a motion is `_amplitude` and `_phase` [deg], or `_real` and `_imag`.
+Motions without columns are zero; heave must be there.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from ...basics.checks import InputError, check_range
+from ...basics.dispersion import wave_number
+from ..assemble import finished, grid, numbers
+from ..convention import CHOICES, Convention, one_of
+from ..raos import MODES, VesselRaos
+from ..symmetry import SYMMETRIES
+
+__all__ = ["csv_text", "looks_like_csv", "parse_csv"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+FORMAT = "Stillhook RAOs, version 1"
+
+_ABOUT = ("name", "origin", "phase_origin", "depth", "speed", "symmetry", "source", "note")
+_KEY = re.compile(r"^#\s*([A-Za-z_ ]+?)\s*:\s*(.*?)\s*$")
+_COLUMN = re.compile(r"^([a-z_ ]+?)\s*(?:[\[(]\s*(.*?)\s*[\])])?$")
+_FIRST = {"omega": "frequency (rad/s)", "frequency": "frequency (Hz)", "period": "period (s)"}
+_FIRST_UNITS = {"rad/s": "frequency (rad/s)", "hz": "frequency (Hz)", "s": "period (s)"}
+_PARTS = {"amplitude": 0, "amp": 0, "phase": 1, "real": 2, "re": 2, "imag": 3, "im": 3}
+_NAMES = ("amplitude", "phase", "real", "imag")
+_TURN_UNITS = {"deg": "degrees", "rad": "radians", "degrees": "degrees", "radians": "radians"}
+_ANGLES = {"deg/m": "deg/m", "rad/m": "rad/m", "": ""}
+
+
+def looks_like_csv(text: str) -> bool:
+    """Say whether the first line that is no remark names a heading and a motion."""
+    for line in text.splitlines()[:200]:
+        if line.strip() and not line.lstrip().startswith("#"):
+            words = line.lower()
+            return "heading" in words and any(f"{mode}_" in words for mode in MODES)
+    return False
+
+
+def parse_csv(owner: str, text: str, *, name: str | None = None) -> VesselRaos:
+    """Return the table of a CSV file.
+
+    Parameters
+    ----------
+    owner, text
+        The file's path, for messages, and what is in it.
+    name
+        What the vessel is called; if left out, the name in the file.
+
+    Raises
+    ------
+    InputError
+        If a key or a column is unknown, a line has another number of columns than the header, a
+        word is no number, or rows are missing.
+    """
+    told, notes, body, start = _head(owner, text)
+    columns, rows = _rows(owner, body, start)
+    known = {*CHOICES, "heading_zero"}
+    choices = {key: value for key, value in told.items() if key in known}
+    first = columns.pop("first")
+    convention = _convention(owner, choices, str(first), columns)
+    depth = _figure(owner, "depth", told, math.inf)
+    low, high = float(rows[:, 0].min()), float(rows[:, 0].max())
+    if not (low > 1e-6 and high < 1e6):
+        raise InputError(
+            f"{owner}: {first} must be in (1e-6, 1e6), got {low:g} to {high:g} in the first column"
+        )
+    omega = convention.omega(rows[:, 0])
+    in_radians = columns.pop("heading") == "radians"
+    heading = np.degrees(rows[:, 1]) if in_radians else rows[:, 1]
+    if np.any(np.abs(heading) > 720.0):
+        raise InputError(f"{owner}: heading must be in [-720, 720] deg, got {heading.max():g} deg")
+    slope = wave_number(omega, depth)
+    values, missing = _values(owner, rows, columns, convention, slope)
+    origin = _point(owner, "origin", told, (0.0, 0.0, 0.0))
+    zero = _point(owner, "phase_origin", told, origin[:2])
+    w, b, table = grid(owner, omega, convention.directions(heading), values)
+    found = [f"CSV: {convention.words()}"]
+    if missing:
+        found.append(f"no columns for {', '.join(missing)}: taken as zero")
+    own = told.get("convention format", "") == FORMAT
+    raos = VesselRaos(
+        name=name or told.get("name", "vessel"), omega=w, heading=b, values=table,
+        origin=(origin[0], origin[1], origin[2]), phase_origin=(zero[0], zero[1]), depth=depth,
+        speed=_figure(owner, "speed", told, 0.0), source=told.get("source", "") or owner,
+        notes=tuple(notes) if own and convention == Convention() else (*notes, *found),
+    )  # fmt: skip
+    symmetry = (
+        one_of(owner, "symmetry", told["symmetry"], SYMMETRIES) if "symmetry" in told else None
+    )
+    # What we wrote ourselves is whole; only a file from elsewhere may be one side of a ship.
+    return raos if own and symmetry is None else finished(raos, symmetry=symmetry)
+
+
+def csv_text(raos: VesselRaos, *, complex_numbers: bool = True) -> str:
+    """Return a table as the text of a CSV file, in the project's convention.
+
+    Parameters
+    ----------
+    raos
+        What to write.
+    complex_numbers
+        Real and imaginary parts, which read back to the last digit; else amplitudes and phases
+        [deg], which a person reads.
+    """
+    out = io.StringIO()
+    out.write(f"# format: {FORMAT}\n")
+    x, y, z = raos.origin
+    about = [
+        ("name", raos.name),
+        ("source", raos.source),
+        ("origin", f"{x!r}, {y!r}, {z!r}"),
+        ("phase_origin", f"{raos.phase_origin[0]!r}, {raos.phase_origin[1]!r}"),
+        ("depth", repr(raos.depth)),
+        ("speed", repr(raos.speed)),
+        *(("note", note) for note in raos.notes),
+    ]
+    for key, value in about:
+        out.write(f"# {key}: {' '.join(str(value).split())}\n")
+    parts = ("real", "imag") if complex_numbers else ("amplitude", "phase")
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(
+        ["omega [rad/s]", "heading [deg]", *(f"{m}_{part}" for m in MODES for part in parts)]
+    )
+    amplitude, phase, values = Convention().table(raos.values, np.ones(raos.values.shape[:2]))
+    first, second = (values.real, values.imag) if complex_numbers else (amplitude, phase)
+    degrees = Convention().headings_deg(raos.heading)
+    for j, heading in enumerate(degrees):
+        for i, omega in enumerate(raos.omega):
+            cells = np.column_stack([first[i, j], second[i, j]]).ravel()
+            writer.writerow([repr(float(v)) for v in (omega, heading, *cells)])
+    return out.getvalue()
+
+
+def _head(owner: str, text: str) -> tuple[dict[str, str], list[str], list[str], int]:
+    """Return what the remarks tell, the notes among them, and the lines that follow."""
+    told: dict[str, str] = {}
+    notes = []
+    lines = text.splitlines()
+    body: list[str] = []
+    start = 0
+    for number, line in enumerate(lines, start=1):
+        bare = line.strip()
+        if not bare:
+            continue
+        if not bare.startswith("#"):
+            body, start = lines[number - 1 :], number
+            break
+        match = _KEY.match(bare)
+        if match is None:
+            continue
+        key, value = match[1].strip().lower().replace(" ", "_"), match[2]
+        if key == "format":
+            told["convention format"] = value
+        elif key == "note":
+            notes.append(value)
+        elif key in CHOICES:
+            told[key] = one_of(owner, key, value, CHOICES[key])
+        elif key == "heading_zero" or key in _ABOUT:
+            told[key] = value
+        # Any other remark is a remark.
+    return told, notes, body, start
+
+
+def _rows(owner: str, lines: list[str], start: int) -> tuple[dict[str, object], FloatArray]:
+    """Return what the columns are, and the numbers below them."""
+    if not lines:
+        raise InputError(f"{owner}: there is no line of column names in this file")
+    mark = max(",;\t", key=lines[0].count)
+    try:
+        table = list(csv.reader(lines, delimiter=mark))
+    except csv.Error as error:
+        raise InputError(f"{owner}: cannot be read as CSV: {error}") from error
+    columns = _columns(owner, [cell.strip() for cell in table[0]])
+    width = len(table[0])
+    found = []
+    for number, row in enumerate(table[1:], start=start + 1):
+        if not any(cell.strip() for cell in row) or row[0].lstrip().startswith("#"):
+            continue
+        if len(row) != width:
+            raise InputError(
+                f"{owner}, line {number}: must have {width} columns as the header has, got "
+                f"{len(row)}; is the file cut off?"
+            )
+        found.append(numbers(owner, number, [cell.strip() for cell in row]))
+    if not found:
+        raise InputError(f"{owner}: there is no row of RAOs below the column names")
+    return columns, np.array(found, dtype=np.float64)
+
+
+def _columns(owner: str, names: list[str]) -> dict[str, object]:
+    """Return what the first two columns are, and (column, unit) of each `mode part`."""
+    columns: dict[str, object] = {}
+    for index, name in enumerate(names):
+        match = _COLUMN.match(name.lower())
+        word, unit = (match[1], (match[2] or "").lower()) if match else ("", "")
+        if index == 0:
+            if word not in _FIRST or (unit and unit not in _FIRST_UNITS):
+                raise InputError(
+                    f"{owner}: the first column must be omega [rad/s], frequency [Hz] or period "
+                    f"[s], got {name!r}"
+                )
+            columns["first"] = _FIRST_UNITS[unit] if unit else _FIRST[word]
+        elif index == 1:
+            if word != "heading" or (unit and unit not in _TURN_UNITS):
+                raise InputError(
+                    f"{owner}: the second column must be heading [deg] or [rad], got {name!r}"
+                )
+            columns["heading"] = _TURN_UNITS[unit] if unit else "degrees"
+        else:
+            mode, _, part = word.rpartition("_")
+            key = f"{mode} {_NAMES[_PARTS[part]]}" if mode in MODES and part in _PARTS else ""
+            if not key or key in columns:
+                raise InputError(
+                    f"{owner}: a column must be a motion ({', '.join(MODES)}) with _amplitude, "
+                    f"_phase, _real or _imag, each once; got {name!r}"
+                )
+            columns[key] = (index, unit)
+    if "heading" not in columns:
+        raise InputError(f"{owner}: there must be a second column, heading [deg]")
+    return columns
+
+
+def _convention(
+    owner: str, told: Mapping[str, str], first: str, columns: Mapping[str, object]
+) -> Convention:
+    """Return the convention of the remarks, and of the units in the column names."""
+    choices = dict(told)
+    choices["waves"] = first
+    for key, entry in columns.items():
+        if not isinstance(entry, tuple) or not entry[1]:
+            continue
+        mode, part = key.split()
+        unit = entry[1]
+        if part == "phase" and unit in _TURN_UNITS:
+            field, value = "phase_unit", _TURN_UNITS[unit]
+        elif mode in MODES[3:] and part != "phase" and unit in _ANGLES:
+            field, value = "rotations", _ANGLES[unit]
+        elif mode in MODES[:3] and part != "phase" and unit in {"m/m", "-"}:
+            continue
+        else:
+            raise InputError(f"{owner}: the unit [{unit}] of {mode}_{part} is not known")
+        if choices.setdefault(field, value) != value:
+            raise InputError(
+                f"{owner}: {field} is told twice: {choices[field]}, and {value} at {mode}_{part}"
+            )
+    zero = choices.pop("heading_zero", "0")
+    fields = {key: value for key, value in choices.items() if key in CHOICES}
+    return Convention(**fields, heading_zero=_one(owner, "heading_zero", zero))
+
+
+def _values(
+    owner: str,
+    rows: FloatArray,
+    columns: Mapping[str, object],
+    convention: Convention,
+    slope: FloatArray,
+) -> tuple[ComplexArray, list[str]]:
+    """Return the operators of each row (n, 6), and the motions that have no columns."""
+    table = np.zeros((len(rows), len(MODES)), dtype=np.complex128)
+    turn = 1.0 if convention.phase_unit == "radians" else math.pi / 180.0
+    missing = []
+
+    def column(key: str) -> FloatArray | None:
+        entry = columns.get(key)
+        return rows[:, entry[0]] if isinstance(entry, tuple) else None
+
+    for i, mode in enumerate(MODES):
+        amplitude, phase, real, imag = (column(f"{mode} {part}") for part in _NAMES)
+        if real is not None and imag is not None and amplitude is None and phase is None:
+            table[:, i] = real + 1j * imag
+        elif amplitude is not None and phase is not None and real is None and imag is None:
+            if np.any(amplitude < 0.0):
+                raise InputError(
+                    f"{owner}: {mode}_amplitude must be at least 0, got {amplitude.min():g}"
+                )
+            table[:, i] = amplitude * np.exp(1j * turn * phase)
+        elif all(part is None for part in (amplitude, phase, real, imag)):
+            missing.append(mode)
+        else:
+            raise InputError(
+                f"{owner}: {mode} must have the columns _amplitude and _phase, or _real and _imag"
+            )
+    if "heave" in missing:
+        raise InputError(f"{owner}: there are no columns for heave")
+    return convention.complex_values(table, slope), missing
+
+
+def _one(owner: str, name: str, word: str) -> float:
+    try:
+        return check_range(owner, name, float(word), low=-1e4, high=1e4)
+    except ValueError:
+        raise InputError(f"{owner}: {name} must be a number, got {word[:40]!r}") from None
+
+
+def _figure(owner: str, name: str, told: Mapping[str, str], default: float) -> float:
+    if name not in told:
+        return default
+    if name == "depth" and told[name].strip().lower() in {"inf", "infinite", "deep"}:
+        return math.inf
+    return _one(owner, name, told[name])
+
+
+def _point(
+    owner: str, name: str, told: Mapping[str, str], default: tuple[float, ...]
+) -> tuple[float, ...]:
+    if name not in told:
+        return default
+    words = told[name].replace(",", " ").split()
+    if len(words) != len(default):
+        raise InputError(f"{owner}: {name} must be {len(default)} numbers [m], got {told[name]!r}")
+    return tuple(_one(owner, name, word) for word in words)

@@ -1,0 +1,233 @@
+"""RAOs from OrcaFlex: the vessel types of a text data file (.yml).
+
+The file tells every convention there is, and each of them is honoured: lead or lag, degrees or
+radians, relative to crest, trough or zero crossing; period or frequency; angles over amplitude,
+largest wave slope or steepness; the positive direction of each motion; symmetry; and *two* points,
+the one whose motions the RAOs are (`RAOOrigin`) and the one where the wave has zero phase
+(`PhaseOrigin`, `~` for the former).  Both are given in the vessel's axes, x forward, y to port, z
+up, whatever the positive directions are; directions are where the waves travel towards (Orcina,
+OrcaFlex help, *Vessel types: Conventions* and *RAOs*).  Slope and steepness go by the wave length
+in deep water, as OrcaFlex itself does.
+
+Older versions write `RAOPeriodOrFreq` where newer ones write `RAOPeriodOrFrequency`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...basics.checks import InputError, check_finite
+from ...basics.dispersion import wave_number
+from ..assemble import finished, grid
+from ..convention import Convention, one_of
+from ..raos import VesselRaos
+from ..symmetry import SYMMETRIES
+from .orcaflex_text import TABLE_KEYS, read_vessel_types, table_of
+
+__all__ = ["looks_like_orcaflex", "parse_orcaflex"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+Entry = dict[str, Any]
+
+_KINDS = {"displacement": "DisplacementRAOs", "load": "LoadRAOs"}
+_LOAD_UNIT = 1e3  # kN to N: the units of OrcaFlex's SI system
+_UNITS = re.compile(r"^[ ]*UnitsSystem:[ ]*(\S+)", re.MULTILINE)
+_PERIODS = (1e-6, 1e6)
+
+
+def looks_like_orcaflex(text: str) -> bool:
+    """Say whether a text has vessel types, or tables of RAOs as OrcaFlex heads them."""
+    return "VesselTypes:" in text or any(f"{key}," in text for key in TABLE_KEYS)
+
+
+def parse_orcaflex(
+    owner: str,
+    text: str,
+    *,
+    name: str | None = None,
+    vessel_type: str | None = None,
+    draught: str | None = None,
+    kind: str = "displacement",
+    depth: float = math.inf,
+) -> VesselRaos:
+    """Return the RAOs of one draught of one vessel type.
+
+    Parameters
+    ----------
+    owner, text
+        The file's path, for messages, and what is in it.
+    name
+        What the vessel is called; if left out, the name of the vessel type.
+    vessel_type, draught
+        Their names in the file; if left out, the first that has RAOs.
+    kind
+        `displacement`; or `load` for the wave loads, whose `values` are then N/m and N m/m.
+    depth
+        Water depth for which they hold [m]; the vessel type does not tell.
+
+    Raises
+    ------
+    InputError
+        If the file is something else, cut off, lacks a convention or knows one that OrcaFlex does
+        not have, or the vessel type, the draught or its RAOs are not there.
+    """
+    units = _UNITS.search(text)
+    if units is not None and units[1] != "SI":
+        raise InputError(
+            f"{owner}: UnitsSystem must be SI, got {units[1]!r}: set it in OrcaFlex and save again"
+        )
+    section = _KINDS[one_of(owner, "kind", kind, tuple(_KINDS))]
+    types, tables = read_vessel_types(owner, text)
+    found = _candidates(owner, types, section, vessel_type, draught)
+    vessel, state, block = found[0]
+    convention = _convention(owner, vessel, load=kind == "load")
+    omega, heading, values = _table(owner, block, tables, convention, load=kind == "load")
+    origin = _point(owner, f"{section}.RAOOrigin", block.get("RAOOrigin"), (0.0, 0.0, 0.0))
+    zero = _point(owner, f"{section}.PhaseOrigin", block.get("PhaseOrigin"), origin)
+    symmetry = one_of(owner, "Symmetry", vessel.get("Symmetry", "None"), SYMMETRIES)
+    title = str(vessel.get("Name", "vessel"))
+    notes = [
+        f"OrcaFlex vessel type {title!r}, draught {state.get('Name', '1')!r}, {section}",
+        f"conventions of the file: {convention.words()}",
+    ]
+    if len(found) > 1:
+        rest = ", ".join(f"{v.get('Name')!r} {d.get('Name')!r}" for v, d, _ in found[1:4])
+        notes.append(f"other RAOs in the file: {rest}{', ..' if len(found) > 4 else ''}")
+    raos = VesselRaos(
+        name=name or title, omega=omega, heading=heading, values=values, origin=origin,
+        phase_origin=zero[:2], depth=depth, source=owner, notes=tuple(notes),
+    )  # fmt: skip
+    return finished(raos, symmetry=symmetry)
+
+
+def _candidates(
+    owner: str, types: list[Entry], section: str, vessel_type: str | None, draught: str | None
+) -> list[tuple[Entry, Entry, Entry]]:
+    """Return what has RAOs and the names asked for: vessel type, draught, the RAOs' block."""
+    found = []
+    names = []
+    for vessel in types:
+        states = vessel.get("Draughts")
+        for state in states if isinstance(states, list) else [vessel]:
+            if not isinstance(state, dict):
+                continue
+            names.append(f"{vessel.get('Name')!r} {state.get('Name')!r}")
+            asked = vessel_type in {None, str(vessel.get("Name"))}
+            asked = asked and draught in {None, str(state.get("Name"))}
+            block = state.get(section)
+            if asked and isinstance(block, dict) and _has_table(block):
+                found.append((vessel, state, block))
+    if not found:
+        wanted = " ".join(repr(x) for x in (vessel_type, draught) if x is not None)
+        raise InputError(
+            f"{owner}: there are no {section} for {wanted or 'any vessel type'} in this file, "
+            f"which has {', '.join(names[:6]) or 'no draught'}"
+            + ("; it may have load RAOs only" if section == "DisplacementRAOs" else "")
+        )
+    return found
+
+
+def _has_table(block: Entry) -> bool:
+    rows = block.get("RAOs")
+    return isinstance(rows, list) and any(isinstance(r, dict) and _entry(r) for r in rows)
+
+
+def _entry(row: Entry) -> Any:
+    """Return the table of a direction, whatever the version calls it."""
+    for key, value in row.items():
+        if str(key).startswith(TABLE_KEYS):
+            return value
+    return None
+
+
+def _convention(owner: str, vessel: Entry, *, load: bool) -> Convention:
+    """Return what the vessel type says its numbers mean."""
+
+    def told(key: str, choices: tuple[str, ...]) -> str:
+        if key not in vessel:
+            raise InputError(
+                f"{owner}: {key} is missing (one of {', '.join(choices)}); without it the RAOs "
+                "mean nothing; is the file cut off?"
+            )
+        return one_of(owner, key, vessel[key], choices)
+
+    unit = told("RAOResponseUnits", ("degrees", "radians"))
+    wave = told("RAOWaveUnit", ("amplitude", "max wave slope", "wave steepness"))
+    # Over a slope in the same unit, degrees and radians are the same number.
+    rotations = ("deg/m" if unit == "degrees" else "rad/m") if wave == "amplitude" else wave
+    return Convention(
+        waves=told("WavesReferredToBy", ("period (s)", "frequency (rad/s)", "frequency (Hz)")),
+        phase=told("RAOPhaseConvention", ("leads", "lags")),
+        phase_unit=told("RAOPhaseUnitsConvention", ("degrees", "radians")),
+        phase_relative_to=told(
+            "RAOPhaseRelativeToConvention",
+            ("crest", "trough", "zero up-crossing", "zero down-crossing"),
+        ),
+        rotations="rad/m" if load else rotations,
+        surge=told("SurgePositive", ("forward", "aft")),
+        sway=told("SwayPositive", ("port", "starboard")),
+        heave=told("HeavePositive", ("up", "down")),
+        roll=f"starboard {told('RollPositiveStarboard', ('down', 'up'))}",
+        pitch=f"bow {told('PitchPositiveBow', ('down', 'up'))}",
+        yaw=f"bow to {told('YawPositiveBow', ('port', 'starboard'))}",
+    )
+
+
+def _table(
+    owner: str, block: Entry, tables: list[FloatArray], convention: Convention, *, load: bool
+) -> tuple[FloatArray, FloatArray, ComplexArray]:
+    """Return frequencies, headings and operators of a block of RAOs."""
+    omega, heading, values = [], [], []
+    for row in block["RAOs"]:
+        entry = _entry(row) if isinstance(row, dict) else None
+        if not entry:
+            continue
+        direction = check_finite(owner, "RAODirection", _number(owner, row.get("RAODirection")))
+        table = table_of(owner, entry, tables)
+        first = table[:, 0]
+        low, high = _PERIODS
+        # An infinite or zero period is no wave of a sea.
+        real = (first > low) & (first < high)
+        if not np.any(real):
+            raise InputError(f"{owner}: no period or frequency in ({low:g}, {high:g}) in a table")
+        frequency = convention.omega(first[real])
+        omega.append(frequency)
+        heading.append(np.full(frequency.size, float(convention.directions(direction))))
+        slope = wave_number(frequency)
+        values.append(convention.values(table[real, 1::2], table[real, 2::2], slope))
+    rows = np.concatenate(values) * (_LOAD_UNIT if load else 1.0)
+    if not np.any(rows):
+        raise InputError(
+            f"{owner}: all RAOs of this vessel type are zero: they were never filled in"
+        )
+    return grid(owner, np.concatenate(omega), np.concatenate(heading), rows)
+
+
+def _number(owner: str, value: object) -> float:
+    if isinstance(value, (int, float, str)) and not isinstance(value, bool):
+        try:
+            return float(value)
+        except ValueError:
+            pass
+    raise InputError(f"{owner}: RAODirection must be a number [deg], got {value!r}")
+
+
+def _point(
+    owner: str, name: str, value: object, default: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Return a point of the vessel [m]; `~`, YAML's nothing, stands for the default."""
+    if value is None:
+        return default
+    if not isinstance(value, list) or len(value) != 3:
+        raise InputError(f"{owner}: {name} must be 3 numbers [m], got {value!r}")
+    filled = [d if v is None or v == "~" else v for v, d in zip(value, default, strict=True)]
+    x, y, z = check_finite(owner, name, filled)
+    if max(abs(x), abs(y), abs(z)) > 1e4:
+        raise InputError(f"{owner}: {name} must be within 10 km, got {value!r}")
+    return float(x), float(y), float(z)

@@ -1,0 +1,117 @@
+"""The headings that a table leaves out because the vessel is symmetric.
+
+Most programs compute waves from one side only.  A vessel whose port and starboard halves are
+mirror images answers waves from the other side with the mirrored motions: surge, heave and pitch
+as they are, sway, roll and yaw with the other sign.  Fore-and-aft symmetry turns surge, pitch and
+yaw round; a body of revolution has one table for all headings.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError
+from .raos import VesselRaos
+
+__all__ = ["SYMMETRIES", "completed", "looks_symmetric"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+SYMMETRIES = ("none", "xz plane", "yz plane", "xz and yz planes", "circular")
+"""What a vessel may be symmetric about."""
+
+PORT_STARBOARD = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+FORE_AFT = np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
+
+_SAME = 1e-7  # rad: two headings that are one
+_SMALL = 0.02  # of its largest that sway, roll and yaw may be in seas from ahead or astern
+_CIRCLE = 72  # headings made of one, for a body of revolution
+
+
+def completed(raos: VesselRaos, symmetry: str) -> VesselRaos:
+    """Return the table with the headings that follow from a symmetry.
+
+    Parameters
+    ----------
+    raos
+        A table whose origin is on the plane, or the axis, of symmetry.
+    symmetry
+        One of :data:`SYMMETRIES`.
+
+    Raises
+    ------
+    InputError
+        If the symmetry is unknown, or circular with more than one heading given.
+    """
+    if symmetry == "none":
+        return raos
+    if symmetry == "circular":
+        return _circular(raos)
+    if symmetry not in SYMMETRIES:
+        raise InputError(f"{raos.source}: symmetry must be one of {SYMMETRIES}, got {symmetry!r}")
+    found = raos
+    if "xz" in symmetry:
+        found = _joined(found, -found.heading, found.values * PORT_STARBOARD)
+    if "yz" in symmetry:
+        found = _joined(found, math.pi - found.heading, found.values * FORE_AFT)
+    return found
+
+
+def looks_symmetric(raos: VesselRaos) -> bool:
+    """Say whether a table of one side only can be taken for half of a symmetric vessel.
+
+    Its headings lie in one half of the circle, and waves from ahead or astern, of which there
+    must be one, make next to no sway, roll and yaw.
+    """
+    side = np.sin(raos.heading)
+    along = np.abs(side) < 1e-6
+    one_side = bool(np.all(side > -1e-6) or np.all(side < 1e-6))
+    if not one_side or not np.any(along) or np.all(along):
+        return False
+    size = np.abs(raos.values[:, :, [1, 3, 5]])
+    largest = size.max(axis=(0, 1))
+    return bool(np.all(size[:, along].max(axis=(0, 1)) <= _SMALL * largest))
+
+
+def _joined(raos: VesselRaos, heading: FloatArray, values: ComplexArray) -> VesselRaos:
+    """Return the table with those of the new headings that it does not have."""
+    turn = 2.0 * math.pi
+    new = np.mod(heading, turn)
+    new = np.where(turn - new < _SAME, 0.0, new)
+    away = np.abs(new[:, None] - raos.heading)
+    fresh = np.flatnonzero(np.all(np.minimum(away, turn - away) > _SAME, axis=1))
+    every = np.concatenate([raos.heading, new[fresh]])
+    order = np.argsort(every)
+    table = np.concatenate([raos.values, values[:, fresh]], axis=1)
+    return replace(raos, heading=every[order], values=table[:, order])
+
+
+def _circular(raos: VesselRaos) -> VesselRaos:
+    """Return one heading turned round the circle: surge and sway, roll and pitch are vectors."""
+    if raos.heading.size != 1:
+        raise InputError(
+            f"{raos.source}: a table with circular symmetry must have 1 heading, "
+            f"got {raos.heading.size}"
+        )
+    heading = np.radians(np.arange(_CIRCLE) * 360.0 / _CIRCLE)
+    turn = heading - raos.heading[0]
+    c, s = np.cos(turn), np.sin(turn)
+    surge, sway, heave, roll, pitch, yaw = np.moveaxis(raos.values, -1, 0)
+    ones = np.ones_like(c)
+    values = np.stack(
+        [
+            surge * c - sway * s,
+            surge * s + sway * c,
+            heave * ones,
+            roll * c - pitch * s,
+            roll * s + pitch * c,
+            yaw * ones,
+        ],
+        axis=-1,
+    )
+    return replace(raos, heading=heading, values=values)

@@ -1,0 +1,283 @@
+"""The vessel: how far the hook heaves per metre of wave.
+
+Second room in the data's way: a sea's spectrum times |RAO|^2 is the hook motion's spectrum.  The
+vessel is one response amplitude operator (RAO) of heave at the hook, a table over frequency: given
+in the case, or made of the RAOs of the vessel's six motions (`models.vessel`) for the place of the
+hook and the headings of the sea.
+
+Between the rows, amplitude and unwrapped phase are each interpolated linearly.  Linear on the
+complex number would cut the corner between two rows whose phases differ and read too low an
+amplitude; a smooth curve would invent a peak that nobody measured.  A line stays within the
+printed values, keeps a constant amplitude constant, and gives the same numbers in every tool.
+
+A table has ends, and a spectrum reaches beyond them.  What the RAO is out there is a choice of
+the case, `below` and `beyond`, and :meth:`HeaveRao.share_outside` tells how much hangs on it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from ..basics.checks import InputError, check_ascending, check_finite, read_only
+from ..basics.quadrature import SpectralDensity, adaptive_nodes
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+
+__all__ = ["BELOW", "BEYOND", "HeaveRao", "OutsideShare"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+BELOW = ("unity", "hold", "zero")
+"""What the RAO may be below its table: linear to 1 at zero frequency, its first value, or 0."""
+
+BEYOND = ("hold", "zero", "decay")
+"""What the RAO may be above its table: its last value, 0, or falling with omega^-2."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutsideShare:
+    """Share of a variance that comes from outside a RAO's table [-].
+
+    Attributes
+    ----------
+    below, beyond
+        Shares below the first and above the last frequency of the table.  Where the RAO is cut
+        to zero the share is what holding its end value would have given.
+    """
+
+    below: float
+    beyond: float
+
+    @property
+    def total(self) -> float:
+        """Both ends together [-]."""
+        return self.below + self.beyond
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HeaveRao:
+    """Heave of the hook per metre of wave amplitude, a table over frequency.
+
+    Time factor e^{+i omega t}, heave positive up, against a wave elevation that has zero phase at
+    the RAO's origin.
+
+    Attributes
+    ----------
+    omega
+        Frequencies, strictly ascending (k,), k >= 2 [rad/s].
+    amplitude
+        Amplitudes (k,) [m/m].
+    phase
+        Phases, positive where heave leads the wave (k,) [rad]; zero if left out.
+    below, beyond
+        What the operator is outside the table: one of :data:`BELOW` and one of :data:`BEYOND`.
+    owner
+        The field of the case that the table comes from, for messages.
+
+    Raises
+    ------
+    InputError
+        If the table is unsorted, has unequal lengths or fewer than two rows, or a value is
+        negative, NaN or unknown.
+
+    Examples
+    --------
+    >>> rao = HeaveRao(omega=[0.5, 1.0], amplitude=[1.0, 0.4], below="unity", beyond="decay")
+    >>> [float(a) for a in abs(rao.response([0.25, 0.75, 2.0])).round(3)]
+    [1.0, 0.7, 0.1]
+    """
+
+    omega: FloatArray
+    amplitude: FloatArray
+    phase: FloatArray | None = None
+    below: str = "unity"
+    beyond: str = "decay"
+    owner: str = "vessel.heave_rao"
+
+    def __post_init__(self) -> None:
+        """Check the table and make its arrays read-only."""
+        owner = self.owner
+        omega = check_ascending(owner, "omega", check_finite(owner, "omega", self.omega))
+        if omega.ndim != 1 or omega.size < 2:
+            raise InputError(f"{owner}: omega must have at least 2 rows, got {omega.size}")
+        if omega[0] < 0.0:
+            raise InputError(f"{owner}: omega must be at least 0 rad/s, got {omega[0]:g}")
+        amplitude = check_finite(owner, "amplitude", self.amplitude)
+        phase = check_finite(
+            owner, "phase", np.zeros(omega.size) if self.phase is None else self.phase
+        )
+        for name, column in (("amplitude", amplitude), ("phase", phase)):
+            if column.shape != omega.shape:
+                raise InputError(
+                    f"{owner}: {name} must have as many rows as omega ({omega.size}), "
+                    f"got {column.size}"
+                )
+        if np.any(amplitude < 0.0):
+            i = int(np.argmax(amplitude < 0.0))
+            raise InputError(
+                f"{owner}: amplitude must be at least 0 m/m, got {amplitude[i]:g} at index {i}"
+            )
+        for name, choice, choices in (
+            ("below", self.below, BELOW),
+            ("beyond", self.beyond, BEYOND),
+        ):
+            if choice not in choices:
+                raise InputError(
+                    f"vessel: {name} must be one of {', '.join(choices)}; got {choice!r}"
+                )
+        object.__setattr__(self, "omega", read_only(omega))
+        object.__setattr__(self, "amplitude", read_only(amplitude))
+        object.__setattr__(self, "phase", read_only(phase))
+
+    @classmethod
+    def from_case(cls, case: Case) -> HeaveRao:
+        """Return the RAO of a case's hook.
+
+        In a short-crested sea it is the one that gives the hook the same spectrum, see
+        :func:`models.vessel.hook_operator.equivalent`.
+
+        Raises
+        ------
+        InputError
+            If the vessel's file is wrong, or the vessel has not been computed in these headings.
+        """
+        vessel = case.vessel
+        table = vessel.heave_rao
+        if table is None:
+            from .hook_operator import equivalent, hook_operators
+
+            omega, operators, _, weights = hook_operators(case)
+            amplitude, phase = equivalent(operators, weights)
+            return cls(
+                omega=omega,
+                amplitude=amplitude,
+                phase=phase,
+                below=vessel.below,
+                beyond=vessel.beyond,
+                owner="vessel.raos",
+            )
+        return cls(
+            omega=np.asarray(table.omega, dtype=np.float64),
+            amplitude=np.asarray(table.amplitude, dtype=np.float64),
+            phase=None if table.phase is None else np.asarray(table.phase, dtype=np.float64),
+            below=vessel.below,
+            beyond=vessel.beyond,
+        )
+
+    def response(self, omega: npt.ArrayLike) -> ComplexArray:
+        """Return the complex operator.
+
+        Parameters
+        ----------
+        omega
+            Frequencies [rad/s], any shape, at least zero.
+
+        Returns
+        -------
+        ComplexArray
+            Hook heave per wave elevation [m/m], same shape.
+        """
+        frequency = np.asarray(omega, dtype=np.float64)
+        rows, _, phases = self._columns()
+        phase = np.interp(frequency, rows, phases)
+        if self.below == "unity":
+            # Long waves lift the vessel as they lift the water: amplitude 1, phase 0.
+            under = frequency < rows[0]
+            part = np.divide(
+                frequency, rows[0], out=np.ones_like(frequency), where=under & (rows[0] > 0.0)
+            )
+            phase = np.where(under, phases[0] * part, phase)
+        result: ComplexArray = self.gain(frequency) * np.exp(1j * phase)
+        return result
+
+    def gain(self, omega: npt.ArrayLike) -> FloatArray:
+        """Return the operator's amplitude, which is all that a spectrum asks for.
+
+        Parameters
+        ----------
+        omega
+            Frequencies [rad/s], any shape, at least zero.
+
+        Returns
+        -------
+        FloatArray
+            Amplitude of the hook's heave per wave amplitude [m/m], same shape.
+        """
+        frequency = np.asarray(omega, dtype=np.float64)
+        rows, amplitudes = self.omega, self.amplitude
+        # np.interp holds the end values, which is `hold`.
+        amplitude = np.interp(frequency, rows, amplitudes)
+        under, over = frequency < rows[0], frequency > rows[-1]
+        if self.below == "zero":
+            amplitude = np.where(under, 0.0, amplitude)
+        elif self.below == "unity":
+            part = np.divide(
+                frequency, rows[0], out=np.ones_like(frequency), where=under & (rows[0] > 0.0)
+            )
+            amplitude = np.where(under, 1.0 + (amplitudes[0] - 1.0) * part, amplitude)
+        if self.beyond == "zero":
+            amplitude = np.where(over, 0.0, amplitude)
+        elif self.beyond == "decay":
+            part = np.divide(rows[-1], frequency, out=np.ones_like(frequency), where=over)
+            amplitude = np.where(over, amplitudes[-1] * part**2, amplitude)
+        return np.asarray(amplitude, dtype=np.float64)
+
+    def __call__(self, omega: npt.ArrayLike) -> ComplexArray:
+        """Return :meth:`response`."""
+        return self.response(omega)
+
+    @property
+    def splits(self) -> tuple[float, ...]:
+        """Frequencies at which the operator has a kink: the table's rows [rad/s]."""
+        return tuple(float(w) for w in self.omega)
+
+    def share_outside(self, spectrum: SpectralDensity, derivative: int = 0) -> OutsideShare:
+        """Return the share of the hook's variance that comes from outside the table.
+
+        Parameters
+        ----------
+        spectrum
+            The sea.
+        derivative
+            Which motion: 0 displacement, 1 velocity, 2 acceleration.
+        """
+        # What is cut to zero cannot be measured; hold the end value to see what is missing.
+        filled = replace(
+            self,
+            below="hold" if self.below == "zero" else self.below,
+            beyond="hold" if self.beyond == "zero" else self.beyond,
+        )
+
+        def variance(omega: FloatArray) -> FloatArray:
+            motion: FloatArray = (
+                np.abs(filled.response(omega)) ** 2
+                * spectrum.density(omega)
+                * omega ** (2 * derivative)
+            )
+            return motion
+
+        nodes = adaptive_nodes(
+            variance, *spectrum.band, splits=(*spectrum.splits, *self.splits), rtol=1e-8
+        )
+        values = variance(nodes.omega)
+        first, last = self.splits[0], self.splits[-1]
+        total = float(nodes.integrate(values))
+        if total == 0.0:
+            return OutsideShare(below=0.0, beyond=0.0)
+        return OutsideShare(
+            below=float(nodes.integrate(np.where(nodes.omega < first, values, 0.0))) / total,
+            beyond=float(nodes.integrate(np.where(nodes.omega > last, values, 0.0))) / total,
+        )
+
+    def _columns(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the table with the phase unwrapped, its first value in (-pi, pi]."""
+        phase = np.zeros_like(self.omega) if self.phase is None else np.unwrap(self.phase)
+        turns = math.ceil((phase[0] - math.pi) / (2.0 * math.pi))
+        return self.omega, self.amplitude, phase - 2.0 * math.pi * turns

@@ -1,0 +1,1 @@
+"""What nobody could do better on a record: the clairvoyant optimum."""

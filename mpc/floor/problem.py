@@ -1,0 +1,112 @@
+"""A plant, a record of the hook and what counts; and what a solver said of it.
+
+    RecordPlant, hook record --> RecordProblem --> `mpc.floor.qp` --> RecordSolution
+
+Motions are deviations from the one that holds the payload still, in which zero is the answer
+wherever no limit binds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .plant import RecordPlant
+
+__all__ = ["RHO", "RHO_START", "RecordProblem", "RecordSolution"]
+
+FloatArray = npt.NDArray[np.float64]
+
+RHO = 1e-8  # of inputs in peak torques [m2]
+RHO_START = 1e-6  # of the first state: its fast rope modes do next to nothing
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordProblem:
+    """A plant, a record of the hook, and what counts.
+
+    Parameters
+    ----------
+    plant
+        The sampled plant.
+    heave, rate, acceleration
+        The hook's motion at the samples, (N+1,) [m, m/s, m/s2].
+    first
+        First sample whose payload displacement counts.
+    minimum_tension
+        What tensions must not fall below [N]; -inf for no such limit.
+    start
+        State at the first sample, (n,); None: free, which no controller can beat.
+    """
+
+    plant: RecordPlant
+    heave: FloatArray
+    rate: FloatArray
+    acceleration: FloatArray
+    first: int
+    minimum_tension: float
+    start: FloatArray | None
+
+    def __post_init__(self) -> None:
+        """Work out the motion that holds the payload still."""
+        x, inputs = self.plant.still(self.heave, self.rate, self.acceleration)
+        r = x[:-1] @ self.plant.Phi.T + inputs @ self.plant.Gamma.T - x[1:]
+        object.__setattr__(self, "still", x)
+        object.__setattr__(self, "still_inputs", inputs)
+        object.__setattr__(self, "residue", r + self.plant.hook_terms(self.heave, self.rate))
+
+    still: FloatArray = None  # type: ignore[assignment]
+    still_inputs: FloatArray = None  # type: ignore[assignment]
+    residue: FloatArray = None  # type: ignore[assignment]
+
+    @property
+    def samples(self) -> int:
+        """Number of samples N over which an input acts."""
+        return len(self.heave) - 1
+
+    @property
+    def counted(self) -> int:
+        """Number of samples whose payload displacement counts."""
+        return self.samples + 1 - self.first
+
+    def window_levels(self) -> FloatArray:
+        """Return the window rows' values of the still payload, (N, 2 ends, nwin)."""
+        p = self.plant
+        levels = np.empty((self.samples, 2, len(p.windows)))
+        for end in (0, 1):
+            speed = self.still[end : end + self.samples] @ p.speed
+            demand = p.demand(self.still, self.still_inputs, end)
+            levels[:, end] = np.stack([demand, speed], axis=1) @ p.windows.T
+        return levels
+
+    def still_tensions(self) -> FloatArray:
+        """Return the tensions of the still payload, (N, nt) [N]."""
+        p, N = self.plant, self.samples
+        hook = np.stack([self.heave[:N], self.rate[:N]], axis=1)
+        moved = self.still[:N] @ p.tensions.T + hook @ p.tension_feed.T
+        return np.asarray(p.static_tensions + moved)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordSolution:
+    """What a solver said.
+
+    Parameters
+    ----------
+    start, inputs
+        y[0], (n,), and e, (N, m).
+    window_prices
+        Multiplier of the upper less that of the lower side of each window row, (N, 2, nwin).
+    tension_prices
+        Multipliers of the tension rows, (N, nt).
+    iterations
+        The solver's.
+    """
+
+    start: FloatArray
+    inputs: FloatArray
+    window_prices: FloatArray
+    tension_prices: FloatArray
+    iterations: int

@@ -1,0 +1,279 @@
+r"""The quadratic programme over a whole record, and the solvers that take it.
+
+    RecordPlant, hook record --> RecordProblem --> RecordQP (sparse) --> RecordSolution
+
+Over states x[k] and inputs i[k], as deviations y and e from a payload held still
+(`RecordPlant.still`),
+
+    min  1/2 sum_k w[k] p[k]^2 + rho/2 \|e\|^2 + rho_0/2 \|y[0]\|^2
+    s.t. y[k+1] = Phi y[k] + Gamma e[k] + r[k]
+         \|windows (demand, motor speed)\| <= 1 at both ends of each sample
+         tensions[k] >= minimum
+
+In these coordinates zero is the answer wherever no limit binds, so that a floor of a micrometre
+costs no digits.  rho and rho_0 pick one among many motions that do the same to the payload; what
+they cost is part of the certificate (`mpc.floor.certificate`).
+
+The programme is handed over in blocks of several samples, with the states inside a block
+eliminated: exactly the same optimum, and matrices large enough for the solver's dense kernels.
+PIQP's multistage factorisation takes it in time linear in the record's length; Clarabel is the
+second opinion.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from models.basics.checks import InputError
+
+from .plant import RecordPlant
+from .problem import RHO, RHO_START, RecordProblem, RecordSolution
+from .solvers import SOLVERS, solve_programme
+
+__all__ = ["solve_record"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_OWNER = "clairvoyant"
+_LONGEST_BLOCK = 16  # samples
+_ENTRY = 1e-15  # smaller entries of the matrices are rounding
+
+
+def solve_record(
+    problem: RecordProblem, *, solver: str = "piqp", block: int | None = None
+) -> RecordSolution:
+    """Solve the programme.
+
+    Parameters
+    ----------
+    problem
+        The programme.
+    solver
+        One of `SOLVERS`.
+    block
+        Samples per block, 1 to 16; by default some that suit the number of states.
+
+    Raises
+    ------
+    InputError
+        If the solver is unknown or not installed.
+    SolverError
+        If it finds no solution.
+    """
+    if solver not in SOLVERS:
+        raise InputError(f"{_OWNER}: solver must be one of {', '.join(SOLVERS)}, got {solver!r}")
+    n = len(problem.plant.states)
+    short = 2 if solver == "piqp" else 4
+    size = block or (short if n <= 6 else min(_LONGEST_BLOCK, max(4, n // 2)))
+    qp = _Assembly(problem, min(size, problem.samples))
+    x, multipliers, iterations = solve_programme(qp, solver, problem.counted)
+    return qp.solution(x, multipliers, iterations)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Group:
+    """Blocks of equal length: `matrix` entries are those of one block."""
+
+    first: int  # sample of the first block
+    blocks: int
+    length: int  # samples per block
+    offset: int  # of its first variable
+    rows: int  # of its first inequality
+    maps: FloatArray  # block's variables to y at its samples 0..length, (length+1, n, nv)
+    G: FloatArray  # inequality rows of a block (nr, nv): windows, then tensions
+    drift: FloatArray  # y at the block's samples from zero, (blocks, length+1, n)
+
+
+class _Assembly:
+    """The sparse programme: 1/2 x'Px + c'x, A x = b, G x <= h_u, G x >= h_l."""
+
+    def __init__(self, problem: RecordProblem, length: int) -> None:
+        self._problem, plant = problem, problem.plant
+        N, n, m = problem.samples, len(plant.states), plant.inputs
+        whole = (N - 1) // length  # the last block alone holds the last sample's cost
+        self._groups: list[_Group] = []
+        offset = rows = 0
+        for first, blocks, size in ((0, whole, length), (whole * length, 1, N - whole * length)):
+            if blocks:
+                group = _group(problem, first, blocks, size, offset, rows)
+                self._groups.append(group)
+                offset += blocks * (n + m * size)
+                rows += blocks * len(group.G)
+        self.variables, self._n, self._m = offset, n, m
+        self.constant = 0.0
+        self.P, self.c = self._cost()
+        self.A, self.b = self._dynamics()
+        self.G, self.low, self.high = self._limits(rows)
+
+    def _cost(self) -> tuple[sp.csc_matrix, FloatArray]:
+        problem, N = self._problem, self._problem.samples
+        weight = np.where(np.arange(N + 1) >= problem.first, 1.0, 0.0)
+        parts, c = [], np.zeros(self.variables)
+        for g in self._groups:
+            last = g.first + g.blocks * g.length == N
+            at = g.first + g.length * np.arange(g.blocks)[:, None] + np.arange(g.length + 1)
+            w = weight[at]
+            if not last:
+                w[:, -1] = 0.0  # counted by the next block
+            row = np.einsum("i,jiv->jv", problem.plant.payload, g.maps)
+            P = np.einsum("bj,ju,jv->buv", w, row, row, optimize=True)
+            P[:, range(self._n, P.shape[1]), range(self._n, P.shape[1])] += RHO
+            if g.first == 0:
+                P[0, range(self._n), range(self._n)] += RHO_START
+            drift = g.drift @ problem.plant.payload
+            self.constant += 0.5 * float((w * drift**2).sum())
+            q = np.einsum("bj,bj,jv->bv", w, drift, row)
+            c[g.offset : g.offset + q.size] = q.ravel()
+            parts.append(_stacked(P))
+        return sp.csc_matrix(sp.block_diag(parts, format="csc")), c
+
+    def _dynamics(self) -> tuple[sp.csc_matrix, FloatArray]:
+        """From block to block; the first row block fixes y[0] where the start is given."""
+        problem, n = self._problem, self._n
+        rows: list[npt.NDArray[np.int64]] = []
+        columns: list[npt.NDArray[np.int64]] = []
+        values: list[FloatArray] = []
+        b: list[FloatArray] = []
+        count = 0
+
+        def put(block: FloatArray, column: npt.NDArray[np.int64]) -> None:
+            """Put (k, n, w) entries below each other, at columns (k,)."""
+            nonlocal count
+            i, j = np.nonzero(np.abs(block).max(axis=0) > _ENTRY)
+            k = np.arange(len(block))[:, None]
+            rows.append((count + n * k + i).ravel())
+            columns.append((column[:, None] + j).ravel())
+            values.append(block[:, i, j].ravel())
+
+        if problem.start is not None:
+            put(np.eye(n)[None], np.zeros(1, dtype=np.int64))
+            b.append(problem.start - problem.still[0])
+            count += n
+        for at, g in enumerate(self._groups):
+            width = n + self._m * g.length
+            start = g.offset + width * np.arange(g.blocks, dtype=np.int64)
+            end = g.offset + g.blocks * width
+            following = np.append(start[1:], end)
+            if at == len(self._groups) - 1:
+                start, following = start[:-1], following[:-1]
+            if len(start):
+                put(np.broadcast_to(g.maps[-1], (len(start), *g.maps[-1].shape)), start)
+                put(np.broadcast_to(-np.eye(n), (len(start), n, n)), following)
+                b.append(-g.drift[: len(start), -1].ravel())
+                count += n * len(start)
+        if not rows:
+            return sp.csc_matrix((0, self.variables)), np.zeros(0)
+        entries = (np.concatenate(rows), np.concatenate(columns))
+        A = sp.csc_matrix((np.concatenate(values), entries), (count, self.variables))
+        return A, np.concatenate(b)
+
+    def _limits(self, rows: int) -> tuple[sp.csc_matrix, FloatArray, FloatArray]:
+        problem, plant = self._problem, self._problem.plant
+        windows, tensions = problem.window_levels(), problem.still_tensions()
+        tensions = tensions - problem.minimum_tension
+        parts, low, high = [], np.empty(rows), np.full(rows, math.inf)
+        for g in self._groups:
+            at = slice(g.first, g.first + g.blocks * g.length)
+            # what the drift inside a block adds, then the still payload's own level
+            level = np.stack(
+                [
+                    np.einsum("bjx,wx->bjw", g.drift[:, end : end + g.length], _state_rows(plant))
+                    for end in (0, 1)
+                ],
+                axis=2,
+            ) + windows[at].reshape(g.blocks, g.length, 2, -1)
+            hang = g.drift[:, :-1] @ plant.tensions.T + tensions[at].reshape(g.blocks, g.length, -1)
+            hang = hang / plant.static_tensions
+            if not math.isfinite(problem.minimum_tension):
+                hang = hang[..., :0]
+            flat = level.reshape(g.blocks, -1)
+            upper = np.full((g.blocks, len(g.G)), math.inf)
+            upper[:, : flat.shape[1]] = 1.0 - flat
+            lower = np.hstack([-1.0 - flat, -hang.reshape(g.blocks, -1)])
+            span = slice(g.rows, g.rows + lower.size)
+            low[span], high[span] = lower.ravel(), upper.ravel()
+            parts.append(sp.kron(sp.eye(g.blocks), sp.csr_matrix(g.G), format="csr"))
+        return sp.csc_matrix(sp.block_diag(parts, format="csc")), low, high
+
+    def solution(self, x: FloatArray, prices: FloatArray, iterations: int) -> RecordSolution:
+        """Return the solver's answer by samples."""
+        plant = self._problem.plant
+        inputs, windows, tensions = [], [], []
+        nwin, nt = len(plant.windows), len(plant.static_tensions)
+        for g in self._groups:
+            width = self._n + self._m * g.length
+            own = x[g.offset : g.offset + g.blocks * width].reshape(g.blocks, width)
+            inputs.append(own[:, self._n :].reshape(-1, self._m))
+            size = g.blocks * len(g.G)
+            price = prices[g.rows : g.rows + size].reshape(g.blocks, len(g.G))
+            split = g.length * 2 * nwin
+            windows.append(price[:, :split].reshape(-1, 2, nwin))
+            # rows of tension were divided by the static one
+            hang = (
+                price[:, split:] if price.shape[1] > split else np.zeros(g.blocks * g.length * nt)
+            )
+            tensions.append(-hang.reshape(-1, nt) / plant.static_tensions)
+        return RecordSolution(
+            start=x[: self._n].copy(),
+            inputs=np.concatenate(inputs),
+            window_prices=np.concatenate(windows),
+            tension_prices=np.maximum(np.concatenate(tensions), 0.0),
+            iterations=iterations,
+        )
+
+
+def _state_rows(plant: RecordPlant) -> FloatArray:
+    """Return what the states add to the window rows at a given input, (nwin, n)."""
+    demand = np.zeros(len(plant.states)) if plant.hold == "line" else -plant.feedback
+    return np.outer(plant.windows[:, 0], demand) + np.outer(plant.windows[:, 1], plant.speed)
+
+
+def _group(
+    problem: RecordProblem, first: int, blocks: int, length: int, offset: int, rows: int
+) -> _Group:
+    plant = problem.plant
+    n, m = len(plant.states), plant.inputs
+    width = n + m * length
+    maps = np.zeros((length + 1, n, width))
+    maps[0, :, :n] = np.eye(n)
+    drift = np.zeros((blocks, length + 1, n))
+    residue = problem.residue[first : first + blocks * length].reshape(blocks, length, n)
+    for j in range(length):
+        maps[j + 1] = plant.Phi @ maps[j]
+        maps[j + 1, :, n + m * j : n + m * (j + 1)] += plant.Gamma
+        drift[:, j + 1] = drift[:, j] @ plant.Phi.T + residue[:, j]
+    by_state = _state_rows(plant)
+    windows = np.zeros((length, 2, len(plant.windows), width))
+    for j in range(length):
+        for end in (0, 1):
+            windows[j, end] = by_state @ maps[j + end]
+            windows[j, end, :, n + m * j + (end if m == 2 else 0)] += plant.windows[:, 0]
+    hang = np.einsum("tx,jxv->jtv", plant.tensions / plant.static_tensions[:, None], maps[:-1])
+    if not math.isfinite(problem.minimum_tension):
+        hang = hang[:, :0]
+    G = np.concatenate([windows.reshape(-1, width), hang.reshape(-1, width)])
+    G[np.abs(G) < _ENTRY] = 0.0
+    return _Group(
+        first=first,
+        blocks=blocks,
+        length=length,
+        offset=offset,
+        rows=rows,
+        maps=maps,
+        G=G,
+        drift=drift,
+    )
+
+
+def _stacked(blocks: FloatArray) -> sp.csc_matrix:
+    """Return (k, w, w) blocks on a diagonal."""
+    k, w, _ = blocks.shape
+    i, j = np.nonzero(np.abs(blocks).max(axis=0) > _ENTRY)
+    at = w * np.arange(k)[:, None]
+    entries = ((at + i).ravel(), (at + j).ravel())
+    return sp.csc_matrix((blocks[:, i, j].ravel(), entries), (k * w, k * w))

@@ -1,0 +1,1 @@
+"""Forecasts of the hook's motion."""

@@ -1,0 +1,155 @@
+"""What a predictor of the hook's motion gives: mean and standard deviation over the leads.
+
+    MRU --> Predictor.update --> Predictor.forecast --> Forecast --> QP
+
+First room of `mpc`: the controllers preview the hook's motion through this protocol and do not
+know which predictor stands behind it, `SeaPredictor` (knows the spectrum), `AdaptiveAR` (knows
+the record alone) or `PerfectPreview` (knows the future, for reference).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError, check_range, read_only
+
+__all__ = ["Forecast", "Predictor", "hermite_weights", "leads_of", "usable"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_MOST_LEADS = 100_000
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Forecast:
+    """The hook's motion at the leads of the predictor that made it; lead 0 is now.
+
+    The arrays are the caller's own to read: they are not copied, as a controller makes one
+    forecast a sample, and a predictor never writes to them again.
+
+    Parameters
+    ----------
+    displacement, velocity
+        Mean of the true motion, up positive [m], [m/s], (n,).
+    displacement_std, velocity_std
+        Standard deviation of what will be minus the mean [m], [m/s], (n,).
+    """
+
+    displacement: FloatArray
+    velocity: FloatArray
+    displacement_std: FloatArray
+    velocity_std: FloatArray
+
+
+@runtime_checkable
+class Predictor(Protocol):
+    """Anything that foretells the hook's motion from what the reference unit has shown."""
+
+    @property
+    def sample_time(self) -> float:
+        """Time from one `update` to the next, and from lead to lead [s]."""
+
+    @property
+    def leads(self) -> FloatArray:
+        """Leads from 0 to the horizon, spaced by the sample time [s], (n,)."""
+
+    def reset(self) -> None:
+        """Forget every earlier sample."""
+
+    def update(self, heave: float, rate: float, valid: bool, time: float) -> None:
+        """Take what the unit shows at a time [s]: heave [m] and heave rate [m/s].
+
+        Call it once a sample.  A sample that is not valid or not finite does not enter the
+        state: the predictor goes on by its model.
+        """
+
+    def forecast(self) -> Forecast:
+        """Return the motion now and at the leads, given the samples so far."""
+
+
+def leads_of(owner: str, sample_time: float, horizon: float) -> FloatArray:
+    """Return the leads 0, Ts, 2 Ts .. horizon [s], read-only.
+
+    Parameters
+    ----------
+    owner
+        Who asks, for the messages.
+    sample_time
+        Spacing [s].
+    horizon
+        Last lead [s], rounded to samples.
+
+    Raises
+    ------
+    InputError
+        If one is out of its range, or the horizon is longer than 100 000 samples.
+    """
+    step = check_range(owner, "sample_time", sample_time, low=0.0, unit="s", open_low=True)
+    last = check_range(owner, "horizon", horizon, low=0.0, high=_MOST_LEADS * step, unit="s")
+    return read_only(step * np.arange(round(last / step) + 1))
+
+
+def hermite_weights(owner: str, knots: FloatArray, at: FloatArray) -> FloatArray:
+    """Return the matrix that interpolates values and rates at knots (cubic Hermite).
+
+    Parameters
+    ----------
+    owner
+        Who asks, for the message.
+    knots
+        Ascending times of the knots [s], (k,), k >= 2.
+    at
+        Times within the knots' range [s], (n,).
+
+    Returns
+    -------
+    ndarray
+        (2n, 2k): [value; rate] at the times from [value, rate] of the first knot, the second...
+
+    Raises
+    ------
+    InputError
+        If a time lies outside the knots.
+    """
+    if at.min() < knots[0] - 1e-9 or at.max() > knots[-1] + 1e-9:
+        raise InputError(
+            f"{owner}: times must be in [{knots[0]:g}, {knots[-1]:g}] s, "
+            f"got {at.min():g} to {at.max():g} s"
+        )
+    n, k = at.size, knots.size
+    left = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, k - 2)
+    h = knots[left + 1] - knots[left]
+    x = (at - knots[left]) / h
+    rows = np.arange(n)
+    weights = np.zeros((2 * n, 2 * k))
+    bends = (
+        ((1.0 + 2.0 * x) * (1.0 - x) ** 2, -6.0 * x * (1.0 - x) / h),
+        (h * x * (1.0 - x) ** 2, (1.0 - x) * (1.0 - 3.0 * x)),
+        (x**2 * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / h),
+        (h * x**2 * (x - 1.0), x * (3.0 * x - 2.0)),
+    )
+    for column, (value, rate) in enumerate(bends):
+        weights[rows, 2 * left + column] = value
+        weights[n + rows, 2 * left + column] = rate
+    return weights
+
+
+def usable(heave: float, rate: float, valid: bool, largest: float) -> bool:
+    """Return whether a sample may enter a state: valid, finite and not absurdly large.
+
+    Parameters
+    ----------
+    heave, rate
+        What the unit shows [m], [m/s].
+    valid
+        Whether the unit says that it works.
+    largest
+        Magnitude that no measurement exceeds [m], [m/s].
+    """
+    # A comparison with NaN is false, so that it needs no test of its own.
+    return bool(valid) and math.fabs(heave) <= largest and math.fabs(rate) <= largest

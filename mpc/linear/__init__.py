@@ -1,0 +1,1 @@
+"""Predictive control with the linear plant, as one quadratic programme a sample."""

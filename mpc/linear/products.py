@@ -1,0 +1,169 @@
+"""Every product of a step that does not change, made once: what keeps a step short.
+
+    chi --> [A chi; gradient; free response of the rows] in one matrix product
+
+The rows come scaled to their limits, so that a violation of one per cent costs the same whatever
+is limited.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import read_only
+
+from ..winch.prediction import PredictionModel
+from .condensed import WATCHED, Condensed, path_of_sea, sea_at_end
+
+if TYPE_CHECKING:
+    from ..forecast.forecast import Forecast
+
+__all__ = ["Products"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_NONE = np.zeros(0)
+_WIDE = 1e20  # no limit, for the solver
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Products:
+    """Matrices of one step; `of` makes them.
+
+    Attributes
+    ----------
+    rows
+        R, scaled, (nr, nb).
+    scale
+        What each row is multiplied by, (nr,).
+    """
+
+    size: int
+    moves: int
+    matrix: FloatArray
+    rows: FloatArray
+    scale: FloatArray
+    low: FloatArray
+    high: FloatArray
+    path_gradient: FloatArray
+    path_free: FloatArray
+    moved_gradient: FloatArray
+    moved_free: FloatArray
+    speed_known: FloatArray
+    speed_moves: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        model: PredictionModel,
+        programme: Condensed,
+        limits: Mapping[str, tuple[float, float]],
+        covariance: FloatArray | None,
+        believed: PredictionModel | None = None,
+    ) -> Products:
+        """Return the products of a programme.
+
+        Parameters
+        ----------
+        model, programme
+            Model and matrices.
+        limits
+            Lowest and highest deviation of each watched signal.
+        covariance
+            None where the hook's path is that of the model's own sea; where it comes with each
+            step, the covariance of the sea's estimate, (nh, nh).
+        believed
+            The estimator's model, whose A it is; by default that of the programme.
+        """
+        over = (model if believed is None else believed).A
+        p, winch, nb = programme, model.winch, len(programme.blocks)
+        names = [WATCHED[k] for k in p.kind]
+        bounds = np.array([limits[name] for name in names]).reshape(len(names), 2)
+        size = np.where(np.isfinite(bounds), np.abs(bounds), 0.0).max(axis=1, initial=0.0)
+        scale = 1.0 / np.maximum(size, 1e-9)
+        to_path = path_of_sea(model, p.steps)
+        ahead = np.linalg.matrix_power(model.A[model.sea_at, model.sea_at], p.steps)
+        constants = slice(model.constants_at.start, model.constants_at.start + 2)
+        gradient, free = np.zeros((nb, model.size)), np.zeros((len(names), model.size))
+        gradient[:, : winch.size], free[:, : winch.size] = p.from_state, p.rows_state
+        gradient[:, constants], free[:, constants] = p.from_constants, p.rows_constants
+        path_gradient = p.from_path
+        if covariance is not None:
+            from_path, from_sea = sea_at_end(model, p.steps, covariance)
+            path_gradient = path_gradient + p.from_end @ from_path
+            gradient[:, model.sea_at] = p.from_end @ from_sea
+        else:
+            gradient[:, model.sea_at] = p.from_path @ to_path + p.from_end @ ahead
+            free[:, model.sea_at] = p.rows_path @ to_path
+        for k, name in enumerate(names):
+            if name == "tension":
+                free[k, model.constants_at.start + 3] = 1.0
+        end = winch.size + 2 * (p.steps + 1)
+        speed_known = np.zeros((nb, model.size))
+        speed_known[:, : winch.size] = p.speeds[:, : winch.size]
+        speed_known[:, model.sea_at] = p.speeds[:, winch.size : end] @ to_path
+        speed_known[:, constants] = p.speeds[:, end : end + 2]
+        # A load that is to be elsewhere, or to move: everything is counted from there, but the
+        # limits on speed and command are not.
+        moved_free = p.rows_state @ winch.moved
+        own = winch.speed @ winch.moved
+        for k, name in enumerate(names):
+            if name in ("speed", "command"):
+                moved_free[k] -= own * (winch.back if name == "command" else 1.0)
+        return cls(
+            size=model.size,
+            moves=nb,
+            matrix=np.ascontiguousarray(np.vstack([over, gradient, free * scale[:, None]])),
+            rows=np.ascontiguousarray(p.rows * scale[:, None]),
+            scale=read_only(scale),
+            low=read_only(np.maximum(bounds[:, 0] * scale, -_WIDE)),
+            high=read_only(np.minimum(bounds[:, 1] * scale, _WIDE)),
+            path_gradient=np.ascontiguousarray(path_gradient),
+            path_free=np.ascontiguousarray(p.rows_path * scale[:, None]),
+            moved_gradient=p.from_state @ winch.moved,
+            moved_free=moved_free * scale[:, None],
+            speed_known=speed_known,
+            speed_moves=np.ascontiguousarray(p.speeds[:, -nb:]),
+        )
+
+    def known(self, chi: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return A chi, the gradient and the free response, of chi alone."""
+        product = self.matrix @ chi
+        n, m = self.size, self.size + self.moves
+        return product[:n], product[n:m], product[m:]
+
+    def shifted(
+        self, gradient: FloatArray, free: FloatArray, reference: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return gradient and free response about a place [m] and a speed [m/s], (2,)."""
+        return gradient - self.moved_gradient @ reference, free - self.moved_free @ reference
+
+    def along(
+        self, gradient: FloatArray, free: FloatArray, forecast: Forecast
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return gradient and free response with the hook on a path that is forecast."""
+        path = np.empty(2 * len(forecast.displacement))
+        path[0::2], path[1::2] = forecast.displacement, forecast.velocity
+        return gradient + self.path_gradient @ path, free + self.path_free @ path
+
+    def question(
+        self,
+        gradient: FloatArray,
+        free: FloatArray,
+        low: FloatArray,
+        high: FloatArray,
+        hard: tuple[FloatArray, FloatArray] = (_NONE, _NONE),
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return gradient, lower and upper bounds for the solver; `hard`: of its hard rows."""
+        lower = np.concatenate((low, hard[0], self.low - free))
+        upper = np.concatenate((high, hard[1], self.high - free))
+        return gradient, lower, upper
+
+    def speeds(self, chi: FloatArray, moves: FloatArray) -> FloatArray:
+        """Return the motor speed at the start of each move [rad/s], by the model's own sea."""
+        return np.asarray(self.speed_known @ chi + self.speed_moves @ moves)

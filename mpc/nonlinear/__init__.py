@@ -1,0 +1,1 @@
+"""Predictive control with the nonlinear plant."""

@@ -1,0 +1,454 @@
+r"""Nonlinear model predictive control: a Gauss-Newton step a sample, in the place of a linear QP.
+
+    last plan --> Shooting.linearise --> H, rows                           preparation
+    m --> Estimator --> chi --> Shooting.free --> gradient, bounds --> QP --> u      feedback
+
+`NonlinearMPC` differs from `LinearMPC` in its model of the winch alone: cost, limits, estimator and
+the path of the hook are the same objects.
+"""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import numpy.typing as npt
+from typing_extensions import override
+
+from models.basics.checks import SolverError, check_range
+from models.case.case import Case
+from models.plant.drive import DriveLimits
+from models.sensing.control import MEASURED as HEARD
+from models.sensing.control import Measurement
+
+from ..linear.condensed import condense, path_of_sea
+from ..linear.linear import LinearMPC
+from ..linear.products import Products
+from ..programme.qp import SoftQP
+from ..winch.weights import Weights
+from .mean_torque import start_torque
+from .responses import with_drift
+from .shooting import Known, Prepared, Shooting
+from .stage import make_stage
+
+if TYPE_CHECKING:
+    from models.plant.payout import DrumTravel
+
+    from ..forecast.forecast import Predictor
+
+__all__ = ["NonlinearMPC"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_OWNER = "nonlinear predictive control"
+_UNIT, _TORQUE = HEARD.index("mru.valid"), HEARD.index("motor.torque")
+_APPLIED = HEARD.index("drive.applied")
+_HEAVE, _RATE = HEARD.index("mru.heave"), HEARD.index("mru.heave_rate")
+_REFERENCE = HEARD.index("reference.displacement")
+
+
+class NonlinearMPC(LinearMPC):
+    r"""A predictive controller of the nonlinear winch within the limits of its drive.
+
+    At every sample, with cost, limits and symbols of `LinearMPC`,
+
+    .. math::
+
+        \min_{d} \; J(x, d) \quad \text{subject to} \quad
+        & x_{j+1} = A x_j + B d_j + \Gamma_w w_j + \Gamma_c c + F n_j, \\
+        & n_j = \varphi(C x_j + D d_j + C_w w_j + C_c c + O n_j + y_{rest}), \\
+        & \text{the limits of } \texttt{LinearMPC},
+            \qquad |(\tau_0 + d_j) \, \omega_j| \le P_{max},
+
+    where the forces n are quadratic drag, slack rope, losses of the gear and friction, layers of
+    the drum (`mpc.nonlinear.stage`).  It is solved by multiple shooting: the forces are linearised
+    at the plan of the sample before, a sample on; what follows is a quadratic programme of the
+    moves, and its answer is one Gauss-Newton step (M. Diehl, H. G. Bock and J. P. Schloeder, "A
+    real-time iteration scheme for nonlinear optimization in optimal feedback control", SIAM J.
+    Control Optim. 43, 2005).  Linearising and condensing need no measurement and are done at the
+    end of the step before; when the measurement is there, a few products of matrices with vectors
+    and the solver are left.
+
+    * n_j, (M m): forces that the linear plant lacks [N], [N m]; F, O: what they do
+    * phi: forces as functions of a few numbers y (velocity of the payload, tensions, motor speed)
+    * P_max: power of the drive [W]; a soft row for every block, hard for the first
+
+    Parameters
+    ----------
+    case
+        Vessel, sea, rope, payload, winch and sensors.
+    horizon, sample_time, blocking, weights, predictor, masses
+        As for `LinearMPC`.
+    minimum_tension, excursion, thermal, deadline, limits
+        As for `LinearMPC`; the deadline is that of the feedback.
+    iterations
+        Gauss-Newton steps in a sample.
+    substeps
+        Shares of a sample over each of which the forces are held.
+    drag, slack, losses, travel
+        What is nonlinear, as for `mpc.nonlinear.stage.make_stage`.  Losses of the gear are left out
+        unless asked for: they cost three times the time of all else and gained three per cent.
+    mean_torque
+        Whether a move is the mean torque of a sample, which the drive can hold at its peak
+        (`mpc.nonlinear.mean_torque`), else that at its start, as in `LinearMPC`.
+    compiled
+        Whether the forces are evaluated in C; by default where there is a compiler.
+    name
+        What it is called; by default after the predictor.
+
+    Attributes
+    ----------
+    seconds
+        What the last step took for feedback and preparation [s].
+
+    Raises
+    ------
+    InputError
+        If an argument is out of its range.
+    SolverError
+        If no weights are stable, or C was demanded and there is no compiler.
+
+    Examples
+    --------
+    >>> from models import load_case
+    >>> from mpc.winch.doubts import Doubts
+    >>> weights = Weights(torque=0.02, doubts=Doubts(force=0.1, torque=0.05, rope=0.1))
+    >>> controller = NonlinearMPC(load_case("thesis-1975"), weights=weights)
+    >>> controller.name, controller.stage.channels
+    ('nonlinear-mpc', ('drag', 'slack.0'))
+    """
+
+    _shooting: Shooting | None = None
+    _y: FloatArray  # what the forces depend on over the horizon, by the last plan
+    _moves: FloatArray
+
+    def __init__(
+        self,
+        case: Case,
+        *,
+        horizon: float | None = None,
+        sample_time: float = 0.05,
+        blocking: Sequence[int] | None = None,
+        weights: Weights | None = None,
+        predictor: Literal["kalman", "ar", "preview"] | Predictor = "kalman",
+        masses: int | None = None,
+        minimum_tension: float | None = None,
+        excursion: float | None = None,
+        thermal: bool = False,
+        deadline: float | None = None,
+        limits: DriveLimits | None = None,
+        iterations: int = 1,
+        substeps: int = 1,
+        drag: bool = True,
+        slack: Sequence[int] | None = None,
+        losses: bool = False,
+        travel: DrumTravel | None = None,
+        mean_torque: bool = True,
+        compiled: bool | None = None,
+        name: str | None = None,
+    ) -> None:
+        check_range(_OWNER, "iterations", iterations, low=1, high=1000)
+        super().__init__(
+            case,
+            horizon=horizon,
+            sample_time=sample_time,
+            blocking=blocking,
+            weights=weights,
+            predictor=predictor,
+            masses=masses,
+            minimum_tension=minimum_tension,
+            excursion=excursion,
+            thermal=thermal,
+            deadline=deadline,
+            limits=limits,
+        )
+        self.name = f"nonlinear-{self.name}" if name is None else name
+        self.iterations = int(iterations)
+        self.stage = make_stage(
+            self.model.winch,
+            substeps=substeps,
+            drag=drag,
+            slack=slack,
+            losses=losses,
+            travel=travel,
+            mean=mean_torque,
+            compiled=compiled,
+        )
+        covariance = None if self.predictor is None else self.estimator.sea_covariance
+        if mean_torque:
+            model = replace(self.model, winch=self.stage.winch)
+            blocks, limited = self.programme.blocks, self.soft_limits
+            self.programme = with_drift(
+                condense(model, self.regulator, blocks, tuple(limited)), self.stage
+            )
+            self.products = Products.of(
+                model, self.programme, limited, covariance, self.estimator.model
+            )
+        else:
+            model = self.model
+        p, products = self.programme, self.products
+        self._shooting = self.shooting = Shooting(
+            model, self.regulator, p, products, self.stage, covariance, self.estimator.model
+        )
+        powers = len(p.blocks) - 1 if self._window.power < math.inf else 0
+        self._low = np.concatenate([products.low, -np.ones(powers)])
+        self._high = np.concatenate([products.high, np.ones(powers)])
+        self._ends = path_of_sea(self.model, 1)
+        self._starts = np.cumsum((0, *p.blocks[:-1])).astype(np.float64)
+        rows = np.vstack([products.rows, np.zeros((powers, len(p.blocks)))])
+        # Where a plan has left all sense, its slopes are not to be trusted with the solver.
+        reach = [_reach(name, self.model.winch.rest_tension) for name in self.stage.arguments]
+        span = np.tile(reach, self.shooting.nodes)
+        self._sane = self.shooting.rest - span, self.shooting.rest + span
+        self._resting = self.shooting.linearise(np.array(self.shooting.rest))
+        self.qp = self._moving = _MovingQP(self.qp, rows)
+        self.reset()
+
+    @override
+    def reset(self) -> None:
+        """Forget every earlier measurement."""
+        if self._shooting is not None:
+            self._moving.change(self._resting.H, self._moving.rows)
+        super().reset()
+        self._counts["forgotten"] = 0
+        self._cut: tuple[float, float, float] | None = None
+        self.seconds: Mapping[str, float] = {"feedback": 0.0, "preparation": 0.0}
+        if self._shooting is not None:
+            self._forget()
+            self._prepare()
+
+    @override
+    def step(self, measurement: Measurement, time: float) -> float:
+        """Return the drive command, its static part included [V, rad/s or N m]."""
+        began = clock.perf_counter()
+        shown, winch, shooting = measurement.values, self.model.winch, self.shooting
+        self._counts["steps"] += 1
+        chi = self.estimator.update(self._followed(measurement))
+        ahead, known = shooting.known(chi)
+        self.estimator.advance(ahead)
+        reference = shown[_REFERENCE : _REFERENCE + 2]
+        if reference.any():
+            known = shooting.shifted(known, reference)
+        if self.predictor is not None:
+            heave, rate = float(shown[_HEAVE]), float(shown[_RATE])
+            self.predictor.update(heave, rate, bool(shown[_UNIT] > 0.5), time)
+            forecast = self.predictor.forecast()
+            known = shooting.along(known, forecast.displacement, forecast.velocity)
+            ends = np.array([forecast.displacement[:2], forecast.velocity[:2]]).T.ravel()
+        else:
+            ends = self._ends @ chi[self.model.sea_at]
+        speed = self.estimator.speed
+        cap = math.inf
+        if self._budget is not None:
+            cap = self._budget.update(max(abs(float(shown[_TORQUE])), abs(self._asked)))
+        low, high = self.hard_bounds(speed + self._gain_of_speed(chi, ends), cap)
+        move: float | None = None
+        for k in range(self.iterations):
+            if k > 0:
+                self._prepare()
+            found = self._feedback(known, low, high, began)
+            if found is None:
+                break
+            move = found
+        if move is None:
+            move = self._otherwise(speed)
+        torque = min(max(move, float(low[0])), float(high[0])) * self.programme.unit
+        command = self._command(torque, speed, chi, ends)
+        self._asked = torque + winch.rest_torque
+        command = min(max(command, -self._window.voltage), self._window.voltage)
+        answered = clock.perf_counter()
+        self.prepare()
+        done = clock.perf_counter()
+        self.seconds = {"feedback": answered - began, "preparation": done - answered}
+        return command
+
+    def prepare(self) -> None:
+        """Linearise and condense at the last plan, a sample on: all that needs no measurement."""
+        self._y = self.shooting.later(self._y)
+        moves = np.append(np.repeat(self._moves, self.programme.blocks), self._moves[-1])
+        self._moves = moves[1:][self._starts.astype(int)]
+        self._speeds = np.interp(self._starts + 1.0, self._starts, self._speeds)
+        self._prepare()
+
+    def optimise(
+        self,
+        chi: FloatArray,
+        *,
+        iterations: int = 50,
+        tolerance: float = 1e-10,
+    ) -> FloatArray:
+        """Return the moves (nb,) for a state chi (n,), iterated until they change no more.
+
+        Raises
+        ------
+        SolverError
+            If they still change by more than the tolerance.
+        """
+        _, known = self.shooting.known(chi)
+        speed = float(self.model.winch.speed @ chi[: self.model.winch.size])
+        low, high = self.hard_bounds(speed)
+        moves = np.full(len(self.programme.blocks), math.inf)
+        for _ in range(iterations):
+            self._prepare(exact=True)
+            if self._feedback(known, low, high, clock.perf_counter()) is None:
+                break
+            if float(np.abs(self._moves - moves).max()) <= tolerance:
+                return self._moves
+            moves = self._moves
+        raise SolverError(f"{_OWNER}: the moves have not settled in {iterations} iterations")
+
+    @property
+    def plan(self) -> FloatArray:
+        """What the forces depend on over the horizon, by the last plan, (K my,)."""
+        return self._y
+
+    @property
+    def power(self) -> float:
+        """Highest power of the drive [W]; infinite where there is no such limit."""
+        return self._window.power
+
+    def hard_bounds(self, speed: float, cap: float = math.inf) -> tuple[FloatArray, FloatArray]:
+        """Return the lowest and highest moves (nb,) at a motor speed [rad/s] and a cap [N m].
+
+        The power of later moves has rows of its own.
+        """
+        return self._window.bounds(speed, np.zeros(len(self.programme.blocks)), cap)
+
+    def _command(self, torque: float, speed: float, chi: FloatArray, ends: FloatArray) -> float:
+        """Return the drive command that gives a move [N m]."""
+        winch, drift, of = self.model.winch, self.stage.drift, self.model.constants_at.start
+        over = drift(chi[: winch.size], torque, ends, chi[of : of + 2])
+        self._cut = None
+        if over == 0.0 or not math.isfinite(over):
+            return winch.command(torque, speed)
+        window, rest = self._window, winch.rest_torque
+        peak = min(window.peak, window.power / max(abs(speed), 1e-9))
+        asked = winch.command(start_torque(torque + rest, over, peak) - rest, speed)
+        same = winch.command(torque + over, speed)
+        if asked != same:
+            self._cut = (asked, same, 3.0 * abs(over / winch.gain))
+        return asked
+
+    def _gain_of_speed(self, chi: FloatArray, ends: FloatArray) -> float:
+        """Return the mean motor speed of the sample over that at its start, as planned [rad/s]."""
+        winch, of = self.model.winch, self.model.constants_at.start
+        torque = self.programme.unit * float(self._moves[0])
+        over = self.stage.drift(chi[: winch.size], torque, ends, chi[of : of + 2])
+        falls = winch.gain * winch.back
+        return over / falls if falls > 0.0 and math.isfinite(over) else 0.0
+
+    def _followed(self, measurement: Measurement) -> Measurement:
+        """Return the measurement with the command that the linear winch would have followed.
+
+        A drive that cut the torque for a part of the sample says what it applies at the end of it;
+        the estimator wants the command that, never cut, has the same mean.
+        """
+        if self._cut is None:
+            return measurement
+        asked, same, reach = self._cut
+        if not abs(float(measurement.values[_APPLIED]) - asked) <= reach:
+            return measurement  # NaN, a brake or another hand on the drive
+        values = measurement.values.copy()
+        values[_APPLIED] = same
+        return Measurement(values)
+
+    def _prepare(self, *, exact: bool = False) -> None:
+        """Linearise and condense at arguments, moves and speeds of the plan."""
+        if math.isfinite(float(self._y.sum())):
+            np.clip(self._y, *self._sane, out=self._y)
+            self._prepared: Prepared = self.shooting.linearise(self._y, exact=exact)
+            if self._condensed():
+                return
+        # A plan that is beyond all numbers is forgotten.
+        self._counts["forgotten"] += 1
+        self._forget()
+        self._prepared = self._resting
+        self._condensed()
+
+    def _forget(self) -> None:
+        """Forget the plan: the load hangs at rest."""
+        self._y = np.array(self.shooting.rest)
+        self._moves = np.zeros(len(self.programme.blocks))
+        self._speeds = np.zeros(len(self.programme.blocks))
+
+    def _condensed(self) -> bool:
+        """Give the linearisation to the solver; return whether it takes it."""
+        p, S = self.programme, self._prepared.outputs
+        rows = np.empty_like(self.qp.rows)
+        count = len(self.products.rows)
+        rows[:count] = S[self.shooting.rows]
+        if len(rows) > count:
+            power = self._window.power
+            torque = self.model.winch.rest_torque + p.unit * self._moves
+            rows[count:] = (torque[1:, None] / power) * S[self.shooting.speeds][1:]
+            later = np.arange(1, len(p.blocks))
+            rows[count + later - 1, later] += p.unit / power * self._speeds[1:]
+        return self._moving.change(self._prepared.H, rows)
+
+    def _feedback(
+        self, known: Known, low: FloatArray, high: FloatArray, began: float
+    ) -> float | None:
+        """Return the first move of one Gauss-Newton step, None if there is none that is good."""
+        shooting, prepared, p = self.shooting, self._prepared, self.programme
+        gradient, o, n = shooting.free(prepared, known)
+        free = o[shooting.rows]
+        if len(self._low) > len(free):
+            # (tau0 + d) omega, linearised, over the power
+            rest, power = self.model.winch.rest_torque, self._window.power
+            moves, speeds = p.unit * self._moves[1:], self._speeds[1:]
+            value = (rest + moves) * o[shooting.speeds][1:] - moves * speeds
+            free = np.concatenate([free, value / power])
+        lower = np.concatenate([low, self._low - free])
+        upper = np.concatenate([high, self._high - free])
+        move = self._solve((gradient, lower, upper), began)
+        if move is None or self.solved is None:
+            return None
+        v = self.solved.v
+        self._y = shooting.arguments(prepared, known, n, v)
+        self._moves = v
+        self._speeds = o[shooting.speeds] + prepared.outputs[shooting.speeds] @ v
+        return move
+
+
+def _reach(argument: str, tension: float) -> float:
+    """Return how far from rest an argument may be: 20 m/s, five times the static tension."""
+    if argument.startswith("spring."):
+        return 5.0 * tension
+    return 20.0 if argument == "payload.velocity" else math.inf
+
+
+class _MovingQP(SoftQP):
+    """A programme whose H and R change too, kept warm all the same."""
+
+    def __init__(self, like: SoftQP, rows: FloatArray) -> None:
+        super().__init__(
+            like.H,
+            rows,
+            quadratic=like.quadratic,
+            linear=like.linear,
+            iterations=like._iterations,
+            time_limit=like._time_limit,
+        )
+
+    def change(self, H: FloatArray, rows: FloatArray) -> bool:
+        """Take another Hessian and other rows, of the same shapes; return whether that is possible.
+
+        If it is not, nothing is changed.
+        """
+        if not math.isfinite(float(H.sum()) + float(rows.sum())):
+            return False
+        before = self.H, self.rows
+        self.H, self.rows = H, rows
+        if self._model.update(H=H, A=rows) >= 0:
+            return True
+        try:
+            self.reset()
+        except SolverError:
+            self.H, self.rows = before
+            self.reset()
+            return False
+        return True

@@ -1,0 +1,1 @@
+"""The quadratic programme and the sampling that predictive control stands on."""

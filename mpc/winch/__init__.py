@@ -1,0 +1,1 @@
+"""The winch as predictive control sees it: model, estimator, weights."""

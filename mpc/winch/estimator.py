@@ -1,0 +1,267 @@
+r"""A Kalman filter of winch, sea and sensors' errors, for what the sensors show and no more.
+
+    m[k], u applied over the last sample --> Estimator.update --> chi[k]
+
+Steady-state gain of the prediction model's Riccati equation (Anderson and Moore, *Optimal
+Filtering*, 1979, sec. 4.4); before it, for some seconds, the gains of a filter that does not yet
+know the load's weight.  Where signals are missing, the gain is that of the others at the same
+covariance.  What comes late is compared with what was on its way at that age.
+
+A number that is not finite never gets in: a signal that shows one counts as missing.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import read_only
+from models.plant.equations import MEASUREMENTS
+from models.sensing.control import MEASURED as HEARD
+from models.sensing.control import Measurement
+from models.sensing.plant import MEASURED
+
+from .doubling import riccati
+from .doubts import AT_FIRST, constant_scales
+from .prediction import PredictionModel
+
+__all__ = ["Estimator", "kalman_covariance", "kalman_gain"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_AT = np.array([HEARD.index(name) for name in MEASURED])
+_AGE, _FRESH = HEARD.index("payload.age"), HEARD.index("payload.valid")
+_UNIT = HEARD.index("mru.valid")
+_APPLIED, _SPEED = HEARD.index("drive.applied"), HEARD.index("motor.speed")
+_NO_TELEMETRY = 1  # bits of what is missing
+_NO_UNIT = 2
+_STARTING = 10.0  # in which the gain comes to its steady value [s]
+_LOWER = 1.0  # by which the load may hang lower or higher at first [m]
+_BITS = 1 << np.arange(len(MEASURED))
+_HUGE = 1e12
+_LATER = 1e-3  # of a sample: an age that is no other than usual
+
+
+class Estimator:
+    """The filter's state, and what moves it.
+
+    Parameters
+    ----------
+    model
+        The prediction model.
+
+    Raises
+    ------
+    SolverError
+        If the Riccati equation has no solution.
+
+    Attributes
+    ----------
+    state
+        chi, (n,); belongs to the last `update`.
+    """
+
+    def __init__(self, model: PredictionModel) -> None:
+        self.model = model
+        self._P = kalman_covariance(model)
+        self._gains: dict[int, FloatArray] = {}
+        self._all = self._gain(0)
+        self._first = _first_gains(model, self._P)
+        self._C = np.ascontiguousarray(model.C)
+        self._A = np.ascontiguousarray(model.A)
+        self._B = np.ascontiguousarray(model.B[:, 0])
+        delays = dict(zip(MEASURED, model.winch.plant.delays, strict=True))
+        self._usual = delays[MEASUREMENTS[0]]
+        self._slack = _LATER * model.winch.sample_time
+        # All is counted from rest, where the rope already carries the load.
+        self._rest = np.zeros(len(MEASURED))
+        self._rest[MEASURED.index("rope.tension")] = model.winch.rest_tension
+        self._force, self._velocity = np.zeros(model.size), np.zeros(model.size)
+        self._force[: model.winch.size] = model.winch.from_constants[:, 0]
+        self._velocity[: model.winch.size] = model.winch.velocity
+        # Where that force is felt: on its way up, and in what arrives now.
+        self._sent, self._felt = np.zeros(model.size), np.zeros(len(MEASURED))
+        for k, name in enumerate(MEASUREMENTS):
+            now = model.winch.force_felt[k]
+            if model.depth[name]:
+                self._sent[model.first[name]] = now
+            self._felt[k] = now * max(0.0, 1.0 - delays[name] / model.winch.sample_time)
+        self._speed = np.zeros(model.size)
+        self._speed[: model.winch.size] = model.winch.speed
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: the load hangs at rest in still water."""
+        self.state = np.zeros(self.model.size)
+        self._ahead = np.zeros(self.model.size)
+        self._before = 0.0  # motor speed at the sample before, as estimated then
+        self._drag = 0.0  # force of quadratic drag at the sample before [N]
+        self._begun = False
+        self._samples = 0
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the one-step prediction, (n, n)."""
+        return self._P
+
+    @property
+    def sea_covariance(self) -> FloatArray:
+        """Covariance of the sea's state once the sample is known, (nh, nh)."""
+        at = self.model.sea_at
+        kept = self._P - self._all @ self.model.C @ self._P
+        return np.array(0.5 * (kept + kept.T)[at, at])
+
+    @property
+    def gain(self) -> FloatArray:
+        """Gain with every signal there, (n, ny)."""
+        return self._all
+
+    @property
+    def speed(self) -> float:
+        """Motor speed at the last update, as estimated [rad/s]."""
+        return self._before
+
+    def update(self, measurement: Measurement, held: float = math.nan) -> FloatArray:
+        """Return chi at this sample, given what is shown now.
+
+        The input over the sample before is that which the drive says it has followed, not the one
+        that it was asked for.
+
+        Parameters
+        ----------
+        measurement
+            What the sensors show.
+        held
+            Torque over the one at rest that the drive has held since the last sample, if it was at
+            its peak all the time [N m]; NaN if it followed a command.
+        """
+        shown = measurement.values
+        winch = self.model.winch
+        ahead = self._ahead
+        if self._begun:
+            applied, speed = float(shown[_APPLIED]), float(shown[_SPEED])
+            if math.isfinite(held) and math.isfinite(speed):
+                # A torque that is held does as much as one that falls to as much below it.
+                fall = 0.5 * winch.gain * winch.back * (speed - self._before)
+                ahead = ahead + self._B * (held + fall)
+            elif math.isfinite(applied):  # what is not known is taken as having held the load
+                ahead = ahead + self._B * winch.torque(applied, self._before)
+            # Quadratic drag at the mean of the velocities before and after: no linear model has it.
+            before, after = self._drag, winch.extra_drag(float(self._velocity @ ahead))
+            ahead = ahead + self._force * (0.5 * (before + after)) + self._sent * before
+        self._begun = True
+        y = shown[_AT] - self._rest
+        missing = 0 if shown[_FRESH] > 0.5 else _NO_TELEMETRY
+        if shown[_UNIT] <= 0.5:
+            missing |= _NO_UNIT
+        y = y - self._felt * winch.extra_drag(float(self._velocity @ ahead))
+        error = y - self._C @ ahead
+        if missing == 0 and math.isfinite(float(np.abs(error).max())):
+            late = float(shown[_AGE]) - self._usual
+            if late > self._slack or late < -self._slack:
+                error = y - self._late(float(shown[_AGE])) @ ahead
+            gain = self._all
+            if self._samples < len(self._first):
+                gain = self._first[self._samples]
+                self._samples += 1
+            self.state = ahead + gain @ error
+        else:
+            self.state = self._partly(ahead, y, missing, float(shown[_AGE]))
+        if not float(np.abs(self.state).max()) < _HUGE:  # no number, or no longer of this world
+            self.reset()
+        self._before = float(self._speed @ self.state)
+        self._drag = winch.extra_drag(float(self._velocity @ self.state))
+        return self.state
+
+    def advance(self, ahead: FloatArray) -> None:
+        """Take A chi, which the caller has computed among other products, as next prediction."""
+        self._ahead = ahead
+
+    def _partly(self, ahead: FloatArray, y: FloatArray, missing: int, age: float) -> FloatArray:
+        """Update with what there is."""
+        rows = self._late(age) if math.isfinite(age) else self._C
+        error = y - rows @ ahead
+        there = np.isfinite(error)
+        if missing & _NO_TELEMETRY:
+            there[:3] = False
+        if missing & _NO_UNIT:
+            there[3:5] = False
+        error = np.where(there, error, 0.0)
+        mask = int((~there) @ _BITS)
+        return np.asarray(ahead + self._gain(mask) @ error)
+
+    def _late(self, age: float) -> FloatArray:
+        """Return C for telemetry of another age than usual."""
+        if abs(age - self._usual) <= self._slack:
+            return self._C
+        rows = self._C.copy()
+        for name in MEASUREMENTS:
+            rows[MEASURED.index(name)] = self.model.late_row(name, age)
+        return rows
+
+    def _gain(self, mask: int) -> FloatArray:
+        """Return the gain without the measurements whose bits are set."""
+        if mask not in self._gains:
+            there = np.array([not mask >> k & 1 for k in range(len(MEASURED))])
+            self._gains[mask] = kalman_gain(self.model, self._P, there)
+        return self._gains[mask]
+
+
+def kalman_covariance(model: PredictionModel) -> FloatArray:
+    """Return the covariance of the steady one-step prediction, (n, n).
+
+    Raises
+    ------
+    SolverError
+        If there is none.
+    """
+    s = model.scale
+    A = model.A / s[:, None] * s
+    G = model.G / s[:, None]
+    # Each measurement in units of its own error.
+    C = model.C * s / np.sqrt(model.R)[:, None]
+    P = riccati(A, C, G @ G.T)
+    return read_only(P * np.outer(s, s))
+
+
+def kalman_gain(model: PredictionModel, P: FloatArray, there: npt.NDArray[np.bool_]) -> FloatArray:
+    """Return the gain of those measurements that are there; zero columns of the others.
+
+    Parameters
+    ----------
+    model
+        The prediction model.
+    P
+        Covariance of the prediction, (n, n).
+    there
+        (ny,).
+    """
+    gain = np.zeros((model.size, len(there)))
+    if there.any():
+        error = np.sqrt(model.R[there])
+        C = model.C[there] / error[:, None]
+        innovation = C @ P @ C.T + np.eye(len(C))
+        gain[:, there] = np.linalg.solve(innovation, C @ P).T / error
+    return gain
+
+
+def _first_gains(model: PredictionModel, P: FloatArray) -> list[FloatArray]:
+    """Return the gains after a start at which the constants are not known, (k, n, ny)."""
+    winch = model.winch
+    at = np.arange(model.constants_at.start, model.constants_at.stop)
+    P = np.array(P)
+    P[at, at] += (np.array(AT_FIRST) * constant_scales(model)) ** 2
+    # A load of another weight hangs lower: the winch's state is not known any better at first.
+    moved = winch.moved[:, 0]
+    P[: winch.size, : winch.size] += (_LOWER**2) * np.outer(moved, moved)
+    there = np.ones(len(model.R), dtype=np.bool_)
+    added, gains = model.G @ model.G.T, []
+    for _ in range(round(_STARTING / winch.sample_time)):
+        gain = kalman_gain(model, P, there)
+        gains.append(gain)
+        kept = np.eye(model.size) - gain @ model.C
+        P = kept @ P @ kept.T + (gain * model.R) @ gain.T
+        P = model.A @ P @ model.A.T + added
+    return gains

@@ -1,0 +1,65 @@
+r"""The model that plans are made on: the winch of the estimator, its rope stiffer than it is.
+
+    PredictionModel, stiffness --> plan_model --> PredictionModel of the regulator and the programme
+
+A drive at its limit gives less than the loop asks for, and what is left of the loop has to get
+along with that.  How little is enough depends on the resonance of load and rope: with a load
+lighter, or a rope stiffer, than the plan's, sixty per cent of the torque was too little, and what
+the plan put right too late went on as an oscillation of metres.  A plan that reckons with a stiffer
+rope errs to the other side, which is the harmless one.  `Unsaturated.growth` tells how far it is
+from instability; `docs/mpc.md` has the limit cycles that it ends.
+
+Only the plan is different.  The filter believes the case; what it finds at rest under a constant
+force is at rest for the plan too, so that nothing is left over.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .prediction import PredictionModel, prediction_model
+
+__all__ = ["plan_model"]
+
+
+def plan_model(model: PredictionModel, stiffness: float) -> PredictionModel:
+    """Return the model of the same world on a rope of another stiffness.
+
+    Parameters
+    ----------
+    model
+        What the estimator believes.
+    stiffness
+        Axial stiffness of the plan's rope over that of the case.
+
+    Raises
+    ------
+    InputError
+        If the stiffness is not above zero.
+    """
+    if stiffness == 1.0:
+        return model
+    here = model.winch
+    other = prediction_model(
+        here.case,
+        sample_time=here.sample_time,
+        masses=here.masses,
+        drag=here.drag,
+        off={"axial_stiffness": stiffness},
+    )
+    stiff = other.winch
+    # A constant force stretches this rope by less.  Seen from where the estimator finds the drum,
+    # all that is at rest is to stay there; the tension is that of the real rope, for the same sake.
+    shift = stiff.resting - here.resting
+    winch = replace(
+        stiff,
+        from_constants=stiff.from_constants + (stiff.A - np.eye(stiff.size)) @ shift,
+        tension=here.tension,
+        tension_from_hook=here.tension_from_hook,
+    )
+    A = np.array(other.A)
+    at = model.constants_at.start
+    A[: winch.size, at : at + 2] = winch.from_constants
+    return replace(other, winch=winch, A=A, R=model.R)

@@ -1,0 +1,361 @@
+r"""The world as a predictive controller sees it: winch, sea and sensors' errors in one state.
+
+    chi[k+1] = A chi + B d + G n        n: white, covariance one
+    y[k]     = C chi + v                v: white, covariance R
+
+The state chi holds, in this order,
+
+* the states of the winch and its rope (`mpc.winch.sampled`);
+* those of a filter whose white-noise response has the spectrum of the hook's motion
+  (`models.plant.shaping`), so that to predict the state is to predict the sea;
+* the error of the reference unit, a Butterworth low-pass of second order (`models.sensing.mru`),
+and a slow
+  one, of which the case does not speak (`Doubts.unit`);
+* constants that are to be estimated: a force on the payload, a torque at the motor, the bias of
+  the accelerometer and of the tension.  Without them a load of another weight would be held off
+  its place.  (Where the payload's zero is, a heavier load has stretched the rope by more: seen from
+  there it is the tension that is off);
+* what telemetry and reference unit have on their way: earlier values of what they show.
+
+`mpc.winch.estimator` makes a Kalman filter of it, `mpc.linear.condensed` the quadratic programme.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+
+from models.basics.checks import SolverError, read_only
+from models.case.case import Case
+from models.hook.hook import HookMotion
+from models.plant.equations import MEASUREMENTS
+from models.plant.shaping import ShapingFilter, fit_shaping_filter
+from models.sensing.mru import MruModel
+from models.sensing.plant import MEASURED
+
+from ..programme.holds import noisy_hold, root_of
+from .doubts import Doubts, doubted
+from .sampled import SampledWinch, sampled_winch
+
+__all__ = ["CONSTANTS", "LATE", "PredictionModel", "prediction_model", "sea_filter"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_OWNER = "prediction model"
+CONSTANTS = (
+    "payload.force",
+    "motor.torque",
+    "payload.acceleration_bias",
+    "rope.tension_bias",
+)
+#: What comes late, in the order of the first measurements.
+LATE = (*MEASUREMENTS, "mru.heave", "mru.heave_rate")
+_GRAVITY = 9.81
+_ERRORS = 4  # states of the reference unit's error: two of what the case says, two of a slow one
+_SLOW = 0.12  # frequency below which that lies, over the mean one of the hook
+_SPARE = 2  # samples by which the telemetry may be later than the case says
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PredictionModel:
+    """Matrices of the augmented state; `prediction_model` makes it.
+
+    Attributes
+    ----------
+    winch
+        The sampled plant.
+    sea
+        The shaping filter of the hook's motion.
+    waves
+        Its rms displacement, velocity and acceleration [m], [m/s], [m/s2].
+    A, B, G
+        (n, n), (n, 1), (n, ng).
+    known
+        How many columns of G are of the sea and the reference unit; the others are doubts.
+    slow
+        Noise over a sample of a slow error of the reference unit of one metre rms, (2, 2).
+    now
+        Rows of what telemetry and reference unit take in at a sample, (5, n).
+    first, depth
+        Of each late signal: where its earlier values begin in chi, and how many there are.
+    C
+        Rows of the measurements, in the order of `models.sensing.plant.MEASURED`, (ny, n).
+    R
+        Variances of their white errors, (ny,).
+    hook
+        Rows of the hook's displacement and velocity, (2, n).
+    """
+
+    winch: SampledWinch
+    sea: ShapingFilter
+    waves: tuple[float, ...]
+    A: FloatArray
+    B: FloatArray
+    G: FloatArray
+    known: int
+    slow: FloatArray
+    now: FloatArray
+    first: Mapping[str, int]
+    depth: Mapping[str, int]
+    C: FloatArray
+    R: FloatArray
+    hook: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("A", "B", "G", "slow", "now", "C", "R", "hook"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def size(self) -> int:
+        """Number of states."""
+        return len(self.A)
+
+    @property
+    def sea_at(self) -> slice:
+        """Where in chi the sea is."""
+        return slice(self.winch.size, self.winch.size + self.sea.order)
+
+    @property
+    def constants_at(self) -> slice:
+        """Where in chi the constants are."""
+        first = self.winch.size + self.sea.order + _ERRORS
+        return slice(first, first + len(CONSTANTS))
+
+    @cached_property
+    def scale(self) -> FloatArray:
+        """Size of each state, for the numerics: its standard deviation in the model, or one."""
+        return read_only(_scales(self))
+
+    def late_row(self, name: str, delay: float) -> FloatArray:
+        """Return the row of a late signal for another delay [s] than that of the case.
+
+        Linear between samples, as the telemetry itself is; a delay that is longer than what is
+        remembered is cut to that.
+        """
+        return _late_row(
+            self.now[LATE.index(name)],
+            self.first[name],
+            self.depth[name],
+            delay / self.winch.sample_time,
+        )
+
+    def __str__(self) -> str:
+        """Return a small tree of sizes."""
+        waiting = sum(self.depth.values())
+        return (
+            f"PredictionModel of {self.winch.case.name}, every {self.winch.sample_time:g} s\n"
+            f"├ winch and sensors: {self.winch.size} states, {self.winch.masses} rope masses\n"
+            f"├ sea: {self.sea.order} states, misfit {100 * self.sea.shape_error:.2g} %\n"
+            f"├ constants: {', '.join(CONSTANTS)}\n"
+            f"└ on their way: {waiting} values"
+        )
+
+
+def prediction_model(
+    case: Case,
+    *,
+    sample_time: float = 0.05,
+    masses: int | None = None,
+    drag: float | None = None,
+    doubts: Doubts | None = None,
+    off: Mapping[str, float] | None = None,
+) -> PredictionModel:
+    """Return the prediction model of a case.
+
+    Parameters
+    ----------
+    case
+        Vessel, sea, rope, payload, winch and sensors.
+    sample_time
+        T [s].
+    masses
+        Masses along the rope; by default those of the case.
+    drag
+        Linear drag coefficient of the payload [N s/m]; see `mpc.winch.sampled.sampled_winch`.
+    doubts
+        What the model does not know of the world; by default next to nothing.
+    off
+        Factors on the plant's numbers; see `mpc.winch.sampled.sampled_winch`.
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range.
+    SolverError
+        If the hook's spectrum cannot be fitted.
+    """
+    winch = sampled_winch(case, sample_time=sample_time, masses=masses, drag=drag, off=off)
+    hook, T, n = HookMotion.from_case(case), winch.sample_time, winch.size
+    sea = sea_filter(hook)
+    sea_A, sea_Q = noisy_hold(sea.A, sea.B, T)
+    error_A, error_Q = _unit_error(case, hook, T)
+    depth = _depths(case, T)
+    sea_at = slice(n, n + sea.order)
+    error_at = slice(sea_at.stop, sea_at.stop + _ERRORS)
+    constants_at = slice(error_at.stop, error_at.stop + len(CONSTANTS))
+    first, end = {}, constants_at.stop
+    for name in LATE:
+        first[name], end = end, end + depth[name]
+
+    shown = np.vstack([sea.C, sea.C @ sea.A])
+    now = _present(winch, shown, sea_at, error_at, constants_at, end)
+    A = np.zeros((end, end))
+    A[:n, :n] = winch.A
+    A[:n, sea_at] = winch.from_hook[:, :2] @ shown + winch.from_hook[:, 2:] @ shown @ sea_A
+    A[sea_at, sea_at] = sea_A
+    A[error_at, error_at] = scipy.linalg.block_diag(error_A, _slow_error(hook, T)[0])
+    A[:n, constants_at.start : constants_at.start + 2] = winch.from_constants
+    A[constants_at, constants_at] = np.eye(len(CONSTANTS))
+    for k, name in enumerate(LATE):
+        if depth[name]:
+            A[first[name]] = now[k]
+            later = np.arange(first[name] + 1, first[name] + depth[name])
+            A[later, later - 1] = 1.0
+
+    hook_rows = np.zeros((2, end))
+    hook_rows[:, sea_at] = shown
+    delays = dict(zip(MEASURED, winch.plant.delays, strict=True))
+    late = [
+        _late_row(now[k], first[name], depth[name], delays[name] / T) for k, name in enumerate(LATE)
+    ]
+    other = np.zeros((len(MEASURED) - len(LATE), end))
+    other[:, :n] = winch.plant.C[len(LATE) :]
+    other[:, sea_at] = winch.plant.F[len(LATE) :, :2] @ shown
+    other[-1, constants_at.start + 3] = 1.0
+    sea_root, error_root = root_of(sea_Q), root_of(error_Q)
+    G = np.zeros((end, sea_root.shape[1] + error_root.shape[1]))
+    G[sea_at, : sea_root.shape[1]] = sea_root
+    G[:n, : sea_root.shape[1]] = winch.from_hook[:, 2:] @ shown @ sea_root
+    G[error_at.start : error_at.start + 2, sea_root.shape[1] :] = error_root
+    parts = (hook.displacement, hook.velocity, hook.acceleration)
+    model = PredictionModel(
+        winch=winch,
+        sea=sea,
+        waves=tuple(float(part.rms) for part in parts),
+        A=A,
+        B=np.vstack([winch.B, np.zeros((end - n, 1))]),
+        G=G,
+        known=G.shape[1],
+        slow=root_of(_slow_error(hook, T)[1]),
+        now=now,
+        first=first,
+        depth=depth,
+        C=np.vstack([*late, other]),
+        R=np.ones(len(MEASURED)),
+        hook=hook_rows,
+    )
+    return doubted(model, Doubts(unit=0.0) if doubts is None else doubts)
+
+
+def sea_filter(hook: HookMotion) -> ShapingFilter:
+    """Return the shaping filter that fits a hook's motion best, of order 4, 6 or 8.
+
+    Raises
+    ------
+    SolverError
+        If none fits.
+    """
+    fits = []
+    for order in (4, 6, 8):
+        try:
+            fits.append(fit_shaping_filter(hook.density, hook.band, order))
+        except SolverError:
+            continue
+    if not fits:
+        raise SolverError(f"{_OWNER}: no filter fits the spectrum of the hook's motion")
+    best = min(fits, key=lambda fit: fit.shape_error)
+    # States of covariance one: those of a companion form differ by many powers of ten.
+    root = scipy.linalg.cholesky(
+        scipy.linalg.solve_continuous_lyapunov(best.A, -best.B @ best.B.T), lower=True
+    )
+    return replace(
+        best,
+        A=np.linalg.solve(root, best.A @ root),
+        B=np.linalg.solve(root, best.B),
+        C=best.C @ root,
+    )
+
+
+def _unit_error(case: Case, hook: HookMotion, T: float) -> tuple[FloatArray, FloatArray]:
+    """Return the error (e, e') of the reference unit over a sample, and what is added to it."""
+    unit = MruModel(case.sensors.mru, T, float(hook.displacement.rms), seed=0)
+    w = 1.0 if case.sensors.mru is None else case.sensors.mru.noise_bandwidth
+    A = np.array([[0.0, 1.0], [-(w**2), -math.sqrt(2.0) * w]])
+    over, added = noisy_hold(A, np.array([[0.0], [1.0]]), T)
+    # variance of e under white noise of intensity one: 1/(2 sqrt(2) w^3)
+    return over, added * unit.error_rms**2 * 2.0 * math.sqrt(2.0) * w**3
+
+
+def _slow_error(hook: HookMotion, T: float) -> tuple[FloatArray, FloatArray]:
+    """Return a slow error of the unit (e, e') over a sample, and what adds up to an rms of one."""
+    w = _SLOW * float(hook.velocity.rms / hook.displacement.rms)
+    A = np.array([[0.0, 1.0], [-(w**2), -math.sqrt(2.0) * w]])
+    over, added = noisy_hold(A, np.array([[0.0], [1.0]]), T)
+    return over, added * 2.0 * math.sqrt(2.0) * w**3
+
+
+def _depths(case: Case, T: float) -> dict[str, int]:
+    """Return how many earlier values are remembered of each late signal."""
+    link = case.sensors.telemetry
+    telemetry = math.ceil((link.delay + link.jitter) / T - 1e-6) + _SPARE
+    unit = 0 if case.sensors.mru is None else math.ceil(case.sensors.mru.delay / T - 1e-6)
+    return {name: telemetry if name in MEASUREMENTS else unit for name in LATE}
+
+
+def _present(
+    winch: SampledWinch,
+    shown: FloatArray,
+    sea_at: slice,
+    error_at: slice,
+    constants_at: slice,
+    size: int,
+) -> FloatArray:
+    """Return the rows of what telemetry and reference unit take in."""
+    rows = np.zeros((len(LATE), size))
+    rows[:, : winch.size] = winch.plant.C[: len(LATE)]
+    rows[:, sea_at] = winch.plant.F[: len(LATE), :2] @ shown
+    rows[3, error_at.start : error_at.stop : 2] = 1.0
+    rows[4, error_at.start + 1 : error_at.stop : 2] = 1.0
+    # A force on the payload is felt by its accelerometer at once.
+    rows[: len(MEASUREMENTS), constants_at.start] = winch.force_felt
+    rows[0, constants_at.start + 2] = 1.0
+    return rows
+
+
+def _late_row(now: FloatArray, first: int, depth: int, samples: float) -> FloatArray:
+    samples = min(max(samples, 0.0), float(depth))
+    whole = math.floor(samples + 1e-6)
+    share = max(samples - whole, 0.0)
+    row = np.zeros(len(now))
+    for back, weight in ((whole, 1.0 - share), (whole + 1, share)):
+        if weight > 1e-9 and back == 0:
+            row += weight * now
+        elif weight > 1e-9:
+            row[first + back - 1] += weight
+    return row
+
+
+def _scales(model: PredictionModel) -> FloatArray:
+    """Return the rms of each state when the drum is held, roughly; one where it has none."""
+    n, w = model.winch.size, model.sea_at.stop
+    heave = max(float(np.linalg.norm(model.hook[0])), 1e-6)
+    sizes = np.ones(model.size)
+    sizes[:n] = heave * np.maximum(np.abs(model.winch.moved).max(axis=1), 1e-6)
+    force, torque = model.winch.rest_tension, abs(model.winch.rest_torque)
+    by_signal = {"tension": 0.1 * force, "torque": 0.1 * torque, "current": 0.1 * torque}
+    for k, name in enumerate(model.winch.plant.states):
+        if not model.winch.moved[k].any():
+            sizes[k] = by_signal.get(name.rsplit(".", 1)[-1], heave)
+    added = np.sqrt(np.diag(model.G @ model.G.T)[w : w + _ERRORS])
+    sizes[w : w + _ERRORS] = np.where(added > 0.0, added, 1.0)
+    sizes[model.constants_at] = [0.1 * force, 0.1 * torque, 0.1 * _GRAVITY, 0.1 * force]
+    for name in LATE:
+        at = slice(model.first[name], model.first[name] + model.depth[name])
+        sizes[at] = heave
+    return sizes

@@ -1,0 +1,263 @@
+r"""The winch and its rope, sampled: what a predictive controller can do, and what it does.
+
+    x[k+1] = A x + B d + from_hook [z, z', z+, z+'] + from_constants c
+
+The input d is not the drive's command but the torque that it asks for at the start of a sample,
+over the one that holds the load.  The command is
+
+    u = u_rest + back omega + d / gain,
+
+where ``back omega`` is the back-EMF of a DC motor, or the speed itself for a drive with a speed
+regulator.  So a limit on the torque is a bound on the input, and that on the voltage a line
+through the state.  Over the sample the command is held, and the torque gives way to the speed as
+it does in the drive.
+
+Everything is a deviation from rest.  The hook moves along the cubic through its displacement and
+velocity at both ends of a sample; the rest is exact.  Constants c are a force on the payload [N]
+and a torque at the motor [N m].
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import check_range, read_only
+from models.case.case import Case
+from models.plant.discrete import zero_order_hold
+from models.plant.equations import MEASUREMENTS
+from models.plant.linear import LinearPlant
+from models.plant.plant import MEAN_LOSSES, Plant, build_plant
+from models.plant.plant_data import PlantData
+from models.sensing.plant import sensed_plant
+
+from ..programme.holds import hermite_hold
+
+__all__ = ["SampledWinch", "sampled_winch"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_OWNER = "predictive control"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SampledWinch:
+    """Plant and sensors, sampled; `sampled_winch` makes it.
+
+    Attributes
+    ----------
+    case, plant
+        The case, and its linear plant with all sensors, in continuous time.
+    A, B, from_hook, from_constants
+        (n, n), (n, 1), (n, 4), (n, 2).
+    payload, velocity, speed, tension
+        Rows of the payload's displacement [m] and velocity [m/s], the motor's speed [rad/s] and the
+        tension at the drum [N], of the state, (n,).
+    tension_from_hook
+        Share of (z, z') in the tension, (2,).
+    force_felt
+        What the payload's sensors show at once of a force on it, per newton, (3,).
+    moved
+        State of a plant whose load is off by one metre, and of one that moves at one metre per
+        second, drum and payload alike, (n, 2).
+    gain, back
+        Torque per command, and command per speed.
+    rest_command, rest_torque, rest_tension
+        What holds the load [unit of the command], [N m], [N].
+    sample_time
+        T [s].
+    masses
+        Masses along the rope.
+    data
+        Numbers of the plant.
+    drag
+        Linear drag coefficient of the payload in A [N s/m].
+    """
+
+    case: Case
+    data: PlantData
+    plant: LinearPlant
+    A: FloatArray
+    B: FloatArray
+    from_hook: FloatArray
+    from_constants: FloatArray
+    payload: FloatArray
+    velocity: FloatArray
+    speed: FloatArray
+    tension: FloatArray
+    tension_from_hook: FloatArray
+    force_felt: FloatArray
+    moved: FloatArray
+    gain: float
+    back: float
+    rest_command: float
+    rest_torque: float
+    rest_tension: float
+    sample_time: float
+    masses: int
+    drag: float
+
+    def __post_init__(self) -> None:
+        for name in (
+            *("A", "B", "from_hook", "from_constants", "payload", "velocity", "speed"),
+            "tension",
+            *("tension_from_hook", "force_felt", "moved"),
+        ):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def dc(self) -> bool:
+        """Whether the motor is a DC motor, whose command is a voltage."""
+        return self.data.motor == "dc"
+
+    @property
+    def size(self) -> int:
+        """Number of states."""
+        return len(self.A)
+
+    def extra_drag(self, velocity: float) -> float:
+        """Return the force of quadratic drag at a payload velocity [m/s] that A has not [N].
+
+        A velocity at which the drag would exceed the weight is no estimate to rely on.
+        """
+        highest = math.sqrt(self.rest_tension / max(self.data.quadratic_drag, 1.0))
+        velocity = min(max(velocity, -highest), highest)
+        return (self.drag - self.data.quadratic_drag * abs(velocity)) * velocity
+
+    def command(self, torque: float, speed: float) -> float:
+        """Return the drive command for an input d [N m] at a motor speed [rad/s]."""
+        return self.rest_command + self.back * speed + torque / self.gain
+
+    def torque(self, command: float, speed: float) -> float:
+        """Return the input d [N m] of a drive command at a motor speed [rad/s]."""
+        return (command - self.rest_command - self.back * speed) * self.gain
+
+    @cached_property
+    def steady(self) -> FloatArray:
+        """Input that holds the payload in its place against each of the constants, (2,)."""
+        return read_only(self._held[self.size])
+
+    @cached_property
+    def resting(self) -> FloatArray:
+        """State in which it then rests, for each of the constants, (n, 2)."""
+        return read_only(self._held[: self.size])
+
+    @cached_property
+    def _held(self) -> FloatArray:
+        """State and input that hold the payload in its place against the constants, (n + 1, 2)."""
+        n = self.size
+        system = np.zeros((n + 1, n + 1))
+        system[:n, :n] = self.A - np.eye(n)
+        system[:n, n:] = self.B
+        system[n, :n] = self.payload
+        wanted = np.vstack([-self.from_constants, np.zeros((1, 2))])
+        scale = np.abs(system).max(axis=1)
+        solved = np.linalg.lstsq(system / scale[:, None], wanted / scale[:, None], rcond=None)[0]
+        return np.asarray(solved)
+
+
+def sampled_winch(
+    case: Case,
+    *,
+    sample_time: float = 0.05,
+    masses: int | None = None,
+    drag: float | None = None,
+    off: Mapping[str, float] | None = None,
+) -> SampledWinch:
+    """Return the sampled plant of a case.
+
+    Parameters
+    ----------
+    case
+        The case.
+    sample_time
+        T [s].
+    masses
+        Masses along the rope; by default those of the case.
+    drag
+        Linear drag coefficient of the payload [N s/m]; by default that of the case if it gives
+        one, else zero: a payload that is held still has next to no quadratic drag.
+    off
+        Factors on the plant's numbers (`models.plant.plant_data.PlantData`) by name, for a plant
+        that is not what the case says: ``{"payload_mass": 1.3}``.
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range.
+    """
+    T = check_range(_OWNER, "sample_time", sample_time, low=0.0, unit="s", open_low=True)
+    coefficient = (case.payload.fixed_drag or 0.0) if drag is None else drag
+    data = PlantData.from_case(case)
+    count = data.chosen_masses(masses)
+    changed: dict[str, Any] = {k: v * getattr(data, k) for k, v in (off or {}).items()}
+    data = replace(data, **changed)
+    plant = sensed_plant(data, masses=count, drag=coefficient, sensors=case.sensors)
+    symbolic = build_plant(data, count)
+    rest = symbolic.operating_point(MEAN_LOSSES)
+    gain, back = _drive(symbolic)
+    known = {name: k for k, name in enumerate(plant.disturbances)}
+    hook = [known["hook.heave"], known["hook.heave_rate"]]
+    rows = {name: k for k, name in enumerate(plant.outputs)}
+    speed = plant.Cz[rows["motor.speed"]]
+    held = np.column_stack([plant.B[:, 0], plant.E[:, known["payload.force"]]])
+    A, inputs = zero_order_hold(plant.A, held, T)
+    tension = rows["rope.tension"]
+    return SampledWinch(
+        case=case,
+        data=data,
+        plant=plant,
+        # The command is held at u = back omega(start) + d / gain.
+        A=A + back * np.outer(inputs[:, 0], speed),
+        B=inputs[:, :1] / gain,
+        from_hook=hermite_hold(plant.A, plant.E[:, hook], T),
+        from_constants=np.column_stack([inputs[:, 1], inputs[:, 0] / gain]),
+        payload=plant.Cz[rows["payload.displacement"]],
+        velocity=plant.Cz[rows["payload.velocity"]],
+        speed=speed,
+        tension=plant.Cz[tension],
+        tension_from_hook=plant.Fz[tension, hook],
+        force_felt=plant.F[: len(MEASUREMENTS), known["payload.force"]],
+        moved=_moved(plant, symbolic),
+        gain=gain,
+        back=back,
+        rest_command=rest.command,
+        rest_torque=rest.torque,
+        rest_tension=rest.tension,
+        sample_time=T,
+        masses=symbolic.masses,
+        drag=coefficient,
+    )
+
+
+def _drive(plant: Plant) -> tuple[float, float]:
+    """Return torque per command, and command per speed."""
+    data = plant.data
+    if data.motor == "dc":
+        return data.torque_constant / data.resistance, data.back_emf_constant
+    return (data.speed_gain, 1.0) if data.speed_gain > 0.0 else (1.0, 0.0)
+
+
+def _moved(plant: LinearPlant, symbolic: Plant) -> FloatArray:
+    """Return the states of a load that is off by one metre, or moves by one metre per second.
+
+    Rope, drum and sensors' filters move with it: such a shift is a solution of the plant's
+    equations, a steady motion one but for friction and drag.
+    """
+    values = symbolic.parameters
+    turns = values["winch.gear_ratio"] / values["winch.drum_radius"]
+    moved = np.zeros((len(plant.states), 2))
+    for k, name in enumerate(plant.states):
+        part, signal = name.split(".")[0], name.rsplit(".", 1)[-1]
+        if part not in ("motor", "rope", "payload", "sensor", "telemetry"):
+            continue
+        by = {"angle": (turns, 0.0), "speed": (0.0, turns)}
+        by |= {"displacement": (1.0, 0.0), "velocity": (0.0, 1.0)}
+        moved[k] = by.get(signal, (0.0, 0.0))
+    return moved

@@ -1,0 +1,208 @@
+r"""The loop of a predictive controller that is not at its limits: stable, and how robust.
+
+    sensors y --> Kalman filter --> regulator --> u --> drive, winch, rope --> y
+                                              (broken here)
+
+Without an active limit the controller is linear: u = C(z) y.  This builds C, closes the loop on
+the same or on another plant (a heavier load, a softer rope), and gives its poles, its highest
+sensitivity M_s on the frequencies up to half the sample rate, and the rms of the payload in the
+modelled sea.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import read_only
+
+from .doubling import lyapunov
+from .estimator import kalman_covariance, kalman_gain
+from .prediction import PredictionModel
+from .regulation import Regulator
+
+__all__ = ["Unsaturated"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+_NODES = 160
+_LOWEST = 1e-3  # [rad/s]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Unsaturated:
+    """Filter and regulator as one linear controller.
+
+    Parameters
+    ----------
+    model
+        What the filter believes.
+    regulator
+        What the controller does with it.
+    """
+
+    model: PredictionModel
+    regulator: Regulator
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance of the filter's one-step prediction, (n, n)."""
+        return kalman_covariance(self.model)
+
+    @cached_property
+    def gain(self) -> FloatArray:
+        """The filter's gain, (n, ny)."""
+        there = np.ones(len(self.model.R), dtype=np.bool_)
+        return read_only(kalman_gain(self.model, self.covariance, there))
+
+    @cached_property
+    def controller(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return (A, B, C, D) of u = C(z) y, with x the one-step prediction."""
+        return self._throttled(1.0)
+
+    def _throttled(self, share: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return that of a drive which gives a share of the torque asked for, and says so."""
+        model, winch = self.model, self.model.winch
+        row = share * self.regulator.feedback(model)
+        ahead = model.A - model.B @ row[None, :]
+        command = -row / winch.gain
+        command[: winch.size] += winch.back * winch.speed
+        kept = np.eye(model.size) - self.gain @ model.C
+        return ahead @ kept, ahead @ self.gain, (command @ kept)[None, :], command[None] @ self.gain
+
+    def poles(self, plant: PredictionModel | None = None, *, share: float = 1.0) -> ComplexArray:
+        """Return the poles of the closed loop on a plant, by default that of the model.
+
+        Parameters
+        ----------
+        plant
+            The plant.
+        share
+            How much of the torque that is asked for the drive gives: below one where it saturates
+            (the gain of its describing function; A. Gelb and W. E. Vander Velde, *Multiple-Input
+            Describing Functions and Nonlinear System Design*, 1968, sec. 2.3).  The filter is told.
+        """
+        A, B, C = _plant(self.model if plant is None else plant)
+        Ac, Bc, Cc, Dc = self.controller if share == 1.0 else self._throttled(share)
+        top = np.hstack([A + B @ Dc @ C, B @ Cc])
+        closed = np.vstack([top, np.hstack([Bc @ C, Ac])])
+        return np.asarray(np.linalg.eigvals(closed), dtype=np.complex128)
+
+    def growth(self, plant: PredictionModel | None = None, *, share: float = 1.0) -> float:
+        """Return the largest modulus of the poles, below one where the loop is stable."""
+        return float(np.abs(self.poles(plant, share=share)).max())
+
+    def sensitivity(
+        self, omega: FloatArray, *, at: str = "torque", plant: PredictionModel | None = None
+    ) -> ComplexArray:
+        """Return S = 1/(1 + L), the loop broken at the torque or at the command, (k,).
+
+        At the torque the drive's back-EMF, or its speed regulator, stays part of the plant's own
+        behaviour that the controller compensates; at the command it is part of the loop.
+
+        Parameters
+        ----------
+        omega
+            [rad/s], below half the sample rate, (k,).
+        at
+            ``torque`` or ``command``.
+        plant
+            The plant; by default that of the model.
+        """
+        model, winch = self.model, self.model.winch
+        true = model if plant is None else plant
+        z = np.exp(1j * np.asarray(omega, dtype=np.float64) * winch.sample_time)
+        A, B, C = _plant(true)
+        Ac, Bc, Cc, Dc = self.controller
+        if at == "torque":
+            kept = _reached(true)
+            A, B = true.A[np.ix_(kept, kept)], true.B[kept]
+            row = -self.regulator.feedback(model)
+            held = np.eye(model.size) - self.gain @ model.C
+            Cc, Dc = (row @ held)[None, :], (row @ self.gain)[None, :]
+        through = C @ np.linalg.solve(_pencil(A, z), np.broadcast_to(B, (z.size, *B.shape)))
+        back = Cc @ np.linalg.solve(_pencil(Ac, z), np.broadcast_to(Bc, (z.size, *Bc.shape))) + Dc
+        return np.asarray(1.0 / (1.0 - (back @ through)[:, 0, 0]))
+
+    def max_sensitivity(self, *, at: str = "torque") -> float:
+        """Return M_s = max |S|; infinite if the loop is not stable."""
+        if self.growth() >= 1.0:
+            return np.inf
+        nyquist = np.pi / self.model.winch.sample_time
+        omega = np.geomspace(_LOWEST, nyquist, _NODES)
+        return float(np.abs(self.sensitivity(omega, at=at)).max())
+
+    def forecast_error(self, ahead: float) -> float:
+        """Return the standard deviation of the hook's forecast, `ahead` [s] from now [m]."""
+        model, at = self.model, self.model.sea_at
+        P = (self.covariance - self.gain @ model.C @ self.covariance)[at, at]
+        over, added = model.A[at, at], (model.G @ model.G.T)[at, at]
+        for _ in range(round(ahead / model.winch.sample_time)):
+            P = over @ P @ over.T + added
+        row = model.hook[0, at]
+        return math.sqrt(max(float(row @ P @ row), 0.0))
+
+    def payload_rms_under(self, truth: PredictionModel) -> float:
+        """Return the payload's rms [m] with the noises of another model of the same winch."""
+        return self._rms_under(truth)[0]
+
+    def torque_rms_under(self, truth: PredictionModel) -> float:
+        """Return the rms of the input d [N m] with the noises of another model."""
+        return self._rms_under(truth)[1]
+
+    def _rms_under(self, truth: PredictionModel) -> tuple[float, float]:
+        """Return the rms of payload [m] and input [N m]; infinite if the loop is not stable."""
+        Ac, Bc, Cc, Dc = self.controller
+        A, B, C = truth.A, truth.B, truth.C
+        winch = truth.winch
+        # The true input d follows from the command and the true speed.
+        to_input = np.zeros(truth.size)
+        to_input[: winch.size] = -winch.back * winch.gain * winch.speed
+        into = B * winch.gain
+        own = A + B @ to_input[None, :]
+        closed = np.block([[own + into @ Dc @ C, into @ Cc], [Bc @ C, Ac]])
+        n, m = truth.size, len(Ac)
+        noise = np.zeros((n + m, truth.G.shape[1] + len(truth.R)))
+        noise[:n, : truth.G.shape[1]] = truth.G
+        root = np.diag(np.sqrt(truth.R))
+        noise[:n, truth.G.shape[1] :] = into @ Dc @ root
+        noise[n:, truth.G.shape[1] :] = Bc @ root
+        at = truth.constants_at
+        noise[at] = 0.0  # constants stay where they are
+        closed[at, at] = 0.0
+        covariance = lyapunov(closed, noise @ noise.T)
+        if covariance is None:
+            return np.inf, np.inf
+        row = np.zeros(n + m)
+        row[: winch.size] = winch.payload
+        asked = np.concatenate([to_input, np.zeros(m)])
+        asked += winch.gain * np.concatenate([(Dc @ C)[0], Cc[0]])
+        payload, torque = (float(r @ covariance @ r) for r in (row, asked))
+        return math.sqrt(max(payload, 0.0)), math.sqrt(max(torque, 0.0))
+
+
+def _plant(model: PredictionModel) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return (A, B, C) from command to measurements: the winch and what is on its way."""
+    winch = model.winch
+    A = np.array(model.A)
+    A[: winch.size, : winch.size] -= (
+        winch.back * winch.gain * np.outer(model.B[: winch.size, 0], winch.speed)
+    )
+    kept = _reached(model)
+    return A[np.ix_(kept, kept)], model.B[kept] * winch.gain, model.C[:, kept]
+
+
+def _reached(model: PredictionModel) -> npt.NDArray[np.int64]:
+    """Return the states that the command reaches: not the sea, the errors and the constants."""
+    waiting = np.arange(model.constants_at.stop, model.size)
+    return np.concatenate([np.arange(model.winch.size), waiting])
+
+
+def _pencil(A: FloatArray, z: ComplexArray) -> ComplexArray:
+    """Return z I - A, (k, n, n)."""
+    return np.asarray(z[:, None, None] * np.eye(len(A)) - A)

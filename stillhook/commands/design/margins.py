@@ -1,0 +1,69 @@
+"""`stillhook margins`: how far the plant's numbers may be off before a design is unstable."""
+
+from __future__ import annotations
+
+import argparse
+
+from models.basics.checks import InputError, check_range
+
+from ...text.terminal import commands, console, progress
+from ..design_argument import given_design
+from ..given import case_words, given_case
+from .optimise import interruptible
+
+__all__ = ["parse_off", "run"]
+
+_USUAL = {"payload.mass": 0.3, "stiffness": 0.2, "drag": 0.5}
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Analyse and show; return 0 if the loop is stable over the ranges, 1 if not."""
+    check_range("margins", "--draws", arguments.draws, low=0, high=1_000_000)
+    case = given_case(arguments)
+    off = parse_off(arguments.off) or _USUAL
+    design = given_design(case, arguments)
+    from synth.robust.mu import robustness
+
+    with progress(shown=not arguments.quiet) as tell, interruptible() as check:
+
+        def step(stage: str, done: int, total: int) -> None:
+            check()
+            tell(stage, done, total)
+
+        found = robustness(design, off, draws=arguments.draws, progress=step)
+    out = console()
+    if arguments.quiet:
+        out.print(f"{case.name}: {found.status}", soft_wrap=True)
+        return 0 if found.ok else 1
+    out.print(str(found), soft_wrap=True)
+    words = case_words(arguments, None)
+    vary = " ".join(
+        f"--vary {d.path}={max(d.at(-1.0), 0.0):.5g}..{d.at(1.0):.5g}"
+        for d in found.doubts
+        if "." in d.path
+    )
+    if vary:
+        commands([("gains for the whole range", f"stillhook robust {words} {vary}")], out)
+    return 0 if found.ok else 1
+
+
+def parse_off(texts: list[str]) -> dict[str, float | str]:
+    """Return shares, or widths with a unit, by path.
+
+    Examples
+    --------
+    >>> parse_off(["payload.mass=0.3", "delay = 20 ms"])
+    {'payload.mass': 0.3, 'delay': '20 ms'}
+    """
+    found: dict[str, float | str] = {}
+    for text in texts:
+        path, sign, width = (part.strip() for part in text.partition("="))
+        if not (path and sign and width):
+            raise InputError(f"--off: must be PATH=SHARE, as in payload.mass=0.3, got {text!r}")
+        if path in found:
+            raise InputError(f"--off: {path} is given twice")
+        try:
+            found[path] = float(width)
+        except ValueError:
+            found[path] = width
+    return found

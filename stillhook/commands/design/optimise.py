@@ -1,0 +1,183 @@
+"""`stillhook optimise`: from a case to its gains, on the terminal and in a folder."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import math
+import shlex
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...text.folder import OutputFolder, folder_name
+from ...text.quantities import number
+from ...text.summary import AT_LEAST
+from ...text.terminal import Progress, commands, console, progress, show_design
+from ..given import case_words, gains_text, given_case
+
+if TYPE_CHECKING:
+    from models import Case
+    from synth.design.design import GainDesign
+
+__all__ = ["run"]
+
+# Where a limit stands in the case file, to suggest a change of it.
+_FIELDS = {
+    "max_sensitivity": "limits.max_sensitivity",
+    "gain_margin_up": "limits.gain_margin_up",
+    "gain_margin_down": "limits.gain_margin_down",
+    "delay_margin": "limits.delay_margin",
+    "low_frequency": "limits.low_frequency.ratio",
+    "roll_off": "limits.roll_off",
+    "motor.torque.peak": "winch.drive.torque_peak",
+    "motor.torque.continuous": "winch.drive.torque_continuous",
+    "motor.speed.peak": "winch.drive.speed",
+    "motor.voltage.peak": "winch.drive.voltage",
+    "motor.current.peak": "winch.drive.current_peak",
+    "motor.current.continuous": "winch.drive.current_continuous",
+    "motor.power.peak": "winch.drive.power",
+    "rope.tension.peak": "limits.rope_tension_peak",
+    "rope.tension.least": "limits.minimum_tension",
+}
+_AGAIN = 0.25  # s between two attempts to interrupt
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Optimise, show and save; return 0 if the design is ok, 1 if not."""
+    from models.basics.checks import check_range
+
+    check_range("optimise", "--starts", arguments.starts, low=1, high=4096)
+    check_range("optimise", "--seed", arguments.seed, low=0)
+    case = given_case(arguments)
+    folder = OutputFolder.prepare(arguments.out or Path("out") / folder_name(case.name))
+    folder.write("case.yaml", case.to_yaml())
+    design: GainDesign | None = None
+    try:
+        with progress(shown=not arguments.quiet) as tell:
+            design = _optimised(case, arguments, tell)
+            _report(folder, design, tell, bound=arguments.bound)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(_kept(folder, design)) from None
+    out = console()
+    if arguments.quiet:
+        out.print(f"{case.name}: {design.status}", soft_wrap=True)
+    else:
+        show_design(design, out, bound=arguments.bound)
+        out.print()
+        out.print(f"Written to {folder.path}: summary.md, design.yaml, figures", soft_wrap=True)
+        commands(_next(design, arguments, folder), out)
+    return 0 if design.ok else 1
+
+
+def _optimised(case: Case, arguments: argparse.Namespace, tell: Progress) -> GainDesign:
+    from synth import optimise_gains
+
+    with interruptible() as check:
+
+        def step(stage: str, done: int, total: int) -> None:
+            check()
+            tell(stage, done, total)
+
+        return optimise_gains(case, starts=arguments.starts, seed=arguments.seed, progress=step)
+
+
+def _report(folder: OutputFolder, design: GainDesign, tell: Progress, *, bound: bool) -> None:
+    from ...designs.report import write_report
+
+    write_report(folder.path, design=design, bound=bound, progress=tell)
+
+
+@contextlib.contextmanager
+def interruptible() -> Iterator[Callable[[], None]]:
+    """Make Ctrl-C end a computation that swallows it.
+
+    CasADi turns an interrupt within IPOPT into a solve that failed, and the search goes on
+    with the next start.  So an interrupt is remembered, and raised again until it gets
+    through: by a timer where there is one, and by the function that is yielded, which the
+    computation's progress calls.
+    """
+    asked = False
+
+    def interrupt(number: int, frame: object) -> None:
+        nonlocal asked
+        del number, frame
+        asked = True
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+        raise KeyboardInterrupt
+
+    def check() -> None:
+        if asked:
+            raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield check  # only the main thread may handle signals
+        return
+    alarm = getattr(signal, "SIGALRM", None)
+    before = signal.signal(signal.SIGINT, interrupt)
+    before_alarm = signal.SIG_DFL if alarm is None else signal.signal(alarm, interrupt)
+    try:
+        yield check
+    finally:
+        if alarm is not None:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(alarm, before_alarm)
+        signal.signal(signal.SIGINT, before)
+
+
+def _kept(folder: OutputFolder, design: GainDesign | None) -> str:
+    """Return what an interrupted run leaves behind: whole files, some of them perhaps old."""
+    kept = sorted(path.name for path in folder.path.iterdir() if not path.name.startswith("."))
+    names = ", ".join(kept)
+    if design is not None:
+        return f"the design is finished, its report is not; kept in {folder.path}: {names}"
+    old = "" if kept == ["case.yaml"] else " (all but case.yaml are from an earlier run)"
+    return f"no design was finished; kept in {folder.path}: {names}{old}"
+
+
+def _next(
+    design: GainDesign, arguments: argparse.Namespace, folder: OutputFolder
+) -> list[tuple[str, str]]:
+    """Return commands to go on with, each with what it does."""
+    case = case_words(arguments, str(folder.path / "case.yaml"))
+    rows = []
+    if not design.feasible:
+        height = _rounded(design.significant_height, math.floor)
+        rows.append(
+            (
+                f"the largest sea that is feasible, H_s {height} m",
+                f"stillhook optimise {case} --set sea.significant_height={height}",
+            )
+        )
+    if design.required:
+        sets = [
+            f"--set {_FIELDS[name]}={_rounded(value, math.ceil)}"
+            for name, value in design.required.items()
+        ]
+        rows.append(("a drive that can do it", f"stillhook optimise {case} {' '.join(sets)}"))
+    dearest = max(design.limits.values(), key=lambda use: use.price, default=None)
+    if dearest is not None and dearest.price > 0.0 and design.ok:
+        bound = dearest.bound * (0.9 if dearest.name in AT_LEAST else 1.1)
+        rows.append(
+            (
+                "the dearest limit, a tenth looser",
+                f"stillhook optimise {case} --set {_FIELDS[dearest.name]}={number(bound)} "
+                f"--out {shlex.quote(str(folder.path) + '-looser')}",
+            )
+        )
+    if design.margins is not None:
+        gains = f"{case} --gains {gains_text(design.gains)}"
+        rows.append(("these gains again", f"stillhook evaluate {gains}"))
+        rows.append(("in which seas they can work", f"stillhook operability {gains}"))
+        rows.append(("where mass, stiffness and delay are off", f"stillhook sweep {gains}"))
+    rows.append(("what was read from the case", f"stillhook check {case}"))
+    return rows
+
+
+def _rounded(value: float, towards: Callable[[float], int]) -> str:
+    """Return a figure rounded down or up at its third digit, so that it suffices."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return number(towards(value / unit) * unit)

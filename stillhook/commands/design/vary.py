@@ -1,0 +1,119 @@
+"""What varies, as text: ranges, lists, choices and seas on the command line.
+
+--vary rope.length=500..1500     the range, tried at its ends and in between
+--vary payload.mass=40t,50t,60t  the range, tried at these values
+--vary 'rope.masses=4|8'         these values and nothing between
+--seas '1.5/8, 2.5/9:0.3'        H_s/T_p, and after a colon the occurrence
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from models.basics.checks import InputError
+from models.casefile.yaml_lines import read_yaml
+from synth.robust.family import Choice, SeaState, read_scatter
+
+__all__ = ["parse_range", "parse_seas", "parse_vary"]
+
+
+def parse_vary(texts: Sequence[str]) -> dict[str, list[Any] | Choice]:
+    """Return values by path from texts PATH=LOW..HIGH, PATH=A,B,.. or PATH=A|B|..
+
+    Raises
+    ------
+    InputError
+        If a text has none of these forms, or a path comes twice.
+
+    Examples
+    --------
+    >>> parse_vary(["depth=500..1500", "payload=40 t, 60 t"])
+    {'depth': [500, 1500], 'payload': ['40 t', '60 t']}
+    """
+    found: dict[str, list[Any] | Choice] = {}
+    for text in texts:
+        path, sign, value = (part.strip() for part in text.partition("="))
+        if not sign or not path or not value:
+            raise InputError(
+                f"--vary: must be PATH=LOW..HIGH or PATH=A,B,C, as in rope.length=500..1500, "
+                f"got {text!r}"
+            )
+        if path in found:
+            raise InputError(f"--vary: {path} is given twice")
+        if "|" in value:
+            found[path] = Choice(*(_read(part, path) for part in value.split("|")))
+        elif ".." in value:
+            found[path] = [_read(part, path) for part in value.split("..")]
+            if len(value.split("..")) != 2:
+                raise InputError(f"--vary: {path} must be LOW..HIGH, got {value!r}")
+        else:
+            found[path] = [_read(part, path) for part in value.split(",")]
+    return found
+
+
+def parse_seas(text: str | None, scatter: str | None) -> list[SeaState] | None:
+    """Return sea states from a text or a scatter table; None for the case's own sea.
+
+    Raises
+    ------
+    InputError
+        If both are given, or one of them cannot be read.
+
+    Examples
+    --------
+    >>> [str(sea) for sea in parse_seas("1.5/8, 2.5/9:0.3", None)]
+    ['H_s 1.5 m, T_p 8 s', 'H_s 2.5 m, T_p 9 s']
+    """
+    if text is not None and scatter is not None:
+        raise InputError("--seas and --scatter: must be one or the other, got both")
+    if scatter is not None:
+        return read_scatter(scatter)
+    if text is None:
+        return None
+    states = []
+    for part in text.split(","):
+        sea, _, share = part.partition(":")
+        height, _, period = sea.partition("/")
+        try:
+            states.append(
+                SeaState(
+                    significant_height=float(height),
+                    peak_period=float(period),
+                    occurrence=float(share) if share.strip() else 1.0,
+                )
+            )
+        except ValueError as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(
+                f"--seas: must be H_s/T_p[:occurrence], as in 1.5/8:0.4, got {part.strip()!r}"
+            ) from None
+    return states
+
+
+def parse_range(name: str, text: str) -> tuple[float, float]:
+    """Return the two ends of a text LOW..HIGH.
+
+    Raises
+    ------
+    InputError
+        If it is not of that form.
+
+    Examples
+    --------
+    >>> parse_range("--schedule", "100..2000")
+    (100.0, 2000.0)
+    """
+    low, sign, high = text.partition("..")
+    try:
+        if sign:
+            return float(low), float(high)
+    except ValueError:
+        pass
+    raise InputError(f"{name}: must be LOW..HIGH in SI units, as in 100..2000, got {text!r}")
+
+
+def _read(text: str, path: str) -> Any:
+    value, _ = read_yaml(text.strip(), f"--vary {path}")
+    return value

@@ -1,0 +1,64 @@
+"""The design that the user names: a file that was written, gains, or those that the case has."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from models import Case
+    from synth.design.design import GainDesign
+    from synth.design.structure_design import StructureDesign
+
+__all__ = ["add_design_arguments", "given_design"]
+
+
+def add_design_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options ``--design`` and ``--gains``."""
+    parser.add_argument(
+        "--design", metavar="FILE", help="a design that was written (design.yaml, combined.yaml)"
+    )
+    parser.add_argument(
+        "--gains",
+        metavar="A=..,a=..,a1=..,a2=..",
+        help="or gains (default: those that the case has in use)",
+    )
+
+
+def given_design(case: Case, arguments: argparse.Namespace) -> GainDesign | StructureDesign:
+    """Return the design of a file on the case given, or that of gains.
+
+    Raises
+    ------
+    InputError
+        If both are given or neither, or the file holds no design.
+    """
+    # Here, as the parser imports this file and has to be quick.
+    from models.basics.checks import InputError
+    from synth import evaluate_gains
+
+    from .given import parse_gains
+
+    if arguments.design is not None:
+        if arguments.gains is not None:
+            raise InputError(f"{arguments.command}: give --design or --gains, not both")
+        from ..designs.design_file import load_design
+        from ..designs.structure_file import load_structure
+
+        try:
+            structure = load_structure(arguments.design)
+        except InputError as error:
+            if "is not a structure's design" not in str(error):
+                raise
+            return evaluate_gains(case, load_design(arguments.design).gains)
+        return replace(structure, case=case)
+    if arguments.gains is not None:
+        return evaluate_gains(case, parse_gains(arguments.gains))
+    if case.gains is None:
+        raise InputError(
+            f"{case.source}: gains: the case has none in use; give --gains, or --design with a "
+            "design.yaml that `stillhook optimise` wrote"
+        )
+    own = {name: getattr(case.gains, name) for name in ("A", "a", "a1", "a2")}
+    return evaluate_gains(case, own)

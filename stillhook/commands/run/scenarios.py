@@ -1,0 +1,82 @@
+"""`stillhook scenarios`: the operations and the controllers that can be simulated."""
+
+from __future__ import annotations
+
+import argparse
+
+from models.basics.units import KINDS
+from models.operation.options import Choice, Option
+from models.operation.scenarios import scenario_names, scenario_options
+
+from ...controllers.controllers import PREDICTIVE
+from ...text.quantities import quantity
+from ...text.terminal import commands, console, pairs
+
+__all__ = ["CONTROLLER_TEXTS", "run"]
+
+CONTROLLER_TEXTS = {
+    "feedback": "the gains of a design, on what comes up from the payload",
+    "feedback-no-antiwindup": "the same without anti-windup, for a controller with states",
+    "feed-forward": "0.9 of the hook's speed from the motion reference unit, to the drum",
+    "feed-forward-lead": "the same, with the delays of sensor and drive made up for",
+    "constant-tension": "holds the rope's tension within a dead band",
+    "none": "the brake is on",
+}
+"""One line on each controller of `synth.controllers.controllers.CONTROLLERS`."""
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """List scenarios and controllers, or the options of one scenario; return 0."""
+    out = console()
+    if arguments.name is not None:
+        _options(arguments.name)
+        return 0
+    from synth.controllers.controllers import CONTROLLERS
+
+    out.print("Scenarios (--scenario)", style="bold")
+    pairs(list(scenario_names().items()), out)
+    out.print()
+    out.print("Controllers (--controller)", style="bold")
+    texts = {name: CONTROLLER_TEXTS.get(name, "") for name in CONTROLLERS}
+    pairs(list({**texts, **PREDICTIVE}.items()), out)
+    out.print()
+    commands(
+        [
+            ("the options of one scenario", "stillhook scenarios landing"),
+            ("its simulation", "stillhook simulate landing --scenario landing"),
+        ],
+        out,
+    )
+    return 0
+
+
+def _options(name: str) -> None:
+    options = scenario_options(name)  # an unknown name ends here
+    out = console()
+    out.print(f"{name}: {scenario_names()[name]}", style="bold", soft_wrap=True)
+    pairs([(key, _text(option)) for key, option in options.items()], out)
+    out.print()
+    key, option = next(iter(options.items()))
+    command = f"stillhook simulate CASE --scenario {name} --option '{key}={_example(option)}'"
+    commands([("with an option", command)], out)
+
+
+def _text(option: Option | Choice) -> str:
+    if isinstance(option, Choice):
+        return f"{option.text}: {', '.join(option.words)}"
+    return f"{option.text} ({_default(option)})"
+
+
+def _default(option: Option) -> str:
+    if callable(option.default):
+        return "follows from the case"
+    unit = KINDS[option.quantity.kind].unit
+    return quantity(option.default, unit) if unit else f"{option.default:g}"
+
+
+def _example(option: Option | Choice) -> str:
+    if isinstance(option, Choice):
+        return option.words[-1]
+    unit = KINDS[option.quantity.kind].unit
+    value = 2.0 if callable(option.default) else 2.0 * option.default or 10.0
+    return quantity(value, unit) if unit else f"{value:g}"

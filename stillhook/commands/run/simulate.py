@@ -1,0 +1,277 @@
+"""`stillhook simulate`: a controller, or several, on the nonlinear plant over some seeds.
+
+Exit status 0 if every run went to its end, 1 if one diverged, 130 after Ctrl-C; what was simulated
+until then is written all the same.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from models.basics.checks import StillhookError, SynthesisError
+
+from ...runs.report import RunFolder
+from ...runs.runs import Runs, keep_worst
+from ...runs.series import Series
+from ...runs.terminal import Ticker, run_progress, show_comparison, show_events, show_runs
+from ...runs.words import headline_of, tree
+from ...text.folder import OutputFolder, folder_name
+from ...text.quantities import count
+from ...text.terminal import commands, console, progress
+from ..given import case_words
+from .interrupts import Stop, stoppable
+from .simulate_given import Asked, again, asked_of
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from models.run.run import Run
+
+__all__ = ["run"]
+
+_MEGABYTE = 1e6
+
+
+@dataclass(kw_only=True)
+class _Simulated:
+    """What came of it: runs by controller, those left out and why."""
+
+    compared: list[Runs] = field(default_factory=list)
+    left_out: dict[str, StillhookError] = field(default_factory=dict)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Simulate, show and save; return the exit status."""
+    asked = asked_of(arguments)
+    name = f"{folder_name(asked.case.name)}-{asked.scenario.name}"
+    place = Path(arguments.out or Path("out") / name)
+    made = [path for path in (place, *place.parents) if not path.exists()]
+    folder = OutputFolder.prepare(place)
+    target = RunFolder(folder=folder, format=arguments.format, several=len(asked.controllers) > 1)
+    out = console()
+    with stoppable() as stop:
+        try:
+            asked = _with_gains(asked, folder, stop, shown=not arguments.quiet)
+            total = len(asked.controllers) * len(asked.seeds) * asked.duration
+            with run_progress(total, shown=not arguments.quiet) as tick:
+                found = _simulated(asked, target, stop, tick)
+                if found.compared:
+                    _finish(target, asked, found.compared, arguments, tick, total)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(_kept(folder)) from None
+        except StillhookError:
+            for path in made:  # a question that was wrong leaves no empty folders behind
+                with contextlib.suppress(OSError):
+                    path.rmdir()
+            raise
+        stopped = stop()
+    if not found.compared:
+        if not stopped:
+            raise next(iter(found.left_out.values()))
+        raise KeyboardInterrupt(f"nothing was simulated; {_kept(folder)}")
+    if arguments.quiet:
+        for runs in found.compared:
+            out.print(f"{headline_of(runs)}; {tree(runs)[0]}", soft_wrap=True)
+    else:
+        _show(asked, found, target, arguments, out)
+    if stopped:
+        done = sum(run.completed for runs in found.compared for run in runs)
+        wanted = len(asked.controllers) * len(asked.seeds)
+        raise KeyboardInterrupt(
+            f"{done} of {count(wanted, 'run')} went to the end; all there is was written to "
+            f"{folder.path}"
+        )
+    return 0 if all(runs.completed for runs in found.compared) else 1
+
+
+def _with_gains(asked: Asked, folder: OutputFolder, stop: Stop, *, shown: bool) -> Asked:
+    """Return what is asked with gains for the feedback, optimised if there are none."""
+    wanted = any(name.startswith("feedback") for name in asked.controllers)
+    if not wanted or asked.design or asked.gains or asked.case.gains is not None:
+        return asked
+    from synth import optimise_gains
+
+    from ...designs.design_file import design_text
+
+    with progress(shown=shown) as tell:
+
+        def step(stage: str, done: int, total: int) -> None:
+            if stop():
+                raise KeyboardInterrupt
+            tell(stage, done, total)
+
+        design = optimise_gains(asked.case, progress=step)
+    folder.write("design.yaml", design_text(design))
+    if design.margins is None and not asked.every:
+        raise SynthesisError(f"no gains for the feedback: {design.status}")
+    return replace(asked, design=design)
+
+
+def _simulated(asked: Asked, target: RunFolder, stop: Stop, tick: Ticker) -> _Simulated:
+    """Run every controller with every seed, until all are done or the user asks to stop."""
+    found = _Simulated()
+    before = 0.0
+    for name in asked.controllers:
+        if stop():
+            break
+        tick(f"preparing {name}", before)
+
+        def tune(share: float, what: str = f"tuning {name}", at: float = before) -> None:
+            tick(f"{what}, {100.0 * share:.0f} %", at)
+            if stop():
+                raise KeyboardInterrupt
+
+        try:
+            series = _prepared(asked, name, tune)
+        except KeyboardInterrupt:
+            if stop():
+                break  # what was simulated before is shown
+            raise
+        except StillhookError as error:
+            if stop():
+                break  # the compiler was interrupted too
+            if not asked.every:
+                raise
+            found.left_out[name] = error
+            series = None
+        runs: list[Run] = []
+        for seed in asked.seeds if series is not None else ():
+            if series is None or stop():
+                break
+
+            def tell(share: float, what: str = f"{name}, seed {seed}", at: float = before) -> None:
+                tick(what, at + share * asked.duration)
+                if stop():
+                    raise KeyboardInterrupt  # which ends the run, and is told by its status
+
+            one = series.run(seed, tell)
+            target.add(one)
+            runs = keep_worst([*runs, one])
+            before += asked.duration
+        if series is not None and runs:
+            found.compared.append(series.runs(runs))
+    return found
+
+
+def _prepared(asked: Asked, name: str, tune: Callable[[float], None]) -> Series:
+    feedback = name.startswith("feedback")
+    with contextlib.ExitStack() as stack:
+        if "mpc" in name:  # whose weights take seconds
+            from mpc.winch.weights import watched
+
+            stack.enter_context(watched(tune))
+        return _series(asked, name, feedback)
+
+
+def _series(asked: Asked, name: str, feedback: bool) -> Series:
+    return Series.prepare(
+        asked.case,
+        name,
+        scenario=asked.scenario,
+        hook=asked.hook,
+        duration=asked.duration,
+        design=asked.design if feedback else None,
+        gains=asked.gains if feedback else None,
+        **asked.rest,
+    )
+
+
+def _finish(
+    target: RunFolder,
+    asked: Asked,
+    compared: Sequence[Runs],
+    arguments: argparse.Namespace,
+    tick: Ticker,
+    total: float,
+) -> None:
+    hook = "the case's own sea" if asked.hook is None else asked.hook.description
+    design = asked.design
+    question = {
+        "controllers": list(asked.controllers),
+        "scenario": asked.scenario.name,
+        "options": list(arguments.options),
+        "hook": hook,
+        "seeds": list(asked.seeds),
+        "gains": dict(design.gains) if design is not None else asked.gains,
+        "command": again(arguments, case_words(arguments)),
+    }
+    target.finish(
+        compared,
+        case=asked.case,
+        question=question,
+        figures=arguments.figures,
+        animate=arguments.animate,
+        progress=lambda what, share: tick(what, share * total),
+    )
+
+
+def _show(
+    asked: Asked,
+    found: _Simulated,
+    target: RunFolder,
+    arguments: argparse.Namespace,
+    out: Console,
+) -> None:
+    design = asked.design
+    if design is not None and arguments.design is None:
+        mark = "ok" if design.ok else "NOT OK"
+        out.print(f"The case has no gains in use, so they were optimised: {mark}: {design.status}")
+        out.print()
+    if len(found.compared) == 1:
+        show_runs(found.compared[0], out)
+    else:
+        show_comparison(found.compared, out)
+    for name, error in found.left_out.items():
+        out.print(f"left out: {error if name in str(error) else f'{name}: {error}'}")
+    show_events(found.compared, out)
+    out.print()
+    out.print(_written(target), soft_wrap=True)
+    commands(_next(asked, found, target, arguments), out)
+
+
+def _written(target: RunFolder) -> str:
+    """Return what was written where, and how much it is."""
+    traces = [path for path in target.written if path.parent.name == "runs"]
+    text = f"Written to {target.folder.path}: summary.md, summary.json, events.csv"
+    if any(path.suffix == ".svg" for path in target.written):
+        text += ", figures"
+    if any(path.suffix == ".gif" for path in target.written):
+        text += ", animation.gif"
+    if traces:
+        size = sum(path.stat().st_size for path in traces) / _MEGABYTE
+        text += f", {count(len(traces), 'time trace')} of {size:.1f} MB"
+    return text
+
+
+def _next(
+    asked: Asked, found: _Simulated, target: RunFolder, arguments: argparse.Namespace
+) -> list[tuple[str, str]]:
+    """Return commands to go on with, each with what it does."""
+    words = case_words(arguments, str(target.folder.path / "case.yaml"))
+    own: dict[str, object] = {}
+    if asked.design is not None and arguments.design is None:
+        own["design"] = target.folder.path / "design.yaml"
+    rows = []
+    if len(asked.controllers) == 1:
+        rows.append(
+            (
+                "every controller in the same sea",
+                again(arguments, words, controller="all", **own),
+            )
+        )
+    if len(asked.seeds) < 10 and not found.compared[0][0].duration > 1e5:
+        rows.append(("ten seas", again(arguments, words, seeds=10, **own)))
+    if not arguments.animate:
+        rows.append(("a moving picture", again(arguments, words, animate=True, **own)))
+    rows.append(("other operations and controllers", "stillhook scenarios"))
+    return rows
+
+
+def _kept(folder: OutputFolder) -> str:
+    kept = sorted(path.name for path in folder.path.iterdir() if not path.name.startswith("."))
+    return f"kept in {folder.path}: {', '.join(kept) or 'nothing'}"

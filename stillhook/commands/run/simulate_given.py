@@ -1,0 +1,270 @@
+"""What the user asked `stillhook simulate` for, read and checked before anything is computed."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from models.basics.checks import InputError, check_range
+from models.casefile.quantity import Quantity
+from models.casefile.yaml_lines import read_yaml
+
+from ...text.terminal import told_once
+from ..given import given_case, parse_gains
+
+if TYPE_CHECKING:
+    from models import Case
+    from models.operation.excitation import MotionSource
+    from models.operation.scenario import Scenario
+    from synth.design.design import GainDesign
+
+__all__ = ["Asked", "again", "asked_of", "parse_options"]
+
+_MANY = 10_000  # seeds: more than anybody wants on purpose
+_TIME = Quantity("time", 0.0, 1e8, open_low=True)
+_LENGTH = Quantity("length", 0.0, 1e5, open_low=True)
+_QUANTITIES = {
+    "duration": _TIME,
+    "sample_time": _TIME,
+    "step": _TIME,
+    "settle": Quantity("time", 0.0, 1e8),
+    "store_step": _TIME,
+    "lock_limit": _LENGTH,
+}
+# What `again` repeats: the option, and its default where that is not None.
+_REPEATED: tuple[tuple[str, object], ...] = (
+    ("controller", "feedback"),
+    ("scenario", "hold"),
+    ("seeds", 1),
+    ("first-seed", 0),
+    ("hours", None),
+    ("duration", None),
+    ("hook", None),
+    ("tip", None),
+    ("sine", None),
+    ("design", None),
+    ("gains", None),
+    ("sample-time", None),
+    ("step", None),
+    ("masses", None),
+    ("settle", None),
+    ("lock-limit", None),
+    ("store-step", None),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What is to be simulated.
+
+    Attributes
+    ----------
+    case, scenario
+        Case and operation.
+    controllers
+        Names of the controllers.
+    every
+        Whether all were asked for, so that one that the case does not allow may be left out.
+    seeds, duration
+        Seeds of the runs, and their length [s].
+    hook
+        The hook's motion; None for the case's own sea.
+    gains, design
+        Of the feedback, if given.
+    rest
+        What else `Series.prepare` is told.
+    """
+
+    case: Case
+    scenario: Scenario
+    controllers: tuple[str, ...]
+    every: bool
+    seeds: range
+    duration: float
+    hook: MotionSource | None
+    gains: Mapping[str, float] | None
+    design: GainDesign | None
+    rest: Mapping[str, Any]
+
+
+def asked_of(arguments: argparse.Namespace) -> Asked:
+    """Return what the arguments ask for.
+
+    Raises
+    ------
+    InputError
+        If any of it is wrong.
+    """
+    from models.operation.scenarios import scenario_named
+
+    check_range("simulate", "--seeds", arguments.seeds, low=1, high=_MANY)
+    check_range("simulate", "--first-seed", arguments.first_seed, low=0)
+    names = parse_controllers(arguments.controller)
+    given = {name: _quantity(arguments, name) for name in _QUANTITIES}
+    options = parse_options(arguments.options)
+    gains = None if arguments.gains is None else parse_gains(arguments.gains)
+    case = given_case(arguments)
+    scenario = scenario_named(arguments.scenario, case, **options)
+    if arguments.hours is not None:
+        given["duration"] = 3600.0 * check_range(
+            "simulate", "--hours", arguments.hours, low=0.0, high=1e4, open_low=True
+        )
+    hook = _hook(arguments)
+    lasting = given.pop("duration")
+    if lasting is None:
+        lasting = _fitting(scenario.duration, hook, given["sample_time"])
+    first = arguments.first_seed
+    return Asked(
+        case=case,
+        scenario=scenario,
+        controllers=names,
+        every=arguments.controller == "all",
+        seeds=range(first, first + arguments.seeds),
+        duration=lasting,
+        hook=hook,
+        gains=gains,
+        design=_design(arguments, case),
+        rest={**given, "masses": arguments.masses, "compiled": arguments.compiled},
+    )
+
+
+def parse_controllers(text: str) -> tuple[str, ...]:
+    """Return names of controllers from a text: one, several with commas between, or all.
+
+    All are those that need no tuning: the predictive ones have to be named.
+
+    Raises
+    ------
+    InputError
+        If there is no such controller, or one is named twice.
+    """
+    from models.basics.signals import pick
+    from synth.controllers.controllers import CONTROLLERS
+
+    from ...controllers.controllers import known_controllers
+
+    if text == "all":
+        return tuple(CONTROLLERS)
+    names = tuple(name.strip() for name in text.split(","))
+    pick("--controller", "controller", known_controllers(), names)
+    if len(set(names)) != len(names):
+        raise InputError(f"--controller: each may be named once, got {text!r}")
+    return names
+
+
+def parse_options(texts: Sequence[str]) -> dict[str, Any]:
+    """Return options of a scenario from texts KEY=VALUE.
+
+    Raises
+    ------
+    InputError
+        If a text is not of that form, or a key comes twice.
+
+    Examples
+    --------
+    >>> parse_options(["height=6 m", "count=3", "lost=mru"])
+    {'height': '6 m', 'count': 3, 'lost': 'mru'}
+    """
+    options: dict[str, Any] = {}
+    for text in texts:
+        key, sign, value = text.partition("=")
+        key = key.strip().replace("-", "_")
+        if not sign or not key:
+            raise InputError(f"--option: must be KEY=VALUE, as in 'height=6 m', got {text!r}")
+        if key in options:
+            raise InputError(f"--option: {key} is given twice")
+        options[key], _ = read_yaml(value, f"--option {key}")
+    return options
+
+
+def again(arguments: argparse.Namespace, case: str, **changes: object) -> str:
+    """Return the command that does the same again, with changes; True adds an option."""
+    words = ["stillhook simulate", case]
+    for name, default in _REPEATED:
+        key = name.replace("-", "_")
+        value = changes.get(key, getattr(arguments, key))
+        if value is not None and value != default:
+            text = f"{value:g}" if isinstance(value, float) else str(value)
+            words.append(f"--{name} {shlex.quote(text)}")
+    words += [f"--option {shlex.quote(text)}" for text in arguments.options]
+    words += ["--no-compile"] * (arguments.compiled is False)
+    words += [f"--{key}" for key, value in changes.items() if value is True]
+    return " ".join(words)
+
+
+def _quantity(arguments: argparse.Namespace, name: str) -> float | None:
+    text = getattr(arguments, name)
+    if text is None:
+        return None
+    option = f"--{name.replace('_', '-')}"
+    value, _ = read_yaml(text, option)
+    try:
+        return float(_QUANTITIES[name].read(value))
+    except InputError as error:
+        raise InputError(f"{option}: {error}") from None
+
+
+def _hook(arguments: argparse.Namespace) -> MotionSource | None:
+    from models.operation.excitation import SineMotion
+    from models.operation.record_file import RecordMotion
+    from models.operation.six_dof import SixDofMotion
+
+    if arguments.tip is not None and arguments.hook is None:
+        raise InputError("--tip: belongs to --hook, a file with heave, roll and pitch")
+    if arguments.sine is not None:
+        parts = arguments.sine.split(",")
+        if len(parts) != 2:
+            raise InputError(
+                f"--sine: must be AMPLITUDE,PERIOD, as in '0.5 m, 8 s', got {arguments.sine!r}"
+            )
+        found = []
+        for name, part, wanted in zip(
+            ("amplitude", "period"), parts, (_LENGTH, _TIME), strict=True
+        ):
+            value, _ = read_yaml(part, "--sine")
+            try:
+                found.append(float(wanted.read(value)))
+            except InputError as error:
+                raise InputError(f"--sine: {name} {error}") from None
+        return SineMotion(amplitude=found[0], period=found[1])
+    if arguments.hook is None:
+        return None
+    with told_once():
+        if arguments.tip is None:
+            return RecordMotion.read(arguments.hook)
+        try:
+            tip = [float(part) for part in arguments.tip.split(",")]
+        except ValueError:
+            tip = []
+        if len(tip) != 3:
+            raise InputError(f"--tip: must be three numbers X,Y,Z [m], got {arguments.tip!r}")
+        return SixDofMotion.read(arguments.hook, tip=tip)
+
+
+def _fitting(lasting: float, hook: MotionSource | None, sample_time: float | None) -> float:
+    """Return the length of a run that a record is long enough for."""
+    record = getattr(hook, "record", hook)
+    length = getattr(record, "duration", None)
+    if length is None:
+        return lasting
+    # The last sample needs the motion up to its end.
+    return float(min(lasting, length - max(0.1, 2.0 * (sample_time or 0.0))))
+
+
+def _design(arguments: argparse.Namespace, case: Case) -> GainDesign | None:
+    if arguments.design is None:
+        return None
+    import sys
+
+    from ...designs.design_file import load_design
+
+    design = load_design(arguments.design)
+    if design.case.name != case.name:
+        print(
+            f"warning: {arguments.design}: is a design for {design.case.name}, not {case.name}",
+            file=sys.stderr,
+        )
+    return design

@@ -1,0 +1,1 @@
+"""Commands that study a design: sweeps, sensitivity, operability, comparison."""

@@ -1,0 +1,215 @@
+"""`stillhook operability`: in which seas the winch can work, and how much of the year that is.
+
+Exit status 0 if the contour was found and its points stood up to single evaluations; 1 if the
+design is unstable, works in no sea at all, or a point did not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.basics.checks import InputError
+from models.basics.units import parse_quantity
+
+from ...text.folder import OutputFolder, folder_name
+from ...text.terminal import Progress, commands, console, progress
+from ..design.optimise import interruptible
+from ..design_argument import given_design
+from ..given import case_words, gains_text, given_case
+
+if TYPE_CHECKING:
+    from models import Case
+    from synth.design.design import GainDesign
+    from synth.design.structure_design import StructureDesign
+    from synth.operability.recheck import ContourCheck
+    from synth.operability.result import Operability
+
+__all__ = ["parse_axis", "run"]
+
+_FINEST = 400  # points of an axis
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Find the contours, show and save them; return the exit status."""
+    periods = parse_axis("--tp", arguments.tp, 1.0) if arguments.tp else None
+    angles = parse_axis("--headings", arguments.headings, 30.0) if arguments.headings else None
+    depths = parse_axis("--depths", arguments.depths, None) if arguments.depths else None
+    if arguments.held and (arguments.design or arguments.gains or arguments.reoptimise):
+        raise InputError("operability: --held goes without --design, --gains and --reoptimise")
+    highest = _length("--highest", arguments.highest)
+    case = given_case(arguments)
+    name = f"{folder_name(case.name)}-operability"
+    folder = OutputFolder.prepare(arguments.out or Path("out") / name)
+    from synth.operability import operability
+
+    with progress(shown=not arguments.quiet) as tell, interruptible() as check:
+
+        def step(stage: str, done: int, total: int) -> None:
+            check()
+            tell(stage, done, total)
+
+        source = case if arguments.held else _design(case, arguments, step)
+        study = operability(
+            source,
+            periods=periods,
+            headings=None if angles is None else [float(np.radians(a)) for a in angles],
+            payload_rms=arguments.payload_rms,
+            payload_significant=arguments.payload_significant,
+            payload_max=arguments.payload_max,
+            payload_speed=arguments.payload_speed,
+            depths=depths,
+            scatter=arguments.scatter,
+            reoptimise=arguments.reoptimise,
+            highest=highest,
+            progress=step,
+        )
+        step("verify", 0, 1)
+        checks = study.verify()
+        step("figures", 0, 1)
+        written = write_operability(study, folder)
+    return _told(study, checks, written, arguments, folder)
+
+
+def parse_axis(name: str, text: str, step: float | None) -> list[float]:
+    """Return the values of LOW..HIGH[/STEP] or A,B,C.
+
+    Parameters
+    ----------
+    name
+        The option, for messages.
+    text
+        What was given.
+    step
+        The step of a range that gives none; None where a range must give its own.
+
+    Raises
+    ------
+    InputError
+        If the text is of neither form, or the values do not ascend.
+
+    Examples
+    --------
+    >>> parse_axis("--tp", "6..8", 1.0), parse_axis("--tp", "6..7/0.5", 1.0)
+    ([6.0, 7.0, 8.0], [6.0, 6.5, 7.0])
+    >>> parse_axis("--depths", "100, 500", None)
+    [100.0, 500.0]
+    """
+    form = "LOW..HIGH/STEP or A,B,C" if step is None else "LOW..HIGH[/STEP] or A,B,C"
+    wrong = InputError(f"{name}: must be {form} in ascending order, got {text!r}")
+    try:
+        if ".." in text:
+            ends, _, given = text.partition("/")
+            low, high = (float(part) for part in ends.split(".."))
+            stride = float(given) if given else step
+            if stride is None or not 0.0 < stride < np.inf or not low <= high < np.inf:
+                raise wrong
+            count = int((high - low) / stride + 1e-9) + 1
+            if count > _FINEST:
+                raise InputError(f"{name}: must be at most {_FINEST} values, got {count}")
+            values = [low + k * stride for k in range(count)]
+        else:
+            values = [float(part) for part in text.split(",")]
+    except ValueError as error:
+        raise (error if isinstance(error, InputError) else wrong) from None
+    if not np.all(np.isfinite(values)) or np.any(np.diff(values) <= 0.0):
+        raise wrong
+    return values
+
+
+def write_operability(study: Operability, folder: OutputFolder) -> list[str]:
+    """Write a study: case, tables, figures; return the names of the files."""
+    from ...seas.operability_plot import capability_figure, contour_figure, depth_figure
+    from ...seas.operability_site_plot import heading_figure, scatter_figure
+    from ...seas.operability_text import netcdf, workable_csv
+    from ...text.style import picture
+
+    folder.write("case.yaml", study.case.to_yaml())
+    folder.write("operability.csv", study.to_csv())
+    folder.write("operability.nc", netcdf(study.dataset))
+    written = ["operability.csv", "operability.nc"]
+    drawn = {"contour": contour_figure(study), "capability": capability_figure(study)}
+    if study.headings is not None and study.headings.size > 1:
+        drawn["headings"] = heading_figure(study)
+    if len(study.depths) > 1:
+        drawn["depths"] = depth_figure(study)
+    folder.discard("workable.csv")
+    if study.scatter is not None:
+        drawn["scatter"] = scatter_figure(study)
+        folder.write("workable.csv", workable_csv(study))
+        written.append("workable.csv")
+    for name in ("contour", "capability", "headings", "depths", "scatter"):
+        for kind in ("svg", "png"):
+            folder.discard(f"{name}.{kind}")
+            if name in drawn:
+                folder.write(f"{name}.{kind}", picture(drawn[name], kind))
+    return [*written, *(f"{name}.svg" for name in drawn)]
+
+
+def _design(
+    case: Case, arguments: argparse.Namespace, step: Progress
+) -> GainDesign | StructureDesign:
+    """Return the design that was asked for, or the best gains where the case has none."""
+    if arguments.design is None and arguments.gains is None and case.gains is None:
+        from synth import optimise_gains
+
+        return optimise_gains(case, progress=step)
+    return given_design(case, arguments)
+
+
+def _told(
+    study: Operability,
+    checks: tuple[ContourCheck, ...],
+    written: list[str],
+    arguments: argparse.Namespace,
+    folder: OutputFolder,
+) -> int:
+    from ...seas.operability_text import show_operability
+
+    works = any(float(at.main.limit.max()) > 0.0 for at in study.depths)
+    good = works and all(check.ok for check in checks)
+    out = console()
+    if arguments.quiet:
+        out.print(f"{study.case.name}: {study.status}", soft_wrap=True)
+        return 0 if good else 1
+    show_operability(study, checks, out)
+    out.print(f"Written to {folder.path}: {', '.join(written)}", soft_wrap=True)
+    commands(_next(study, arguments, folder), out)
+    return 0 if good else 1
+
+
+def _next(
+    study: Operability, arguments: argparse.Namespace, folder: OutputFolder
+) -> list[tuple[str, str]]:
+    from synth.design.design import GainDesign as Gains
+
+    words = case_words(arguments, str(folder.path / "case.yaml"))
+    design = ""
+    if arguments.design:
+        design = f" --design {shlex.quote(arguments.design)}"
+    elif isinstance(study.design, Gains):
+        design = f" --gains {shlex.quote(gains_text(study.design.gains))}"
+    rows = []
+    if not study.wanted:
+        again = f"stillhook operability {words}{design} --payload-rms '50 mm'"
+        rows.append(("with a bound on the payload's motion", again))
+    if study.scatter is None:
+        again = f"stillhook operability {words}{design} --scatter example"
+        rows.append(("how much of a (made-up) year is workable", again))
+    if len(study.depths) == 1:
+        length = study.case.rope.length
+        again = f"--depths {0.25 * length:.4g},{0.5 * length:.4g},{length:.4g}"
+        rows.append(("at other depths", f"stillhook operability {words}{design} {again}"))
+    rows.append(("other structures", f"stillhook structures {words}"))
+    return rows
+
+
+def _length(name: str, text: str) -> float:
+    try:
+        return float(parse_quantity(text, "length"))
+    except (ValueError, TypeError) as error:
+        raise InputError(f"{name}: {error}") from None

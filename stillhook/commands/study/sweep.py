@@ -1,0 +1,285 @@
+"""`stillhook sweep`: a design or a controller on many cases about the nominal one.
+
+Exit status 0 if every case holds the payload, 1 if one does not or could not be run, 130 after
+Ctrl-C; what was run in time until then is kept, and the same command, or --resume, goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from models.basics.checks import InputError, check_range
+
+from ...text.folder import OutputFolder, folder_name
+from ...text.quantities import count
+from ...text.terminal import console
+from ..design_argument import given_design
+from ..given import given_case
+from ..run.interrupts import stoppable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from models import Case
+    from models.spread import Spread
+
+__all__ = ["run"]
+
+_MOST = 100  # of the worst cases that are told
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Swept:
+    """A sweep that was made: its case, what varied, and what came of it."""
+
+    case: Case
+    design: object
+    spread: Spread
+    result: xr.Dataset
+    folder: Path
+    words: str
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Sweep, show and save; return the exit status."""
+    from .sweep_output import show, write
+
+    check_range("sweep", "--worst", arguments.worst, low=0, high=_MOST)
+    swept = _resumed(arguments) if arguments.resume else _swept(arguments)
+    result = swept.result
+    complete = int(result.attrs.get("complete", 1)) == 1
+    if not complete and not (result["status"] >= 0).any():
+        raise KeyboardInterrupt("no case was finished")
+    written = write(swept, arguments)
+    show(swept, written, arguments, console())
+    if not complete:
+        there = count(int((result["status"] >= 0).sum()), "case")
+        raise KeyboardInterrupt(
+            f"{there} kept; stillhook sweep --resume {shlex.quote(str(swept.folder))} goes on"
+        )
+    return 0 if bool((result["stable"] == 1).all()) else 1
+
+
+def _swept(arguments: argparse.Namespace) -> Swept:
+    """Return the sweep that was asked for."""
+    from ...sweeps.sweeping import spread_of, sweep
+
+    if arguments.case is None:
+        raise InputError("sweep: say which case, or --resume and the folder of a sweep")
+    if arguments.mode == "frequency":
+        _only_in_time(arguments)
+    case = given_case(arguments)
+    design = given_pilot(case, arguments)
+    spread = given_spread(case, arguments)
+    place = Path(arguments.out or Path("out") / f"{folder_name(case.name)}-sweep")
+    made = [path for path in (place, *place.parents) if not path.exists()]
+    folder = OutputFolder.prepare(place).path
+    options: dict[str, Any] = {}
+    if arguments.mode == "time":
+        options = {
+            "duration": arguments.duration,
+            "settle": arguments.settle,
+            "scenario": arguments.scenario,
+            "options": _options(arguments.options),
+            "masses": arguments.masses,
+            "design_follows": arguments.follow,
+            "common_seed": arguments.common_seed,
+            "first": arguments.first,
+            "engine": arguments.cluster,
+            "jobs": arguments.jobs,
+            "store": folder,
+        }
+    from .compare import _progress
+
+    try:
+        with stoppable() as stop, _progress(stop, shown=not arguments.quiet) as tell:
+            result = sweep(
+                design,
+                spread,
+                case=case,
+                samples=arguments.samples,
+                sampling=arguments.sampling,
+                seed=arguments.seed,
+                mode=arguments.mode,
+                progress=tell,
+                **options,
+            )
+    except InputError:
+        for path in made:  # a question that was wrong leaves no empty folders behind
+            with contextlib.suppress(OSError):
+                path.rmdir()
+        raise
+    from ..given import case_words
+
+    return Swept(
+        case=case,
+        design=design,
+        spread=spread_of(spread, case, arguments.mode),
+        result=result,
+        folder=folder,
+        words=case_words(arguments),
+    )
+
+
+def _resumed(arguments: argparse.Namespace) -> Swept:
+    """Return the sweep of a folder, gone on with."""
+    import warnings
+
+    from models.basics.physics_warning import PhysicsWarning
+
+    from ...sweeps.header import question_from, read_header
+    from ...sweeps.store import RESULT
+    from ...sweeps.sweeping import resume_sweep
+    from .compare import _progress
+
+    if arguments.case is not None:
+        raise InputError(
+            f"sweep: --resume takes case and all else from {arguments.resume}; give no CASE"
+        )
+    path = Path(arguments.resume) / RESULT
+    warnings.simplefilter("ignore", PhysicsWarning)  # told when it was begun
+    question, spread, _ = question_from(read_header(path), str(path))
+    with stoppable() as stop, _progress(stop, shown=not arguments.quiet) as tell:
+        result = resume_sweep(
+            arguments.resume, engine=arguments.cluster, jobs=arguments.jobs, progress=tell
+        )
+    return Swept(
+        case=question.case,
+        design=None,
+        spread=spread,
+        result=result,
+        folder=Path(arguments.resume),
+        words="",
+    )
+
+
+def given_pilot(case: Case, arguments: argparse.Namespace) -> object:
+    """Return what is tried: a controller's name, or a design on the case.
+
+    Raises
+    ------
+    InputError
+        If there is none, or a name goes with the frequency domain.
+    """
+    if arguments.controller is None:
+        return given_design(case, arguments)
+    if arguments.mode == "frequency":
+        raise InputError(
+            "sweep: --controller goes with --mode time; in the frequency domain give --design or "
+            "--gains"
+        )
+    return str(arguments.controller)
+
+
+def given_spread(case: Case, arguments: argparse.Namespace) -> Spread | None:
+    """Return what varies; None for the usual.
+
+    Raises
+    ------
+    InputError
+        If a file is none, or a text is not of the form PATH=RANGE.
+    """
+    from models.spread import Spread
+
+    from ...sweeps.usual import fault_spread
+
+    del case
+    parts = []
+    if arguments.spread is not None:
+        parts.append(Spread.from_yaml(arguments.spread))
+    if arguments.vary:
+        parts.append(Spread(parse_ranges(arguments.vary)))
+    if arguments.faults is not None:
+        names = [name.strip() for name in arguments.faults.split(",")]
+        parts.append(fault_spread(*names))
+    if not parts:
+        return None
+    together: dict[str, Any] = {}
+    correlations: dict[tuple[str, str], float] = {}
+    for part in parts:
+        for path, distribution in part.distributions.items():
+            if path in together:
+                raise InputError(f"sweep: {path} is given twice")
+            together[path] = distribution
+        correlations |= part.correlations or {}
+    return Spread(together, correlations)
+
+
+def parse_ranges(texts: list[str]) -> dict[str, Any]:
+    """Return even distributions from texts PATH=WIDTH or PATH=LOW..HIGH.
+
+    Raises
+    ------
+    InputError
+        If a text has neither form, or a path comes twice.
+
+    Examples
+    --------
+    >>> parse_ranges(["payload.mass=30 %", "delay=20 ms..80 ms"])["delay"].to_dict()
+    {'uniform': {'low': '20 ms', 'high': '80 ms'}}
+    """
+    from models.spread import Uniform
+
+    found: dict[str, Any] = {}
+    for text in texts:
+        path, sign, value = (part.strip() for part in text.partition("="))
+        ends = [_number(part) for part in value.split("..")]
+        if not (path and sign and value) or len(ends) > 2 or "" in ends:
+            raise InputError(
+                "--vary: must be PATH=WIDTH or PATH=LOW..HIGH, as in payload.mass=30% or "
+                f"'delay=20 ms..80 ms', got {text!r}"
+            )
+        if path in found:
+            raise InputError(f"--vary: {path} is given twice")
+        found[path] = Uniform(*ends)
+    return found
+
+
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text.strip()
+
+
+def _options(texts: list[str]) -> dict[str, object]:
+    """Return the options of an operation from texts KEY=VALUE."""
+    from models.casefile.yaml_lines import read_yaml
+
+    found: dict[str, object] = {}
+    for text in texts:
+        key, sign, value = (part.strip() for part in text.partition("="))
+        if not (key and sign):
+            raise InputError(f"--option: must be KEY=VALUE, as in 'height=6 m', got {text!r}")
+        found[key], _ = read_yaml(value, f"--option {key}")
+    return found
+
+
+def _only_in_time(arguments: argparse.Namespace) -> None:
+    """Refuse options that would do nothing.
+
+    Raises
+    ------
+    InputError
+        If there is one.
+    """
+    given = {
+        "--follow": arguments.follow,
+        "--faults": arguments.faults is not None,
+        "--settle": arguments.settle is not None,
+        "--scenario": arguments.scenario != "hold",
+        "--option": bool(arguments.options),
+        "--masses": arguments.masses is not None,
+        "--common-seed": arguments.common_seed,
+        "--first": arguments.first != 0,
+        "--jobs": arguments.jobs is not None,
+        "--cluster": arguments.cluster is not None,
+    }
+    wrong = [name for name, there in given.items() if there]
+    if wrong:
+        raise InputError(f"sweep: {', '.join(wrong)}: only with --mode time")

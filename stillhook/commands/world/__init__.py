@@ -1,0 +1,1 @@
+"""Commands about the world: vessels, seas, motions, case files."""

@@ -1,0 +1,237 @@
+"""`stillhook check`: what was read from a case, as the figures that follow from it.
+
+Errors and warnings are those of reading the case.  The table is for a second look: a stiffness
+with a slipped decimal, a winch that is loaded to the limit at rest, a drum too slow for the sea.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import shlex
+from typing import TYPE_CHECKING
+
+from ...text.quantities import duration, number, percent, quantity
+from ...text.terminal import commands, console, table_of
+from ..given import case_words, given_case
+
+if TYPE_CHECKING:
+    from models import Case
+    from models.hook.hook import HookMotion
+
+__all__ = ["derived_figures", "run"]
+
+Rows = list[tuple[str, str, str]]
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Read the case and show what follows from it; return 0."""
+    from models.hook.hook import HookMotion
+
+    case = given_case(arguments)
+    hook = HookMotion.from_case(case)
+    tables = derived_figures(case, hook)
+    out = console()
+    about = " ".join(case.description.split())
+    out.print(f"{case.name}: {about}" if about else case.name)
+    for title, rows in tables.items():
+        out.print()
+        table_of(title, rows, out)
+    out.print()
+    out.print(f"{arguments.case}: no errors", soft_wrap=True)
+    words = case_words(arguments)
+    rows_next = [("the gains for it", f"stillhook optimise {words}")]
+    if case.gains is not None:
+        rows_next.append(("the gains in use", f"stillhook evaluate {words}"))
+    rows_next.append(
+        (
+            "another sea",
+            f"stillhook check {shlex.quote(arguments.case)} --set sea.significant_height=1.5",
+        )
+    )
+    commands(rows_next, out)
+    return 0
+
+
+def derived_figures(case: Case, hook: HookMotion) -> dict[str, Rows]:
+    """Return tables of label, figure and remark by their titles.
+
+    Parameters
+    ----------
+    case, hook
+        The case, and its hook's motion.
+    """
+    return {
+        "sea and hook": _sea(case, hook),
+        "rope and payload": _rope(case, hook),
+        "winch": _winch(case, hook),
+        "sensors and limits": _limits(case),
+    }
+
+
+def _sea(case: Case, hook: HookMotion) -> Rows:
+    sea, statistics = case.sea, hook.sea.statistics
+    moved, speed = hook.displacement, hook.velocity
+    time = case.limits.exposure_time
+    outside = hook.outside["displacement"].total
+    rows = [
+        (
+            "sea",
+            f"H_s {quantity(sea.significant_height, 'm')}",
+            f"{sea.spectrum}, peak period {quantity(sea.spectral_peak_period, 's')}, "
+            f"T_z {quantity(statistics.zero_crossing_period, 's')}",
+        ),
+        (
+            "steepness",
+            number(sea.steepness, 2),
+            f"seas stay below {number(sea.breaking_steepness, 2)}",
+        ),
+        *_vessel(case),
+        (
+            "hook, rms",
+            quantity(moved.rms, "m"),
+            f"T_z {quantity(moved.zero_crossing_period, 's')}",
+        ),
+        ("hook, significant height", quantity(moved.significant_height, "m"), "4 rms"),
+        (
+            f"hook, largest in {duration(time)}",
+            quantity(moved.most_probable_maximum(time), "m"),
+            "most probable, from the mean",
+        ),
+        (
+            "hook speed, rms",
+            quantity(speed.rms, "m/s"),
+            f"largest in {duration(time)} {quantity(speed.most_probable_maximum(time), 'm/s')}",
+        ),
+    ]
+    if outside > 5e-4:
+        remark = f"of the variance: below {case.vessel.below}, beyond {case.vessel.beyond}"
+        rows.append(("outside the RAO's table", percent(outside), remark))
+    return rows
+
+
+def _vessel(case: Case) -> Rows:
+    """Return the vessel, the heading of the waves and the hook's place, where the case has them."""
+    from models.vessel.crane import place_text
+    from models.vessel.hook_operator import case_raos
+
+    from ...text.hook_words import heading_words
+
+    vessel, place = case.vessel, case.vessel.hook_point
+    if place is None or vessel.heading is None:
+        return []
+    raos = case_raos(case)
+    heading = f"{math.degrees(vessel.heading) % 360.0:.4g} deg"
+    return [
+        ("vessel", raos.name, f"hook at {place_text(place)}"),
+        ("waves towards", heading, heading_words(vessel.heading)),
+    ]
+
+
+def _rope(case: Case, hook: HookMotion) -> Rows:
+    from models.plant.plant_data import PlantData
+    from synth.question.question import uncompensated
+
+    rope, payload = case.rope, case.payload
+    drag, rms = uncompensated(case, PlantData.from_case(case), hook)
+    modes = _modes(case)
+    periods = [quantity(2.0 * math.pi / mode, "s") for mode in modes]
+    held = f"drum held; next {', '.join(periods[1:])}" if periods[1:] else "drum held, one spring"
+    how = "fixed by the case" if payload.fixed_drag is not None else "with the drum held"
+    return [
+        ("stiffness K = EA/L", quantity(rope.stiffness, "N/m"), f"EA {quantity(rope.ea, 'N')}"),
+        (
+            "mass that moves, M",
+            quantity(case.moving_mass, "kg"),
+            f"payload {quantity(payload.mass, 'kg')}, "
+            f"added {quantity(payload.hydrodynamic_mass, 'kg')}, rope {quantity(rope.mass, 'kg')}",
+        ),
+        ("natural period", periods[0], held),
+        (
+            "stretch at rest",
+            quantity(_stretch(case), "m"),
+            f"axial waves need {quantity(rope.travel_time, 's')} end to end",
+        ),
+        ("linear drag", quantity(drag, "N s/m"), how),
+        (
+            "payload, rms",
+            quantity(rms, "m"),
+            f"{number(rms / hook.displacement.rms)} times the hook's, with the drum held",
+        ),
+    ]
+
+
+def _winch(case: Case, hook: HookMotion) -> Rows:
+    winch, drive = case.winch, case.winch.drive
+    torque = case.static_torque_budget
+    rope_speed = winch.speed_limit * case.drum_radius / winch.gearbox.ratio
+    fastest = hook.velocity.most_probable_maximum(case.limits.exposure_time)
+    tension = case.limits.rope_tension_peak
+    allowed = "" if tension is None else f"{percent(case.static_tension / tension)} of what it may"
+    kind = "DC" if winch.motor.type == "dc" else "AC"
+    return [
+        ("drum radius", quantity(case.drum_radius, "m"), "to the rope's centre, rope paid out"),
+        ("static rope tension", quantity(case.static_tension, "N"), allowed),
+        (
+            "static motor torque",
+            quantity(torque, "N m"),
+            f"{percent(torque / drive.torque_continuous)} of the rating, "
+            f"{percent(torque / drive.torque_peak)} of the peak",
+        ),
+        (
+            "fastest rope",
+            quantity(rope_speed, "m/s"),
+            f"the hook's largest speed is {percent(fastest / rope_speed)} of it",
+        ),
+        (
+            "inertia",
+            quantity(winch.inertia, "kg m2"),
+            f"at the motor ({kind}); {quantity(_rope_mass(case), 'kg')} at the rope",
+        ),
+        (
+            "power to follow the hook",
+            quantity(case.static_tension * fastest / winch.gearbox.efficiency, "W"),
+            "static tension times that speed",
+        ),
+    ]
+
+
+def _limits(case: Case) -> Rows:
+    sensors, limits = case.sensors, case.limits
+    bandwidth = sensors.payload.bandwidth
+    seen = "perfect" if isinstance(bandwidth, str) else f"{number(bandwidth)} rad/s"
+    slow = limits.low_frequency
+    kept = "enforced" if limits.drive == "enforce" else "reported only"
+    rows = [
+        ("payload sensor", seen, "bandwidth"),
+        ("telemetry", quantity(sensors.telemetry.delay, "s"), "delay"),
+        ("sensitivity peak M_s", number(limits.max_sensitivity), "at most"),
+        ("drive limits", kept, f"largest values in {duration(limits.exposure_time)}"),
+    ]
+    if slow is not None:
+        remark = f"at most, up to {slow.below:g} rad/s"
+        rows.append(("|P/Z| at low frequency", number(slow.ratio), remark))
+    return rows
+
+
+def _modes(case: Case) -> list[float]:
+    """Return the natural frequencies with the drum held [rad/s]: the first three."""
+    from models.plant.rope import fixed_top_modes
+
+    rope = case.rope
+    if rope.lumping == "thesis":
+        return [math.sqrt(rope.stiffness / case.moving_mass)]
+    mass = case.payload.virtual_mass
+    return [float(w) for w in fixed_top_modes(rope.ea, rope.length, rope.mass_per_length, mass, 3)]
+
+
+def _stretch(case: Case) -> float:
+    """Return the elongation of the rope at rest [m]: payload's weight, and half the rope's own."""
+    rope = case.rope
+    return (case.payload.submerged_weight + 0.5 * rope.submerged_weight) / rope.stiffness
+
+
+def _rope_mass(case: Case) -> float:
+    """Return the mass that the winch's inertia is at the rope [kg]."""
+    winch = case.winch
+    return winch.inertia * (winch.gearbox.ratio / case.drum_radius) ** 2

@@ -1,0 +1,1 @@
+"""The fair comparison of controllers in the same seas."""

@@ -1,0 +1,308 @@
+"""One run of a comparison: a contender in a sea with a seed, and what there is to keep of it.
+
+    Question, Contender, H_s, Law --> Prepared --> run(seed) --> Cell (plain data)
+
+Common random numbers: every contender meets the same motion of the hook, to the last bit at the
+nodes that it is drawn at, growing out of rest in the same way, and is judged over the same time.
+Noise of sensors, telemetry and reference unit comes from the same seed; contenders with the same
+sample time are shown the very same numbers, others the same noise sampled more or less often.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError
+from models.case.case import Case
+from models.operation.excitation import Motion, SpectrumMotion
+from models.run.run import Run
+from models.run.summary import ERROR
+from models.sensing.control import holds_brake
+from models.simulation.simulation import EASE
+
+from ..controllers.contenders import Contender
+from ..controllers.law import Law
+from ..runs.runs import TRIPS
+from ..runs.series import Progress, Series
+from .mismatch import Mismatch
+
+__all__ = ["TRACED", "WINDOW", "Cell", "CommonSea", "Prepared", "Question", "Trace"]
+
+FloatArray = npt.NDArray[np.float64]
+
+TRACED = (
+    "hook.heave",
+    "payload.displacement",
+    "motor.torque",
+    "motor.speed",
+    "rope.minimum_tension",
+    "drive.saturated",
+)
+"""Signals that are kept around the worst moment."""
+
+WINDOW = 60.0
+"""Time that is kept around the worst moment [s]."""
+
+_ROUNDING = 1e-6  # of a limit that counts as broken
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Question:
+    """What all contenders are asked.
+
+    Attributes
+    ----------
+    case
+        The case that the controllers are made for.
+    duration, settle
+        Length of a run, and when its statistics begin [s].
+    mismatch
+        What of the plant is not as in the case.
+    masses
+        Masses along the rope of the plant; None for those of the case.
+    compiled
+        Whether the plant runs as C; None: if there is a compiler.
+    design_at
+        "each": linear laws are designed for every sea; "case": once, for that of the case.
+    starts
+        Starts of the searches for designs.
+    """
+
+    case: Case
+    duration: float
+    settle: float
+    mismatch: Mismatch
+    masses: int | None = None
+    compiled: bool | None = None
+    design_at: str = "each"
+    starts: int = 8
+
+    def known(self, height: float) -> Case:
+        """Return the case with a significant height [m], as the controllers know it."""
+        if height == self.case.sea.significant_height:
+            return self.case
+        return self.case.replace({"sea.significant_height": height})
+
+    def true(self, height: float) -> Case:
+        """Return the case that is simulated."""
+        return self.mismatch.apply(self.known(height))
+
+    def design_height(self, height: float) -> float:
+        """Return the significant height that a law for a sea is designed in [m]."""
+        return height if self.design_at == "each" else float(self.case.sea.significant_height)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Cell:
+    """What is kept of one run, as plain data.
+
+    Attributes
+    ----------
+    contender, height, seed
+        Which run: name, significant height [m], seed.
+    status, message
+        As in `models.run.run.Run`; "failed" if there is no run at all.
+    quantities
+        Quantities of `models.run.summary` by name, SI.
+    trips
+        How often the brake ended the controller's work, by kind.
+    broken
+        Share of the stored samples in which a limit was broken, by its name [1].
+    fallbacks, counts
+        What had to be replaced by the simulator, and what the controller counted itself.
+    step
+        Wall time of a step of a controller in Python: median, p99, max [s]; empty if compiled.
+    worst
+        When the payload was farthest from its place [s].
+    sample_time, wall
+        Sample time of the controller, and time that the run took [s].
+    """
+
+    contender: str
+    height: float
+    seed: int
+    status: str
+    message: str = ""
+    quantities: Mapping[str, float] = field(default_factory=dict)
+    trips: Mapping[str, int] = field(default_factory=dict)
+    broken: Mapping[str, float] = field(default_factory=dict)
+    fallbacks: Mapping[str, int] = field(default_factory=dict)
+    counts: Mapping[str, float] = field(default_factory=dict)
+    step: Mapping[str, float] = field(default_factory=dict)
+    worst: float = math.nan
+    sample_time: float = math.nan
+    wall: float = math.nan
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the payload's distance from its place [m]; inf if it diverged."""
+        if self.status == "diverged":
+            return math.inf
+        return self.quantities.get("tracking error rms", math.nan)
+
+    @property
+    def lost(self) -> bool:
+        """Whether the controller lost the payload: lock lost, brake, divergence, no run."""
+        if self.status in ("diverged", "failed", "died") or self.trips:
+            return True
+        return not math.isnan(self.quantities.get("lost lock at", math.nan))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trace:
+    """Time traces of one run around a moment: `time` (n,) [s], `signals` (n,) by name."""
+
+    contender: str
+    time: FloatArray
+    signals: Mapping[str, FloatArray]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CommonSea(SpectrumMotion):
+    """The hook's motion that every contender meets: drawn for the whole run, whatever the step.
+
+    Attributes
+    ----------
+    lasting
+        Length that it is drawn for [s]: that of the run, which is no multiple of every sample.
+    ease
+        Time in which it grows out of rest [s], where the simulation does not see to that: with
+        the brake on.
+    """
+
+    lasting: float
+    ease: float = 0.0
+
+    def motion(self, duration: float, step: float, seed: int) -> Motion:
+        """Return the motion; it lasts a little longer than was asked for."""
+        return super().motion(max(duration, self.lasting), step, seed).eased(self.ease)
+
+
+class Prepared:
+    """A contender in one sea, ready to run.
+
+    Parameters
+    ----------
+    question, contender, height, law
+        What it is asked, who it is, the significant height [m], and its law if it needs one.
+
+    Raises
+    ------
+    InputError, SynthesisError, SolverError
+        If there is no such controller for the case.
+    """
+
+    def __init__(
+        self, question: Question, contender: Contender, height: float, law: Law | None
+    ) -> None:
+        if contender.make is None:
+            raise InputError("the floor is no controller")
+        self._contender, self._height = contender, height
+        controller = contender.make(question.known(height), law)
+        true = question.true(height)
+        sea = SpectrumMotion.from_case(true).hook
+        self._settle = question.settle
+        self._series = Series.prepare(
+            true,
+            controller,
+            hook=CommonSea(
+                hook=sea, lasting=question.duration, ease=EASE if holds_brake(controller) else 0.0
+            ),
+            duration=question.duration,
+            settle=question.settle,
+            masses=question.masses,
+            compiled=question.compiled,
+        )
+
+    def run(self, seed: int, progress: Progress | None = None) -> Cell:
+        """Run with one seed.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            If the run was interrupted: half a run is worth nothing.
+        """
+        return self._cell(self._run(seed, progress), seed)
+
+    def trace(self, seed: int, moment: float, progress: Progress | None = None) -> Trace:
+        """Run once more, and return the traces around a moment [s]."""
+        run = self._run(seed, progress)
+        near = np.abs(run.time - moment) <= 0.5 * WINDOW
+        return Trace(
+            contender=self._contender.name,
+            time=run.time[near].copy(),
+            signals={name: run[name][near].copy() for name in TRACED if name in run},
+        )
+
+    def _run(self, seed: int, progress: Progress | None) -> Run:
+        run = self._series.run(seed, progress)
+        if run.status == "interrupted":
+            raise KeyboardInterrupt
+        return run
+
+    def _cell(self, run: Run, seed: int) -> Cell:
+        timings, error = run.timings, run.statistics.signals.get(ERROR)
+        step = {
+            "median": timings.controller_median,
+            "p99": timings.controller_p99,
+            "max": timings.controller_max,
+        }
+        worst = math.nan
+        if error is not None:
+            up = error.maximum >= -error.minimum
+            worst = error.maximum_time if up else error.minimum_time
+        counts = getattr(self._series.simulation.controller, "counts", None)
+        return Cell(
+            contender=self._contender.name,
+            height=self._height,
+            seed=seed,
+            status=run.status,
+            message=run.message,
+            quantities={name: q.value for name, q in run.statistics.quantities.items()},
+            trips=dict(Counter(event.kind for event in run.events if event.kind in TRIPS)),
+            broken=_broken(run, self._settle),
+            fallbacks=dict(timings.fallbacks),
+            counts={str(k): float(v) for k, v in counts.items()} if counts else {},
+            step={} if math.isnan(step["median"]) else step,
+            worst=worst,
+            sample_time=run.sample_time,
+            wall=timings.wall_seconds,
+        )
+
+
+def _broken(run: Run, settle: float) -> dict[str, float]:
+    """Return the share of the stored samples in which each limit was broken."""
+    limits, winch = run.case.limits, run.case.winch
+    counted = run.time >= settle
+    if not counted.any():
+        return {}
+
+    def share(name: str, low: float | None, high: float | None) -> float:
+        if name not in run:
+            return 0.0
+        values = run[name][counted]
+        out = np.zeros(values.size, dtype=np.bool_)
+        if low is not None:
+            out |= values < low - _ROUNDING * abs(low)
+        if high is not None:
+            out |= values > high + _ROUNDING * abs(high)
+        return float(out.mean())
+
+    speed, torque = winch.speed_limit, winch.drive.torque_peak
+    return {
+        "speed": share("motor.speed", -speed, speed),
+        "torque": share("motor.torque", -torque, torque),
+        "tension low": share("rope.minimum_tension", limits.minimum_tension, None),
+        "tension high": share("rope.tension", None, limits.rope_tension_peak),
+    }

@@ -1,0 +1,287 @@
+"""`Comparison`: what contenders in the same seas came to, and how sure that is.
+
+    cells --> Comparison --> table, sentences, worst_moment --> figures, folder, terminal
+
+A row of the table is one contender in seas of one height.  Means are over seeds, with Student's
+95 % interval; the pooled root mean square is that of all seeds together, and what is compared
+with the floor.  The payload's rms is about its place, so that a load that has sunk does not count
+as still.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.basics.intervals import Interval, mean_interval
+from models.case.case import Case
+
+from ..controllers.contenders import Contender
+from ..controllers.law import Law
+from .cell import Cell, Question, Trace
+
+__all__ = ["COLUMNS", "Comparison"]
+
+COLUMNS: Mapping[str, str] = {
+    "payload rms": "m",
+    "payload rms low": "m",
+    "payload rms high": "m",
+    "pooled rms": "m",
+    "of the floor": "mean square over that of the floor, both pooled over seeds",
+    "worst seed": "",
+    "worst seed rms": "m",
+    "significant": "m",
+    "largest": "m",
+    "saturated": "% of the time",
+    "torque rms": "N m",
+    "energy": "J/h, net",
+    "slack": "% of the time",
+    "snap load": "N, largest of all seeds",
+    "lost lock": "runs",
+    "tripped": "runs ended by the brake",
+    "overspeed trips": "runs",
+    "rope-out trips": "runs",
+    "diverged": "runs",
+    "failed": "runs",
+    "speed beyond": "% of the time beyond the motor's limit",
+    "torque beyond": "% of the time beyond the peak; the plant allows none",
+    "tension below": "% of the time below limits.minimum_tension",
+    "tension above": "% of the time above limits.rope_tension_peak",
+    "fallbacks": "commands replaced, of all seeds",
+    "step median": "s, of a controller in Python",
+    "step p99": "s",
+    "step max": "s",
+}
+"""Columns of the table after contender, height and runs, with unit or meaning."""
+
+_RUNS = {"overspeed trips": "overspeed", "rope-out trips": "rope-out"}
+_BROKEN = {
+    "speed beyond": "speed",
+    "torque beyond": "torque",
+    "tension below": "tension low",
+    "tension above": "tension high",
+}
+# What a controller counts that is no command replaced: a late plan is replaced by a shifted one.
+_NO_FALLBACKS = ("steps", "iterations", "late")
+_MEANS = {
+    "significant": "payload significant",
+    "largest": "tracking error largest",
+    "saturated": "saturated share",
+    "torque rms": "motor torque rms",
+    "energy": "energy per hour, net",
+    "slack": "slack share",
+}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Comparison:
+    """What contenders came to.
+
+    Attributes
+    ----------
+    case
+        The case that they were made for.
+    contenders, heights, seeds
+        Who took part, in seas of which significant height [m], and with which seeds.
+    question
+        What all were asked.
+    cells
+        One for each run.
+    refused
+        Why a contender did not take part in seas of a height, by name and height.
+    laws
+        Designs by contender and height.
+    traces
+        Time traces of the worst moment, one for each contender that has any.
+    complete
+        Whether every run was made; False after Ctrl-C.
+    seconds
+        Time that it took [s].
+    """
+
+    case: Case
+    contenders: tuple[Contender, ...]
+    heights: tuple[float, ...]
+    seeds: tuple[int, ...]
+    question: Question
+    cells: tuple[Cell, ...]
+    refused: Mapping[tuple[str, float], str] = field(default_factory=dict)
+    laws: Mapping[tuple[str, float], Law] = field(default_factory=dict)
+    traces: tuple[Trace, ...] = ()
+    complete: bool = True
+    seconds: float = math.nan
+
+    @cached_property
+    def _groups(self) -> dict[tuple[str, float], list[Cell]]:
+        found: dict[tuple[str, float], list[Cell]] = {}
+        for cell in self.cells:
+            found.setdefault((cell.contender, cell.height), []).append(cell)
+        return found
+
+    def of(self, name: str, height: float) -> Sequence[Cell]:
+        """Return the runs of a contender in seas of a height [m]."""
+        return tuple(self._groups.get((name, height), ()))
+
+    def contender(self, name: str) -> Contender:
+        """Return a contender by its name."""
+        return next(each for each in self.contenders if each.name == name)
+
+    def rms(self, name: str, height: float) -> Interval:
+        """Return the mean over seeds of the payload's rms about its place, and its interval [m]."""
+        return mean_interval([cell.rms for cell in self.of(name, height)], unit="m")
+
+    def pooled(self, name: str, height: float, seeds: Sequence[int] | None = None) -> float:
+        """Return the root of the mean square over all seeds, or over some [m]; NaN without any."""
+        wanted = self.seeds if seeds is None else seeds
+        values = [cell.rms for cell in self.of(name, height) if cell.seed in wanted]
+        known = [value for value in values if not math.isnan(value)]
+        return math.sqrt(float(np.mean(np.square(known)))) if known else math.nan
+
+    def lost(self, name: str, height: float) -> int:
+        """Return in how many runs the payload was lost: lock, brake, divergence, failure."""
+        return sum(cell.lost for cell in self.of(name, height))
+
+    def cliff(self, name: str) -> float:
+        """Return the lowest height at which any run was lost [m]; NaN if there is none."""
+        return next((h for h in self.heights if self.lost(name, h)), math.nan)
+
+    @property
+    def floor(self) -> Contender | None:
+        """The clairvoyant floor, if it took part."""
+        return next((each for each in self.contenders if each.group == "floor"), None)
+
+    def best(self, height: float, groups: Sequence[str]) -> str | None:
+        """Return who of some groups has the least pooled rms at a height; None if nobody has."""
+        found = {
+            each.name: self.pooled(each.name, height)
+            for each in self.contenders
+            if each.group in groups
+        }
+        known = {name: value for name, value in found.items() if math.isfinite(value)}
+        if not known:
+            return None
+        # Equal but for the last digit: the one that was named first.
+        least = min(known.values())
+        return next(name for name, value in known.items() if value <= 1.001 * least)
+
+    @cached_property
+    def worst_moment(self) -> tuple[float, int, float] | None:
+        """Height [m], seed and time [s] at which the best linear law was farthest off.
+
+        In the highest sea of which there are runs; None if no linear law has any.
+        """
+        for height in reversed(self.heights):
+            name = self.best(height, ("linear",))
+            if name is None:
+                continue
+            cells = [cell for cell in self.of(name, height) if not math.isnan(cell.worst)]
+            if cells:
+                worst = max(cells, key=lambda cell: cell.quantities["tracking error largest"])
+                return height, worst.seed, worst.worst
+        return None
+
+    @cached_property
+    def table(self) -> Any:
+        """Everything as a `pandas.DataFrame`: a row for each contender and height, SI units.
+
+        Columns are ``contender``, ``height``, ``runs``, those of `COLUMNS`, and ``note``: why a
+        contender did not take part, or how its design came about.
+        """
+        rows = [self._row(each, height) for each in self.contenders for height in self.heights]
+        names = ["contender", "height", "runs", *COLUMNS, "note"]
+        return import_module("pandas").DataFrame(rows, columns=names)
+
+    def note(self, contender: Contender, height: float) -> str:
+        """Return why a contender did not take part, or how its design came about."""
+        if (contender.name, height) in self.refused:
+            return self.refused[contender.name, height]
+        cells = self.of(contender.name, height)
+        failed = next((c.message for c in cells if c.status in ("failed", "died")), "")
+        if failed:
+            return failed
+        law = self.laws.get((contender.name, height))
+        if law is None:
+            return ""
+        how = "designed within the drive's limits"
+        if law.drive == "reported":
+            how = "designed without the drive's limits"
+        return how if law.ok else f"{how}; {law.status}"
+
+    def _row(self, contender: Contender, height: float) -> dict[str, Any]:
+        name, cells = contender.name, self.of(contender.name, height)
+        row: dict[str, Any] = {"contender": name, "height": height, "runs": len(cells)}
+        row |= {"note": self.note(contender, height)}
+        if not cells:
+            return row
+        mean = self.rms(name, height)
+        row |= {
+            "payload rms": mean.mean,
+            "payload rms low": mean.low,
+            "payload rms high": mean.high,
+        }
+        row |= {"pooled rms": self.pooled(name, height), "of the floor": self._ratio(name, height)}
+        known = [cell for cell in cells if not math.isnan(cell.rms)]
+        if known:
+            worst = max(known, key=lambda cell: cell.rms)
+            row |= {"worst seed": worst.seed, "worst seed rms": worst.rms}
+        for column, quantity in _MEANS.items():
+            row[column] = _mean([cell.quantities.get(quantity, math.nan) for cell in cells])
+        snaps = [cell.quantities.get("snap load", math.nan) for cell in cells]
+        row["snap load"] = max((x for x in snaps if not math.isnan(x)), default=math.nan)
+        locks = [cell.quantities.get("lost lock at", math.nan) for cell in cells]
+        row["lost lock"] = sum(not math.isnan(at) for at in locks)
+        row["tripped"] = sum(bool(cell.trips) for cell in cells)
+        row |= {column: sum(kind in c.trips for c in cells) for column, kind in _RUNS.items()}
+        row["diverged"] = sum(cell.status == "diverged" for cell in cells)
+        row["failed"] = sum(cell.status in ("failed", "died") for cell in cells)
+        for column, limit in _BROKEN.items():
+            row[column] = 100.0 * _mean([cell.broken.get(limit, math.nan) for cell in cells])
+        row["fallbacks"] = sum(sum(cell.fallbacks.values()) for cell in cells) + sum(
+            value for c in cells for kind, value in c.counts.items() if kind not in _NO_FALLBACKS
+        )
+        row["step median"] = _mean([cell.step.get("median", math.nan) for cell in cells])
+        row["step p99"] = _mean([cell.step.get("p99", math.nan) for cell in cells])
+        steps = [cell.step["max"] for cell in cells if cell.step]
+        row["step max"] = max(steps, default=math.nan)
+        return row
+
+    def _ratio(self, name: str, height: float) -> float:
+        """Return the mean square over that of the floor, on the seeds that both have."""
+        if self.floor is None:
+            return math.nan
+        own = {c.seed for c in self.of(name, height) if not math.isnan(c.rms)}
+        low = {c.seed for c in self.of(self.floor.name, height) if not math.isnan(c.rms)}
+        both = sorted(own & low)
+        floor = self.pooled(self.floor.name, height, both)
+        return (self.pooled(name, height, both) / floor) ** 2 if floor > 0.0 else math.nan
+
+    @cached_property
+    def sentences(self) -> tuple[str, ...]:
+        """What the numbers say, in plain sentences (`stillhook.comparison.words`)."""
+        from .words import sentences_of
+
+        return sentences_of(self)
+
+    def save(self, folder: str | Path, *, figures: bool = True) -> list[Path]:
+        """Write everything into a folder (`stillhook.comparison.report.write_comparison`)."""
+        from .report import write_comparison
+
+        return write_comparison(folder, self, figures=figures)
+
+    def __str__(self) -> str:
+        """Return the main figures as a small table, and what they say."""
+        from .words import plain_table
+
+        return "\n".join([*plain_table(self), "", *self.sentences])
+
+
+def _mean(values: Sequence[float]) -> float:
+    known = [value for value in values if not math.isnan(value)]
+    return float(np.mean(known)) if known else math.nan

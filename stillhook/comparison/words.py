@@ -1,0 +1,257 @@
+"""What a comparison says, in words: where prediction helps, where it does not, who loses the load.
+
+    Comparison --> headline, rows for the terminal, sentences computed from the numbers
+
+Contenders are compared seed by seed: the ratio of two of them in the same sea varies far less
+than either.  A difference is called one only where Student's 95 % interval of the mean log ratio
+leaves out zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from models.basics.intervals import mean_interval
+
+from ..text.quantities import count, duration, number, quantity, scale
+
+if TYPE_CHECKING:
+    from .comparison import Comparison
+
+__all__ = [
+    "HEADINGS",
+    "LEGEND",
+    "headline_of",
+    "left_out",
+    "plain_table",
+    "rows_at",
+    "sentences_of",
+]
+
+HEADINGS = ("", "rms", "95 % interval", "largest", "sat.", "lost", "/ floor")
+LEGEND = (
+    "sat.: of the time at the drive's limits; lost: runs in which the payload left its place by "
+    "more than the hook's significant height, or the brake stepped in; / floor: mean square over "
+    "the clairvoyant's"
+)
+"""What the headings mean."""
+
+_NOTHING = 1e-12  # [m]
+_EVEN = math.log(1.25)  # an interval of the log ratio within this says "no difference"
+_MANY = 1000.0  # beyond that a ratio says no more
+
+
+def headline_of(found: Comparison) -> str:
+    """Return what was compared."""
+    seas = f"{count(len(found.seeds), 'seed')} of {duration(found.question.duration)}"
+    heights = ", ".join(f"{height:.4g}" for height in found.heights)
+    text = (
+        f"{found.case.name}: {count(len(found.contenders), 'contender')}, H_s {heights} m, {seas}"
+    )
+    off = found.question.mismatch.text
+    return f"{text}; the plant is off by {off}" if off else text
+
+
+def rows_at(found: Comparison, height: float) -> list[tuple[str, ...]]:
+    """Return the cells of the table at a height, as in `HEADINGS`, one row for each contender."""
+    rows: list[tuple[str, ...]] = []
+    known = [found.pooled(each.name, height) for each in found.contenders]
+    sizes = [value for value in known if math.isfinite(value)]
+    factor, unit = scale("m", max(sizes, default=1.0))
+    for each in found.contenders:
+        cells = found.of(each.name, height)
+        if not cells:
+            continue
+        mean = found.rms(each.name, height)
+        between = ""
+        if math.isfinite(mean.low):
+            between = f"{number(max(mean.low, 0.0) / factor)} to {number(mean.high / factor)}"
+        table = found.table
+        row = table[(table["contender"] == each.name) & (table["height"] == height)].iloc[0]
+        rows.append(
+            (
+                each.name,
+                "" if math.isnan(mean.mean) else f"{number(mean.mean / factor)} {unit}",
+                between,
+                _short(row["largest"], factor),
+                "" if _missing(row["saturated"]) else f"{row['saturated']:.3g} %",
+                f"{found.lost(each.name, height)}/{len(cells)}",
+                "" if _missing(row["of the floor"]) else number(row["of the floor"]),
+            )
+        )
+    return rows
+
+
+def left_out(found: Comparison) -> list[str]:
+    """Return who did not take part, and why, one line each."""
+    reasons: dict[tuple[str, str], list[float]] = {}
+    for each in found.contenders:
+        for height in found.heights:
+            reason = found.refused.get((each.name, height))
+            if reason is not None:
+                reasons.setdefault((each.name, reason), []).append(height)
+    lines = []
+    for (name, reason), heights in reasons.items():
+        where = ""
+        if len(heights) < len(found.heights):
+            where = f" at H_s {', '.join(f'{height:.4g}' for height in heights)} m"
+        lines.append(f"{name} did not take part{where}: {reason}")
+    return lines
+
+
+def plain_table(found: Comparison) -> list[str]:
+    """Return headline, tables and who was left out as lines of text."""
+    lines = [headline_of(found)]
+    for height in found.heights:
+        cells_at = rows_at(found, height)
+        used = [i for i in range(len(HEADINGS)) if i == 0 or any(row[i] for row in cells_at)]
+        rows = [(f"H_s {height:.4g} m", *(HEADINGS[i] for i in used[1:]))]
+        rows += [tuple(row[i] for i in used) for row in cells_at]
+        widths = [max(len(row[i]) for row in rows) for i in range(len(used))]
+        lines.append("")
+        for row in rows:
+            cells = [row[0].ljust(widths[0])]
+            cells += [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
+            lines.append("  ".join(cells).rstrip())
+    return [*lines, *left_out(found)]
+
+
+def sentences_of(found: Comparison) -> tuple[str, ...]:
+    """Return what the numbers say: one sentence for each height, and what is the same for all."""
+    lines = []
+    for height in found.heights:
+        linear = found.best(height, ("linear",))
+        predictive = found.best(height, ("predictive",))
+        parts = []
+        if linear is not None:
+            parts.append(_best_linear(found, linear, height))
+        if linear is not None and predictive is not None:
+            parts.append(_against(found, predictive, linear, height, "prediction"))
+        reference = found.best(height, ("reference",))
+        if reference is not None and predictive is not None:
+            parts.append(_against(found, reference, predictive, height, "knowing the future"))
+        own = found.best(height, ("own",))
+        if linear is not None and own is not None:
+            parts.append(_against(found, own, linear, height, ""))
+        lost = _lost(found, height)
+        if lost:
+            parts.append(lost)
+        if parts:
+            lines.append(f"H_s {height:.4g} m: {'; '.join(parts)}.")
+    return (*lines, *_overall(found))
+
+
+def _best_linear(found: Comparison, name: str, height: float) -> str:
+    """Return who is the best linear law, against the brake, and how far above the floor."""
+    text = f"the best linear law is {name}, {quantity(found.pooled(name, height), 'm')} rms"
+    lost = found.lost(name, height)
+    if lost:
+        text += (
+            f" though it loses the load in {lost} of {count(len(found.of(name, height)), 'run')}"
+        )
+    held = found.best(height, ("brake",))
+    if held is not None and found.pooled(name, height) > 0.0:
+        share = found.pooled(held, height) / found.pooled(name, height)
+        side = "less" if share >= 1.0 else "more"
+        times = max(share, 1.0 / share)
+        factor = number(times, 2) if times < _MANY else f"over {_MANY:.0f}"
+        text += f", {factor} times {side} than with the drum held"
+    if found.floor is not None:
+        least = found.pooled(found.floor.name, height)
+        if least > 0.0:
+            text += f"; the floor is {quantity(least, 'm')}"
+    return text
+
+
+def _against(found: Comparison, name: str, other: str, height: float, what: str) -> str:
+    """Return whether one contender is better than another, seed by seed."""
+    ratios = _log_ratios(found, name, other, height)
+    label = f"{name} ({what})" if what else name
+    if not ratios:
+        return f"{label} and {other} have no run in common"
+    mean = mean_interval(ratios)
+    factor = math.exp(mean.mean)
+    if math.isnan(mean.low):
+        side = "less" if factor < 1.0 else "more"
+        times = number(max(factor, 1.0 / factor), 2)
+        return f"{label} moves the load {times} times {side} than {other}, in a single sea"
+    if mean.low <= 0.0 <= mean.high:
+        band = f"{number(math.exp(mean.low), 2)} to {number(math.exp(mean.high), 2)} times"
+        if max(-mean.low, mean.high) <= _EVEN:
+            return f"{label} does not help: {band} the rms of {other}"
+        seeds = count(len(ratios), "seed")
+        return f"whether {label} helps cannot be told from {seeds}: {band} the rms of {other}"
+    if mean.high < 0.0:
+        low, high = number(math.exp(-mean.high), 2), number(math.exp(-mean.low), 2)
+        return f"{label} helps: {low} to {high} times less rms than {other}"
+    low, high = number(math.exp(mean.low), 2), number(math.exp(mean.high), 2)
+    return f"{label} does not help: {low} to {high} times more rms than {other}"
+
+
+def _log_ratios(found: Comparison, name: str, other: str, height: float) -> list[float]:
+    theirs = {cell.seed: cell.rms for cell in found.of(other, height)}
+    pairs = [(cell.rms, theirs.get(cell.seed, math.nan)) for cell in found.of(name, height)]
+    return [
+        math.log(max(a, _NOTHING) / max(b, _NOTHING))
+        for a, b in pairs
+        if math.isfinite(a) and math.isfinite(b)
+    ]
+
+
+def _lost(found: Comparison, height: float) -> str:
+    """Return who loses the load at a height."""
+    told = [
+        f"{each.name} in {found.lost(each.name, height)}"
+        for each in found.contenders
+        if found.lost(each.name, height)
+    ]
+    return f"the load is lost by {_listed(told)} of {len(found.seeds)}" if told else ""
+
+
+def _overall(found: Comparison) -> Sequence[str]:
+    """Return at which heights prediction helps and at which it does not."""
+    verdicts: dict[str, list[float]] = {
+        "helps": [],
+        "does not help": [],
+        "cannot be told from so few seeds": [],
+    }
+    for height in found.heights:
+        linear, best = found.best(height, ("linear",)), found.best(height, ("predictive",))
+        if linear is None or best is None:
+            continue
+        ratios = _log_ratios(found, best, linear, height)
+        mean = mean_interval(ratios) if ratios else None
+        if mean is None or math.isnan(mean.low):
+            verdicts["cannot be told from so few seeds"].append(height)
+        elif mean.high < 0.0:
+            verdicts["helps"].append(height)
+        elif mean.low > 0.0 or max(-mean.low, mean.high) <= _EVEN:
+            verdicts["does not help"].append(height)
+        else:
+            verdicts["cannot be told from so few seeds"].append(height)
+    parts = [
+        f"it {verdict} at H_s {_listed([f'{h:.4g}' for h in heights])} m"
+        for verdict, heights in verdicts.items()
+        if heights
+    ]
+    if not parts:
+        if any(each.group == "predictive" for each in found.contenders):
+            return (
+                "Whether prediction helps cannot be told: there is nothing to compare it with.",
+            )
+        return ()
+    return (f"Prediction against the best linear law: {'; '.join(parts)}.",)
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def _short(value: float, factor: float) -> str:
+    return "" if _missing(value) else number(value / factor)
+
+
+def _missing(value: float) -> bool:
+    return value is None or math.isnan(value)

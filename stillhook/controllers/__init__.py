@@ -1,0 +1,1 @@
+"""From a name or a design to a controller in time."""

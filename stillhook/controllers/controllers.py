@@ -1,0 +1,88 @@
+"""Every controller by its name, linear and predictive: what `simulate` and the command line offer.
+
+    name, case [, design, gains] --> synth.controllers.controllers or mpc --> controller
+
+`synth` and `mpc` do not know each other; here the names of both meet.  The predictive ones are
+imported when one is made, as they bring a solver along.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from models.basics.checks import InputError
+from models.basics.signals import pick
+from models.case.case import Case
+from models.sensing.control import Controller
+
+if TYPE_CHECKING:
+    from synth.design.design import GainDesign
+    from synth.design.tuning import Tuning
+
+__all__ = ["PREDICTIVE", "controller_by_name", "known_controllers"]
+
+#: Predictive controllers and what each is, in a line.
+PREDICTIVE: Mapping[str, str] = MappingProxyType(
+    {
+        "mpc": "predictive control, with the sea that its own filter expects",
+        "mpc-ar": "the same, with a forecast learnt from the record alone",
+        "mpc-preview": "the same, knowing what the hook will do: for reference only",
+        "nonlinear-mpc": "the same with drag, slack rope and the drive's limits in its model",
+    }
+)
+
+
+def known_controllers() -> tuple[str, ...]:
+    """Return the names of all controllers."""
+    from synth.controllers.controllers import CONTROLLERS
+
+    return (*CONTROLLERS, *PREDICTIVE)
+
+
+def controller_by_name(
+    name: str,
+    case: Case,
+    *,
+    design: GainDesign | Tuning | None = None,
+    gains: Mapping[str, float] | None = None,
+    sample_time: float | None = None,
+) -> Controller:
+    """Return the controller of a name for a case.
+
+    Parameters
+    ----------
+    name
+        One of `known_controllers`.
+    case
+        The case.
+    design, gains
+        For feedback only.
+    sample_time
+        T [s]; by default the controller's own.
+
+    Raises
+    ------
+    InputError
+        If there is no such controller, or what is given with it does not belong to it.
+    SolverError, SynthesisError
+        If it cannot be made for the case.
+    """
+    pick("controllers", "controller", known_controllers(), (name,))
+    if name not in PREDICTIVE:
+        from synth.controllers.controllers import controller_named
+
+        return controller_named(name, case, design=design, gains=gains, sample_time=sample_time)
+    if gains is not None:
+        raise InputError(f"{name}: gains are for feedback; predictive control has none")
+    T = 0.05 if sample_time is None else sample_time
+    if name == "nonlinear-mpc":
+        from mpc.nonlinear.nonlinear import NonlinearMPC
+
+        return NonlinearMPC(case, sample_time=T)
+    from mpc.linear.linear import LinearMPC
+
+    if name == "mpc":
+        return LinearMPC(case, sample_time=T)
+    return LinearMPC(case, sample_time=T, predictor="ar" if name == "mpc-ar" else "preview")

@@ -1,0 +1,157 @@
+"""The designs of a comparison: one for each sea, fair to the linear laws, as plain data.
+
+    case at one H_s --> optimise_gains, optimise_structure --> Law --> store, other processes
+
+A linear law can be designed to keep the drive's limits, or as if there were none: the first is
+slow in a sea that the drive could follow, the second falls off where it cannot.  In between is one
+that keeps them in a sea of half the height, and saturates now and then.  None is fair to linear
+control by itself, so all take part, whatever the case says about the limits; the plant that they
+are simulated on has them all the same.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from models.case.case import Case
+from synth.design.design import GainDesign
+from synth.design.structure_design import StructureDesign
+from synth.design.tuning import Tuning
+from synth.loop.controller import Controller
+
+__all__ = ["EAGER", "HALF", "Law", "design_law"]
+
+EAGER = "-eager"
+"""Ending of the designs that ignore the drive's limits."""
+HALF = "-half"
+"""Ending of the designs that keep them in a sea of half the height."""
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Law:
+    """A linear law as plain data, exact to the last bit in JSON.
+
+    Attributes
+    ----------
+    kind
+        "gains", "controller", or "none" where no stable law was found.
+    values
+        Gains by name, or the matrices A, B, C, D and the names of the measurements and inputs.
+    ok
+        Whether it keeps every limit that it was designed for.
+    drive
+        "enforced" or "reported": whether the drive's limits were among these; empty if the
+        design was given.
+    status
+        The sentence of the design.
+    """
+
+    kind: str
+    values: Mapping[str, Any]
+    ok: bool
+    drive: str = ""
+    status: str = ""
+
+    @property
+    def found(self) -> bool:
+        """Whether there is a law at all."""
+        return self.kind != "none"
+
+    @property
+    def law(self) -> Mapping[str, float] | Controller:
+        """What `LinearFeedback` takes: gains, or a controller in state space."""
+        if self.kind == "gains":
+            return dict(self.values)
+        ny, nu = len(self.values["measurements"]), len(self.values["inputs"])
+        n = len(self.values["A"])
+        import numpy as np
+
+        shapes = {"A": (n, n), "B": (n, ny), "C": (nu, n), "D": (nu, ny)}
+        return Controller(
+            **{k: np.reshape(np.array(self.values[k], float), s) for k, s in shapes.items()},
+            measurements=tuple(self.values["measurements"]),
+            inputs=tuple(self.values["inputs"]),
+        )
+
+    @property
+    def digest(self) -> str:
+        """Digest of what it does, whatever was said about it."""
+        text = json.dumps({"kind": self.kind, "values": dict(self.values)}, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return asdict(self)
+
+    @classmethod
+    def of(cls, design: GainDesign | StructureDesign | Tuning, drive: str = "") -> Law:
+        """Return the law of a design."""
+        about: dict[str, Any] = {"ok": bool(design.ok), "drive": drive, "status": design.status}
+        if isinstance(design, GainDesign):
+            gains = {name: float(value) for name, value in design.gains.items()}
+            return cls(
+                kind="gains" if design.margins is not None else "none", values=gains, **about
+            )
+        if design.margins is None or not design.parameters:
+            return cls(kind="none", values={}, **about)
+        controller = design.controller
+        if controller is None:
+            return cls(kind="none", values={}, **about)
+        values: dict[str, Any] = {k: getattr(controller, k).tolist() for k in ("A", "B", "C", "D")}
+        values |= {"measurements": list(controller.measurements), "inputs": list(controller.inputs)}
+        return cls(kind="controller", values=values, **about)
+
+
+def design_law(needs: str, case: Case, starts: int, progress: Progress | None = None) -> Law:
+    """Return the law that is designed for a case.
+
+    Parameters
+    ----------
+    needs
+        "gains" or the name of a structure, for a law within the drive's limits; followed by
+        "-eager" for one that ignores them, or "-half" for one that keeps them in half the sea.
+    case
+        The case, in the sea that the law is for.
+    starts
+        Starts of the search.
+    progress
+        Called as progress(stage, done, total).
+
+    Raises
+    ------
+    InputError
+        If a limit lies below the static load.
+    """
+    if needs.endswith(EAGER):
+        free = case.replace({"limits.drive": "report"})
+        return Law.of(_design(needs.removesuffix(EAGER), free, starts, progress), "reported")
+    changes: dict[str, object] = {"limits.drive": "enforce"}
+    if needs.endswith(HALF):
+        needs = needs.removesuffix(HALF)
+        changes["sea.significant_height"] = 0.5 * float(case.sea.significant_height)
+    strict = case.replace(changes)
+    design = _design(needs, strict, starts, progress)
+    law = Law.of(design, "enforced")
+    if isinstance(design, StructureDesign) and not design.drive_kept:
+        # What was found ignores the limits: that is the eager one, and takes part as such.
+        status = f"no law within the drive's limits: {law.status}"
+        return replace(law, kind="none", values={}, status=status)
+    return law
+
+
+def _design(
+    needs: str, case: Case, starts: int, progress: Progress | None
+) -> GainDesign | StructureDesign:
+    if needs == "gains":
+        from synth.design.optimise import optimise_gains
+
+        return optimise_gains(case, starts=starts, progress=progress)
+    from synth.design.structure_search import optimise_structure
+
+    return optimise_structure(case, needs, starts=starts, progress=progress)

@@ -1,0 +1,1 @@
+"""Designs as files, figures and reports."""

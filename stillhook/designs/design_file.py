@@ -1,0 +1,240 @@
+"""A design as a YAML file that loads again: the case, the gains, and every figure claimed.
+
+The file mirrors `GainDesign`: one key for each field, dataclasses as sections, arrays as lists,
+and the case as it stands in a case file.  What a field may hold is read from its annotation, so
+the file follows the classes without a second description of them.  Reading is strict: what is
+missing, unknown or of another kind is named with file, line and path.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import types
+import typing
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Union, get_args, get_origin
+
+import numpy as np
+
+from models.basics.checks import InputError
+from models.basics.files import write_text_atomically
+from models.case.case import Case
+from models.casefile.messages import line_of, message_line, suggestion
+from models.casefile.yaml_lines import read_yaml, yaml_text
+from synth.design.design import GainDesign
+from synth.verify.verify import Verification
+
+__all__ = ["FORMAT", "load_design", "save_design"]
+
+FORMAT = 1
+"""Version of the file's format."""
+
+_KEY = "stillhook_design"
+_WRITER = "written_by"
+_GAINS = ("A", "a", "a1", "a2")
+Place = tuple[str | int, ...]
+
+
+def save_design(design: GainDesign, path: str | Path) -> Path:
+    """Write a design to a YAML file, whole or not at all.
+
+    Parameters
+    ----------
+    design
+        The design.
+    path
+        The file; its folder must exist.
+
+    Returns
+    -------
+    Path
+        The file written.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    return write_text_atomically(path, design_text(design))
+
+
+def design_text(design: GainDesign) -> str:
+    """Return a design as the YAML text that `load_design` reads."""
+    from .. import __version__
+
+    content = {_KEY: FORMAT, _WRITER: f"stillhook {__version__}", **_encoded(design)}
+    # The case comes last: it is the longest, and the one part that is not an answer.
+    content["case"] = content.pop("case")
+    heading = (
+        f"# A design by Stillhook for the case {design.case.name}, in SI units.\n"
+        "# stillhook.load_design reads it; the section `case` is a case file of its own.\n"
+    )
+    return heading + yaml_text(content)
+
+
+def load_design(path: str | Path) -> GainDesign:
+    """Read a design from a file that `save_design` wrote.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    GainDesign
+        Equal to the one saved, to the last digit; `verify` checks it anew.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is not a design, or a field is missing, unknown or wrong.
+
+    Warns
+    -----
+    PhysicsWarning
+        For each implausible figure of its case, as when the case was loaded.
+    """
+    source = str(path)
+    data, lines = read_yaml(_text(Path(path)), source)
+    if not isinstance(data, Mapping) or _KEY not in data:
+        raise InputError(f"{source}: is not a design file: it has no key `{_KEY}`")
+    if data[_KEY] != FORMAT:
+        line = lines.get((_KEY,), 0)
+        wanted = f"must be {FORMAT}, the format that this version reads, got {data[_KEY]!r}"
+        raise InputError(message_line(source, line, (_KEY,), wanted))
+    content = {key: value for key, value in data.items() if key not in (_KEY, _WRITER)}
+    reader = _Reader(source, lines)
+    design: GainDesign = reader.value(GainDesign, content, ())
+    for name in _GAINS:
+        if name not in design.gains:
+            raise reader.error(("gains", name), "is missing; it must be a number")
+    return design
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such design file") from None
+    except IsADirectoryError:
+        hint = f"; did you mean {path / 'design.yaml'}?" if (path / "design.yaml").exists() else ""
+        raise InputError(f"{path}: is a folder; a design file is wanted{hint}") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not a text file in UTF-8 (byte {error.start})") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+
+
+def _encoded(value: Any) -> Any:
+    """Return plain data: dicts, lists, texts, numbers; fields that are None are left out."""
+    if isinstance(value, Case):
+        return value.to_dict()
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        pairs = [(f.name, getattr(value, f.name)) for f in dataclasses.fields(value)]
+        return {name: _encoded(item) for name, item in pairs if item is not None}
+    if isinstance(value, Mapping):
+        return {str(key): _encoded(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, tuple | list):
+        return [_encoded(item) for item in value]
+    return value
+
+
+@dataclasses.dataclass(frozen=True)
+class _Reader:
+    """Makes values of annotated types from plain data, and words what is wrong with the data.
+
+    Parameters
+    ----------
+    source
+        Name of the file.
+    lines
+        Line of each path in it.
+    """
+
+    source: str
+    lines: Mapping[Place, int]
+
+    def error(self, place: Place, text: str) -> InputError:
+        return InputError(message_line(self.source, line_of(place, self.lines), place, text))
+
+    def value(self, kind: Any, data: Any, place: Place) -> Any:
+        """Return `data` as a value of the type `kind`."""
+        origin, arguments = get_origin(kind), get_args(kind)
+        if origin in (Union, types.UnionType):
+            (inner,) = [item for item in arguments if item is not type(None)]
+            return None if data is None else self.value(inner, data, place)
+        if kind is Case:
+            return self.case(data, place)
+        if dataclasses.is_dataclass(kind):
+            return self.record(kind, data, place)
+        if origin is not None and issubclass(origin, Mapping):
+            section = self.section(data, place)
+            return {k: self.value(arguments[1], v, (*place, k)) for k, v in section.items()}
+        if origin is tuple:
+            rows = self.rows(data, place)
+            return tuple(self.value(arguments[0], v, (*place, i)) for i, v in enumerate(rows))
+        if origin is np.ndarray:
+            rows = self.rows(data, place)
+            array = np.array([self.number(v, (*place, i)) for i, v in enumerate(rows)])
+            array.setflags(write=False)
+            return array
+        if kind is float:
+            return self.number(data, place)
+        names = {bool: "true or false", int: "a whole number", str: "text"}
+        if type(data) is not kind:
+            raise self.error(place, f"must be {names[kind]}, got {_got(data)}")
+        return data
+
+    def record(self, kind: Any, data: Any, place: Place) -> Any:
+        """Return a dataclass from a section with a key for each of its fields."""
+        section = self.section(data, place)
+        hints = typing.get_type_hints(kind, localns={"Verification": Verification})
+        fields = {field.name: field for field in dataclasses.fields(kind)}
+        for key in section:
+            if key not in fields:
+                where = (*place, key)
+                raise self.error(where, f"unknown key; {suggestion(key, list(fields))}")
+        values: dict[str, Any] = {}
+        for name, field in fields.items():
+            if name in section:
+                values[name] = self.value(hints[name], section[name], (*place, name))
+            elif type(None) in get_args(hints[name]):
+                values[name] = None
+            elif field.default is field.default_factory is dataclasses.MISSING:
+                raise self.error((*place, name), "is missing")
+        return kind(**values)
+
+    def case(self, data: Any, place: Place) -> Case:
+        """Return the case, checked like a case file of its own."""
+        section = self.section(data, place)
+        depth = len(place)
+        lines = {path[depth:]: line for path, line in self.lines.items() if path[:depth] == place}
+        return Case.from_dict(section, source=self.source, lines=lines)
+
+    def section(self, data: Any, place: Place) -> Mapping[str, Any]:
+        if not isinstance(data, Mapping):
+            raise self.error(place, f"must be a section with keys of its own, got {_got(data)}")
+        return data
+
+    def rows(self, data: Any, place: Place) -> list[Any]:
+        if not isinstance(data, list):
+            raise self.error(place, f"must be a list, got {_got(data)}")
+        return data
+
+    def number(self, data: Any, place: Place) -> float:
+        if isinstance(data, bool) or not isinstance(data, int | float) or math.isnan(data):
+            raise self.error(place, f"must be a number, got {_got(data)}")
+        return float(data)
+
+
+def _got(data: Any) -> str:
+    if isinstance(data, Mapping | list):
+        return "a section" if isinstance(data, Mapping) else "a list"
+    return "nothing" if data is None else f"{data!r:.60}"

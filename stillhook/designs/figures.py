@@ -1,0 +1,311 @@
+"""The figures of a design: payload spectrum, responses, Nyquist curve, use of the limits.
+
+Each function takes a `GainDesign` and returns a matplotlib `Figure`; nothing is shown, saved or
+kept.  Titles say what the figure found.  What an unstable loop does not have (a spectrum, a use
+of limits) is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError
+from synth.design.design import GainDesign
+
+from ..text.motion import DRUM as DRUM_HAUL
+from ..text.motion import HOOK as HOOK_HEAVE
+from ..text.motion import PAYLOAD, MotionView, highest
+from ..text.quantities import decibels, number, quantity
+from ..text.style import (
+    AFTER,
+    BEFORE,
+    BROKEN,
+    DRUM,
+    HOOK,
+    REFERENCE,
+    annotate,
+    headline,
+    new_figure,
+    styled,
+    typeset,
+)
+from ..text.summary import LimitRow, limit_rows
+from .nyquist_plot import nyquist
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["FIGURES", "limits", "nyquist", "payload_spectrum", "responses"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_WEIGHT = 0.999  # share of a variance that a spectrum's axis has to hold
+_PERIODS = (20.0, 12.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5)  # marks on an axis [s]
+_CUT = 2.0  # use of a limit at which its bar is cut off
+
+
+def payload_spectrum(design: GainDesign) -> Figure:
+    """Return the spectra of hook and payload, with the drum held and with the gains.
+
+    Parameters
+    ----------
+    design
+        The design.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Variance density [m^2 s/rad] on a logarithmic axis over frequency [rad/s].
+    """
+    view = MotionView(design)
+    omega = view.frequencies
+    curves = [
+        ("hook", HOOK, view.hook.density(omega), view.hook_motion.rms),
+        ("payload, drum held", BEFORE, view.held_density(omega), design.payload_rms_before),
+    ]
+    if view.compensated:
+        density = view.payload_density(omega)
+        curves.append(("payload, with the gains", AFTER, density, design.payload_rms))
+    right = max(2.0, 1.15 * max(_quantile(omega, density) for _, _, density, _ in curves))
+    peaks = [float(density[np.isfinite(density)].max()) for _, _, density, _ in curves]
+    bottom = max(1e-3 * min(peaks), 1e-10 * max(peaks))
+    shown = omega <= right
+    with styled():
+        figure = new_figure()
+        axes = figure.add_subplot()
+        for label, colour, density, rms in curves:
+            heights = np.clip(density[shown], 1e-3 * bottom, None)
+            text = f"{label}: {quantity(rms, 'm')} rms"
+            axes.semilogy(omega[shown], heights, color=colour, label=text)
+        if view.compensated:
+            axes.fill_between(omega[shown], 1e-3 * bottom, heights, color=AFTER, alpha=0.12)
+        axes.set_ylim(bottom, 3.0 * max(peaks))
+        axes.set_xlim(0.0, right)
+        axes.set_xlabel("frequency [rad/s]")
+        axes.set_ylabel("variance density [m² s/rad]")
+        _period_axis(axes, right)
+        axes.legend(loc="upper right")
+        headline(axes, _spectrum_finding(design), design)
+    return figure
+
+
+def responses(design: GainDesign) -> Figure:
+    """Return |P/Z| with the drum held and with the gains, and |X/Z|.
+
+    Parameters
+    ----------
+    design
+        The design.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Two logarithmic axes, one above the other, over frequency [rad/s].
+    """
+    view = MotionView(design)
+    low, high = _response_band(view)
+    omega = view.frequencies
+    omega = np.unique(np.concatenate([np.geomspace(low, high, 700), omega]))
+    omega = omega[(omega >= low) & (omega <= high)]
+    held = np.abs(view.held_response(omega))
+    with styled():
+        figure = new_figure(7.2, 6.2)
+        if view.compensated:
+            upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+            payload = np.abs(design.assessment.response(PAYLOAD, HOOK_HEAVE, omega))
+            upper.loglog(omega, payload, color=AFTER, label="with the gains", zorder=3)
+            _range(upper, np.concatenate([held, payload]), 2.0)
+            drum = np.abs(design.assessment.response(DRUM_HAUL, HOOK_HEAVE, omega))
+            lower.loglog(omega, drum, color=DRUM)
+            _range(lower, drum, 4.0)
+            _mark_peak(design, lower, low, high)
+            _frame(view, lower, "drum over hook |X/Z| [m/m]")
+        else:
+            upper = lower = figure.add_subplot()
+        upper.loglog(omega, held, color=BEFORE, label="drum held")
+        _frame(view, upper, "payload over hook |P/Z| [m/m]")
+        _slow_limit(design, upper, low)
+        upper.set_xlim(low, high)
+        upper.legend(loc="best")
+        lower.set_xlabel("frequency [rad/s]   (shaded: 90 % of the hook's motion)")
+        headline(upper, _response_finding(view), design)
+    return figure
+
+
+def limits(design: GainDesign) -> Figure:
+    """Return the use of each limit as a bar.
+
+    Parameters
+    ----------
+    design
+        The design, of a stable loop.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Bars in percent of each limit; what the case only reports is hatched.
+
+    Raises
+    ------
+    InputError
+        If the design has no limits to show (an unstable loop).
+    """
+    rows = limit_rows(design)
+    if not rows:
+        raise InputError("limits: the loop is unstable, so there is no use of limits")
+    longest = min(max(1.1, *(1.02 * row.use for row in rows)), _CUT)
+    with styled():
+        figure = new_figure(7.6, 1.5 + 0.36 * len(rows))
+        axes = figure.add_subplot()
+        for place, row in enumerate(rows):
+            axes.barh(
+                place,
+                100.0 * min(row.use, longest),
+                height=0.62,
+                color=AFTER if row.kept else BROKEN,
+                alpha=1.0 if row.enforced else 0.45,
+                hatch=None if row.enforced else "///",
+                edgecolor="white",
+                linewidth=0.0,
+            )
+            _bar_text(axes, place, row, longest)
+        axes.axvline(100.0, color=REFERENCE, linewidth=1.2)
+        labels = [typeset(row.label) for row in rows]
+        axes.set_yticks(range(len(rows)), labels)
+        axes.invert_yaxis()
+        axes.set_xlim(0.0, 100.0 * longest)
+        axes.grid(visible=False, axis="y")
+        note = "" if all(row.enforced for row in rows) else "   (hatched: reported, not enforced)"
+        axes.set_xlabel(f"use of the limit [%]{note}")
+        headline(axes, _limits_finding(rows), design)
+    return figure
+
+
+FIGURES: dict[str, Callable[[GainDesign], Figure]] = {
+    "payload_spectrum": payload_spectrum,
+    "responses": responses,
+    "nyquist": nyquist,
+    "limits": limits,
+}
+"""All figures of a design by the names of their files."""
+
+
+def _spectrum_finding(design: GainDesign) -> str:
+    if design.margins is None:
+        return "The loop is unstable: no compensated payload to show"
+    before, after = quantity(design.payload_rms_before, "m"), quantity(design.payload_rms, "m")
+    change = decibels(design.payload_rms_before / design.payload_rms)
+    return f"The payload goes from {before} to {after} rms ({change})"
+
+
+def _response_finding(view: MotionView) -> str:
+    design = view.design
+    if not view.compensated:
+        return "The loop is unstable: only the drum held is shown"
+    omega = np.geomspace(*view.energetic_band, 300)
+    payload = np.abs(design.assessment.response(PAYLOAD, HOOK_HEAVE, omega))
+    held = np.abs(view.held_response(omega))
+    gains = f"{number(float(payload.min()), 2)} to {number(float(payload.max()), 2)}"
+    before = f"{number(float(held.min()), 2)} to {number(float(held.max()), 2)}"
+    return f"In the waves |P/Z| is {gains} with the gains, {before} with the drum held"
+
+
+def _limits_finding(rows: list[LimitRow]) -> str:
+    broken = [row.label for row in rows if not row.kept and row.enforced]
+    over = sum(not row.kept and not row.enforced for row in rows)
+    if broken:
+        text = f"Broken: {', '.join(broken)}"
+    else:
+        used = sum(row.use > 0.999 for row in rows if row.enforced)
+        text = f"Every enforced limit is kept, {used or 'none'} used up"
+    return f"{text}; {over} reported ones exceeded" if over else text
+
+
+def _quantile(omega: FloatArray, density: FloatArray) -> float:
+    """Return the frequency below which nearly all of a variance lies [rad/s]."""
+    slices = 0.5 * (density[1:] + density[:-1]) * np.diff(omega)
+    total = np.cumsum(np.nan_to_num(slices, posinf=0.0))
+    return float(omega[1 + np.searchsorted(total, _WEIGHT * total[-1])])
+
+
+def _period_axis(axes: Axes, right: float) -> None:
+    """Add the period [s] on top, in round figures."""
+    chosen: list[float] = []
+    for period in _PERIODS:
+        place = 2.0 * np.pi / period
+        apart = not chosen or place - 2.0 * np.pi / chosen[-1] > 0.06 * right
+        if place < 0.98 * right and apart:
+            chosen.append(period)
+    top = axes.secondary_xaxis("top")
+    places = [2.0 * np.pi / period for period in chosen]
+    top.set_xticks(places, [f"{period:g} s" for period in chosen])
+
+
+def _response_band(view: MotionView) -> tuple[float, float]:
+    low, high = 0.02, 20.0
+    limit = view.design.case.limits.low_frequency
+    if limit is not None:
+        low = min(low, 0.4 * limit.below)
+    if view.design.margins is not None:
+        high = max(high, 2.0 * float(view.design.margins.crossovers.max(initial=0.0)))
+    return low, min(high, 200.0)
+
+
+def _range(axes: Axes, values: FloatArray, room: float) -> None:
+    top = float(np.max(values))
+    axes.set_ylim(0.6 * max(float(np.min(values)), 1e-4 * top), room * top)
+
+
+def _frame(view: MotionView, axes: Axes, label: str) -> None:
+    low, high = view.energetic_band
+    axes.axvspan(low, high, color=HOOK, alpha=0.15, linewidth=0.0)
+    axes.axhline(1.0, color=REFERENCE, linewidth=0.9, linestyle=(0, (4, 3)))
+    axes.set_ylabel(label)
+
+
+def _mark_peak(design: GainDesign, axes: Axes, low: float, high: float) -> None:
+    def height(omega: FloatArray) -> FloatArray:
+        return np.abs(design.assessment.response(DRUM_HAUL, HOOK_HEAVE, omega))
+
+    at = highest(height, low, high)
+    value = float(height(np.array([at]))[0])
+    if value > 1.05:
+        text = f"peak {number(value)} at {number(at)} rad/s"
+        annotate(axes, text, (at, value), (-170.0, 8.0))
+
+
+def _slow_limit(design: GainDesign, axes: Axes, low: float) -> None:
+    """Draw the corner under which |P/Z| has to stay at low frequency."""
+    limit = design.case.limits.low_frequency
+    if limit is None:
+        return
+    across, up = [low, limit.below, limit.below], [limit.ratio, limit.ratio, 2.5 * limit.ratio]
+    text = f"limit: {limit.ratio:g} up to {limit.below:g} rad/s"
+    axes.plot(across, up, color=REFERENCE, linewidth=2.0, label=text)
+
+
+def _bar_text(axes: Axes, place: int, row: LimitRow, longest: float) -> None:
+    """Write value, bound and price into a long bar, or behind a short one."""
+    text = f"{row.value}  ({row.bound})"
+    if row.price:
+        text += f"   price {row.price} per %"
+    shown = min(row.use, longest)
+    if row.use > longest:
+        text += f"   {100.0 * row.use:.0f} % ▸"
+    inside = shown > 0.62 * longest
+    plain = row.enforced or not inside
+    axes.text(
+        100.0 * shown + (-1.2 if inside else 1.2) * longest,
+        place,
+        text,
+        horizontalalignment="right" if inside else "left",
+        verticalalignment="center",
+        fontsize=9.0,
+        color="white" if inside and row.enforced else REFERENCE,
+        bbox=None if plain else {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
+    )

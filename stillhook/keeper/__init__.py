@@ -1,0 +1,1 @@
+"""What keeps results: the journal, the pool of processes, the digest of the code."""

@@ -1,0 +1,1 @@
+"""Runs in time as figures, words and files, and `simulate`."""

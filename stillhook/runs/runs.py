@@ -1,0 +1,226 @@
+"""`Runs`: what several seeds of one question say together.
+
+    Series.run(seed) ... --> Runs --> summary, extremes, worst --> table, figures, folder
+
+The runs differ in their seed alone: case, controller and scenario are the same.
+`stillhook.runs.simulation` makes them, `stillhook.runs.table` and `stillhook.runs.words` say what
+came of them, `stillhook.runs.report` writes them into a folder.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Literal, overload
+
+import numpy as np
+
+from models.basics.checks import InputError
+from models.case.case import Case
+from models.operation.scenario import Scenario
+from models.run.extremes import ExtremeEstimate, extreme_over_seeds
+from models.run.metrics import Summary
+from models.run.run import Run
+from models.run.summary import ERROR
+
+__all__ = ["EXTREMES", "TRIPS", "Runs", "keep_worst", "stays"]
+
+EXTREMES: Mapping[str, tuple[str, bool]] = {
+    "payload up": (ERROR, False),
+    "payload down": (ERROR, True),
+    "rope tension": ("rope.tension", False),
+}
+"""Most probable extremes by name: of which signal, and whether its minimum."""
+
+TRIPS = ("overspeed", "stroke", "rope-out", "rope-in")
+"""Kinds of events in which the brake ends the controller's work (`models.simulation.trips`)."""
+
+_METHODS: tuple[Literal["gumbel", "pareto"], ...] = ("gumbel", "pareto")
+_EVENTS_SHOWN = 4
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Runs(Sequence[Run]):
+    """Runs of one case, controller and scenario that differ in their seed alone.
+
+    Attributes
+    ----------
+    runs
+        The runs, at least one.
+    scenario
+        What was asked of them.
+    lock_limit
+        Size of the payload's error beyond which lock counted as lost [m]; None: not watched.
+    """
+
+    runs: tuple[Run, ...]
+    scenario: Scenario
+    lock_limit: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check that there is a run."""
+        if not self.runs:
+            raise InputError("runs: at least one run is wanted, got none")
+
+    @overload
+    def __getitem__(self, index: int) -> Run: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Run, ...]: ...
+    def __getitem__(self, index: int | slice) -> Run | tuple[Run, ...]:
+        """Return a run by its place, from 0."""
+        return self.runs[index]
+
+    def __len__(self) -> int:
+        """Return the number of runs."""
+        return len(self.runs)
+
+    @property
+    def case(self) -> Case:
+        """The case, as it is in the scenario."""
+        return self.runs[0].case
+
+    @property
+    def controller(self) -> str:
+        """Name of the controller."""
+        return self.runs[0].controller
+
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """The seeds, in the order of the runs."""
+        return tuple(run.seed for run in self.runs)
+
+    @property
+    def completed(self) -> bool:
+        """Whether every run went to its end."""
+        return all(run.completed for run in self.runs)
+
+    @property
+    def stays(self) -> bool:
+        """Whether the payload is held in one place all the time, and nothing fails."""
+        return stays(self.scenario)
+
+    @property
+    def judged(self) -> tuple[Run, ...]:
+        """The runs that count: all, but those that Ctrl-C cut short if there are others."""
+        whole = tuple(run for run in self.runs if run.status != "interrupted")
+        return whole or self.runs
+
+    @cached_property
+    def summary(self) -> Summary:
+        """Means of all quantities and shares of all mishaps, with their 95 % intervals."""
+        return Summary.of(self.judged)
+
+    @cached_property
+    def extremes(self) -> Mapping[str, Mapping[str, ExtremeEstimate]]:
+        """Most probable extremes in the exposure time of the case, by name and method.
+
+        ``runs.extremes["payload up"]["gumbel"]``; the names are those of `EXTREMES`, the methods
+        "gumbel" and "pareto".  Where there are too few data the estimate is NaN and its status
+        says why.  Empty where the payload is moved or something fails: then no part of a run
+        is like another.
+        """
+        sound = [run for run in self.judged if run.status != "diverged"]
+        if not self.stays or not sound:
+            return {}
+        duration = self.case.limits.exposure_time
+        return {
+            name: {
+                method: extreme_over_seeds(
+                    sound, signal, method=method, minimum=minimum, duration=duration
+                )
+                for method in _METHODS
+            }
+            for name, (signal, minimum) in EXTREMES.items()
+        }
+
+    @property
+    def tripped(self) -> int:
+        """In how many of the judged runs the brake ended the controller's work."""
+        return sum(any(event.kind in TRIPS for event in run.events) for run in self.judged)
+
+    @property
+    def worst(self) -> Run:
+        """The run with the largest error of those that still have their traces, if any has."""
+        shown = [run for run in self.runs if run.time.size] or list(self.runs)
+        return max(shown, key=_badness)
+
+    def save(
+        self,
+        folder: str | Path,
+        *,
+        format: Literal["csv", "parquet", "netcdf", "none"] = "csv",
+        figures: bool = True,
+    ) -> list[Path]:
+        """Write everything there is to say about the runs into a folder.
+
+        Parameters
+        ----------
+        folder
+            The folder; it is made if need be.
+        format
+            Of the files with the time traces.
+        figures
+            Whether to draw figures.
+
+        Returns
+        -------
+        list of Path
+            The files written, see `stillhook.runs.report.write_runs`.
+
+        Raises
+        ------
+        InputError
+            If the folder cannot be made or a file cannot be written.
+        """
+        from .report import write_runs
+
+        return write_runs(folder, [self], format=format, figures=figures)
+
+    def __str__(self) -> str:
+        """Return the runs as a small tree."""
+        from .words import headline_of, tree
+
+        lines = [headline_of(self), *tree(self)]
+        for run in self.runs:
+            told = [f"seed {run.seed}: at {event}" for event in run.events[:_EVENTS_SHOWN]]
+            lines += told if len(self) == 1 or run.status != "completed" else []
+        marks = ["", *["├ "] * (len(lines) - 2), "└ "]
+        return "\n".join(mark + line for mark, line in zip(marks, lines, strict=True))
+
+
+def stays(scenario: Scenario) -> bool:
+    """Return whether the payload is held in one place from start to end, and nothing fails."""
+    return not (
+        scenario.profile.moves
+        or scenario.surroundings is not None
+        or scenario.disengage_at is not None
+        or scenario.parameter_changes
+        or scenario.brake_trips
+        or scenario.telemetry_outages
+        or scenario.sensor_failures
+        or scenario.mru_outages
+        or scenario.telemetry_delays
+        or scenario.mru_biases
+    )
+
+
+def keep_worst(runs: Sequence[Run]) -> list[Run]:
+    """Return the runs, the worst of them alone with its time traces: those are what is large."""
+    worst = max(range(len(runs)), key=lambda i: _badness(runs[i]), default=0)
+    return [run if i == worst else _without_traces(run) for i, run in enumerate(runs)]
+
+
+def _badness(run: Run) -> float:
+    """Return the largest error [m]; one that diverged is worse than any other."""
+    found = run.statistics.quantities.get("tracking error largest")
+    value = math.nan if found is None else found.value
+    return math.inf if run.status == "diverged" else (-1.0 if math.isnan(value) else value)
+
+
+def _without_traces(run: Run) -> Run:
+    if not run.time.size:
+        return run
+    return replace(run, time=np.zeros(0), values=np.zeros((0, len(run.signals))))

@@ -1,0 +1,220 @@
+"""`Series`: runs that differ in their seed alone, prepared once for all of them.
+
+    case, controller by name, of a design or of the user's own --> Series --> run(seed)
+
+What `models.simulation.simulate` does for one seed with a controller at hand;
+`stillhook.runs.simulation` and the command line make `Runs` of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.basics.checks import InputError
+from models.case.case import Case
+from models.casefile.quantity import Quantity as Range
+from models.operation.excitation import SpectrumMotion
+from models.operation.scenario import Scenario
+from models.operation.scenarios import scenario_named
+from models.run.run import Run
+from models.run.summary import Quantity
+from models.sensing.control import Controller, holds_brake
+from models.simulation.simulate import run_simulation
+from models.simulation.simulation import Simulation, prepare
+from synth.controllers.linear_feedback import LinearFeedback
+from synth.design.design import GainDesign
+from synth.design.tuning import Tuning
+
+from ..controllers.controllers import controller_by_name
+from .runs import Runs, stays
+from .window import error_of
+
+if TYPE_CHECKING:
+    from models.operation.excitation import MotionSource
+    from models.plant.drive import DriveLimits
+
+__all__ = ["Progress", "Series", "controller_of"]
+
+Progress = Callable[[float], None]
+
+_FEEDBACK_SAMPLE = 0.01  # [s]
+_PROTOCOL = ("name", "sample_time", "reset", "step")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Series:
+    """Runs that differ in their seed alone, prepared but not yet run.
+
+    Attributes
+    ----------
+    simulation
+        The prepared simulation.
+    duration, settle, store_step, lock_limit, deadline
+        As for `models.simulation.simulate.simulate`; None where it chooses.
+    """
+
+    simulation: Simulation
+    duration: float
+    settle: float | None = None
+    store_step: float | None = None
+    lock_limit: float | None = None
+    deadline: float | None = None
+
+    @classmethod
+    def prepare(
+        cls,
+        case: Case,
+        controller: str | GainDesign | Tuning | Controller,
+        *,
+        scenario: str | Scenario = "hold",
+        options: Mapping[str, object] | None = None,
+        hook: MotionSource | None = None,
+        duration: float | str | None = None,
+        design: GainDesign | Tuning | None = None,
+        gains: Mapping[str, float] | None = None,
+        sample_time: float | None = None,
+        step: float | None = None,
+        masses: int | None = None,
+        limits: DriveLimits | None = None,
+        parameters: Mapping[str, float] | None = None,
+        settle: float | None = None,
+        store_step: float | None = None,
+        lock_limit: float | None = None,
+        deadline: float | None = None,
+        compiled: bool | None = None,
+    ) -> Series:
+        """Prepare; the arguments are those of `simulate`.
+
+        Raises
+        ------
+        InputError, SynthesisError, SolverError
+            As `simulate`.
+        """
+        if isinstance(scenario, str):
+            scenario = scenario_named(scenario, case, **(options or {}))
+        elif options:
+            raise InputError("simulate: options are for a scenario by its name")
+        # A lift in air is another case, with another static command, than the one given.
+        own = scenario.case_for(case)
+        if duration is not None:
+            scenario = replace(scenario, duration=_seconds(duration))
+        lasting = scenario.duration
+        simulation = prepare(
+            case,
+            controller_of(controller, own, design=design, gains=gains, sample_time=sample_time),
+            scenario=scenario,
+            hook=hook,
+            step=step,
+            masses=masses,
+            limits=limits,
+            parameters=parameters,
+            compiled=compiled,
+        )
+        return cls(
+            simulation=simulation,
+            duration=lasting,
+            settle=settle,
+            store_step=store_step,
+            lock_limit=_default_lock_limit(simulation) if lock_limit is None else lock_limit,
+            deadline=deadline,
+        )
+
+    def run(self, seed: int, progress: Progress | None = None) -> Run:
+        """Run with one seed; `progress` is called now and then with the share that is done."""
+        run = run_simulation(
+            self.simulation,
+            seed=seed,
+            duration=self.duration,
+            settle=self.settle,
+            store_step=self.store_step,
+            lock_limit=self.lock_limit,
+            deadline=self.deadline,
+            progress=progress,
+        )
+        return _with_error_before_touchdown(run)
+
+    def runs(self, found: Sequence[Run]) -> Runs:
+        """Return runs of this series as one result."""
+        return Runs(
+            runs=tuple(found), scenario=self.simulation.scenario, lock_limit=self.lock_limit
+        )
+
+
+def controller_of(
+    controller: str | GainDesign | Tuning | Controller,
+    case: Case,
+    *,
+    design: GainDesign | Tuning | None = None,
+    gains: Mapping[str, float] | None = None,
+    sample_time: float | None = None,
+) -> Controller:
+    """Return the controller that is meant: by its name, of a design, or the object itself.
+
+    Raises
+    ------
+    InputError
+        If it is none of these, or what is given with it does not belong to it.
+    """
+    if isinstance(controller, str):
+        return controller_by_name(
+            controller, case, design=design, gains=gains, sample_time=sample_time
+        )
+    if design is not None or gains is not None:
+        raise InputError("simulate: design and gains are for a controller by its name")
+    if isinstance(controller, GainDesign | Tuning):
+        own = _FEEDBACK_SAMPLE if sample_time is None else sample_time
+        return LinearFeedback.from_design(controller, case=case, sample_time=own)
+    lacking = [name for name in _PROTOCOL if not hasattr(controller, name)]
+    if lacking:
+        raise InputError(
+            "simulate: controller must be a name, a design, or an object with "
+            f"{', '.join(_PROTOCOL)}; got {type(controller).__name__}, which has no "
+            f"{' and no '.join(lacking)}"
+        )
+    if sample_time is not None:
+        raise InputError(
+            f"simulate: sample_time is for a controller by its name; {controller.name} has its "
+            f"own, {controller.sample_time:g} s"
+        )
+    return controller
+
+
+def _seconds(duration: float | str) -> float:
+    try:
+        return float(Range("time", 0.0, 1e8, open_low=True).read(duration))
+    except InputError as error:
+        raise InputError(f"simulate: duration {error}") from None
+
+
+def _default_lock_limit(simulation: Simulation) -> float | None:
+    """Return the significant height of the hook's motion [m], where that makes sense."""
+    hook = simulation.hook
+    if not isinstance(hook, SpectrumMotion) or not stays(simulation.scenario):
+        return None
+    return None if holds_brake(simulation.controller) else 4.0 * hook.hook.displacement.rms
+
+
+def _with_error_before_touchdown(run: Run) -> Run:
+    """Return a run that also knows how far off the payload was before it touched down.
+
+    What is asked afterwards is below the ground, so the error of the whole run says nothing.
+    """
+    found = run.statistics.quantities.get("touch-down at")
+    if found is None:
+        return run
+    counted = (run.time >= run.statistics.settle) & (run.time < found.value)
+    error = error_of(run)[counted]
+    rms, largest = math.nan, math.nan
+    if error.size:
+        rms, largest = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
+    quantities = {
+        **run.statistics.quantities,
+        "error before touch-down rms": Quantity(value=rms, unit="m"),
+        "error before touch-down largest": Quantity(value=largest, unit="m"),
+    }
+    return replace(run, statistics=replace(run.statistics, quantities=quantities))

@@ -1,0 +1,172 @@
+"""`sh.simulate`: a controller on the nonlinear plant, over as many seeds as are asked for.
+
+    case, controller, scenario --> Series --> run(seed) ... --> Runs
+
+`Runs` keeps the runs and says what they say together; `stillhook.runs.report` writes them into a
+folder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Literal
+
+from models.basics.checks import InputError, check_range
+from models.basics.draws import check_seed
+from models.basics.threads import one_thread
+from models.case.case import Case
+from models.operation.scenario import Scenario
+from models.run.run import Run
+from models.sensing.control import Controller
+from synth.design.design import GainDesign
+from synth.design.tuning import Tuning
+
+from .runs import Runs, keep_worst
+from .series import Progress, Series
+
+if TYPE_CHECKING:
+    from models.operation.excitation import MotionSource
+    from models.plant.drive import DriveLimits
+
+__all__ = ["simulate"]
+
+
+def simulate(
+    case: Case,
+    controller: str | GainDesign | Tuning | Controller = "feedback",
+    *,
+    scenario: str | Scenario = "hold",
+    options: Mapping[str, object] | None = None,
+    hook: MotionSource | None = None,
+    seeds: int | Sequence[int] = 1,
+    duration: float | str | None = None,
+    design: GainDesign | Tuning | None = None,
+    gains: Mapping[str, float] | None = None,
+    sample_time: float | None = None,
+    step: float | None = None,
+    masses: int | None = None,
+    limits: DriveLimits | None = None,
+    parameters: Mapping[str, float] | None = None,
+    settle: float | None = None,
+    store_step: float | None = None,
+    lock_limit: float | None = None,
+    deadline: float | None = None,
+    compiled: bool | None = None,
+    traces: Literal["all", "worst"] = "all",
+    progress: Progress | None = None,
+) -> Runs:
+    """Simulate a controller over seeds.
+
+    Parameters
+    ----------
+    case
+        Vessel, sea, rope, payload, winch and sensors.
+    controller
+        The name of a controller (`stillhook.controllers.controllers`); a design, whose feedback is
+        meant; or any object with ``name``, ``sample_time``, ``reset()`` and ``step(measurement,
+        time)`` (`models.sensing.control.Controller`).
+    scenario, options
+        An operation, or the name of one and its options: numbers in SI, or texts with a unit
+        (`models.operation.scenarios`).
+    hook
+        Motion of the hook, such as ``sh.RecordMotion.read("heave.csv")``; by default drawn from
+        the case's sea.
+    seeds
+        How many runs, or their seeds.
+    duration
+        Length of a run [s], or a text such as ``"3 h"``; by default the scenario's own.
+    design, gains
+        For "feedback": gains count before a design, a design before the gains of the case.
+    sample_time
+        Of a controller by name or of a design [s]; by default its own.
+    step, masses, limits, parameters, settle, store_step, deadline, compiled
+        As for `models.simulation.simulate.simulate`.
+    lock_limit
+        Size of the payload's error beyond which it counts as having lost lock [m]; by default
+        the significant height of the hook's motion in the case's sea, where the payload is to
+        stay in its place.
+    traces
+        Whether all runs keep their time traces, up to 8 MB each, or the one with the largest
+        error alone; the statistics are of every sample all the same.
+    progress
+        Called now and then with the share of the whole that is done.
+
+    Returns
+    -------
+    Runs
+        Also of runs that diverged; after Ctrl-C those that there are.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range, a name is unknown, or the step is too long for the plant.
+    SynthesisError
+        If the controller is not stable on the linear plant of the case.
+    SolverError
+        If there is no static operating point, or the controller's recursion fails.
+
+    Examples
+    --------
+    >>> import stillhook as sh
+    >>> runs = sh.simulate(sh.load_case("thesis-1975"), "none", seeds=3, duration="5 min")
+    >>> len(runs), runs.completed, runs.summary["payload rms"].count
+    (3, True, 3)
+    """
+    numbers = _seeds_of(seeds)
+    if traces not in ("all", "worst"):
+        raise InputError(f"simulate: traces must be one of all, worst; got {traces!r}")
+    series = Series.prepare(
+        case,
+        controller,
+        scenario=scenario,
+        options=options,
+        hook=hook,
+        duration=duration,
+        design=design,
+        gains=gains,
+        sample_time=sample_time,
+        step=step,
+        masses=masses,
+        limits=limits,
+        parameters=parameters,
+        settle=settle,
+        store_step=store_step,
+        lock_limit=lock_limit,
+        deadline=deadline,
+        compiled=compiled,
+    )
+    found: list[Run] = []
+    for done, seed in enumerate(numbers):
+        tell = None if progress is None else _part(progress, done, len(numbers))
+        # Small matrices: a second BLAS thread only gets in the way of a controller in Python.
+        with one_thread():
+            found.append(series.run(seed, tell))
+        if traces == "worst":
+            found = keep_worst(found)
+        if found[-1].status == "interrupted":
+            break
+    return series.runs(found)
+
+
+def _seeds_of(seeds: int | Sequence[int]) -> tuple[int, ...]:
+    """Return the seeds: 0 to n - 1, or those given.
+
+    Raises
+    ------
+    InputError
+        If there is none, one is negative, or one comes twice.
+    """
+    if isinstance(seeds, int):
+        check_range("simulate", "seeds", seeds, low=1)
+        return tuple(range(seeds))
+    found = tuple(check_seed("simulate", seed) for seed in seeds)
+    if not found or len(set(found)) != len(found):
+        raise InputError(f"simulate: seeds must be distinct whole numbers, got {list(found)}")
+    return found
+
+
+def _part(progress: Progress, done: int, total: int) -> Progress:
+    def tell(share: float) -> None:
+        progress((done + share) / total)
+
+    return tell

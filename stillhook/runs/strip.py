@@ -1,0 +1,333 @@
+"""A run as a strip of pictures: hook, drum, rope and payload at some moments, against the earth.
+
+Time runs to the right, height is drawn to one scale: a hook that heaves by a metre above a payload
+that stays within millimetres looks like just that.  The rope is too long to be drawn; its middle
+is left out.  What is drawn at one moment, `Station`, is also a frame of `stillhook.runs.animation`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError
+from models.operation.scenario import Scenario
+from models.run.run import Run
+
+from ..text.quantities import quantity
+from ..text.style import AFTER, BROKEN, DRUM, HOOK, REFERENCE, new_figure, styled, typeset
+from .window import Window, moves, whole_of, window_of
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.transforms import Affine2DBase, Transform
+
+__all__ = ["Scene", "draw_station", "height_axis", "strip"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_SHOTS = 8
+_WAVES = 2.2  # periods of the hook's motion that a strip of a payload at rest shows
+_SLACK = 1.0  # [N]
+_HULL, _SEA, _GROUND = "#b8bec4", "#56b4e9", "#8c6d46"
+# Of the drawing of the ship [inch].
+_WIDTH, _RADIUS, _BOX = 0.62, 0.15, 0.2
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scene:
+    """Where everything is over a part of a run, in the heights of one drawing [m].
+
+    Attributes
+    ----------
+    time
+        Times (n,) [s].
+    hook, payload
+        Heights of both (n,); the hook's place at rest is at `offset`, the payload's at 0.
+    angle
+        Angle that the drum has turned, hauling in positive (n,) [rad].
+    tension
+        Tension at the drum (n,) [N].
+    slack
+        Whether the rope is slack (n,).
+    ground, water
+        Heights of a seabed or deck, and of the water's surface (n,); None where there is none.
+    asked
+        Height that is asked of the payload (n,).
+    offset
+        Height at which the hook is drawn at rest.
+    """
+
+    time: FloatArray
+    hook: FloatArray
+    payload: FloatArray
+    angle: FloatArray
+    tension: FloatArray
+    slack: npt.NDArray[np.bool_]
+    ground: FloatArray | None
+    water: FloatArray | None
+    asked: FloatArray
+    offset: float
+
+    @classmethod
+    def of(cls, run: Run, window: Window, scenario: Scenario | None = None) -> Scene:
+        """Return the scene of a part of a run; the scenario says where the water is.
+
+        Raises
+        ------
+        InputError
+            If the run has no stored samples in that part.
+        """
+        rows = window.rows(run.time)
+        time = run.time[rows]
+        if time.size < 2:
+            raise InputError(f"strip: the run with seed {run.seed} has no time traces to draw")
+
+        def of_run(name: str) -> FloatArray:
+            values = run[name][rows] if name in run else np.zeros(time.size)
+            return np.where(np.isfinite(values), values, 0.0)
+
+        heave, payload = of_run("hook.heave"), of_run("payload.displacement")
+        ground = payload - of_run("contact.gap") if "contact.gap" in run else None
+        water = None
+        surroundings = scenario.surroundings if scenario is not None else None
+        if surroundings is not None and surroundings.water is not None:
+            water = of_run("water.surface") - surroundings.water.below
+        lowest = min(float(a.min()) for a in (payload, ground, water) if a is not None)
+        highest = max(float(a.max()) for a in (payload, ground, water) if a is not None)
+        room = 0.35 * max(highest - lowest, float(np.ptp(heave)), 1e-3)
+        return cls(
+            time=time,
+            hook=heave + highest - float(heave.min()) + room,
+            payload=payload,
+            angle=of_run("drum.haul") / run.case.drum_radius,
+            tension=of_run("rope.tension"),
+            slack=of_run("rope.minimum_tension") <= _SLACK,
+            ground=ground,
+            water=water,
+            asked=of_run("reference.displacement"),
+            offset=highest - float(heave.min()) + room,
+        )
+
+    @property
+    def bottom(self) -> float:
+        """The lowest height of the drawing [m]."""
+        lowest = min(
+            float(a.min()) for a in (self.payload, self.ground, self.water) if a is not None
+        )
+        return lowest - 0.18 * (self.top - lowest)
+
+    @property
+    def top(self) -> float:
+        """The highest height of the drawing [m], with room for the ship."""
+        lowest = min(float(self.payload.min()), 0.0)
+        return float(self.hook.max()) + 0.12 * (float(self.hook.max()) - lowest)
+
+
+def strip(run: Run, scenario: Scenario | None = None, window: Window | None = None) -> Figure:
+    """Return pictures of a run at some moments, side by side.
+
+    Parameters
+    ----------
+    run
+        The run, with its traces.
+    scenario
+        What was asked of it: says where the water's surface is.
+    window
+        What to show; by default some waves about the worst moment, or all of an operation.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Heights [m] over time [s].
+
+    Raises
+    ------
+    InputError
+        If the run has no stored samples.
+    """
+    window = _window(run) if window is None else window
+    scene = Scene.of(run, window, scenario)
+    with styled():
+        figure = new_figure(10.4, 5.0)
+        axes = figure.add_subplot()
+        _background(axes, scene)
+        time = scene.time
+        axes.plot(time, scene.hook, color=HOOK, linewidth=1.0, alpha=0.7)
+        axes.plot(time, scene.payload, color=AFTER, linewidth=1.2, alpha=0.7)
+        if np.ptp(scene.asked) > 0.0:
+            axes.plot(time, scene.asked, color=REFERENCE, linewidth=1.0, linestyle=(0, (4, 3)))
+        span = float(time[-1] - time[0])
+        # Half a picture of room at both ends: the ship is to the left of its rope.
+        shots = np.linspace(time[0] + 0.09 * span, time[-1] - 0.02 * span, _SHOTS)
+        for at in np.searchsorted(time, shots):
+            draw_station(axes, float(time[at]), scene, int(at))
+            label = quantity(float(scene.tension[at]), "N")
+            # Clear of the box, of the ship, and of the place where the rope is broken.
+            middle = 0.4 * float(scene.hook[at]) + 0.6 * float(scene.payload[at])
+            axes.annotate(
+                "slack" if scene.slack[at] else label,
+                (time[at], middle),
+                xytext=(5, 0),
+                textcoords="offset points",
+                fontsize=9.0,
+                color=BROKEN if scene.slack[at] else REFERENCE,
+                verticalalignment="center",
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
+                zorder=6,
+            )
+        axes.set_xlim(float(time[0]), float(time[-1]) + 0.03 * span)
+        height_axis(axes, scene)
+        axes.set_xlabel("time [s]")
+        about = f"{run.case.name}, {run.scenario}, {run.controller}, seed {run.seed}"
+        axes.set_title(f"{about}: {window.why}", fontsize=9.5, color="#555555")
+        figure.suptitle(
+            typeset(_finding(scene)), x=0.012, ha="left", fontsize=11.0, fontweight="bold"
+        )
+    return figure
+
+
+def draw_station(axes: Axes, x: float, scene: Scene, at: int) -> list[Artist]:
+    """Draw ship, drum, rope and payload at a moment, the rope at `x`; return what was drawn."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Circle, Polygon, Rectangle
+    from matplotlib.transforms import Affine2D, ScaledTranslation
+
+    inches = axes.figure.dpi_scale_trans
+
+    def at_height(height: float) -> Transform:
+        # In inches from a point of the drawing: the ship keeps its shape at any scale of time.
+        place = ScaledTranslation(x, height, cast("Affine2DBase", axes.transData))
+        transform: Transform = Affine2D() + inches + place
+        return transform
+
+    hook, payload = float(scene.hook[at]), float(scene.payload[at])
+    slack, turned = bool(scene.slack[at]), float(scene.angle[at])
+    ship, load = at_height(hook), at_height(payload)
+    broken = at_height(0.55 * hook + 0.45 * payload)
+    centre = (-0.5 * _WIDTH, -0.12 + _RADIUS)
+    deck = -0.12
+    hull = [(-_WIDTH - 0.06, deck), (-0.08, deck), (-0.14, deck - 0.13), (-_WIDTH, deck - 0.13)]
+    rope: dict[str, Any] = {
+        "color": BROKEN if slack else REFERENCE,
+        "linestyle": ":" if slack else "-",
+    }
+    spokes = [turned + k * 2.0 * math.pi / 3.0 for k in range(3)]
+    drawn: list[Artist] = [
+        Line2D([x, x], [hook, payload], linewidth=1.2, zorder=3, **rope),
+        Rectangle((-0.05, -0.03), 0.1, 0.06, color="white", transform=broken, zorder=3),
+        *(
+            Line2D(
+                [-0.05, 0.05],
+                [y - 0.02, y + 0.02],
+                color=REFERENCE,
+                linewidth=0.9,
+                transform=broken,
+                zorder=3,
+            )
+            for y in (-0.03, 0.03)
+        ),
+        Polygon(
+            hull, facecolor=_HULL, edgecolor=REFERENCE, linewidth=0.8, transform=ship, zorder=4
+        ),
+        Line2D([-0.2, 0.0], [deck, 0.0], color=REFERENCE, linewidth=1.8, transform=ship, zorder=4),
+        Line2D(
+            [centre[0], 0.0],
+            [centre[1] + _RADIUS, 0.0],
+            linewidth=1.2,
+            transform=ship,
+            zorder=4,
+            **rope,
+        ),
+        Circle(
+            centre,
+            _RADIUS,
+            facecolor="white",
+            edgecolor=DRUM,
+            linewidth=1.8,
+            transform=ship,
+            zorder=5,
+        ),
+        *(
+            Line2D(
+                [centre[0], centre[0] + _RADIUS * math.cos(angle)],
+                [centre[1], centre[1] + _RADIUS * math.sin(angle)],
+                color=DRUM,
+                linewidth=2.2 if k == 0 else 1.0,
+                transform=ship,
+                zorder=5,
+            )
+            for k, angle in enumerate(spokes)
+        ),
+        Rectangle(
+            (-0.5 * _BOX, 0.0),
+            _BOX,
+            _BOX,
+            facecolor=AFTER,
+            edgecolor="white",
+            linewidth=0.6,
+            transform=load,
+            zorder=5,
+        ),
+    ]
+    for artist in drawn:
+        axes.add_artist(artist)
+        artist.set_clip_on(False)
+    return drawn
+
+
+def height_axis(axes: Axes, scene: Scene) -> None:
+    """Set the limits of a drawing's height, and mark those of the payload and of the hook."""
+    from matplotlib.ticker import MaxNLocator
+
+    axes.set_ylim(scene.bottom, scene.top)
+    step = MaxNLocator(nbins=8, steps=[1, 2, 5, 10]).tick_values(scene.bottom, scene.top)
+    each = float(step[1] - step[0])
+    places, labels = [], []
+    for values, offset in ((scene.payload, 0.0), (scene.hook, scene.offset)):
+        low = min(0, round((float(values.min()) - offset) / each))
+        high = max(0, round((float(values.max()) - offset) / each))
+        for mark in range(low, high + 1):
+            places.append(mark * each + offset)
+            labels.append(f"{mark * each:.6g}".replace("-", "\u2212"))
+    axes.set_yticks(places, labels)
+    axes.set_ylabel("payload, and hook above it [m]")
+
+
+def _background(axes: Axes, scene: Scene) -> None:
+    """Draw what stands still: the places at rest, the ground, the water."""
+    for height in (0.0, scene.offset):
+        axes.axhline(height, color=REFERENCE, linewidth=0.8, alpha=0.6)
+    if scene.water is not None:
+        axes.fill_between(
+            scene.time, scene.water, scene.bottom, color=_SEA, alpha=0.25, linewidth=0
+        )
+        axes.plot(scene.time, scene.water, color=_SEA, linewidth=1.2)
+    if scene.ground is not None:
+        axes.fill_between(
+            scene.time, scene.ground, scene.bottom, color=_GROUND, alpha=0.35, linewidth=0.0
+        )
+        axes.plot(scene.time, scene.ground, color=_GROUND, linewidth=1.5)
+    axes.grid(visible=False)
+
+
+def _window(run: Run) -> Window:
+    """Return some waves about the worst moment; all of it where the payload is moved."""
+    if moves(run):
+        return whole_of(run)
+    period = run.statistics["hook.heave"].period
+    return window_of(run, length=max(_WAVES * (10.0 if math.isnan(period) else period), 5.0))
+
+
+def _finding(scene: Scene) -> str:
+    hook, payload = float(np.ptp(scene.hook)), float(np.ptp(scene.payload - scene.asked))
+    text = f"The hook moves over {quantity(hook, 'm')}, the payload strays over"
+    if np.ptp(scene.asked) > 0.0:
+        return f"{text} {quantity(payload, 'm')} about what is asked"
+    return f"{text} {quantity(payload, 'm')}"

@@ -1,0 +1,300 @@
+"""The time traces of a run: the whole of it as an envelope, and its worst minute beside it.
+
+One row for each thing that matters to an operator: hook and payload, drum, torque and speed of the
+motor with their limits, the rope's tension, and when brake, telemetry and drive were not as usual.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError
+from models.run.run import Event, Run
+from models.run.summary import ERROR
+
+from ..text.quantities import duration, percent, quantity, scale
+from ..text.style import AFTER, BROKEN, DRUM, HOOK, REFERENCE, new_figure, styled, typeset
+from .window import Window, envelope, error_of, moves, runs_of_true, window_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["traces"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_BINS = 500  # over the width of the whole run
+_SMALL = 0.25  # of the hook's motion: a payload that moves less has a scale of its own
+_EVENTS = 12  # told below the figure
+_SLACK = 1.0  # tension below which the rope is slack [N]
+_REACH = 1.6  # a limit farther away than so many times the signal is not drawn
+_DASHED = (0, (4, 3))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Panel:
+    """One row: signals with label and colour, unit, and the limits to shade."""
+
+    title: str
+    unit: str
+    signals: tuple[tuple[str, str, str], ...]
+    limits: tuple[float, float] = (-math.inf, math.inf)
+    rest: float | None = None
+    slack: bool = False
+
+
+def traces(run: Run, window: Window | None = None) -> Figure:
+    """Return the time traces of a run.
+
+    Parameters
+    ----------
+    run
+        The run, with its traces.
+    window
+        What to show on the right; by default `run_window.window_of`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A row for each panel; on the left the whole run, on the right the window.
+
+    Raises
+    ------
+    InputError
+        If the run has no stored samples.
+    """
+    if run.time.size < 2:
+        raise InputError(f"traces: the run with seed {run.seed} has no time traces to draw")
+    window = window_of(run) if window is None else window
+    panels = _panels(run)
+    split = window.end - window.start < 0.95 * float(run.time[-1])
+    told = run.events[:_EVENTS]
+    with styled():
+        figure = new_figure(10.4, 1.75 * len(panels) + 1.7 + 0.17 * len(told))
+        grid = figure.subplots(
+            len(panels) + 1,
+            2 if split else 1,
+            sharex="col",
+            squeeze=False,
+            height_ratios=[1.0] * len(panels) + [0.42],
+            width_ratios=[1.15, 1.0] if split else [1.0],
+        )
+        columns = [None, window] if split else [None]
+        for column, part in enumerate(columns):
+            for row, panel in enumerate(panels):
+                _draw(grid[row][column], run, panel, part)
+            _states(grid[-1][column], run, part)
+            _mark_events(list(grid[:, column]), told, part)
+            grid[-1][column].set_xlabel("time [s]")
+        if split:
+            for axes in grid[:-1, 0]:
+                axes.axvspan(window.start, window.end, color="#f0e442", alpha=0.2, linewidth=0.0)
+            grid[0][1].set_title(_close_up(window), fontsize=9.5, color="#555555")
+        for row in range(len(panels)):
+            grid[row][0].set_ylabel(f"{panels[row].title}\n[{_scale(run, panels[row])[1]}]")
+        about = f"{run.case.name}, {run.scenario}, {run.controller}, seed {run.seed}"
+        lasting = duration(round(float(run.time[-1]), 3))
+        grid[0][0].set_title(f"{about}: {lasting}", fontsize=9.5, color="#555555")
+        figure.align_ylabels(grid[:, 0])
+        figure.suptitle(
+            typeset(_finding(run)), x=0.012, ha="left", fontsize=11.0, fontweight="bold"
+        )
+        handles, labels = grid[0][-1].get_legend_handles_labels()
+        if len(labels) > 1:
+            figure.legend(handles, labels, loc="upper right", ncols=3, borderpad=0.1)
+        if told:
+            figure.supxlabel(_events_text(run), x=0.012, ha="left", fontsize=9.0)
+    return figure
+
+
+def _panels(run: Run) -> list[_Panel]:
+    drive, winch = run.case.winch.drive, run.case.winch
+    hook, payload = ("hook.heave", "hook", HOOK), ("payload.displacement", "payload", AFTER)
+    asked = ("reference.displacement", "asked", REFERENCE)
+    moved = moves(run)
+    wide = (*((asked,) if moved else ()), payload)
+    small = not moved and _span(run, "payload.displacement") < _SMALL * _span(run, "hook.heave")
+    if small:
+        panels = [
+            _Panel(title="hook", unit="m", signals=(hook,)),
+            _Panel(title="payload", unit="m", signals=wide),
+        ]
+    else:
+        panels = [_Panel(title="hook, payload", unit="m", signals=(hook, *wide))]
+    if moved:
+        error = (ERROR, "", AFTER)
+        panels.append(_Panel(title="payload's error", unit="m", signals=(error,)))
+    panels.append(_Panel(title="drum haul", unit="m", signals=(("drum.haul", "", DRUM),)))
+    for name, title, unit, limit, rest in (
+        ("motor.torque", "motor torque", "N m", drive.torque_peak, run.case.static_torque),
+        ("motor.speed", "motor speed", "rpm", winch.speed_limit, None),
+    ):
+        panels.append(
+            _Panel(
+                title=title,
+                unit=unit,
+                signals=((name, "", DRUM),),
+                limits=(-limit, limit),
+                rest=rest,
+            )
+        )
+    most = run.case.limits.rope_tension_peak
+    panels.append(
+        _Panel(
+            title="rope tension",
+            unit="N",
+            signals=(("rope.tension", "", REFERENCE),),
+            limits=(-math.inf, math.inf if most is None else most),
+            slack=True,
+        )
+    )
+    if "contact.gap" in run:
+        gap = _Panel(title="clearance below", unit="m", signals=(("contact.gap", "", AFTER),))
+        panels.append(gap)
+    return [panel for panel in panels if panel.signals[0][0] in (*run.signals, ERROR)]
+
+
+def _signal(run: Run, name: str) -> FloatArray:
+    """Return a signal (n,); the error up to touchdown only, as nobody can follow after it."""
+    values = error_of(run) if name == ERROR else run[name]
+    found = run.statistics.quantities.get("touch-down at")
+    if name == ERROR and found is not None and not math.isnan(found.value):
+        values = np.where(run.time < found.value, values, np.nan)
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def _draw(axes: Axes, run: Run, panel: _Panel, window: Window | None) -> None:
+    rows = slice(None) if window is None else window.rows(run.time)
+    time = run.time[rows]
+    factor, _ = _scale(run, panel)
+    for name, label, colour in panel.signals:
+        values = _signal(run, name)[rows] / factor
+        at, low, high = envelope(time, values, _BINS)
+        if label == "asked":  # it is smooth, and a line shows it best
+            axes.plot(at, low, color=colour, label=label, linestyle=_DASHED, linewidth=1.2)
+        elif at is time or window is not None:
+            axes.plot(time, values, color=colour, label=label, linewidth=1.5)
+        else:
+            axes.fill_between(at, low, high, color=colour, alpha=0.75, linewidth=0.5, label=label)
+    _shade_limits(axes, panel, factor)
+    if panel.rest is not None:
+        axes.axhline(panel.rest / factor, color=REFERENCE, linewidth=0.8, linestyle=_DASHED)
+    if panel.slack and "rope.minimum_tension" in run:
+        slack = run["rope.minimum_tension"][rows] <= _SLACK
+        for start, end in runs_of_true(time, slack):
+            axes.axvspan(start, end, color=BROKEN, alpha=0.3, linewidth=0.0)
+    if time.size:
+        axes.set_xlim(float(time[0]), float(time[-1]))
+
+
+def _shade_limits(axes: Axes, panel: _Panel, factor: float) -> None:
+    """Shade what lies beyond a limit, if the signal comes anywhere near it."""
+    low, high = axes.get_ylim()
+    reach = max(abs(low), abs(high))
+    for limit, sign in zip(panel.limits, (-1.0, 1.0), strict=True):
+        bound = limit / factor
+        end = high if sign > 0.0 else -low
+        if not math.isfinite(bound) or abs(bound) > _REACH * reach or sign * bound > _REACH * end:
+            continue
+        far = bound + sign * 0.12 * abs(bound)
+        low, high = min(low, far), max(high, far)
+        axes.axhspan(
+            bound, bound + sign * 10.0 * abs(bound), color=BROKEN, alpha=0.15, linewidth=0.0
+        )
+        axes.axhline(bound, color=BROKEN, linewidth=0.9)
+    axes.set_ylim(low, high)
+
+
+def _states(axes: Axes, run: Run, window: Window | None) -> None:
+    """Draw when brake, link, drive and rope were not as usual, as bars one above the other."""
+    rows = slice(None) if window is None else window.rows(run.time)
+    time = run.time[rows]
+
+    def flag(name: str, limit: float, *, below: bool = False) -> npt.NDArray[np.bool_]:
+        if name not in run:
+            return np.zeros(time.size, dtype=np.bool_)
+        values = run[name][rows]
+        return values < limit if below else values > limit
+
+    late = run.case.sensors.telemetry.delay + 1.0
+    states = (
+        ("brake", flag("brake.on", 0.5), REFERENCE),
+        ("no link", flag("payload.age", late), HOOK),
+        ("saturated", flag("drive.saturated", 0.5), BROKEN),
+    )
+    for place, (_, values, colour) in enumerate(states):
+        bars = [(start, end - start) for start, end in runs_of_true(time, values)]
+        axes.broken_barh(bars, (place + 0.12, 0.76), facecolors=colour, edgecolors=colour)
+    axes.set_yticks([place + 0.5 for place in range(len(states))], [name for name, *_ in states])
+    axes.set_ylim(len(states), 0)
+    axes.grid(visible=False, axis="y")
+    axes.tick_params(axis="y", length=0)
+
+
+def _mark_events(column: Sequence[Axes], told: Sequence[Event], window: Window | None) -> None:
+    """Draw a line through all panels where something happened, with its number on top."""
+    for number, event in enumerate(told, 1):
+        if window is not None and not window.start <= event.time <= window.end:
+            continue
+        for axes in column:
+            axes.axvline(event.time, color=REFERENCE, linewidth=0.8, linestyle=":")
+        column[0].annotate(
+            str(number),
+            (event.time, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(1.5, -2.0),
+            textcoords="offset points",
+            fontsize=9.0,
+            verticalalignment="top",
+        )
+
+
+def _events_text(run: Run) -> str:
+    lines = [f"{i}  at {event}" for i, event in enumerate(run.events[:_EVENTS], 1)]
+    if len(run.events) > _EVENTS:
+        lines[-1] += f"   (and {len(run.events) - _EVENTS} more)"
+    return "\n".join(lines)
+
+
+def _finding(run: Run) -> str:
+    statistics = run.statistics
+    if run.status == "diverged":
+        return f"{run.message[:1].upper()}{run.message[1:]}"
+    found = {name: q.value for name, q in statistics.quantities.items()}
+    largest, residual = found["tracking error largest"], found.get("residual", math.nan)
+    touched = found.get("touch-down speed", math.nan)
+    if not math.isnan(touched):
+        before = found.get("error before touch-down largest", math.nan)
+        told = "" if math.isnan(before) else f", off by at most {quantity(before, 'm')} before"
+        return f"The payload touches down at {quantity(touched, 'm/s')}{told}"
+    text = f"The payload is off by at most {quantity(largest, 'm')}"
+    if not math.isnan(residual):
+        rms = quantity(found["hook rms"] * residual / 100.0, "m")
+        text += f", {rms} rms: {percent(residual / 100.0)} of the hook's motion"
+    return text
+
+
+def _close_up(window: Window) -> str:
+    return f"{window.why}: {window.start:.4g} to {window.end:.4g} s"
+
+
+def _span(run: Run, name: str) -> float:
+    values = run[name]
+    values = values[np.isfinite(values)]
+    return float(np.ptp(values)) if values.size else 0.0
+
+
+def _scale(run: Run, panel: _Panel) -> tuple[float, str]:
+    """Return factor and name of the unit that a panel is drawn in."""
+    size = 0.0
+    for name, *_ in panel.signals:
+        values = np.abs(_signal(run, name))
+        size = max(size, float(values[np.isfinite(values)].max(initial=0.0)))
+    return scale(panel.unit, size)

@@ -1,0 +1,1 @@
+"""Seas, vessels and operability as figures and words."""

@@ -1,0 +1,96 @@
+"""The folder that results go to: made, tried, and written file by file, each whole or not at all.
+
+A long computation is worth nothing if its result cannot be kept, so the folder is made and
+written to before the computation begins.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from models.basics.checks import InputError
+
+__all__ = ["OutputFolder", "folder_name"]
+
+
+@dataclass(frozen=True)
+class OutputFolder:
+    """A folder that can be written to.
+
+    Parameters
+    ----------
+    path
+        The folder; it is made with its parents by `prepare`.
+    """
+
+    path: Path
+
+    @classmethod
+    def prepare(cls, path: str | Path) -> OutputFolder:
+        """Return the folder, made if need be and known to be writable.
+
+        Raises
+        ------
+        InputError
+            If it cannot be made, or no file can be written into it.
+        """
+        folder = Path(path)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except FileExistsError:
+            raise InputError(
+                f"{folder}: the output folder cannot be made: a file is there"
+            ) from None
+        except NotADirectoryError:
+            raise InputError(
+                f"{folder}: the output folder cannot be made: part of the path is a file"
+            ) from None
+        except OSError as error:
+            reason = error.strerror or error
+            raise InputError(f"{folder}: the output folder cannot be made: {reason}") from error
+        ready = cls(folder)
+        ready.write(f".{os.getpid()}.probe", b"")
+        (folder / f".{os.getpid()}.probe").unlink(missing_ok=True)
+        return ready
+
+    def write(self, name: str, content: str | bytes) -> Path:
+        """Write a file under a temporary name, then rename it; return its path.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        target = self.path / name
+        temporary = target.with_name(f".{name}.{os.getpid()}.tmp")
+        data = content.encode("utf-8") if isinstance(content, str) else content
+        try:
+            temporary.write_bytes(data)
+            os.replace(temporary, target)
+        except OSError as error:
+            reason = error.strerror or error
+            raise InputError(f"{target}: cannot be written: {reason}") from error
+        finally:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+        return target
+
+    def discard(self, name: str) -> None:
+        """Remove a file of an earlier run, if there is one."""
+        with contextlib.suppress(OSError):
+            (self.path / name).unlink(missing_ok=True)
+
+
+def folder_name(text: str) -> str:
+    """Return a case's name as the name of a folder.
+
+    Examples
+    --------
+    >>> folder_name("subsea-crane"), folder_name("Crane 2/B: 50 t"), folder_name("..")
+    ('subsea-crane', 'Crane-2-B-50-t', 'case')
+    """
+    return re.sub(r"[^\w.-]+", "-", text).strip("-.") or "case"

@@ -1,0 +1,179 @@
+"""The payload before and after compensation: spectra and statistics, ready to be shown.
+
+    GainDesign -> hook, payload with the drum held, payload with the gains -> figures, summary
+
+Everything is in the sea that the design's figures hold for: the case's own, or the largest
+feasible one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.metrics import most_probable_maximum, zero_crossing_period
+from models.basics.quadrature import adaptive_nodes
+from models.case.case import Case
+from models.hook.hook import HookMotion
+from synth.design.design import GainDesign
+from synth.question.question import locked_response
+
+__all__ = ["Motion", "MotionView", "highest", "hook_of"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+PAYLOAD = "payload.displacement"
+DRUM = "drum.haul"
+HOOK = "hook.heave"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """A Gaussian motion in three figures and one period.
+
+    Attributes
+    ----------
+    rms
+        Standard deviation [m].
+    mean_period
+        Mean zero-crossing period T_z [s].
+    largest
+        Most probable maximum in the exposure time, from the mean [m].
+    """
+
+    rms: float
+    mean_period: float
+    largest: float
+
+    @property
+    def significant_height(self) -> float:
+        """Significant double amplitude, 4 sigma [m]."""
+        return 4.0 * self.rms
+
+
+@dataclass(frozen=True, eq=False)
+class MotionView:
+    """Hook and payload of a design, as spectra and as numbers.
+
+    Parameters
+    ----------
+    design
+        The design.
+    """
+
+    design: GainDesign
+
+    @cached_property
+    def hook(self) -> HookMotion:
+        """Motion of the hook."""
+        return hook_of(self.design.sea_case)
+
+    @property
+    def compensated(self) -> bool:
+        """Whether there is a compensated payload to speak of: a loop that is stable."""
+        return self.design.margins is not None
+
+    def held_response(self, omega: FloatArray) -> ComplexArray:
+        """Return P/Z with the drum held, (k,)."""
+        return locked_response(self.design.case, omega, self.design.drag_before)
+
+    def held_density(self, omega: FloatArray) -> FloatArray:
+        """Return the payload's density with the drum held [m^2 s/rad], (k,)."""
+        return np.asarray(np.abs(self.held_response(omega)) ** 2 * self.hook.density(omega))
+
+    def payload_density(self, omega: FloatArray) -> FloatArray:
+        """Return the payload's density with the gains [m^2 s/rad], (k,)."""
+        return self.design.assessment.spectrum(PAYLOAD, omega)
+
+    @cached_property
+    def frequencies(self) -> FloatArray:
+        """Frequencies [rad/s] over the sea's band, close enough to show every peak."""
+        low, high = self.hook.band
+        grid = [np.geomspace(low, high, 900), np.array(self.hook.splits)]
+        if self.compensated:
+            grid.append(self.design.assessment.grid)
+        peak, damping = self._resonance
+        grid.append(peak + damping * np.linspace(-8.0, 8.0, 81))
+        every = np.unique(np.concatenate(grid))
+        return every[(every >= low) & (every <= high)]
+
+    @cached_property
+    def energetic_band(self) -> tuple[float, float]:
+        """Frequencies between which 90 % of the hook's variance lies [rad/s]."""
+        omega = np.geomspace(*self.hook.band, 4000)
+        density = self.hook.density(omega)
+        parts = np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(omega))
+        low, high = np.interp([0.05 * parts[-1], 0.95 * parts[-1]], parts, omega[1:])
+        return float(low), float(high)
+
+    @cached_property
+    def hook_motion(self) -> Motion:
+        """The hook's motion."""
+        found = self.hook.displacement
+        return self._motion(found.rms, found.zero_crossing_period)
+
+    @cached_property
+    def before(self) -> Motion:
+        """The payload's motion with the drum held."""
+        rms = self.design.payload_rms_before
+        if not math.isfinite(rms):
+            return Motion(rms=math.inf, mean_period=math.nan, largest=math.inf)
+        peak, damping = self._resonance
+        low, high = self.hook.band
+        powers = np.array([[0.0], [2.0]])
+
+        def integrands(omega: FloatArray) -> FloatArray:
+            return np.asarray(omega**powers * self.held_density(omega))
+
+        nodes = adaptive_nodes(
+            integrands,
+            low,
+            high,
+            splits=self.hook.splits,
+            poles=[complex(-damping, peak)],
+            rtol=1e-7,
+        )
+        m0, m2 = (float(m) for m in nodes.integrate(integrands(nodes.omega)))
+        return self._motion(rms, zero_crossing_period(m0, m2))
+
+    @cached_property
+    def after(self) -> Motion | None:
+        """The payload's motion with the gains; None if the loop is unstable."""
+        if not self.compensated:
+            return None
+        period = self.design.assessment.mean_period(PAYLOAD)
+        return self._motion(self.design.payload_rms, period)
+
+    @cached_property
+    def _resonance(self) -> tuple[float, float]:
+        """Frequency and decay rate of the payload's resonance with the drum held [rad/s]."""
+        low, high = self.hook.band
+        peak = highest(lambda omega: np.abs(self.held_response(omega)), low, high)
+        height = float(np.abs(self.held_response(np.array([peak])))[0])
+        # A resonance of height h has a damping ratio of about 1/(2 h).
+        return peak, peak / (2.0 * max(height, 1.0))
+
+    def _motion(self, rms: float, period: float) -> Motion:
+        time = self.design.case.limits.exposure_time
+        largest = most_probable_maximum(rms, period, time)
+        return Motion(rms=rms, mean_period=period, largest=largest)
+
+
+def hook_of(case: Case) -> HookMotion:
+    """Return the hook motion of a case, without the warnings that its user has had already."""
+    return HookMotion.from_case(case, warn=False)
+
+
+def highest(function: Callable[[FloatArray], FloatArray], low: float, high: float) -> float:
+    """Return where a function of frequency [rad/s] is largest, by zooming into a grid."""
+    for _ in range(9):
+        grid = np.geomspace(low, high, 400)
+        at = int(np.argmax(function(grid)))
+        low, high = grid[max(at - 2, 0)], grid[min(at + 2, grid.size - 1)]
+    return float(np.sqrt(low * high))

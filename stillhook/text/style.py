@@ -1,0 +1,125 @@
+"""How all figures look: one size, one grid, colours that everybody can tell apart.
+
+The colours are those of Okabe and Ito (2008).  A colour means the same thing in every figure:
+grey the hook, vermilion the payload with the drum held, blue the payload with the gains, green
+what the winch does, black the reference.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import logging
+import re
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from synth.design.design import GainDesign
+
+__all__ = [
+    "AFTER",
+    "BEFORE",
+    "BROKEN",
+    "DRUM",
+    "HOOK",
+    "REFERENCE",
+    "annotate",
+    "headline",
+    "new_figure",
+    "picture",
+    "styled",
+    "typeset",
+]
+
+HOOK = "#7f7f7f"
+BEFORE = "#d55e00"
+AFTER = "#0072b2"
+DRUM = "#009e73"
+REFERENCE = "#222222"
+BROKEN = "#d55e00"
+
+_STYLE: Any = {
+    "font.size": 10.0,
+    "font.family": "DejaVu Sans",  # comes with matplotlib: the same everywhere
+    "axes.titlelocation": "left",
+    "axes.labelsize": 10.0,
+    "xtick.labelsize": 9.5,
+    "ytick.labelsize": 9.5,
+    "legend.fontsize": 9.5,
+    "legend.frameon": True,
+    "legend.framealpha": 0.9,
+    "legend.edgecolor": "none",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#d9d9d9",
+    "grid.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "lines.linewidth": 1.8,
+    "savefig.facecolor": "white",
+    # The same figure gives the same file: no random identifiers, glyphs as outlines.
+    "svg.hashsalt": "stillhook",
+    "svg.fonttype": "path",
+}
+
+
+@contextlib.contextmanager
+def styled() -> Iterator[None]:
+    """Apply the style to what is made inside, and leave matplotlib's settings as they were."""
+    # On a fresh machine it announces that it looks for fonts; that is nobody's business.
+    logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
+    from matplotlib import rc_context
+
+    with rc_context(_STYLE):
+        yield
+
+
+def new_figure(width: float = 7.2, height: float = 4.4) -> Figure:
+    """Return an empty figure [inch] that belongs to nobody: no pyplot, no global state."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def headline(axes: Axes, finding: str, design: GainDesign) -> None:
+    """Set what the figure found as its title, and what it is about in small below."""
+    from .summary import sea_text
+
+    figure = axes.get_figure()
+    if figure is not None:
+        figure.suptitle(typeset(finding), x=0.012, ha="left", fontsize=11.0, fontweight="bold")
+    about = f"{design.case.name}: {sea_text(design)}"
+    axes.set_title(typeset(about), fontsize=9.5, fontweight="normal", color="#555555", pad=6.0)
+
+
+def typeset(text: str) -> str:
+    """Return a text with H_s, T_p, T_S and M_s as matplotlib's mathematics."""
+    return re.sub(r"\b(H_s|T_p|T_S|M_s)\b", r"$\1$", text)
+
+
+def annotate(axes: Axes, text: str, at: tuple[float, float], offset: tuple[float, float]) -> None:
+    """Write a remark near a point, joined to it by a thin line; `offset` in points."""
+    axes.annotate(
+        text,
+        at,
+        xytext=offset,
+        textcoords="offset points",
+        fontsize=9.0,
+        color=REFERENCE,
+        arrowprops={"arrowstyle": "-", "color": "#666666", "linewidth": 0.8},
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5},
+    )
+
+
+def picture(figure: Figure, kind: str) -> bytes:
+    """Return a figure as the contents of an `svg` or `png` file."""
+    target = io.BytesIO()
+    # Without a date the same design gives the same file.
+    metadata = {"Date": None} if kind == "svg" else {"Software": "Stillhook"}
+    with styled():
+        figure.savefig(target, format=kind, dpi=150, metadata=metadata)
+    return target.getvalue()

@@ -1,0 +1,317 @@
+"""What there is to say about a design, in words and figures: one text for terminal and report.
+
+    GainDesign -> rows of text -> `stillhook.text.terminal` (tables, bars),
+    `stillhook.designs.report` (Markdown)
+
+Nothing here decides how it looks.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from models.rig.winch import DCMotor
+from synth.design.design import GainDesign
+from synth.design.tuning import LimitUse
+
+from .bound_text import bound_sentence
+from .motion import MotionView
+from .quantities import decibels, number, percent, quantity, scale
+
+__all__ = [
+    "AT_LEAST",
+    "GainRow",
+    "LimitRow",
+    "MotionRow",
+    "command_text",
+    "effect",
+    "facts",
+    "gain_rows",
+    "has_gains",
+    "label_of",
+    "limit_rows",
+    "margin_rows",
+    "motion_rows",
+    "required_rows",
+    "sea_text",
+]
+
+_LABELS = {
+    "max_sensitivity": "sensitivity peak M_s",
+    "gain_margin_up": "gain margin, up",
+    "gain_margin_down": "gain margin, down",
+    "delay_margin": "delay margin",
+    "roll_off": "|L| beyond the rope modes",
+    "motor.torque.peak": "motor torque, peak",
+    "motor.torque.continuous": "motor torque, continuous",
+    "motor.speed.peak": "motor speed, peak",
+    "motor.voltage.peak": "motor voltage, peak",
+    "motor.current.peak": "motor current, peak",
+    "motor.current.continuous": "motor current, continuous",
+    "motor.power.peak": "motor power, peak",
+    "rope.tension.peak": "rope tension, largest",
+    "rope.tension.least": "rope tension, least",
+}
+AT_LEAST = ("gain_margin_up", "delay_margin", "rope.tension.least")
+"""Limits whose bound is the least value."""
+_PRICED = 1e-5  # a price below this share of the payload's rms is noise of the solver
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionRow:
+    """One motion as text: standard deviation, significant height, largest amplitude."""
+
+    label: str
+    rms: str
+    significant: str
+    largest: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class GainRow:
+    """One gain as text: its value, its product with the amplifier, the product's unit."""
+
+    name: str
+    acts_on: str
+    value: str
+    product: str
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitRow:
+    """One limit as text.
+
+    Attributes
+    ----------
+    name, label
+        Its name in the design, and what people call it.
+    value, bound
+        What the design does, and what it may do.
+    use
+        Share that is used; above 1 the limit is broken.
+    kept, enforced
+        Whether it is kept, and whether it had to be.
+    price
+        What the payload would gain, or nothing if the limit costs nothing.
+    """
+
+    name: str
+    label: str
+    value: str
+    bound: str
+    use: float
+    kept: bool
+    enforced: bool
+    price: str
+
+    @property
+    def remark(self) -> str:
+        """What is special about the limit, if anything."""
+        if not self.enforced:
+            return "reported"
+        return self.price if self.kept else "broken"
+
+
+def sea_text(design: GainDesign) -> str:
+    """Return the sea that the figures hold for."""
+    sea = design.case.sea
+    period = "T_p" if sea.significant_period is None else "T_S"
+    value = sea.peak_period if sea.significant_period is None else sea.significant_period
+    text = f"H_s {quantity(design.significant_height, 'm')}, {period} {quantity(value or 0.0, 's')}"
+    if not design.feasible:
+        text += f" (asked for: H_s {quantity(sea.significant_height, 'm')})"
+    return f"{text}, {sea.spectrum}"
+
+
+def motion_rows(design: GainDesign) -> list[MotionRow]:
+    """Return hook and payload motion, before and after."""
+    view = MotionView(design)
+    found = [("hook", view.hook_motion), ("payload, drum held", view.before)]
+    if view.after is not None:
+        found.append(("payload, with these gains", view.after))
+    return [
+        MotionRow(
+            label=label,
+            rms=quantity(motion.rms, "m"),
+            significant=quantity(motion.significant_height, "m"),
+            largest=quantity(motion.largest, "m"),
+        )
+        for label, motion in found
+    ]
+
+
+def effect(design: GainDesign) -> str:
+    """Return what the gains do to the payload, in a sentence."""
+    if design.margins is None:
+        return "no stable loop: the payload's motion has no standard deviation"
+    before, after = design.payload_rms_before, design.payload_rms
+    if math.isinf(before):
+        return f"the payload moves {quantity(after, 'm')} rms; with the drum held it resonates"
+    loss = decibels(before / after)
+    if after > before:
+        return (
+            f"the payload moves {percent(after / before - 1.0)} more than with the drum held "
+            f"({loss})"
+        )
+    return f"compensation takes away {percent(1.0 - after / before)} of the motion ({loss})"
+
+
+def has_gains(design: GainDesign) -> bool:
+    """Return whether there is a loop at all: any gain that is not zero."""
+    return any(design.gains[name] for name in ("a", "a1", "a2"))
+
+
+def gain_rows(design: GainDesign) -> list[GainRow]:
+    """Return the gains, as the law u = -A (a P'' + a1 P' + a2 P) has them."""
+    amplifier = design.gains["A"]
+    rows = []
+    for name, acts_on, per in (
+        ("a", "acceleration", ("s2/m", "m/s2")),
+        ("a1", "velocity", ("s/m", "m/s")),
+        ("a2", "displacement", ("/m", "m")),
+    ):
+        value = design.gains[name]
+        rows.append(
+            GainRow(
+                name=name,
+                acts_on=acts_on,
+                value=number(value, 4),
+                product=number(amplifier * value, 4),
+                unit=_gain_unit(design, *per),
+            )
+        )
+    return rows
+
+
+def command_text(design: GainDesign) -> str:
+    """Return what the law commands."""
+    unit = _command_unit(design)
+    what = {"V": "armature voltage", "rad/s": "motor speed", "N m": "motor torque"}[unit]
+    return f"{what} [{unit}] = -A (a P'' + a1 P' + a2 P), A = {number(design.gains['A'], 4)}"
+
+
+def margin_rows(design: GainDesign) -> list[tuple[str, str, str]]:
+    """Return the margins: what, figure, and the same figure in other words."""
+    margins = design.margins
+    if margins is None:
+        return []
+    smallest = 1.0 / margins.max_sensitivity
+    rows = [
+        (
+            "sensitivity peak M_s",
+            number(margins.max_sensitivity),
+            f"at {number(margins.peak)} rad/s; L stays {number(smallest)} away from -1",
+        ),
+        (
+            "gain may grow",
+            "without bound" if math.isinf(margins.gain) else f"x {number(margins.gain)}",
+            "" if math.isinf(margins.gain) else f"by {decibels(margins.gain)}",
+        ),
+        (
+            "gain may fall",
+            f"x {number(margins.gain_down)}" if margins.gain_down > 0.0 else "to nothing",
+            f"by {decibels(1.0 / margins.gain_down)}: conditionally stable"
+            if margins.gain_down > 0.0
+            else "",
+        ),
+    ]
+    if math.isinf(margins.phase):
+        rows.append(("phase, delay", "without bound", "|L| stays below 1"))
+    else:
+        rows.append(("phase", f"{number(math.degrees(margins.phase))} deg", ""))
+        rows.append(("further delay", quantity(margins.delay, "s"), ""))
+    rows.append(("disk margin", number(margins.disk), "gain and phase together"))
+    return rows
+
+
+def limit_rows(design: GainDesign) -> list[LimitRow]:
+    """Return the limits, those that bind the design first."""
+    uses = sorted(design.limits.values(), key=lambda use: not use.enforced)
+    return [_limit_row(design, use) for use in uses]
+
+
+def label_of(design: GainDesign, name: str) -> str:
+    """Return what people call a limit."""
+    slow = design.case.limits.low_frequency
+    if name == "low_frequency" and slow is not None:
+        return f"|P/Z| up to {slow.below:g} rad/s"
+    return _LABELS.get(name, name.replace(".", " ").replace("_", " "))
+
+
+def facts(design: GainDesign, *, bound: bool = True) -> list[tuple[str, str]]:
+    """Return what the figures rest on: sea, rope, drag, search, check, and the bound beside them.
+
+    `bound` says whether to compute that too, which takes about two seconds.
+    """
+    case = design.case
+    if case.rope.lumping == "thesis":
+        rope = "one spring with all of the rope's mass at the payload"
+    else:
+        rope = f"{design.masses} masses along {quantity(case.rope.length, 'm', 4)}"
+    if case.payload.fixed_drag is None:
+        drag = (
+            f"{quantity(design.drag, 'N s/m')}, {quantity(design.drag_before, 'N s/m')} with the "
+            "drum held: it follows the payload's speed"
+        )
+    else:
+        drag = f"{quantity(design.drag, 'N s/m')}, fixed by the case"
+    rows = [("sea", sea_text(design)), ("rope", rope), ("drag", drag)]
+    if design.starts:
+        rows.append(("search", f"{design.agreed} of {len(design.starts)} starts agree"))
+    if design.verification is not None:
+        rows.append(("check", design.verification.status))
+    if bound and (text := bound_sentence(design)):
+        rows.append(("bound", text))
+    return rows
+
+
+def required_rows(design: GainDesign) -> list[tuple[str, str, str]]:
+    """Return what each limit that breaks is and would have to be in the sea asked for."""
+    rows = []
+    for name, value in design.required.items():
+        use = design.limits[name]
+        needed = _measured(use, value, size=use.bound)
+        rows.append((label_of(design, name), _measured(use, use.bound), needed))
+    return rows
+
+
+def _limit_row(design: GainDesign, use: LimitUse) -> LimitRow:
+    sign = "≥" if use.name in AT_LEAST else "≤"
+    worth = use.price > _PRICED * design.payload_rms and use.enforced
+    return LimitRow(
+        name=use.name,
+        label=label_of(design, use.name),
+        value=_measured(use, use.value, size=use.bound),
+        bound=f"{sign} {_measured(use, use.bound)}",
+        use=use.use,
+        kept=use.kept,
+        enforced=use.enforced,
+        price=quantity(use.price, "m", 2) if worth else "",
+    )
+
+
+def _measured(use: LimitUse, value: float, *, size: float | None = None) -> str:
+    unit = "rpm" if use.name.startswith("motor.speed") else use.unit
+    if use.name.startswith("gain_margin"):
+        return "no bound" if math.isinf(value) else f"x {number(value)}"
+    if math.isinf(value):
+        return "no bound"
+    if size is not None and scale(unit, size)[0] > 1e3 * abs(value):
+        size = None  # 3 W is not 0.000003 MW
+    return quantity(value, unit, size=size)
+
+
+def _command_unit(design: GainDesign) -> str:
+    motor = design.case.winch.motor
+    if isinstance(motor, DCMotor):
+        return "V"
+    return "rad/s" if motor.speed_gain > 0.0 else "N m"
+
+
+def _gain_unit(design: GainDesign, per_volt: str, per: str) -> str:
+    unit = _command_unit(design)
+    if unit == "V":
+        return f"V{per_volt}" if per_volt.startswith("/") else f"V {per_volt}"
+    return f"{unit} per {per}"

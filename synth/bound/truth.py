@@ -1,0 +1,183 @@
+r"""What a controller of a model does to the true spectra and delays, and what the model missed.
+
+A Riccati equation needs rational models: a fitted factor of the sea, a Pade model of a delay.
+Their optimum X (the closed loop's response from the measurements' noise to the command) is not
+the optimum of the true problem, but it yields a bound of it all the same.  Every controller of
+the true loop is X + D for some stable D, and its cost is a quadratic of D,
+
+.. math::
+
+    J(X + D) = J(X) + 2 Re \int tr(D G) d\omega
+               + \int tr(W_u D \Phi_y D^H) d\omega ,\qquad
+    G = P_{yw} \Phi F^H W P_{zu}, \quad
+    W_u = P_{zu}^H W P_{zu}, \quad \Phi_y = P_{yw} \Phi P_{yw}^H .
+
+The model's optimality says that the model's own G~, in place of G, integrates to zero for every
+such D.  So G may be replaced by G - G~, and completing the square at every frequency gives
+
+.. math::  J(any) \ge J(X) - \int tr(W_u^{-1} (G - G~)^H \Phi_y^{-1} (G - G~)) d\omega .
+
+J(X) is taken on the true spectra and exact delays; what is subtracted is of second order in the
+misfit, and zero where the models are exact.  The bound is a theorem whatever the fit; a bad fit
+makes it low, never wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from models.plant.linear import LinearPlant
+from models.plant.response import PlantResponse
+
+from ..loop.disturbance import Disturbance
+from ..structures.lqg import Estimator, Regulator
+from ..verify.integrals import panels
+
+__all__ = ["ClosedLoop", "Truth", "frequencies", "optimal_response"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+_ORDER = 12  # Gauss-Legendre nodes a panel
+_TAIL = 8  # panels of 1/omega above all features
+_BELOW = 1e-3  # of the slowest pole: from there on to zero the densities are constant
+_BEYOND = 30.0  # ... which begin this far above the fastest pole
+
+
+def frequencies(
+    sources: Sequence[Disturbance], marks: ComplexArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return nodes [rad/s] and weights of integrals over the half line, (k,) each.
+
+    `marks` are poles [1/s] near which something happens.
+    """
+    sizes = np.abs(marks)
+    sizes = sizes[sizes > 1e-6]
+    ends = [w for s in sources for w in (*(s.band or ()), *s.splits)]
+    low = min([_BELOW * float(sizes.min(initial=1.0)), *(0.1 * w for w in ends)])
+    high = max([_BEYOND * float(sizes.max(initial=1.0)), *ends])
+    edges = panels(low, high, ends, marks)
+    rule, weight = np.polynomial.legendre.leggauss(_ORDER)
+    half = 0.5 * np.diff(edges)
+    omega = ((edges[:-1] + half)[:, None] + half[:, None] * rule).ravel()
+    weights = (half[:, None] * weight).ravel()
+    inverse = np.linspace(0.0, 1.0 / high, _TAIL + 1)
+    half = 0.5 * np.diff(inverse)
+    v = ((inverse[:-1] + half)[:, None] + half[:, None] * rule).ravel()
+    beyond = (half[:, None] * weight).ravel() / v**2
+    # Towards zero the density is even, but integrators leave nothing of its digits.
+    return np.concatenate([[low], omega, 1.0 / v]), np.concatenate([[low], weights, beyond])
+
+
+def optimal_response(
+    plant: LinearPlant, feedback: Regulator, kalman: Estimator, omega: FloatArray
+) -> ComplexArray:
+    """Return X, (k, nu, ny), of an LQG loop: from noise on the measurements to the inputs.
+
+    The innovations see the noise through I - C (s - A + LC)^-1 L, and the command sees the
+    innovations through K (s - A - BK)^-1 L (the separation principle).
+    """
+    K, L, C = feedback.gain, kalman.gain, plant.C
+    ny, nu = len(plant.measurements), len(plant.inputs)
+    commanded = _system(plant.A + plant.B @ K, L, K, np.zeros((nu, ny))).response(omega).yu
+    innovated = _system(plant.A - L @ C, L, -C, np.eye(ny)).response(omega).yu
+    return np.asarray(commanded @ innovated, dtype=np.complex128)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ClosedLoop:
+    """Variances of the outputs by name, and, with weights, the cost and what a model missed."""
+
+    variances: dict[str, float]
+    cost: float
+    missed: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Truth:
+    """A plant with its exact delays and spectra on nodes, next to its rational model.
+
+    Attributes
+    ----------
+    plant, model
+        Responses at the nodes, with the same signals.
+    weights
+        Of the quadrature, (k,).
+    spectra, fitted
+        One-sided densities of the disturbances, true and of the model, (nw, k).
+    """
+
+    plant: PlantResponse
+    model: PlantResponse
+    weights: FloatArray
+    spectra: FloatArray
+    fitted: FloatArray
+
+    def variances(self, X: ComplexArray) -> dict[str, float]:
+        """Return the variance of every output with the closed-loop response X."""
+        F = self._closed(self.plant, X)
+        found = np.einsum("kzw,wk,k->z", np.abs(F) ** 2, self.spectra, self.weights)
+        return dict(zip(self.plant.outputs, (float(v) for v in found), strict=True))
+
+    def judge(self, X: ComplexArray, charge: FloatArray) -> ClosedLoop:
+        """Return what X does and what its model missed, for weights of the outputs, (nz,)."""
+        variances = self.variances(X)
+        use = np.flatnonzero(charge)
+        G = self._gradient(self.plant, X, self.spectra, use, charge)
+        G -= self._gradient(self.model, X, self.fitted, use, charge)
+        yw, zu = self.plant.yw, self.plant.zu[:, use]
+        heard = np.einsum("kyw,wk,kvw->kyv", yw, self.spectra, yw.conj())
+        moved = np.einsum("kzu,z,kzv->kuv", zu.conj(), charge[use], zu)
+        # Measurements in units of their own noise, as those differ by many decades.
+        unit = np.sqrt(np.maximum(np.einsum("kyy->ky", heard).real, 1e-300))
+        heard = heard / unit[:, :, None] / unit[:, None, :]
+        G = G / unit[:, :, None]
+        lost = np.linalg.solve(heard, G)
+        spare = np.linalg.solve(moved, np.swapaxes(G.conj(), 1, 2))
+        density = np.einsum("kuy,kyu->k", spare, lost).real
+        return ClosedLoop(
+            variances=variances,
+            cost=float(charge @ np.array([variances[name] for name in self.plant.outputs])),
+            missed=float(np.maximum(density, 0.0) @ self.weights),
+        )
+
+    def importance(self, X: ComplexArray, charge: FloatArray, source: int) -> FloatArray:
+        """Return what a squared error of one fitted density costs at every node, (k,)."""
+        use = np.flatnonzero(charge)
+        F = self._closed(self.plant, X)[:, use, source]
+        zu, heard = self.plant.zu[:, use], self.plant.yw[:, :, source]
+        effect = np.einsum("kz,z,kzu->ku", F.conj(), charge[use], zu)
+        moved = np.einsum("kzu,z,kzv->kuv", zu.conj(), charge[use], zu)
+        cost = np.einsum(
+            "ku,ku->k", effect, np.linalg.solve(moved, effect.conj()[..., None])[..., 0]
+        )
+        y = np.einsum("kyw,wk,kvw->kyv", self.plant.yw, self.spectra, self.plant.yw.conj())
+        unit = np.sqrt(np.maximum(np.einsum("kyy->ky", y).real, 1e-300))
+        y, heard = y / unit[:, :, None] / unit[:, None, :], heard / unit
+        seen = np.einsum("ky,ky->k", heard.conj(), np.linalg.solve(y, heard[..., None])[..., 0])
+        return np.asarray(np.maximum(cost.real * seen.real, 0.0))
+
+    @staticmethod
+    def _closed(blocks: PlantResponse, X: ComplexArray) -> ComplexArray:
+        return np.asarray(blocks.zw + blocks.zu @ (X @ blocks.yw), dtype=np.complex128)
+
+    def _gradient(
+        self,
+        blocks: PlantResponse,
+        X: ComplexArray,
+        spectra: FloatArray,
+        use: npt.NDArray[np.intp],
+        charge: FloatArray,
+    ) -> ComplexArray:
+        """Return G, (k, ny, nu)."""
+        F = self._closed(blocks, X)[:, use]
+        effect = np.einsum("kzw,z,kzu->kwu", F.conj(), charge[use], blocks.zu[:, use])
+        return np.asarray(blocks.yw @ (spectra.T[:, :, None] * effect), dtype=np.complex128)
+
+
+def _system(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray) -> LinearPlant:
+    return LinearPlant(A=A, B=B, E=np.zeros((len(A), 0)), C=C, D=D)

@@ -1,0 +1,319 @@
+r"""What a linear controller of high order achieves within margins: Youla's parametrisation.
+
+    Bound -> its LQG controller as the observer -> Q(s) from innovations to command
+      -> cone programme on frequency nodes (cvxpy, Clarabel) -> Controller
+
+Every stabilising controller is an observer with state feedback whose innovations drive the command
+through a stable Q, and every closed-loop response is affine in Q.  Variances, limits on rms
+values, M_s and roll-off are then convex, and with Q in a Laguerre basis a second-order cone
+programme (Boyd and Barratt, *Linear Controller Design*, 1991).  The answer is achievable, so it
+lies above the best possible and falls with the number of functions; a bound it is not.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import cvxpy
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError, SolverError, SynthesisError, check_range
+from models.basics.riccati import balanced_truncation, solve_lyapunov
+from models.basics.threads import one_thread
+
+from ..loop.assess import Assessment
+from ..loop.controller import Controller, closed_loop_poles
+from ..verify.recompute import LawMatrices, closed_matrices, lyapunov_variances
+from ..verify.verification import Check, Verification, agreement, bounded
+from .bound import Bound
+from .nodes import densities
+from .truth import frequencies
+from .youla_parts import AffineLoop, basis, compressed, laguerre, realised
+
+if TYPE_CHECKING:
+    from ..loop.margins import Margins
+
+__all__ = ["YoulaDesign", "youla_design"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+cp: Any = cvxpy  # its functions come through a star import that mypy does not follow
+
+_POINTS, _DENSE = 200, 2000  # at which M_s holds at first, and is looked at
+_EXCHANGES = 5
+_ABOVE = 1.5  # times the mean frequency of the sea: the functions' pole
+_INSIDE = 0.998  # of a limit between them
+_PADE = 6  # of the delays, in the verification
+_TIME, _SPREAD = 0.03, 5e-3  # agreement with the fitted sea, and of a margin
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class YoulaDesign:
+    """A controller of high order, and what it achieves.
+
+    Attributes
+    ----------
+    bound
+        The question, and the bound from below.
+    value
+        Root of the weighted variance on the true spectra: an upper value of the best possible.
+    rms
+        Of what is limited, by name.
+    max_sensitivity
+        The M_s that was asked for, or infinity.
+    margins
+        Of the loop with its exact delays.
+    functions
+        Laguerre functions of each measurement.
+    controller
+        The controller, u = +C y.
+    """
+
+    bound: Bound
+    value: float
+    rms: Mapping[str, float]
+    max_sensitivity: float
+    margins: Margins
+    functions: int
+    controller: Controller
+
+    def reduced(self, order: int) -> Controller:
+        """Return the controller truncated to at most `order` states.
+
+        The states of least weight in the closed loop are dropped: reached as the disturbances
+        drive them there, heard in what is minimised and limited and in the command.  It need not
+        be stabilising: a start for a search, or to be looked at with `Bound.of`.
+        """
+        heard, reached = self._gramians
+        left, right = balanced_truncation(heard, reached, order)
+        given = self.controller
+        return Controller(
+            A=left @ given.A @ right,
+            B=left @ given.B,
+            C=given.C @ right,
+            D=given.D,
+            measurements=given.measurements,
+            inputs=given.inputs,
+        )
+
+    @cached_property
+    def _gramians(self) -> tuple[FloatArray, FloatArray]:
+        """Observability and controllability of the controller's states in the closed loop."""
+        plant, point = self.bound.dual.plant, self.bound.point
+        given = self.controller
+        law = LawMatrices(
+            A=np.array(given.A), B=np.array(given.B), C=np.array(given.C), D=np.array(given.D)
+        )
+        A, E, Cz, _ = closed_matrices(plant, law)
+        n = len(plant.states)
+        reached = solve_lyapunov(A, E @ E.T)
+        moved = np.hstack([np.zeros((len(plant.inputs), n)), given.C])
+        charge = self.bound.dual.charge(point.multipliers)
+        cost = float(charge @ np.sum((Cz @ reached) * Cz, axis=1))
+        effort = np.sum((moved @ reached) * moved, axis=1)
+        rows = np.vstack([np.sqrt(charge)[:, None] * Cz, np.sqrt(cost / effort)[:, None] * moved])
+        heard = solve_lyapunov(A.T, rows.T @ rows)
+        return heard[n:, n:], reached[n:, n:]
+
+    def lowest(self, *, within: float = 0.1, most: int = 20) -> Controller:
+        """Return the controller of lowest order that is stable and loses at most a share `within`.
+
+        Raises
+        ------
+        SynthesisError
+            If there is none of at most `most` states.
+        """
+        for order in range(1, most + 1):
+            controller = self.reduced(order)
+            try:
+                found = self.bound.of(controller)
+            except SynthesisError:
+                continue
+            if found <= (1.0 + within) * self.value:
+                return controller
+        raise SynthesisError(
+            f"Youla: no truncation to at most {most} states keeps within {100 * within:g} %"
+        )
+
+    @one_thread()
+    def verify(self) -> Verification:
+        """Check stability, M_s and variance of the realised controller by other routes."""
+        bound, plant = self.bound, self.bound.plant
+        rational = plant.without_delays(_PADE, at="measurements")
+        growth = float(closed_loop_poles(rational, self.controller).real.max())
+        checks = [Check(name="poles", ok=growth < 0.0, found=growth, note="Pade delays")]
+        if growth < 0.0:
+            law = LawMatrices.of(self.controller, rational)
+            by_time = lyapunov_variances(rational, law, bound.filters)
+            rms = math.sqrt(sum(w * by_time[n] for n, w in bound.minimise.items()))
+            worst = max([0.0, *bound.fits.values()])
+            checks.append(
+                agreement("value.time", self.value, rms, _TIME + worst, "Lyapunov, fitted sea")
+            )
+            checks.append(agreement("value", self.value, bound.of(self.controller), 1e-3, "exact"))
+            checks.append(bounded("bound", bound.value, self.value, 0.0, "", at_least=True))
+            found = Assessment(plant, self.controller, bound.sources).margins.max_sensitivity
+            checks.append(
+                bounded("max_sensitivity", self.max_sensitivity, found, _SPREAD, "exact delays")
+            )
+        return Verification.of(checks, f"verified: {len(checks)} checks passed")
+
+    def __str__(self) -> str:
+        """Return a small tree."""
+        return (
+            f"YoulaDesign: {self.value:.5g} rms of {self.bound.whole}, "
+            f"{self.bound.sentence(self.value)}\n"
+            f"├ order {len(self.controller.A)}, {self.functions} functions a measurement\n"
+            f"└ M_s {self.margins.max_sensitivity:.3f}, delay margin {self.margins.delay:.4g} s"
+        )
+
+
+@one_thread()
+def youla_design(
+    bound: Bound,
+    *,
+    max_sensitivity: float = math.inf,
+    roll_off: tuple[float, float] | None = None,
+    functions: int = 8,
+    pace: float | None = None,
+) -> YoulaDesign:
+    """Return the best controller with a Q of so many functions.
+
+    Parameters
+    ----------
+    bound
+        The question: plant with one input, spectra, weights, rms limits.
+    max_sensitivity
+        Limit on M_s of the loop, broken at the input.
+    roll_off
+        (bound, above): |L| at most `bound` from the frequency `above` on [rad/s].
+    functions
+        Laguerre functions for each measurement.
+    pace
+        Their pole [rad/s]; by default half as much again as the mean frequency of the sea.
+
+    Raises
+    ------
+    InputError
+        If a number is out of range.
+    SynthesisError
+        If no such controller keeps the limits, or the plant has more than one input.
+    """
+    if len(bound.plant.inputs) != 1:
+        raise SynthesisError("Youla: the plant must have one input")
+    if not max_sensitivity > 1.0:
+        raise InputError(f"Youla: max_sensitivity must be above 1, got {max_sensitivity!r}")
+    check_range("Youla", "functions", functions, low=1, high=60)
+    dual, point = bound.dual, bound.point
+    plant, K, L = dual.plant, point.regulator.gain, dual.estimator.gain
+    parts = AffineLoop(bound)
+    marks = parts.marks
+    a = pace or _pace(bound, marks)
+    Aq, Bq, Cq = laguerre(a, functions, len(plant.measurements))
+    omega, weights = frequencies(bound.sources, marks)
+    omega, weights = omega[1:], weights[1:]
+    columns = basis(omega, a, functions)
+    q = cp.Variable(Cq.shape[1])
+    constant, slope = parts.outputs(omega, columns)
+    spectra = np.sqrt(densities(bound.sources, omega) * weights)
+    names = list(bound.plant.outputs)
+    # Unit columns, as the measurements differ by many decades.
+    rows = {
+        n: compressed(constant, slope, spectra, names.index(n))
+        for n in dict.fromkeys([*bound.minimise, *bound.limits])
+    }
+    scale = np.sqrt(sum(w * np.sum(rows[n][0] ** 2, axis=0) for n, w in bound.minimise.items()))
+    scale = 1.0 / np.maximum(scale, 1e-12 * scale.max())
+    unit = bound.attained or 1.0
+    stacked = cp.hstack(
+        [
+            math.sqrt(w) / unit * (rows[n][0] * scale @ q + rows[n][1])
+            for n, w in bound.minimise.items()
+        ]
+    )
+    limits = [
+        cp.norm(rows[n][0] * (scale / b) @ q + rows[n][1] / b) <= _INSIDE
+        for n, b in bound.limits.items()
+    ]
+    if roll_off is not None:
+        level, above = roll_off
+        high = np.geomspace(above, 100.0 * above, 100)
+        base, moved = parts.sensitivity(high, basis(high, a, functions))
+        # |L| <= b wherever |T| <= b/(1 + b), and T = 1 - S is affine.
+        limits.append(_size(base - 1.0, moved * scale, q) <= _INSIDE * level / (1.0 + level))
+    dense = np.unique(np.concatenate([np.geomspace(0.002 * a, 200.0 * a, _DENSE), *_around(marks)]))
+    base, moved = parts.sensitivity(dense, basis(dense, a, functions))
+    moved, chosen = moved * scale, np.zeros(dense.size, dtype=np.bool_)
+    chosen[:: _DENSE // _POINTS] = math.isfinite(max_sensitivity)
+    for _ in range(_EXCHANGES):
+        held = list(limits)
+        if chosen.any():
+            held.append(_size(base[chosen], moved[chosen], q) <= _INSIDE * max_sensitivity)
+        _solve(cp.Problem(cp.Minimize(cp.norm(stacked)), held), q)
+        broken = np.abs(base + moved @ q.value) > max_sensitivity
+        if not broken.any():
+            break
+        chosen |= broken
+    values = np.asarray(q.value, dtype=np.float64) * scale
+    controller = realised(plant, K, L, Aq, Bq, Cq * values)
+    view = Assessment(bound.plant, controller, bound.sources)
+    if not view.stable:
+        raise SynthesisError("Youla: the realised controller does not stabilise the true plant")
+    rms = {n: float(np.linalg.norm(r @ values + r0)) for n, (r, r0) in rows.items()}
+    return YoulaDesign(
+        bound=bound,
+        value=math.sqrt(sum(w * rms[n] ** 2 for n, w in bound.minimise.items())),
+        rms={n: rms[n] for n in bound.limits},
+        max_sensitivity=max_sensitivity,
+        margins=view.margins,
+        functions=functions,
+        controller=controller,
+    )
+
+
+def _solve(problem: Any, q: Any) -> None:
+    """Solve a cone programme with Clarabel."""
+    try:
+        with warnings.catch_warnings():
+            # An inaccurate solution is a controller all the same, and is looked at as such.
+            warnings.simplefilter("ignore", UserWarning)
+            problem.solve(solver=cp.CLARABEL)
+    except cvxpy.error.SolverError as error:
+        raise SolverError(f"Youla: Clarabel failed: {error}") from error
+    if q.value is None or problem.status not in ("optimal", "optimal_inaccurate"):
+        raise SynthesisError(f"Youla: no controller with {q.size} free numbers keeps the limits")
+
+
+def _size(base: ComplexArray, moved: ComplexArray, q: Any) -> Any:
+    """Return |base + moved q|, (k,)."""
+    real, imaginary = moved.real @ q + base.real, moved.imag @ q + base.imag
+    return cp.norm(cp.vstack([real, imaginary]), 2, axis=0)
+
+
+def _around(marks: ComplexArray) -> list[FloatArray]:
+    """Return frequencies about lightly damped poles [rad/s]."""
+    light = marks[(marks.imag > 0.0) & (np.abs(marks.real) < 0.3 * marks.imag)]
+    steps = np.linspace(-4.0, 4.0, 17)
+    found = [m.imag + max(abs(m.real), 1e-4 * m.imag) * steps for m in light]
+    return [at[at > 0.0] for at in found]
+
+
+def _pace(bound: Bound, marks: ComplexArray) -> float:
+    """Return a frequency amid what there is to be done [rad/s]: somewhat above the sea's mean."""
+    found = []
+    for source in bound.sources:
+        if source.band is not None:
+            edges = np.geomspace(*source.band, 500)
+            density = source.density(edges)
+            found.append(np.trapezoid(edges * density, edges) / np.trapezoid(density, edges))
+    if found:
+        return _ABOVE * float(max(found))
+    sizes = np.abs(marks)
+    return float(np.exp(np.median(np.log(sizes[sizes > 1e-3]))))

@@ -1,0 +1,1 @@
+"""Controllers in time: designs, and the laws that the industry uses."""

@@ -1,0 +1,263 @@
+r"""Linear feedback in the time domain: a design, sampled.
+
+::
+
+    reference velocity ----> feed ---------------------------------+
+                                                                   v
+    measured --(+)--> fresh? --> [low-pass] --> C(z): A, B, C, D -(+)--> command, static included
+                ^- reference                      ^
+                                                  K_b
+                                                  +--- drive.applied - command asked for
+
+From gains, C is static: the 1975 thesis's u = -A (a P'' + a1 P' + a2 P) (its eq. 30), about the
+reference.  It has nothing that could wind up, so anti-windup changes nothing.
+
+A controller with states (from `synth.design.tuning`) is sampled by Tustin's rule, which keeps every
+stable pole stable, or as if its measurements were held (``zoh``).  Anti-windup is by
+back-calculation in the observer's form (K. J. Astrom and B. Wittenmark, Computer-Controlled
+Systems, 3rd ed., chapter 9): while the drive does not do what it is asked, the states follow
+what it does,
+
+    x+ = A x + B e + K_b (u_applied - u_asked),
+
+with K_b by `synth.structures.sampled_controller.tracking_gain`, so that A - K_b C is stable, an
+integrator included.
+
+What comes up from the payload may stop coming.  Values older than `hold_for` fade out, until
+after another second only the static command and the reference are left: a voltage that goes
+on from an old measurement would drive the drum away.  So would the last heave rate of a motion
+reference unit that is lost; it counts as nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError, check_range
+from models.basics.signals import pick
+from models.case.case import Case
+from models.plant.plant import MEAN_LOSSES, build_plant
+
+from ..design.design import GainDesign
+from ..loop.controller import Controller
+from ..structures.drum_speed import SteadyMotion
+from ..structures.recursive import RecursiveController, Signals, checked_sample_time
+from ..structures.sampled_controller import Matrices, low_pass_matrices, sampled, tracking_gain
+
+if TYPE_CHECKING:
+    from ..design.tuning import Tuning
+
+__all__ = ["LinearFeedback"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_OWNER = "linear feedback"
+PAYLOAD = ("payload.acceleration", "payload.velocity", "payload.displacement")
+HOOK = ("mru.heave", "mru.heave_rate")
+HEARD = (*PAYLOAD, *HOOK, "drum.haul", "motor.speed", "motor.torque", "rope.tension")
+FADE = 1.0  # in which an old measurement loses its weight [s]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, init=False)
+class LinearFeedback(RecursiveController):
+    """u = u_static + feed-forward of the reference + C(z) (y - y_reference).
+
+    Parameters
+    ----------
+    case
+        The case.
+    law
+        Gains ``a, a1, a2`` and optionally ``A`` (by default that of the case, else 1), or a
+        controller u = +C(s) y with one input, which may hear what is measured at the payload
+        and at the winch.
+    sample_time
+        T [s].
+    anti_windup
+        Whether the states of a dynamic controller follow the drive where it has limits.
+    method
+        ``tustin`` or ``zoh``, for a dynamic controller.
+    prewarp
+        Frequency at which Tustin's rule is exact [rad/s]; by default zero.
+    filter_bandwidth
+        First-order low-pass on every measurement [rad/s]; by default none.
+    hold_for
+        Age up to which the payload's values count in full [s]; by default a second more than
+        the telemetry's delay.
+    name
+        What it is called; by default ``feedback``.
+
+    Raises
+    ------
+    InputError
+        If the gains are incomplete, a number is out of its range, or the controller hears or
+        commands something that there is not.
+    SynthesisError
+        If the controller has an unstable state that its output does not show, which no
+        anti-windup can hold.
+    """
+
+    case: Case
+    controller: Controller
+    anti_windup: bool
+    method: str
+    hold_for: float
+    motor: SteadyMotion
+
+    def __init__(
+        self,
+        case: Case,
+        law: Mapping[str, float] | Controller,
+        *,
+        sample_time: float = 0.01,
+        anti_windup: bool = True,
+        method: str = "tustin",
+        prewarp: float | None = None,
+        filter_bandwidth: float | None = None,
+        hold_for: float | None = None,
+        name: str = "feedback",
+    ) -> None:
+        checked_sample_time(_OWNER, sample_time)
+        plant = build_plant(case)
+        point, late = plant.operating_point(MEAN_LOSSES), case.sensors.telemetry.delay
+        controller = law if isinstance(law, Controller) else _from_gains(case, law)
+        _check_signals(controller)
+        hold = late + 1.0 if hold_for is None else hold_for
+        check_range(_OWNER, "hold_for", hold, low=0.0, unit="s")
+        C = sampled(controller, sample_time, method=method, prewarp=prewarp)
+        self._set(
+            case=case,
+            controller=controller,
+            anti_windup=anti_windup and len(C[0]) > 0,
+            method=method,
+            hold_for=float(hold),
+            motor=SteadyMotion.of(plant.data),
+        )
+        ny = len(controller.measurements)
+        low_pass = low_pass_matrices(ny, filter_bandwidth, sample_time)
+        back = tracking_gain(C, sample_time) if self.anti_windup else np.zeros((len(C[0]), 1))
+        static = {"rope.tension": point.tension, "motor.torque": point.torque}
+        filtered, own = len(low_pass[0]), len(C[0])
+
+        def respond(xc: ca.SX, m: Signals) -> tuple[ca.SX, ca.SX]:
+            # Not by slices: an empty slice of a column of two is a row in CasADi.
+            xf, x, asked = ca.vertsplit(xc, [0, filtered, filtered + own, xc.numel()])
+            error = self._deviations(m, static)
+            following, heard = _advance(low_pass, xf, error)
+            if self.anti_windup:  # what the drive really did over the last sample
+                x = x + back @ (m["drive.applied"] - asked)
+            after, feedback = _advance(C, x, heard)
+            speed = self.motor.per_rope_speed * m["reference.velocity"]
+            command = point.command + (self.motor.feed * speed + feedback)
+            following = ca.vertcat(following, after)
+            if self.anti_windup:
+                following = ca.vertcat(following, command)
+            return following, command
+
+        last = [point.command] if self.anti_windup else []
+        self._adopt(name, sample_time, [*np.zeros(filtered + own), *last], respond)
+
+    @classmethod
+    def from_design(
+        cls,
+        design: GainDesign | Tuning,
+        *,
+        case: Case | None = None,
+        sample_time: float = 0.01,
+        anti_windup: bool = True,
+        method: str = "tustin",
+        prewarp: float | None = None,
+        filter_bandwidth: float | None = None,
+        hold_for: float | None = None,
+        name: str = "feedback",
+    ) -> LinearFeedback:
+        """Return the feedback of a design.
+
+        Parameters
+        ----------
+        design
+            A `GainDesign`, or a `Tuning` of any structure on the plant of a case.
+        case
+            The case that it is to run on; by default the design's own.  A `Tuning` knows of
+            none.
+
+        Raises
+        ------
+        InputError
+            If a `Tuning` comes without a case or has no controller; otherwise as the class.
+        """
+        law: Mapping[str, float] | Controller
+        if isinstance(design, GainDesign):
+            law, case = design.gains, design.case if case is None else case
+        else:
+            if design.controller is None:
+                raise InputError(f"{_OWNER}: the design has no controller: {design.status}")
+            law = design.controller
+        if case is None:
+            raise InputError(f"{_OWNER}: a Tuning does not know its case: say case=...")
+        return cls(
+            case,
+            law,
+            sample_time=sample_time,
+            anti_windup=anti_windup,
+            method=method,
+            prewarp=prewarp,
+            filter_bandwidth=filter_bandwidth,
+            hold_for=hold_for,
+            name=name,
+        )
+
+    @property
+    def dynamic(self) -> bool:
+        """Whether the controller has states of its own, which may wind up."""
+        return len(self.controller.A) > 0
+
+    def _deviations(self, m: Signals, static: Mapping[str, float]) -> ca.SX:
+        """Return y - y_reference of what the controller hears, (ny, 1)."""
+        fresh = ca.fmin(1.0, ca.fmax(0.0, (self.hold_for + FADE - m["payload.age"]) / FADE))
+        wanted: dict[str, ca.SX | float] = {
+            "drum.haul": m["reference.displacement"],
+            "motor.speed": self.motor.per_rope_speed * m["reference.velocity"],
+            **static,
+        }
+        wanted |= {name: m[name.replace("payload", "reference")] for name in PAYLOAD}
+        # A reference unit that is lost shows its last values: a heave rate that goes on for ever.
+        trust = {**dict.fromkeys(PAYLOAD, fresh), **dict.fromkeys(HOOK, m["mru.valid"])}
+        rows = []
+        for name in self.controller.measurements:
+            deviation = m[name] - wanted.get(name, 0.0)
+            rows.append(trust[name] * deviation if name in trust else deviation)
+        return ca.vertcat(*rows)
+
+
+def _from_gains(case: Case, gains: Mapping[str, float]) -> Controller:
+    """Return u = -A (a P'' + a1 P' + a2 P)."""
+    unknown = set(gains) - {"A", "a", "a1", "a2"}
+    if unknown or not {"a", "a1", "a2"} <= set(gains):
+        raise InputError(
+            "gains: must be a, a1, a2 and optionally A, got " + (", ".join(gains) or "none")
+        )
+    own = case.gains.A if case.gains is not None else 1.0
+    values = {name: check_range("gains", name, v) for name, v in {"A": own, **gains}.items()}
+    products = [-values["A"] * values[name] for name in ("a", "a1", "a2")]
+    return Controller.static([products], PAYLOAD, ("drive.command",))
+
+
+def _check_signals(controller: Controller) -> None:
+    if len(controller.inputs) != 1:
+        raise InputError(
+            f"{_OWNER}: the controller must have one input, the drive's command, got "
+            f"{', '.join(controller.inputs) or 'none'}"
+        )
+    pick(_OWNER, "measurement", HEARD, controller.measurements)
+
+
+def _advance(matrices: Matrices, x: ca.SX, y: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Return (A x + B y, C x + D y)."""
+    A, B, C, D = (ca.DM(matrix) for matrix in matrices)
+    return A @ x + B @ y, C @ x + D @ y

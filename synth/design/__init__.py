@@ -1,0 +1,1 @@
+"""A design: found, evaluated, and told with its limits and its check."""

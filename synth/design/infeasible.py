@@ -1,0 +1,152 @@
+"""When the drive is too small: the largest sea it can do, and what it would have to be.
+
+Two further programmes on the same loop.  The first makes the sea a variable and maximises it
+within the limits: the limits that bind there are the ones that break first.  The second keeps
+the sea asked for and looks for the least factor on just those limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..question.question import Question
+from ..search.multistart import briskest, coarse_programme
+from ..search.polishing import polish, view_of
+from ..search.programme import Goal, Problem, Solved
+from .tuning import Tuning
+
+__all__ = ["Shortfall", "shortfall"]
+
+FloatArray = npt.NDArray[np.float64]
+
+Progress = Callable[[str, int, int], None]
+
+_BINDING = 5e-3  # a limit that is used up to this share of itself binds
+_KEPT = 1e-4  # relative excess over a limit that a polished answer may have
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shortfall:
+    """What a drive that is too small can do.
+
+    Attributes
+    ----------
+    share
+        Largest feasible significant height over the one asked for.
+    values, coefficient
+        Gains ``a, a1, a2`` there, and their drag coefficient [N s/m].
+    breaks_first
+        Name of the drive limit that binds there at the highest price.
+    required
+        What each binding drive limit would have to be in the sea asked for.
+    """
+
+    share: float
+    values: Mapping[str, float]
+    coefficient: float | None
+    breaks_first: str
+    required: Mapping[str, float]
+
+
+def shortfall(
+    question: Question, free: Tuning, progress: Progress | None = None
+) -> Shortfall | None:
+    """Return the largest feasible sea and what is missing, or None if no sea is feasible.
+
+    Parameters
+    ----------
+    question
+        The case, with all its limits.
+    free
+        The answer without drive limits, to start from.
+    progress
+        Called as progress(stage, done, total).
+    """
+    problem = question.problem
+    if progress is not None:
+        progress("largest sea", 0, 2)
+    best = _largest_sea(problem, free)
+    if best is None:
+        return None
+    binding = _binding(problem, best)
+    if progress is not None:
+        progress("largest sea", 1, 2)
+    required = _required(problem, free, best, binding)
+    if progress is not None:
+        progress("largest sea", 2, 2)
+    return Shortfall(
+        share=float(np.exp(best.extra)),
+        values=problem.law.named([float(v) for v in best.values]),
+        coefficient=best.coefficient,
+        breaks_first=binding[0],
+        required=required,
+    )
+
+
+def _largest_sea(problem: Problem, free: Tuning) -> Solved | None:
+    begins = _begins(free)
+    programme = coarse_programme(problem, begins, briskest(problem, begins), Goal.SEA)
+    found: list[Solved] = []
+    for begin in begins:
+        for guess in (0.0, -1.5, -4.0):  # from the sea asked for down to a fiftieth of it
+            coefficient = free.coefficient
+            if coefficient is not None:
+                coefficient *= float(np.exp(guess))
+            solved = programme.solve(programme.pack(begin, coefficient, guess))
+            if solved.converged and problem.stable(solved.values, solved.coefficient):
+                found.append(solved)
+                break
+    if not found:
+        return None
+    best = max(found, key=lambda s: s.extra)
+    polished, _, excess = polish(problem, best, briskest(problem, begins), Goal.SEA)
+    return polished if excess <= _KEPT else None
+
+
+def _required(
+    problem: Problem, free: Tuning, best: Solved, binding: Sequence[str]
+) -> dict[str, float]:
+    """Return the least bounds of the binding limits for which the sea asked for is feasible."""
+    begins = [*_begins(free), best.values]
+    reference = briskest(problem, begins)
+    programme = coarse_programme(problem, begins, reference, Goal.RELAX, relaxed=binding)
+    found: list[Solved] = []
+    for begin in begins:
+        for guess in (0.0, 1.0, 3.0):
+            solved = programme.solve(programme.pack(begin, free.coefficient, guess))
+            if solved.converged and problem.stable(solved.values, solved.coefficient):
+                found.append(solved)
+                break
+    if not found:
+        return {}
+    least = min(found, key=lambda s: s.extra)
+    _, view, excess = polish(problem, least, reference, Goal.RELAX, binding)
+    if excess > _KEPT:
+        return {}
+    # What each of them comes to there; one that the others spare is not asked for more.
+    values = {lim.name: (lim, lim.measure(view)) for lim in problem.limits if lim.name in binding}
+    return {name: value for name, (lim, value) in values.items() if lim.use(value) > 1.0}
+
+
+def _binding(problem: Problem, solved: Solved) -> list[str]:
+    """Return the drive limits that are used up at the largest sea, the dearest first.
+
+    Not by their multipliers alone: of two limits that say nearly the same (torque and current
+    of a DC motor) only one has a price, and relaxing that one would change nothing.
+    """
+    view = view_of(problem, solved, amplitude=float(np.exp(solved.extra)))
+    uses = {lim.name: lim.use(lim.measure(view)) for lim in problem.limits if lim.drive}
+    names = [name for name, use in uses.items() if use > 1.0 - _BINDING]
+    return sorted(names or [max(uses, key=lambda n: uses[n])], key=lambda n: -abs(solved.prices[n]))
+
+
+def _begins(free: Tuning) -> list[FloatArray]:
+    """Return the answer without drive limits and a few other stable ends of its search."""
+    best = np.array(list(free.parameters.values()))
+    others = [s.end for s in free.starts if s.converged and s.stable]
+    others += [s.begin for s in free.starts]
+    return [best, *others[:5]]

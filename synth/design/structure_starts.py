@@ -1,0 +1,164 @@
+"""Where the search of a structure begins: the best of the simpler structures within it.
+
+    StructureQuestion -> simpler structures, searched -> the same controllers as its own parameters
+
+A structure that contains another has at least its optimum, but its search has more dimensions to
+get lost in.  So it begins at the simpler one's answer, and `no_worse` holds it to that.  Contained
+are: feedback without filters in that behind a lead or a roll-off (nearly: a roll-off's corner has
+an end), rolled-off feedback in that with a notch or (nearly) integral action and in a free
+controller of order two or more, and feed-forward and drum feedback in both combined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..loop.assess import Assessment
+from ..question.problem import Problem
+from ..question.structure_question import StructureQuestion, pose_structure
+from ..search.multistart import Found, Progress, search
+from ..search.polishing import KEPT, polish
+from ..search.programme import Solved
+from ..structures.structure import Law
+from ..structures.winch_diagram import TRANSPARENT
+from ..structures.winch_law import WinchLaw
+from ..structures.winch_structures import LowOrderFeedback
+from .tuning import Tuning, tuning_of
+
+__all__ = ["as_values", "nested_starts", "no_worse", "starts_from"]
+
+_FEW = 4  # starts of a structure within another
+_BETTER = 1e-6  # of the log cost that counts as better
+_HAIR = 2e-5  # of the log cost that says nothing
+_PLAIN, _ROLLED = "payload-feedback", "payload-feedback-rolloff"
+_WITHIN: Mapping[str, tuple[str, ...]] = {
+    _ROLLED: (_PLAIN,),
+    "payload-feedback-lead": (_PLAIN,),
+    "payload-feedback-notch": (_ROLLED,),
+    "payload-feedback-integral": (_ROLLED,),
+    "combined": ("feed-forward", "drum-feedback"),
+}
+#: What makes the parts of a structure that another has not do nothing.
+_NEUTRAL: Mapping[str, float] = {
+    "payload.acceleration_gain": 0.0,
+    "payload.velocity_gain": 0.0,
+    "payload.position_gain": 0.0,
+    "heave.gain": 0.0,
+    "heave.lead": 0.0,
+    "heave.bandwidth": 100.0,
+    "rolloff.corner": TRANSPARENT,
+    "rolloff.damping": 0.7,
+    "lead.zero": 50.0,
+    "lead.pole": 50.0,
+    "notch.depth": 1.0,
+    "integral.corner": 0.0,
+}
+
+
+def nested_starts(
+    posed: StructureQuestion, starts: int, seed: int, progress: Progress | None = None
+) -> list[list[float]]:
+    """Return parameter vectors to begin with: the best of each structure within this one.
+
+    Parameters
+    ----------
+    posed
+        The question; a free controller's parameters get the sizes that go with the answer.
+    starts, seed
+        Starts of the search in question, of which the structures within get a few.
+    progress
+        Called as progress(stage, done, total).
+    """
+    structure = posed.structure
+    within = _WITHIN.get(structure.name, ())
+    if isinstance(structure, LowOrderFeedback) and structure.order >= 2:
+        within = (_ROLLED,)
+    found: list[list[float]] = []
+    for name in within:
+        inner = pose_structure(posed.question.case, name, posed.question.masses)
+        tuning = _answer(inner, min(starts, _FEW), seed, progress)
+        if tuning.controller is None:
+            continue
+        if isinstance(structure, LowOrderFeedback):
+            found.append(structure.start(posed.law, tuning.parameters, tuning.controller))
+            continue
+        found += starts_from(posed, [tuning.parameters])
+    return found
+
+
+def starts_from(
+    posed: StructureQuestion, guesses: Sequence[Mapping[str, float]]
+) -> list[list[float]]:
+    """Return parameter vectors of designs that are known by the names of their parameters.
+
+    What they do not name does nothing; where that is the feed-forward, a second vector has the
+    one that suits the rest best.
+    """
+    found = []
+    for guess in guesses:
+        values = as_values(posed.law, guess)
+        found.append(values)
+        if isinstance(posed.law, WinchLaw) and "heave.gain" not in guess:
+            found += posed.law.fed(values, posed.problem(posed.limits))
+    return found
+
+
+def _answer(posed: StructureQuestion, starts: int, seed: int, progress: Progress | None) -> Tuning:
+    """Return the answer of a structure within another."""
+    guesses = nested_starts(posed, starts, seed, progress)
+    problem = posed.problem(posed.limits)
+    return tuning_of(problem, search(problem, starts + len(guesses), seed, guesses, progress))
+
+
+def as_values(law: Law, known: Mapping[str, float]) -> list[float]:
+    """Return a law's parameters where some are known by name and the others do nothing."""
+    full = {**_NEUTRAL, **known}
+    values = [full.get(p.name, p.scale) for p in law.parameters]
+    limits = ((p.low, p.high) for p in law.parameters)
+    return [float(np.clip(v, *pair)) for v, pair in zip(values, limits, strict=True)]
+
+
+def no_worse(problem: Problem, found: Found, starts: Sequence[Sequence[float]]) -> Found:
+    """Return what was found, or the best of known points that keep the limits and are better.
+
+    A search may leave the basin that it was shown; a point that is known already is then polished
+    in its own.
+    """
+    for values in starts:
+        best = found.solved.objective if found.solved is not None else np.inf
+        best = best if found.excess <= KEPT else np.inf
+        solved = _as_it_is(problem, values)
+        if solved is None or solved.objective > best - _BETTER:
+            continue
+        again, view, excess = polish(problem, solved, np.array(values, dtype=np.float64))
+        if again.converged and excess <= KEPT and again.objective < best:
+            found = replace(found, solved=again, view=view, excess=excess)
+    return found
+
+
+def _as_it_is(problem: Problem, values: Sequence[float]) -> Solved | None:
+    """Return a known point as an answer; None if it is unstable or breaks a limit."""
+    controller = problem.law.controller(values)
+    if not problem.stable(values):
+        return None
+    view = Assessment(problem.plant, controller, problem.disturbances, drag=problem.drag)
+    coefficient = view.coefficient if problem.drag is not None else None
+    if not problem.stable(values, coefficient):
+        return None
+    if any(limit.use(limit.measure(view)) > 1.0 + KEPT for limit in problem.limits):
+        return None
+    variance = sum(weight * view.sigma(name) ** 2 for name, weight in problem.minimise.items())
+    return Solved(
+        values=np.array(values, dtype=np.float64),
+        coefficient=coefficient,
+        # A hair dearer than it is, so that a solve which arrives at the same point counts.
+        objective=0.5 * float(np.log(variance)) + _HAIR,
+        extra=0.0,
+        converged=False,
+        message="as it was",
+        iterations=0,
+        prices={limit.name: 0.0 for limit in problem.limits},
+    )

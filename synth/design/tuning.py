@@ -1,0 +1,302 @@
+"""Tune a controller structure on a plant: the entry point of gain synthesis.
+
+    plant + structure + spectra + weights + limits -> Problem -> search -> Tuning
+
+Here the question is checked and the answer is put into words; the work is done in
+`synth.search.multistart`.  Nothing unstable and nothing that breaks a limit leaves as a success.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from models.basics.checks import InputError, check_range
+from models.basics.threads import one_thread
+from models.plant.linear import LinearPlant
+
+from ..limits.limits import Limit
+from ..loop.assess import Assessment
+from ..loop.controller import Controller
+from ..loop.disturbance import disturbances
+from ..loop.element import DragElement
+from ..loop.margins import Margins
+from ..search.multistart import Found, Progress, Start, search
+from ..search.polishing import KEPT
+from ..search.programme import Problem
+from ..structures.structure import Structure
+
+if TYPE_CHECKING:
+    from ..verify.verify import Verification
+
+__all__ = ["LimitUse", "Tuning", "limit_uses", "tune", "tuning_of"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitUse:
+    """How a design uses one limit.
+
+    Attributes
+    ----------
+    value, bound
+        In `unit`.
+    use
+        Share of the limit that is used; above 1 it is broken.
+    price
+        What the cost (in its own unit) would fall by if the bound were one percent looser; 0
+        where the limit does not bind.
+    enforced
+        Whether the optimiser had to keep it.
+    """
+
+    name: str
+    value: float
+    bound: float
+    use: float
+    price: float = 0.0
+    unit: str = ""
+    enforced: bool = True
+
+    @property
+    def kept(self) -> bool:
+        """Whether the limit is kept."""
+        return self.use <= 1.0 + KEPT
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tuning:
+    """The answer of `tune`, with the question it answers.
+
+    Attributes
+    ----------
+    ok
+        Stable, all limits kept, converged and checked.
+    status
+        The sentence for the user.
+    cost
+        Square root of the weighted variance, in the unit of the outputs.
+    parameters
+        Free parameters of the structure by name.
+    controller
+        The controller in state space, u = +C y.
+    margins
+        Stability margins, refined (`synth.loop.margins`).
+    limits
+        Use of each limit by name.
+    starts
+        All starts of the search.
+    agreed
+        How many starts ended within 1e-4 of the best cost.
+    assessment
+        The closed loop in numbers; None if no stable one was found.
+    found
+        The search's raw answer.
+    coefficient
+        The drag coefficient that agrees with the response [N s/m], if drag was asked for.
+    """
+
+    problem: Problem
+    ok: bool
+    status: str
+    cost: float
+    parameters: Mapping[str, float]
+    controller: Controller | None
+    margins: Margins | None
+    limits: Mapping[str, LimitUse]
+    starts: tuple[Start, ...] = ()
+    agreed: int = 0
+    coefficient: float | None = None
+    assessment: Assessment | None = field(repr=False)
+    found: Found = field(repr=False)
+
+    def verify(self) -> Verification:
+        """Check everything that is claimed by code that the optimiser did not use.
+
+        Returns
+        -------
+        synth.verify.verify.Verification
+        """
+        from ..verify.verify import verify_tuning
+
+        return verify_tuning(self)
+
+    def __str__(self) -> str:
+        """Return a small tree."""
+        lines = [f"Tuning: {self.status}", f"├ cost {self.cost:.6g}"]
+        lines += [f"├ {name} = {value:.6g}" for name, value in self.parameters.items()]
+        lines += [f"├ {u.name}: {100 * u.use:.1f} % of {u.bound:g}" for u in self.limits.values()]
+        if self.margins is not None:
+            m = self.margins
+            lines.append(f"├ M_s {m.max_sensitivity:.3f}, delay margin {m.delay:.4g} s")
+        lines[-1] = "└" + lines[-1][1:]
+        return "\n".join(lines)
+
+
+def tune(
+    plant: LinearPlant,
+    structure: Structure,
+    *,
+    spectrum: Mapping[str, Any],
+    minimise: Mapping[str, float],
+    limits: Sequence[Limit] = (),
+    starts: int = 16,
+    seed: int = 0,
+    drag: DragElement | None = None,
+    guesses: Sequence[Sequence[float]] = (),
+    progress: Progress | None = None,
+) -> Tuning:
+    """Return the controller of a structure that minimises a weighted variance within limits.
+
+    Parameters
+    ----------
+    plant
+        Any linear plant with named signals; delays of its measurements are taken exactly.
+    structure
+        `StaticGain`, `PayloadFeedback`, `LowOrder` or a structure of your own.
+    spectrum
+        One-sided spectra of disturbances by name: a callable of omega [rad/s], a table
+        (omega, density), an object with ``density`` and ``band``, or `White`.
+    minimise
+        Weights on the variances of performance outputs by name.
+    limits
+        What may not be exceeded, see `synth.limits.limits`.
+    starts
+        How many starts the search has, at least 1.
+    seed
+        Seed of the Sobol set; the same seed gives the same answer.
+    drag
+        A quadratic drag to be linearised consistently with the response.
+    guesses
+        Parameter vectors to start from, before any that are drawn.
+    progress
+        Called as progress(stage, done, total).
+
+    Returns
+    -------
+    Tuning
+        With ``ok`` false and a status that says why if no stable design within the limits
+        was found.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, a weight is negative or there is nothing to minimise.
+    """
+    problem = _problem(plant, structure, spectrum, minimise, limits, drag)
+    check_range("tune", "starts", starts, low=1)
+    with one_thread():
+        return tuning_of(problem, search(problem, int(starts), seed, guesses, progress))
+
+
+def limit_uses(
+    limits: Sequence[Limit], view: Assessment, prices: Mapping[str, float], *, enforced: bool = True
+) -> dict[str, LimitUse]:
+    """Return the use of each limit by name; `prices` are in units of the cost per percent."""
+    uses = {}
+    for limit in limits:
+        value = limit.measure(view)
+        uses[limit.name] = LimitUse(
+            name=limit.name,
+            value=value,
+            bound=limit.bound,
+            use=limit.use(value),
+            price=prices.get(limit.name, 0.0),
+            unit=limit.unit,
+            enforced=enforced,
+        )
+    return uses
+
+
+def tuning_of(problem: Problem, found: Found) -> Tuning:
+    """Return what a search found as an answer in words and numbers."""
+    solved, view = found.solved, found.view
+    if solved is None or view is None:
+        return Tuning(
+            problem=problem,
+            ok=False,
+            status="no stabilising controller of this structure was found",
+            cost=np.inf,
+            parameters={},
+            controller=None,
+            margins=None,
+            limits={},
+            starts=found.starts,
+            assessment=None,
+            found=found,
+        )
+    cost = float(np.sqrt(sum(w * view.sigma(o) ** 2 for o, w in problem.minimise.items())))
+    # The programme prices the logarithm of the cost per logarithm of the bound.
+    prices = {name: 0.01 * abs(price) * cost for name, price in solved.prices.items()}
+    uses = limit_uses(problem.limits, view, prices)
+    ok = bool(view.stable and solved.converged and found.excess <= KEPT and np.isfinite(cost))
+    return Tuning(
+        problem=problem,
+        ok=ok,
+        status=_status(ok, view, uses, cost),
+        cost=cost,
+        parameters=problem.law.named([float(v) for v in solved.values]),
+        controller=problem.law.controller([float(v) for v in solved.values]),
+        margins=view.margins,
+        limits=uses,
+        starts=found.starts,
+        agreed=found.agreed,
+        coefficient=solved.coefficient,
+        assessment=view,
+        found=found,
+    )
+
+
+def _status(ok: bool, view: Assessment, uses: Mapping[str, LimitUse], cost: float) -> str:
+    if ok:
+        binding = [u.name for u in uses.values() if u.price > 1e-5 * cost]
+        if not binding:
+            return "optimal; no limit binds"
+        return f"optimal within the limits; {', '.join(binding)} bind{'s' * (len(binding) == 1)}"
+    if not view.stable:
+        return "the search ended at an unstable loop"
+    broken = [u for u in uses.values() if not u.kept]
+    if not broken:
+        return "the solver did not converge"
+    values = [f"{u.name} at {u.value:.4g} instead of {u.bound:.4g}" for u in broken]
+    return f"the limits cannot all be kept; the least violation leaves {' and '.join(values)}"
+
+
+def _problem(
+    plant: LinearPlant,
+    structure: Structure,
+    spectrum: Mapping[str, Any],
+    minimise: Mapping[str, float],
+    limits: Sequence[Limit],
+    drag: DragElement | None,
+) -> Problem:
+    for name, weight in minimise.items():
+        if name not in plant.outputs:
+            raise InputError(
+                f"tune: minimise: there is no output {name!r}; there are: "
+                f"{', '.join(plant.outputs) or 'none'}"
+            )
+        check_range("tune", f"minimise[{name}]", weight, low=0.0)
+    if not any(weight > 0.0 for weight in minimise.values()):
+        raise InputError("tune: minimise must give at least one output a weight above 0")
+    names = [limit.name for limit in limits]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"tune: limits must have different names, got {name!r} twice")
+    for limit in limits:
+        for output in {*limit.outputs, getattr(limit, "output", None)} - {None}:
+            if output not in plant.outputs:
+                raise InputError(
+                    f"tune: limit {limit.name}: there is no output {output!r}; there are: "
+                    f"{', '.join(plant.outputs) or 'none'}"
+                )
+    return Problem(
+        plant=plant,
+        law=structure.bind(plant),
+        disturbances=disturbances(spectrum, plant.independent_disturbances),
+        minimise={name: float(w) for name, w in minimise.items() if w > 0.0},
+        limits=tuple(limits),
+        drag=drag,
+    )

@@ -1,0 +1,1 @@
+"""Limits of a design: margins, signals, and what a case asks for."""

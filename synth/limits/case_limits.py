@@ -1,0 +1,144 @@
+"""The limits of a case: which there are, what they bound, and what the load at rest leaves."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from models.basics.checks import InputError
+from models.case.case import Case
+from models.plant.linear import LinearPlant
+from models.plant.plant_data import PlantData
+from models.plant.rope import fixed_top_modes, lump_rope, lumped_modes
+
+from .limits import Limit
+from .margin_limits import (
+    DelayMargin,
+    GainMargin,
+    GainMarginDown,
+    LowFrequency,
+    MaxSensitivity,
+    RollOff,
+)
+from .signal_limits import Continuous, Least, Peak, Power
+
+__all__ = ["drive_limits", "loop_limits", "modelled_bandwidth"]
+
+PAYLOAD = "payload.displacement"
+HOOK = "hook.heave"
+_HELD = 0.05  # a rope mode within this share of its exact frequency counts as modelled
+
+
+def loop_limits(case: Case, data: PlantData, masses: int) -> tuple[Limit, ...]:
+    """Return the limits on the loop, for a plant of `masses` rope masses."""
+    wanted = case.limits
+    limits: list[Limit] = [MaxSensitivity(bound=wanted.max_sensitivity)]
+    if wanted.gain_margin_up is not None:
+        limits.append(GainMargin(bound=wanted.gain_margin_up))
+    if wanted.gain_margin_down is not None:
+        limits.append(GainMarginDown(bound=wanted.gain_margin_down))
+    if wanted.delay_margin:
+        limits.append(DelayMargin(bound=wanted.delay_margin))
+    if wanted.low_frequency is not None:
+        limits.append(
+            LowFrequency(
+                bound=wanted.low_frequency.ratio,
+                below=wanted.low_frequency.below,
+                output=PAYLOAD,
+                disturbance=HOOK,
+            )
+        )
+    above = modelled_bandwidth(data, masses)
+    if wanted.roll_off is not None and math.isfinite(above):
+        limits.append(RollOff(bound=wanted.roll_off, above=above))
+    return tuple(limits)
+
+
+def drive_limits(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
+    """Return the limits on motor, drive and rope.
+
+    Raises
+    ------
+    InputError
+        If they are to be enforced and the load at rest breaks one already.
+    """
+    drive, wanted, static = case.winch.drive, case.limits, plant.static
+    time = wanted.exposure_time
+    limits: list[Limit] = []
+
+    def peak(output: str, bound: float | None) -> None:
+        if bound is not None:
+            limits.append(
+                Peak(
+                    bound=bound,
+                    output=output,
+                    static=static[output],
+                    duration=time,
+                    unit=plant.units[output],
+                )
+            )
+
+    def continuous(output: str, bound: float | None) -> None:
+        if bound is not None:
+            limits.append(
+                Continuous(
+                    bound=bound, output=output, static=static[output], unit=plant.units[output]
+                )
+            )
+
+    peak("motor.torque", drive.torque_peak)
+    continuous("motor.torque", drive.torque_continuous)
+    peak("motor.speed", case.winch.speed_limit)
+    if case.winch.motor.type == "dc":
+        peak("motor.voltage", drive.voltage)
+        peak("motor.current", drive.current_peak)
+        continuous("motor.current", drive.current_continuous)
+    if case.winch.power_limit is not None and math.isfinite(case.winch.power_limit):
+        limits.append(
+            Power(
+                bound=case.winch.power_limit,
+                torque="motor.torque",
+                speed="motor.speed",
+                static=static["motor.torque"],
+                duration=time,
+            )
+        )
+    peak("rope.tension", wanted.rope_tension_peak)
+    if wanted.minimum_tension is not None:
+        limits.append(
+            Least(
+                bound=wanted.minimum_tension,
+                output="rope.tension",
+                static=static["rope.tension"],
+                duration=time,
+                unit="N",
+            )
+        )
+    _check_static(case, limits)
+    return tuple(limits)
+
+
+def _check_static(case: Case, limits: list[Limit]) -> None:
+    """Refuse limits that the load at rest breaks already, if they are to be enforced."""
+    if case.limits.drive != "enforce":
+        return
+    for limit in limits:
+        static = getattr(limit, "static", 0.0)
+        if isinstance(limit, Peak | Continuous) and abs(static) >= limit.bound:
+            raise InputError(
+                f"{case.source or case.name}: {limit.name} must be above the static load, "
+                f"{abs(static):.6g} {limit.unit}, got {limit.bound:.6g} {limit.unit}"
+            )
+
+
+def modelled_bandwidth(data: PlantData, masses: int) -> float:
+    """Return the frequency up to which `masses` hold every axial mode [rad/s]."""
+    if data.lumping == "thesis" or data.mass_per_length == 0.0:
+        return math.inf
+    rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
+    exact = fixed_top_modes(*rope, data.payload_mass, masses + 1)
+    lumped = lumped_modes(lump_rope(masses), *rope, data.payload_mass)
+    good = np.abs(lumped / exact[:masses] - 1.0) <= _HELD
+    first_bad = int(np.argmin(good)) if not good.all() else masses
+    return float(exact[first_bad])

@@ -1,0 +1,257 @@
+"""Limits on the loop itself: margins, roll-off, and what it does to slow motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+from typing_extensions import override
+
+from models.basics.checks import check_range
+
+from ..loop.phasor import Phasor
+from .limits import Limit
+
+if TYPE_CHECKING:
+    from ..loop.assess import Assessment
+    from .symbols import Symbols
+
+__all__ = [
+    "DelayMargin",
+    "GainMargin",
+    "GainMarginDown",
+    "LowFrequency",
+    "MaxSensitivity",
+    "RollOff",
+]
+
+FloatArray = npt.NDArray[np.float64]
+_RATIO = 1.4  # of the ends of one disc's diameter, where few discs do
+_MOST_DISCS = 12
+_FAR = 1e3  # a loop gain beyond which a gain margin of zero asks for nothing
+_OVERLAP = 0.2  # of neighbouring discs, in their widths
+_THICK = 0.03  # half the width of the band about the arc that a delay margin forbids
+_TINY = 1e-12
+_ABOUT = np.array([-0.05, -0.02, -0.01, -0.004, 0.0, 0.004, 0.01, 0.02, 0.05])
+
+
+@dataclass(frozen=True, kw_only=True)
+class MaxSensitivity(Limit):
+    """|S| = 1/|1 + L| at most `bound` at every frequency (module margin 1/bound)."""
+
+    name: str = "max_sensitivity"
+
+    def __post_init__(self) -> None:
+        check_range("MaxSensitivity", "bound", self.bound, low=1.0, open_low=True)
+
+    @override
+    def rows(self, symbols: Symbols, bound: Any) -> Any:
+        # The logarithm keeps |L| of 1e6 at low frequency from dwarfing what matters.
+        return ca.vertcat(*[-ca.log(bound**2 * d.squared()) for d in symbols.differences])
+
+    @override
+    def measure(self, loop: Assessment) -> float:
+        return loop.max_sensitivity
+
+    @override
+    def critical(self, loop: Assessment) -> FloatArray:
+        return loop.sensitivity_region(0.8 * self.bound)
+
+    @override
+    def worst(self, loop: Assessment) -> FloatArray:
+        return loop.sensitivity_peaks(self.bound)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GainMargin(Limit):
+    """The loop gain may grow by the factor `bound` before the loop is unstable."""
+
+    name: str = "gain_margin_up"
+    at_least: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        check_range("GainMargin", "bound", self.bound, low=1.0, open_low=True)
+
+    @override
+    def rows(self, symbols: Symbols, bound: Any) -> Any:
+        # The curve keeps off the segment [-1, -1/bound] of the real axis.
+        reach = symbols.module_margin
+        ratio = self.bound * (1.0 - reach)
+        return _off_segment(symbols, 1.0 - reach, 1.0 / bound, ratio)
+
+    @override
+    def measure(self, loop: Assessment) -> float:
+        return loop.margins.gain
+
+    @override
+    def critical(self, loop: Assessment) -> FloatArray:
+        return _around(loop.margins.real_axis_crossings)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GainMarginDown(Limit):
+    """The loop gain may fall to the factor `bound` (below 1) before the loop is unstable.
+
+    What a conditionally stable loop lacks: saturation lowers the effective gain and drives
+    it into a limit cycle.
+    """
+
+    name: str = "gain_margin_down"
+
+    def __post_init__(self) -> None:
+        check_range("GainMarginDown", "bound", self.bound, low=0.0, high=1.0, open_high=True)
+
+    @override
+    def rows(self, symbols: Symbols, bound: Any) -> Any:
+        # The curve keeps off the segment [-1/bound, -1] of the real axis.
+        far = 1.0 / ca.fmax(bound, 1.0 / _FAR)
+        reach = symbols.module_margin
+        ratio = 1.0 / (max(self.bound, 1.0 / _FAR) * (1.0 + reach))
+        return _off_segment(symbols, 1.0 + reach, far, ratio)
+
+    @override
+    def measure(self, loop: Assessment) -> float:
+        return loop.margins.gain_down
+
+    @override
+    def critical(self, loop: Assessment) -> FloatArray:
+        return _around(loop.margins.real_axis_crossings)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DelayMargin(Limit):
+    """The loop stays stable for any further delay up to `bound` [s]."""
+
+    name: str = "delay_margin"
+    unit: str = "s"
+    at_least: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        check_range("DelayMargin", "bound", self.bound, low=0.0, unit="s", open_low=True)
+
+    @override
+    def rows(self, symbols: Symbols, bound: Any) -> Any:
+        # A delay tau turns L by omega tau: L keeps off the arc of the unit circle that such a
+        # turn carries to -1.  The disc of a limit on the sensitivity covers the arc's first part.
+        covered = 2.0 * np.arcsin(0.5 * symbols.module_margin)
+        at = np.flatnonzero(symbols.omega_values * self.bound > covered).tolist()
+        turn = ca.fmin(symbols.omega[at] * bound, 2.0 * np.pi)
+        # Half as thick as wide where it is short, and its round end where the arc ends.
+        width = ca.fmax(turn - covered, 0.0)
+        thick = ca.fmin(_THICK, 0.25 * width)
+        half = 0.5 * width - thick
+        middle = np.pi + covered + 0.5 * width
+        rows = []
+        for d in symbols.differences:
+            loop = d - 1.0
+            re, im = loop.re[at], loop.im[at]
+            along = re * ca.cos(middle) + im * ca.sin(middle)
+            across = ca.fabs(im * ca.cos(middle) - re * ca.sin(middle))
+            beside = ca.atan2(across, along) < half
+            radial = (ca.sqrt(along**2 + across**2 + _TINY) - 1.0) ** 2
+            to_end = (along - ca.cos(half)) ** 2 + (across - ca.sin(half)) ** 2
+            squared = ca.if_else(beside, radial, to_end)
+            rows.append(ca.log((thick**2 + _TINY) / (squared + _TINY)))
+        return ca.vertcat(*rows)
+
+    @override
+    def measure(self, loop: Assessment) -> float:
+        return loop.margins.delay
+
+    @override
+    def critical(self, loop: Assessment) -> FloatArray:
+        return _around(loop.margins.crossovers)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RollOff(Limit):
+    """|L| at most `bound` from the frequency `above` [rad/s] on."""
+
+    above: float
+    name: str = "roll_off"
+
+    @property
+    @override
+    def edges(self) -> tuple[float, ...]:
+        return (self.above,)
+
+    @override
+    def rows(self, symbols: Symbols, bound: Any) -> Any:
+        at = np.flatnonzero(symbols.omega_values >= self.above).tolist()
+        return ca.vertcat(
+            *[ca.log((d - 1.0).squared()[at] / bound**2 + 1e-6) for d in symbols.differences]
+        )
+
+    @override
+    def measure(self, loop: Assessment) -> float:
+        return loop.largest_loop_gain(self.above)[0]
+
+    @override
+    def critical(self, loop: Assessment) -> FloatArray:
+        return np.array([self.above, loop.largest_loop_gain(self.above)[1]])
+
+
+@dataclass(frozen=True, kw_only=True)
+class LowFrequency(Limit):
+    """|output / disturbance| at most `bound` up to the frequency `below` [rad/s].
+
+    Without it the optimum drops the displacement gain, and the load drifts with tide and swell.
+    """
+
+    output: str
+    disturbance: str
+    below: float
+    name: str = "low_frequency"
+
+    @property
+    @override
+    def edges(self) -> tuple[float, ...]:
+        return (self.below,)
+
+    @override
+    def rows(self, symbols: Symbols, bound: Any) -> Any:
+        at = np.flatnonzero(symbols.omega_values <= self.below).tolist()
+        response = symbols.response(self.output, self.disturbance)
+        return ca.log(response.squared()[at] / bound**2)
+
+    @override
+    def measure(self, loop: Assessment) -> float:
+        return loop.largest_response(self.output, self.disturbance, self.below)[0]
+
+    @override
+    def critical(self, loop: Assessment) -> FloatArray:
+        worst = loop.largest_response(self.output, self.disturbance, self.below)[1]
+        return np.array([worst, self.below])
+
+
+def _around(omega: FloatArray) -> FloatArray:
+    """Return frequencies at and about `omega`: a crossing moves while the gains do."""
+    return np.outer(omega, 1.0 + _ABOUT).ravel()
+
+
+def _off_segment(symbols: Symbols, start: Any, end: Any, ratio: float) -> Any:
+    """Return rows that keep every loop off the real axis from -start to -end.
+
+    By a chain of overlapping discs centred on the axis: the end is exact, and unlike the
+    segment itself they are wide enough for nodes to see.  `ratio`, above one, is that of the
+    two ends in numbers; where it is not, the disc of a limit on the sensitivity covers all.
+    """
+    if ratio <= 1.0:
+        return ca.MX(0, 1)
+    count = min(_MOST_DISCS, max(1, int(np.ceil(np.log(ratio) / np.log(_RATIO)))))
+    rows = []
+    for k in range(count):
+        first = start * (end / start) ** (k / count)
+        last = start * (end / start) ** ((k + 1) / count)
+        first = first - _OVERLAP * (last - first)  # into the disc before
+        centre, radius = Phasor(-0.5 * (first + last), 0.0), 0.5 * (last - first)
+        rows += [_off_disc(d - 1.0, centre, radius) for d in symbols.differences]
+    return ca.vertcat(*rows)
+
+
+def _off_disc(point: Phasor, centre: Phasor, radius: Any) -> Any:
+    """Return a row that keeps `point` out of a disc; the logarithm bounds its slope far away."""
+    return ca.log((radius**2 + _TINY) / ((point - centre).squared() + _TINY))

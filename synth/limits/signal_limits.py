@@ -1,0 +1,151 @@
+"""Limits on signals: what motor, drive and rope stand, for hours and at the peak.
+
+Peaks and continuous ratings follow one rule: |static| + k sigma <= bound, with
+k = sqrt(2 ln(T / T_z)), the most probable maximum of a Gaussian signal of mean period T_z in
+the time T (Rice 1945, Longuet-Higgins 1952); sqrt(static^2 + sigma^2) <= rating.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from typing_extensions import override
+
+from models.basics.checks import check_range
+
+from .limits import Limit
+
+if TYPE_CHECKING:
+    from ..loop.assess import Assessment
+    from .symbols import Symbols
+
+__all__ = ["Continuous", "Least", "Peak", "Power", "Rms"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rms(Limit):
+    """Standard deviation of `output` at most `bound`."""
+
+    output: str
+    drive: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        check_range("Rms", "bound", self.bound, low=0.0, open_low=True)
+        if not self.name:
+            object.__setattr__(self, "name", f"{self.output}.rms")
+
+    @override
+    def rows(self, symbols: Symbols, bound: Any) -> Any:
+        return symbols.moment(self.output, 0) / bound**2 - 1.0
+
+    @override
+    def measure(self, loop: Assessment) -> float:
+        return loop.sigma(self.output)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Continuous(Limit):
+    """sqrt(static^2 + sigma^2) of `output` at most the rating `bound`."""
+
+    output: str
+    static: float = 0.0
+    drive: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            object.__setattr__(self, "name", f"{self.output}.continuous")
+
+    @override
+    def rows(self, symbols: Symbols, bound: Any) -> Any:
+        return (self.static**2 + symbols.moment(self.output, 0)) / bound**2 - 1.0
+
+    @override
+    def measure(self, loop: Assessment) -> float:
+        return float(np.hypot(self.static, loop.sigma(self.output)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Peak(Limit):
+    """|static| + k sigma of `output` at most `bound` in `duration` [s]."""
+
+    output: str
+    static: float = 0.0
+    duration: float = 10800.0
+    drive: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        check_range("Peak", "duration", self.duration, low=0.0, unit="s", open_low=True)
+        if not self.name:
+            object.__setattr__(self, "name", f"{self.output}.peak")
+
+    @override
+    def rows(self, symbols: Symbols, bound: Any) -> Any:
+        return (abs(self.static) + symbols.peak(self.output, self.duration)) / bound - 1.0
+
+    @override
+    def measure(self, loop: Assessment) -> float:
+        return abs(self.static) + loop.peak(self.output, self.duration)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Least(Limit):
+    """static - k sigma of `output` at least `bound` in `duration` [s]: a rope that stays taut."""
+
+    output: str
+    static: float
+    duration: float = 10800.0
+    at_least: ClassVar[bool] = True
+    drive: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            object.__setattr__(self, "name", f"{self.output}.least")
+
+    @override
+    def rows(self, symbols: Symbols, bound: Any) -> Any:
+        return (bound - self.static + symbols.peak(self.output, self.duration)) / abs(self.static)
+
+    @override
+    def measure(self, loop: Assessment) -> float:
+        return self.static - loop.peak(self.output, self.duration)
+
+    @override
+    def use(self, value: float) -> float:
+        # What is used of the room between the static value and the bound.
+        room = self.static - self.bound
+        return (self.static - value) / room if room > 0.0 else np.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class Power(Limit):
+    """(|static| + k_T sigma_T) k_Omega sigma_Omega of torque and speed at most `bound` [W].
+
+    Their peaks need not coincide, so the value is an upper bound of the shaft power on the
+    k-sigma box of torque and speed: on the safe side of a drive's constant-power region.
+    """
+
+    torque: str
+    speed: str
+    static: float = 0.0
+    duration: float = 10800.0
+    name: str = "motor.power.peak"
+    unit: str = "W"
+    drive: ClassVar[bool] = True
+
+    @property
+    @override
+    def outputs(self) -> tuple[str, ...]:
+        """The outputs whose variances the limit needs."""
+        return (self.torque, self.speed)
+
+    @override
+    def rows(self, symbols: Symbols, bound: Any) -> Any:
+        torque = abs(self.static) + symbols.peak(self.torque, self.duration)
+        return torque * symbols.peak(self.speed, self.duration) / bound - 1.0
+
+    @override
+    def measure(self, loop: Assessment) -> float:
+        torque = abs(self.static) + loop.peak(self.torque, self.duration)
+        return torque * loop.peak(self.speed, self.duration)

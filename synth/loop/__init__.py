@@ -1,0 +1,1 @@
+"""The loop: responses, margins and what is measured on them."""

@@ -1,0 +1,309 @@
+"""A closed loop in numbers: poles, variances, margins, extremes, for any controller.
+
+This is what the optimiser, the exchange of nodes and every report look through: one plant,
+one controller, what shakes them, and (if there is quadratic drag) the drag coefficient that
+agrees with the response.  Everything is computed when asked for and kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import SolverError
+from models.basics.metrics import peak_factor
+from models.basics.quadrature import Quadrature, adaptive_nodes
+from models.plant.drag import consistent_drag
+from models.plant.linear import LinearPlant
+
+from .controller import Controller, closed_loop_poles
+from .disturbance import Disturbance
+from .element import DragElement, with_drag
+from .loop import closed_loop, numeric_blocks, return_differences
+from .margins import Margins, loop_margins, refine_minima, worst_margins
+
+__all__ = ["Assessment"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+_RTOL = 1e-8  # of every variance
+_PADE = 6  # order of the delay models that the poles are those of
+_LATE, _LATE_PADE = 0.2, 12  # delay beyond which that is too little [s], and the order it takes
+_GRID_PER_DECADE = 150
+_MOST_NODES = 150  # that a region of high sensitivity asks for
+
+
+class Assessment:
+    """What a controller does to a plant.
+
+    Parameters
+    ----------
+    plant, controller
+        The two ends of the loop.
+    disturbances
+        What shakes the plant.
+    drag
+        Quadratic drag, if any; its coefficient is then solved with the response.
+    coefficient
+        The drag coefficient [N s/m] if it is known already (the optimiser's own).
+    """
+
+    def __init__(
+        self,
+        plant: LinearPlant,
+        controller: Controller,
+        disturbances: Sequence[Disturbance],
+        *,
+        drag: DragElement | None = None,
+        coefficient: float | None = None,
+    ) -> None:
+        self._bare = plant
+        self.controller = controller
+        self.disturbances = tuple(disturbances)
+        self._drag = drag
+        self._given = coefficient
+        self._moments: dict[str, tuple[float, float]] = {}
+
+    @cached_property
+    def coefficient(self) -> float:
+        """The drag coefficient that agrees with the response [N s/m]; 0 without drag."""
+        if self._drag is None:
+            return 0.0
+        if self._given is not None:
+            return self._given
+        return consistent_coefficient(self._bare, self.controller, self.disturbances, self._drag)
+
+    @cached_property
+    def plant(self) -> LinearPlant:
+        """The plant with its drag."""
+        if self._drag is None:
+            return self._bare
+        return with_drag(self._bare, self._drag, self.coefficient)
+
+    @cached_property
+    def poles(self) -> ComplexArray:
+        """Poles of the closed loop [1/s], delays as Pade models."""
+        late = max(self.plant.delays, default=0.0) > _LATE
+        rational = self.plant.without_delays(_LATE_PADE if late else _PADE)
+        return closed_loop_poles(rational, self.controller)
+
+    @property
+    def stable(self) -> bool:
+        """Whether all poles lie in the left half plane."""
+        return bool(self.poles.real.max(initial=-np.inf) < 0.0)
+
+    @cached_property
+    def grid(self) -> FloatArray:
+        """Frequencies dense enough to see every peak and crossing [rad/s]."""
+        open_poles = np.concatenate([self.plant.poles(), np.linalg.eigvals(self.controller.A)])
+        return frequency_grid(np.concatenate([self.poles, open_poles]))
+
+    @cached_property
+    def margins(self) -> Margins:
+        """Margins of the loops broken at the inputs."""
+        count = len(self.plant.inputs)
+        return worst_margins(
+            [loop_margins(self._loop(i), self.grid, self._grid_gain[i]) for i in range(count)]
+        )
+
+    @cached_property
+    def _grid_gain(self) -> list[ComplexArray]:
+        """L of each loop on the grid."""
+        blocks = numeric_blocks(self.plant.response(self.grid))
+        differences = return_differences(blocks, self._law(self.grid))
+        return [np.asarray(d, dtype=np.complex128) - 1.0 for d in differences]
+
+    @cached_property
+    def _peaks(self) -> list[tuple[FloatArray, FloatArray]]:
+        """Places of the local minima of |1 + L| of each loop, and their values."""
+        return [
+            refine_minima(self._distance(i), self.grid, np.abs(1.0 + gain))
+            for i, gain in enumerate(self._grid_gain)
+        ]
+
+    @property
+    def max_sensitivity(self) -> float:
+        """M_s of the worst loop, as in `margins` but without the crossings."""
+        return float(1.0 / min(least.min() for _, least in self._peaks))
+
+    def loop_gain(self, omega: FloatArray, index: int = 0) -> ComplexArray:
+        """Return L of the loop broken at input `index`, (k,)."""
+        return self._loop(index)(np.asarray(omega, dtype=np.float64))
+
+    def response(self, output: str, disturbance: str, omega: FloatArray) -> ComplexArray:
+        """Return the closed-loop response of `output` to `disturbance`, (k,)."""
+        blocks = numeric_blocks(self.plant.response(omega))
+        pair = (output, disturbance)
+        return np.asarray(closed_loop(blocks, self._law(omega), [pair])[pair])
+
+    def sigma(self, output: str) -> float:
+        """Return the standard deviation of `output`."""
+        return float(np.sqrt(self._moment(output)[0]))
+
+    def mean_period(self, output: str) -> float:
+        """Return the mean zero-crossing period of `output` [s]."""
+        m0, m2 = self._moment(output)
+        return float(2.0 * np.pi * np.sqrt(m0 / m2)) if 0.0 < m2 < np.inf else np.inf
+
+    def peak(self, output: str, duration: float) -> float:
+        """Return the most probable maximum of `output` in `duration` [s], without its mean."""
+        return peak_factor(self.mean_period(output), duration) * self.sigma(output)
+
+    def sensitivity_peaks(self, above: float) -> FloatArray:
+        """Return the frequencies of all peaks of |S| above a value [rad/s]."""
+        found = [at[least < 1.0 / above] for at, least in self._peaks]
+        return np.unique(np.concatenate(found))
+
+    def sensitivity_region(self, above: float) -> FloatArray:
+        """Return the peaks of |S| above a value, and the grid around them [rad/s]."""
+        found = []
+        for i, (at, least) in enumerate(self._peaks):
+            distance = np.abs(1.0 + self._grid_gain[i])
+            region = self.grid[distance < 1.0 / above]
+            found += [at[least < 1.0 / above], region[:: max(1, region.size // _MOST_NODES)]]
+        return np.unique(np.concatenate(found))
+
+    def largest_loop_gain(self, above: float) -> tuple[float, float]:
+        """Return the largest |L| from frequency `above` [rad/s] on, and where it is."""
+        return self._largest(
+            lambda w: np.max([np.abs(self._loop(i)(w)) for i in range(len(self.plant.inputs))], 0),
+            np.unique(np.append(self.grid[self.grid > above], [above, 10.0 * self.grid[-1]])),
+        )
+
+    def largest_response(self, output: str, disturbance: str, below: float) -> tuple[float, float]:
+        """Return the largest |response| up to frequency `below` [rad/s], and where it is."""
+        return self._largest(
+            lambda w: np.abs(self.response(output, disturbance, w)),
+            np.unique(np.append(self.grid[self.grid < below], [1e-4 * below, below])),
+        )
+
+    def spectrum(self, output: str, omega: FloatArray) -> FloatArray:
+        """Return the one-sided density of `output` at `omega` [rad/s], (k,)."""
+        pairs = [(output, d.name) for d in self.disturbances]
+        found = closed_loop(numeric_blocks(self.plant.response(omega)), self._law(omega), pairs)
+        parts = [np.abs(found[output, d.name]) ** 2 * d.density(omega) for d in self.disturbances]
+        return np.asarray(np.sum(parts, axis=0), dtype=np.float64)
+
+    def quadrature(self, outputs: Sequence[str], rtol: float = _RTOL) -> Quadrature:
+        """Return nodes on which the variance and the second moment of `outputs` are accurate."""
+        low, high, half_line = integration_band(self.disturbances, self.poles)
+        pairs = [(output, d.name) for output in outputs for d in self.disturbances]
+
+        def integrands(omega: FloatArray) -> FloatArray:
+            found = closed_loop(numeric_blocks(self.plant.response(omega)), self._law(omega), pairs)
+            rows = [
+                np.abs(found[output, d.name]) ** 2 * d.density(omega)
+                for output in outputs
+                for d in self.disturbances
+            ]
+            return np.array(rows)
+
+        return adaptive_nodes(
+            integrands,
+            low,
+            high,
+            splits=[w for d in self.disturbances for w in d.splits],
+            poles=_off_axis(self.poles),
+            rtol=rtol,
+            half_line=half_line,
+        )
+
+    def _moment(self, output: str) -> tuple[float, float]:
+        if output not in self._moments:
+            try:
+                nodes = self.quadrature([output])
+            except SolverError:
+                # A pole so close to the axis that the variance has no digits: it has no bound.
+                self._moments[output] = np.inf, np.inf
+                return self._moments[output]
+            density = self.spectrum(output, nodes.omega)
+            m0 = float(nodes.integrate(density))
+            self._moments[output] = m0, float(nodes.integrate(density * nodes.omega**2))
+        return self._moments[output]
+
+    def _loop(self, index: int) -> Callable[[FloatArray], ComplexArray]:
+        def loop(omega: FloatArray) -> ComplexArray:
+            blocks = numeric_blocks(self.plant.response(omega))
+            difference = return_differences(blocks, self._law(omega))[index]
+            return np.asarray(difference, dtype=np.complex128) - 1.0
+
+        return loop
+
+    def _distance(self, index: int) -> Callable[[FloatArray], FloatArray]:
+        loop = self._loop(index)
+        return lambda omega: np.abs(1.0 + loop(omega))
+
+    def _law(self, omega: FloatArray) -> list[list[ComplexArray]]:
+        response = self.controller.response_at(1j * omega)
+        rows, columns = response.shape[1:]
+        return [[response[:, i, j] for j in range(columns)] for i in range(rows)]
+
+    @staticmethod
+    def _largest(
+        function: Callable[[FloatArray], FloatArray], grid: FloatArray
+    ) -> tuple[float, float]:
+        at, value = refine_minima(lambda w: -function(w), grid, -function(grid))
+        k = int(np.argmin(value))
+        return float(-value[k]), float(at[k])
+
+
+def frequency_grid(poles: ComplexArray) -> FloatArray:
+    """Return a logarithmic grid [rad/s] with clusters at lightly damped `poles` [1/s]."""
+    sizes = np.abs(poles)
+    sizes = sizes[sizes > 1e-6 * max(1.0, float(sizes.max(initial=1.0)))]
+    smallest = float(sizes.min(initial=1.0))
+    low = min(1e-4, 0.01 * smallest)
+    high = 100.0 * float(sizes.max(initial=1.0))
+    count = int(_GRID_PER_DECADE * np.log10(high / low))
+    omega, damping = np.abs(poles.imag), np.abs(poles.real)
+    light = (omega > 0.0) & (damping < 0.3 * omega)
+    steps = np.array([0.0, 0.1, 0.25, 0.5, 0.8, 1.2, 2.0, 3.5, 6.0, 10.0])
+    steps = np.concatenate([-steps[:0:-1], steps])
+    near = omega[light, None] + np.maximum(damping[light], 1e-7 * omega[light])[:, None] * steps
+    grid = np.concatenate([np.geomspace(low, high, count), near.ravel()])
+    return np.unique(grid[(grid >= low) & (grid <= high)])
+
+
+def integration_band(
+    disturbances: Sequence[Disturbance], poles: ComplexArray
+) -> tuple[float, float, bool]:
+    """Return the band [rad/s] of variances, and whether to go on to 0 and infinity."""
+    if any(d.band is None for d in disturbances):
+        sizes = np.abs(poles)
+        sizes = sizes[sizes > 1e-6 * max(1.0, float(sizes.max(initial=1.0)))]
+        return (
+            0.1 * float(sizes.min(initial=1.0)),
+            10.0 * float(sizes.max(initial=1.0)),
+            True,
+        )
+    bands = [d.band for d in disturbances if d.band is not None]
+    return min(b[0] for b in bands), max(b[1] for b in bands), False
+
+
+def consistent_coefficient(
+    plant: LinearPlant,
+    controller: Controller,
+    disturbances: Sequence[Disturbance],
+    drag: DragElement,
+) -> float:
+    """Return the drag coefficient [N s/m] that agrees with the closed loop's own velocity.
+
+    Raises
+    ------
+    SolverError
+        If no coefficient agrees: the loop is unstable with any drag.
+    """
+
+    def velocity(coefficient: float) -> float:
+        view = Assessment(plant, controller, disturbances, drag=drag, coefficient=coefficient)
+        return view.sigma(drag.velocity) if view.stable else np.inf
+
+    return consistent_drag(drag.quadratic, velocity)
+
+
+def _off_axis(poles: ComplexArray) -> list[complex]:
+    return [complex(p) for p in poles if abs(p.real) > 1e-12 * max(1.0, abs(p)) and p.imag >= 0.0]

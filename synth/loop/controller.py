@@ -1,0 +1,126 @@
+"""A linear controller in state space, and the closed loop that it makes with a plant.
+
+What `synth.design.tuning` hands over and what every check of a design starts from: plain matrices
+with the names of the signals that they connect.  The sign convention is u = +C(s) y, so the
+loop gain broken at the plant's input is L = -C P_yu.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError, check_finite, read_only
+from models.plant.linear import LinearPlant
+
+if TYPE_CHECKING:
+    import control
+
+__all__ = ["Controller", "closed_loop_matrix", "closed_loop_poles"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Controller:
+    """A controller x' = A x + B y, u = C x + D y.
+
+    Parameters
+    ----------
+    A, B, C, D
+        Matrices, (n, n), (n, ny), (nu, n), (nu, ny); n may be 0.
+    measurements, inputs
+        Names of y (what the controller hears) and u (what it commands).
+
+    Raises
+    ------
+    InputError
+        If the shapes disagree or a number is not finite.
+    """
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: FloatArray
+    measurements: tuple[str, ...]
+    inputs: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        ny, nu = len(self.measurements), len(self.inputs)
+        n = np.asarray(self.A).shape[0]
+        for name, shape in (("A", (n, n)), ("B", (n, ny)), ("C", (nu, n)), ("D", (nu, ny))):
+            matrix = check_finite("controller", name, getattr(self, name))
+            if matrix.shape != shape:
+                raise InputError(f"controller: {name} must have shape {shape}, got {matrix.shape}")
+            object.__setattr__(self, name, read_only(matrix))
+
+    @staticmethod
+    def static(
+        gain: npt.ArrayLike, measurements: Sequence[str], inputs: Sequence[str]
+    ) -> Controller:
+        """Return the controller u = gain y, gain of shape (nu, ny)."""
+        D = np.asarray(gain, dtype=np.float64)
+        nu, ny = D.shape
+        return Controller(
+            A=np.zeros((0, 0)),
+            B=np.zeros((0, ny)),
+            C=np.zeros((nu, 0)),
+            D=D,
+            measurements=tuple(measurements),
+            inputs=tuple(inputs),
+        )
+
+    def response_at(self, s: npt.ArrayLike) -> ComplexArray:
+        """Return C(s) at points `s` [1/s], (k, nu, ny)."""
+        points = np.asarray(s, dtype=np.complex128).reshape(-1)
+        n = self.A.shape[0]
+        result = np.repeat(self.D[None].astype(np.complex128), points.size, axis=0)
+        if n:
+            inner = np.linalg.solve(
+                points[:, None, None] * np.eye(n) - self.A,
+                np.broadcast_to(self.B.astype(np.complex128), (points.size, *self.B.shape)),
+            )
+            result += self.C @ inner
+        return result
+
+    def to_control(self) -> control.StateSpace:
+        """Return a python-control system from the measurements to the inputs."""
+        import control
+
+        return control.ss(
+            self.A,
+            self.B,
+            self.C,
+            self.D,
+            inputs=[name.replace(".", "_") for name in self.measurements],
+            outputs=[name.replace(".", "_") for name in self.inputs],
+        )
+
+
+def closed_loop_matrix(plant: LinearPlant, controller: Controller) -> FloatArray:
+    """Return the state matrix of plant and controller in a loop, (n + nk, n + nk).
+
+    Delays of the plant are ignored: replace them first (`LinearPlant.without_delays`).
+    """
+    Dk, Ck = controller.D, controller.C
+    inverse = np.linalg.inv(np.eye(len(plant.inputs)) - Dk @ plant.D)
+    on_plant, on_states = inverse @ Dk @ plant.C, inverse @ Ck  # u = on_plant x + on_states xk
+    return np.block(
+        [
+            [plant.A + plant.B @ on_plant, plant.B @ on_states],
+            [
+                controller.B @ (plant.C + plant.D @ on_plant),
+                controller.A + controller.B @ plant.D @ on_states,
+            ],
+        ]
+    )
+
+
+def closed_loop_poles(plant: LinearPlant, controller: Controller) -> ComplexArray:
+    """Return the poles of the closed loop [1/s]; delays are ignored."""
+    return np.asarray(np.linalg.eigvals(closed_loop_matrix(plant, controller)), dtype=np.complex128)

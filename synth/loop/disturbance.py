@@ -1,0 +1,127 @@
+"""What shakes the plant: one-sided spectra of the disturbances, in one common form.
+
+`synth.design.tuning` takes a callable, a table, a spectrum object of `models` (sea, hook motion) or
+`White`; here each becomes a `Disturbance` with a density, the band that holds its variance
+and the frequencies where it is not smooth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError, check_ascending, check_finite
+from models.basics.white import White
+
+__all__ = ["Disturbance", "White", "disturbances"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disturbance:
+    """One disturbance: its name, density, band [rad/s] (None: the half line) and kinks [rad/s]."""
+
+    name: str
+    density: Callable[[FloatArray], FloatArray]
+    band: tuple[float, float] | None
+    splits: tuple[float, ...] = ()
+
+    def scaled(self, amplitude: float) -> Disturbance:
+        """Return the disturbance with its amplitude times `amplitude`."""
+        plain, factor = self.density, amplitude**2
+
+        def density(omega: FloatArray) -> FloatArray:
+            return factor * plain(omega)
+
+        return self if amplitude == 1.0 else replace(self, density=density)
+
+
+def disturbances(spectrum: Mapping[str, Any], known: tuple[str, ...]) -> tuple[Disturbance, ...]:
+    """Return the disturbances of a mapping from their names to their spectra.
+
+    Parameters
+    ----------
+    spectrum
+        By name of the disturbance: a `White`, an object with ``density``, ``band`` and
+        ``splits`` (`models.basics.quadrature.SpectralDensity`), a callable of omega [rad/s], or a
+        table (omega, density), linear in between and zero outside.
+    known
+        Names of the plant's independent disturbances.
+
+    Raises
+    ------
+    InputError
+        If there is none, a name is unknown, or a spectrum is none of these or is negative.
+    """
+    if not spectrum:
+        raise InputError("tune: spectrum must name at least one disturbance, got none")
+    result = []
+    for name, value in spectrum.items():
+        if name not in known:
+            raise InputError(
+                f"tune: spectrum: there is no disturbance {name!r}; there are: "
+                f"{', '.join(known) or 'none'}"
+            )
+        result.append(_disturbance(name, value))
+    return tuple(result)
+
+
+def _disturbance(name: str, value: Any) -> Disturbance:
+    if isinstance(value, White):
+        return Disturbance(name=name, density=value.density, band=None)
+    if hasattr(value, "density") and hasattr(value, "band"):
+        return Disturbance(
+            name=name,
+            density=_checked(name, value.density),
+            band=tuple(value.band),
+            splits=tuple(getattr(value, "splits", ())),
+        )
+    if callable(value):
+        return Disturbance(name=name, density=_checked(name, value), band=None)
+    try:
+        omega, density = value
+    except (TypeError, ValueError):
+        raise InputError(
+            f"tune: spectrum of {name} must be a callable of omega, a table (omega, density) "
+            f"or White, got {type(value).__name__}"
+        ) from None
+    owner = f"tune: spectrum of {name}"
+    nodes = check_ascending(owner, "omega", omega)
+    values = check_finite(owner, "density", density)
+    if nodes.shape != values.shape or nodes.size < 2:
+        raise InputError(
+            f"{owner}: omega and density must be equally long, at least 2, got "
+            f"{nodes.shape} and {values.shape}"
+        )
+    if nodes[0] < 0.0 or float(values.min()) < 0.0:
+        raise InputError(f"{owner}: omega and density must be at least 0")
+
+    def table(omega: FloatArray) -> FloatArray:
+        return np.interp(omega, nodes, values, left=0.0, right=0.0)
+
+    low = float(nodes[0]) if nodes[0] > 0.0 else min(float(nodes[1]), 1e-3 * float(nodes[-1]))
+    # A table that begins at zero keeps its first cell: the band starts a little above zero,
+    # where a finite density holds nothing that matters.
+    if nodes[0] == 0.0:
+        low = 1e-6 * float(nodes[-1])
+    inner = tuple(float(w) for w in nodes[1:-1] if w > low)
+    return Disturbance(name=name, density=table, band=(low, float(nodes[-1])), splits=inner)
+
+
+def _checked(name: str, density: Callable[[Any], Any]) -> Callable[[FloatArray], FloatArray]:
+    def checked(omega: FloatArray) -> FloatArray:
+        values = np.asarray(density(omega), dtype=np.float64)
+        if values.shape != np.shape(omega) or not np.all(np.isfinite(values)) or np.any(values < 0):
+            raise InputError(
+                f"tune: spectrum of {name} must return a finite density of at least 0 for every "
+                f"omega, got an array of shape {values.shape}"
+                + (f" with a least value of {values.min():g}" if values.size else "")
+            )
+        return values
+
+    return checked

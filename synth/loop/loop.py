@@ -1,0 +1,191 @@
+r"""The closed loop on frequency nodes: every response from one diagram, exact delays included.
+
+::
+
+                 w ---->+-----------+----> z
+                        |   plant   |
+              +--> u -->|           |----> y --+
+              |         +-----------+          |
+              |                                |
+              +----------- C(s) <--------------+
+
+    z = zw w + zu u,  y = yw w + yu u,  u = C y
+    F = zw + zu (I - C yu)^-1 C yw          closed loop from w to z
+    L = -C yu                               loop gain broken at u
+    1 + L_i = det(I - C yu) / minor_ii      loop i broken, all others closed; S_i its inverse
+
+The formulas are stated once, for NumPy's complex arrays and for `synth.loop.phasor.Phasor`
+symbols: the optimiser and the reports thus cannot disagree on what a loop is.  (The
+verification uses none of this.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from models.plant.response import PlantResponse
+
+from .phasor import constant
+
+__all__ = [
+    "Blocks",
+    "close_scalar",
+    "closed_loop",
+    "determinant",
+    "numeric_blocks",
+    "return_differences",
+]
+
+Complex = Any
+Matrix = list[list[Complex]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Blocks:
+    """A plant's response at the nodes, as nested lists of vectors over the nodes."""
+
+    zw: Matrix
+    zu: Matrix
+    yw: Matrix
+    yu: Matrix
+    outputs: tuple[str, ...]
+    disturbances: tuple[str, ...]
+
+    def row(self, output: str) -> int:
+        """Return the position of an output."""
+        return self.outputs.index(output)
+
+    def column(self, disturbance: str) -> int:
+        """Return the position of a disturbance."""
+        return self.disturbances.index(disturbance)
+
+
+def numeric_blocks(response: PlantResponse, *, symbolic: bool = False) -> Blocks:
+    """Return the blocks of a response, as NumPy vectors or as CasADi constants."""
+
+    def nested(block: npt.NDArray[np.complex128]) -> Matrix:
+        rows, columns = block.shape[1:]
+        make = constant if symbolic else np.asarray
+        return [[make(block[:, i, j]) for j in range(columns)] for i in range(rows)]
+
+    return Blocks(
+        zw=nested(response.zw),
+        zu=nested(response.zu),
+        yw=nested(response.yw),
+        yu=nested(response.yu),
+        outputs=response.outputs,
+        disturbances=response.disturbances,
+    )
+
+
+def closed_loop(
+    blocks: Blocks, law: Matrix, wanted: Sequence[tuple[str, str]]
+) -> Mapping[tuple[str, str], Complex]:
+    """Return the closed-loop responses of the wanted (output, disturbance) pairs."""
+    difference = _difference(blocks, law)
+    commands: dict[int, list[Complex]] = {}  # per disturbance: the commands u it causes
+    result: dict[tuple[str, str], Complex] = {}
+    for output, disturbance in wanted:
+        row, column = blocks.row(output), blocks.column(disturbance)
+        if column not in commands:
+            heard = [_dot(line, [y[column] for y in blocks.yw]) for line in law]
+            commands[column] = _solve(difference, heard)
+        result[output, disturbance] = blocks.zw[row][column] + _dot(
+            blocks.zu[row], commands[column]
+        )
+    return result
+
+
+def return_differences(blocks: Blocks, law: Matrix) -> list[Complex]:
+    """Return 1 + L_i for each loop i broken at its input with all other loops closed."""
+    difference = _difference(blocks, law)
+    count = len(difference)
+    if count == 1:
+        return [difference[0][0]]
+    result = []
+    for i in range(count):
+        unit = [1.0 if k == i else 0.0 for k in range(count)]
+        result.append(1.0 / _solve(difference, unit)[i])
+    return result
+
+
+def determinant(blocks: Blocks, law: Matrix) -> Complex:
+    """Return det(I - C yu): closed-loop over open-loop characteristic function."""
+    rows = [list(line) for line in _difference(blocks, law)]
+    result: Complex = rows[0][0]
+    for k in range(len(rows) - 1):
+        for i in range(k + 1, len(rows)):
+            ratio = rows[i][k] / rows[k][k]
+            for j in range(k + 1, len(rows)):
+                rows[i][j] = rows[i][j] - ratio * rows[k][j]
+        result = result * rows[k + 1][k + 1]
+    return result
+
+
+def close_scalar(blocks: Blocks, output: str, disturbance: str, gain: Any) -> Blocks:
+    """Return the blocks with `disturbance` = ... + gain * `output` closed around the plant.
+
+    This is how an equivalent linear element (drag: force = -C velocity) enters with a
+    coefficient that is itself unknown: a rank-one update of every block,
+    ``P_ab + P_af gain (1 - P_vf gain)^-1 P_vb`` (Woodbury).
+    """
+    v, f = blocks.row(output), blocks.column(disturbance)
+    factor = gain / (1.0 - blocks.zw[v][f] * gain)
+    to_z = [blocks.zw[i][f] * factor for i in range(len(blocks.zw))]
+    to_y = [blocks.yw[i][f] * factor for i in range(len(blocks.yw))]
+
+    def updated(block: Matrix, out: list[Complex], row: list[Complex]) -> Matrix:
+        return [
+            [entry + out[i] * row[j] for j, entry in enumerate(line)]
+            for i, line in enumerate(block)
+        ]
+
+    return Blocks(
+        zw=updated(blocks.zw, to_z, blocks.zw[v]),
+        zu=updated(blocks.zu, to_z, blocks.zu[v]),
+        yw=updated(blocks.yw, to_y, blocks.zw[v]),
+        yu=updated(blocks.yu, to_y, blocks.zu[v]),
+        outputs=blocks.outputs,
+        disturbances=blocks.disturbances,
+    )
+
+
+def _difference(blocks: Blocks, law: Matrix) -> Matrix:
+    """Return I - C yu."""
+    columns = range(len(law))
+    return [
+        [(1.0 if i == j else 0.0) - _dot(line, [y[j] for y in blocks.yu]) for j in columns]
+        for i, line in enumerate(law)
+    ]
+
+
+def _dot(a: Sequence[Complex], b: Sequence[Complex]) -> Complex:
+    total: Complex = 0.0
+    for x, y in zip(a, b, strict=True):
+        if isinstance(x, float | int) and x == 0.0:
+            continue  # a structural zero costs nothing
+        total = y * x + total  # the response first: it knows complex arithmetic
+    return total
+
+
+def _solve(matrix: Matrix, right: Sequence[Complex]) -> list[Complex]:
+    """Solve a small system whose entries are vectors over the nodes (no pivoting: symbols)."""
+    count = len(matrix)
+    rows = [list(line) for line in matrix]
+    b = list(right)
+    for k in range(count):
+        for i in range(k + 1, count):
+            ratio = rows[i][k] / rows[k][k]
+            for j in range(k + 1, count):
+                rows[i][j] = rows[i][j] - ratio * rows[k][j]
+            b[i] = b[i] - ratio * b[k]
+    for i in reversed(range(count)):
+        for j in range(i + 1, count):
+            b[i] = b[i] - rows[i][j] * b[j]
+        b[i] = b[i] / rows[i][i]
+    return b

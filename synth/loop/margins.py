@@ -1,0 +1,173 @@
+"""Stability margins of a loop from its frequency response, refined until grid-free.
+
+Every margin here is that of a loop that is stable at its nominal gain and delay; whether it
+is, `synth.loop.assess` asks of the poles.  Peaks are found on a grid and refined by zooming,
+crossings by bisection, so that no figure depends on the grid's spacing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Margins", "loop_margins", "refine_minima"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+LoopGain = Callable[[FloatArray], ComplexArray]
+
+_INSIDE = np.arange(1.0, 9.0) / 9.0
+_SPLITS = 16  # of a bracket into nine: 50 bits
+_ZOOM = np.linspace(0.0, 1.0, 17)
+_ROUNDS = 7  # each zooms by a factor of eight: 8^7 is 2e6
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Margins:
+    """Margins of a stable loop; for several loops, of the worst one.
+
+    Attributes
+    ----------
+    max_sensitivity
+        M_s, the peak of |1/(1+L)|, at `peak` [rad/s].
+    gain
+        Factor by which the gain may grow; infinity if without bound.
+    gain_down
+        Factor to which the gain may fall; 0 if all the way.
+    phase
+        Phase margin, the least at any crossover [rad]; infinity without a crossover.
+    delay
+        Further delay that makes the loop unstable [s]; infinity without a crossover.
+    disk
+        Balanced disk margin alpha, 1/max|S - 1/2| (Seiler, Packard and Gahinet 2020, skew 0).
+    crossovers, real_axis_crossings
+        Where |L| = 1 and where L crosses the negative real axis [rad/s].
+    """
+
+    max_sensitivity: float
+    peak: float
+    gain: float
+    gain_down: float
+    phase: float
+    delay: float
+    disk: float
+    crossovers: FloatArray
+    real_axis_crossings: FloatArray
+
+    def __str__(self) -> str:
+        """Return the figures as a small tree."""
+        return (
+            f"Margins\n├ M_s {self.max_sensitivity:.3f} at {self.peak:.3g} rad/s\n"
+            f"├ gain x {self.gain_down:.3g} .. {self.gain:.3g}\n"
+            f"├ phase {np.degrees(self.phase):.1f} deg\n"
+            f"├ delay {self.delay * 1e3:.1f} ms\n└ disk {self.disk:.3f}"
+        )
+
+
+def loop_margins(loop: LoopGain, grid: FloatArray, gain: ComplexArray) -> Margins:
+    """Return the margins of `loop`(omega) -> L, (k,), known as `gain` on a grid [rad/s]."""
+    peak_at, distance = refine_minima(lambda w: np.abs(1.0 + loop(w)), grid, np.abs(1.0 + gain))
+    # |S - 1/2| = |1 - L| / (2 |1 + L|)
+    _, disk = refine_minima(lambda w: _disk_distance(loop(w)), grid, _disk_distance(gain))
+    crossovers = _crossings(lambda w: np.abs(loop(w)) - 1.0, grid, np.abs(gain) - 1.0)
+    at_unity = loop(crossovers) if crossovers.size else np.zeros(0, complex)
+    turn = np.angle(-at_unity)  # angle beyond -180 deg
+    axis = _crossings(lambda w: loop(w).imag, grid, gain.imag)
+    on_axis = loop(axis).real if axis.size else np.zeros(0)
+    axis, on_axis = _with_ends(grid, gain, axis, on_axis)
+    negative = on_axis < 0.0
+    above, below = on_axis[negative & (on_axis > -1.0)], on_axis[negative & (on_axis < -1.0)]
+    return Margins(
+        max_sensitivity=float(1.0 / distance.min()),
+        peak=float(peak_at[np.argmin(distance)]),
+        gain=float(np.min(-1.0 / above)) if above.size else np.inf,
+        gain_down=float(np.max(-1.0 / below)) if below.size else 0.0,
+        phase=float(np.abs(turn).min()) if turn.size else np.inf,
+        delay=float((np.mod(turn, 2.0 * np.pi) / crossovers).min()) if turn.size else np.inf,
+        disk=float(disk.min()),
+        crossovers=crossovers,
+        real_axis_crossings=axis[negative],
+    )
+
+
+def worst_margins(margins: list[Margins]) -> Margins:
+    """Return the worst of each figure over several loops."""
+    if len(margins) == 1:
+        return margins[0]
+    peak = max(margins, key=lambda m: m.max_sensitivity)
+    return Margins(
+        max_sensitivity=peak.max_sensitivity,
+        peak=peak.peak,
+        gain=min(m.gain for m in margins),
+        gain_down=max(m.gain_down for m in margins),
+        phase=min(m.phase for m in margins),
+        delay=min(m.delay for m in margins),
+        disk=min(m.disk for m in margins),
+        crossovers=np.sort(np.concatenate([m.crossovers for m in margins])),
+        real_axis_crossings=np.sort(np.concatenate([m.real_axis_crossings for m in margins])),
+    )
+
+
+def refine_minima(
+    function: Callable[[FloatArray], FloatArray], grid: FloatArray, values: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return places and values of all local minima of `function`, refined from a grid.
+
+    The ends of the grid count as minima.  All brackets are zoomed into at once, so the
+    function is called a handful of times with long vectors.
+    """
+    inner = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])) + 1
+    ends = np.array([0, grid.size - 1])
+    if not inner.size:
+        return grid[ends], values[ends]
+    low, high = grid[inner - 1], grid[inner + 1]
+    best, at = values[inner], grid[inner]
+    for _ in range(_ROUNDS):
+        nodes = low[:, None] + (high - low)[:, None] * _ZOOM
+        inside = function(nodes.ravel()).reshape(nodes.shape)
+        k = np.argmin(inside, axis=1)
+        rows = np.arange(len(k))
+        better = inside[rows, k] < best
+        best = np.where(better, inside[rows, k], best)
+        at = np.where(better, nodes[rows, k], at)
+        low = nodes[rows, np.maximum(k - 1, 0)]
+        high = nodes[rows, np.minimum(k + 1, _ZOOM.size - 1)]
+    return np.concatenate([at, grid[ends]]), np.concatenate([best, values[ends]])
+
+
+def _crossings(
+    function: Callable[[FloatArray], FloatArray], grid: FloatArray, values: FloatArray
+) -> FloatArray:
+    """Return where `function` changes its sign between grid points, all of them zoomed into."""
+    # Zero counts as positive, so that a crossing that falls on a grid point is seen once.
+    at = np.flatnonzero((values[:-1] >= 0.0) != (values[1:] >= 0.0))
+    low, high, left = grid[at], grid[at + 1], values[at] >= 0.0
+    if not at.size:
+        return np.zeros(0)
+    rows = np.arange(at.size)
+    for _ in range(_SPLITS):
+        # Many points in one call cost little more than one: a ninth of the bracket is left.
+        nodes = low[:, None] + (high - low)[:, None] * _INSIDE
+        changed = (function(nodes.ravel()).reshape(nodes.shape) >= 0.0) != left[:, None]
+        first = np.where(changed.any(axis=1), changed.argmax(axis=1), _INSIDE.size)
+        ends = np.column_stack([low, nodes, high])
+        low, high = ends[rows, first], ends[rows, first + 1]
+    return 0.5 * (low + high)
+
+
+def _with_ends(
+    grid: FloatArray, gain: ComplexArray, axis: FloatArray, on_axis: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Add the ends of the grid where L starts or ends on the real axis (a finite DC gain)."""
+    for i in (0, -1):
+        if abs(gain[i]) > 1e-6 and abs(gain[i].imag) < 1e-3 * abs(gain[i]):
+            axis, on_axis = np.append(axis, grid[i]), np.append(on_axis, gain[i].real)
+    return axis, on_axis
+
+
+def _disk_distance(gain: ComplexArray) -> FloatArray:
+    # 1 - L may vanish: the distance is then unbounded, which a least value does not mind.
+    return np.asarray(2.0 * np.abs(1.0 + gain) / np.maximum(np.abs(1.0 - gain), 1e-300))

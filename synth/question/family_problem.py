@@ -1,0 +1,187 @@
+"""Several loops with one set of parameters: the problem of robust and of scheduled design.
+
+    plants x seas -> Scenario, Scenario, ... -> FamilyProblem -> FamilyProgramme -> search
+
+A scenario is a `Problem` of its own, with its occurrence and, for the regret, the best cost
+that gains of its own would reach.  The parameters that are searched for are the same for all;
+where gains follow a schedule, a *blend* makes each scenario's gains from them, so that
+robust design and gain scheduling are one problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError, check_range
+
+from ..structures.structure import Parameter
+from .problem import Problem, Values
+
+__all__ = ["FamilyProblem", "Objective", "Scenario"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class Objective(Enum):
+    """What one set of gains is to make small over all scenarios."""
+
+    WORST = "worst"
+    MEAN = "mean"
+    REGRET = "regret"
+
+    @classmethod
+    def of(cls, name: str | Objective) -> Objective:
+        """Return the objective of a name.
+
+        Raises
+        ------
+        InputError
+            If there is none of that name.
+        """
+        if isinstance(name, Objective):
+            return name
+        try:
+            return cls(name)
+        except ValueError:
+            names = ", ".join(o.value for o in cls)
+            raise InputError(f"objective: must be one of {names}, got {name!r}") from None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scenario:
+    """One loop of a family.
+
+    Attributes
+    ----------
+    name
+        How reports call it.
+    problem
+        Its plant, disturbances and limits.
+    weight
+        Its occurrence; only ratios count.
+    best
+        The least cost that parameters of its own would reach, for the regret.
+    blend
+        Its parameters as a matrix times the searched ones, (own, searched); None: the same.
+    """
+
+    name: str
+    problem: Problem
+    weight: float = 1.0
+    best: float = 1.0
+    blend: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        check_range("scenario", "weight", self.weight, low=0.0)
+        check_range("scenario", "best", self.best, low=0.0, open_low=True)
+
+    def values(self, searched: Values) -> FloatArray:
+        """Return the scenario's own parameters."""
+        given = np.asarray(searched, dtype=np.float64)
+        return given if self.blend is None else np.asarray(self.blend @ given, dtype=np.float64)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FamilyProblem:
+    """Scenarios with one set of searched parameters, and what is made small.
+
+    Parameters
+    ----------
+    scenarios
+        At least one.
+    objective
+        Worst cost, root of the occurrence-weighted mean square, or worst ratio to `best`.
+    parameters
+        The searched parameters; by default those of the first scenario's law.
+
+    Raises
+    ------
+    InputError
+        If there is no scenario, no weight, or the numbers of parameters disagree.
+    """
+
+    scenarios: tuple[Scenario, ...]
+    objective: Objective = Objective.WORST
+    parameters: tuple[Parameter, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.scenarios:
+            raise InputError("family: must have at least one scenario, got none")
+        if not self.parameters:
+            object.__setattr__(self, "parameters", self.scenarios[0].problem.law.parameters)
+        if not any(s.weight > 0.0 for s in self.scenarios):
+            raise InputError("family: at least one scenario must have a weight above 0")
+        for scenario in self.scenarios:
+            own = len(scenario.problem.law.parameters)
+            found = (own, own) if scenario.blend is None else scenario.blend.shape
+            if found != (own, len(self.parameters)):
+                raise InputError(
+                    f"family: scenario {scenario.name} must make its {own} parameters of the "
+                    f"{len(self.parameters)} searched ones, got a blend of shape {found}"
+                )
+
+    @cached_property
+    def scales(self) -> FloatArray:
+        """Typical sizes of the searched parameters."""
+        return np.array([p.scale for p in self.parameters])
+
+    @cached_property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """Scenarios that share one loop and differ in what shakes it, by index.
+
+        With quadratic drag no two share a loop: the drag follows the sea.
+        """
+        found: dict[tuple[object, ...], list[int]] = {}
+        for i, scenario in enumerate(self.scenarios):
+            problem, blend = scenario.problem, scenario.blend
+            loop_limits = tuple(lim for lim in problem.limits if not lim.drive)
+            key: tuple[object, ...] = (id(problem.plant), loop_limits)
+            key += (None if blend is None else blend.tobytes(),)
+            found.setdefault(key if problem.drag is None else (i,), []).append(i)
+        return tuple(tuple(members) for members in found.values())
+
+    def with_scenarios(self, scenarios: Sequence[Scenario]) -> FamilyProblem:
+        """Return the same problem over other scenarios."""
+        return FamilyProblem(
+            scenarios=tuple(scenarios), objective=self.objective, parameters=self.parameters
+        )
+
+    def stable(self, values: Values, coefficients: Sequence[float | None] | None = None) -> bool:
+        """Return whether every loop is stable."""
+        for group in self.groups:
+            scenario = self.scenarios[group[0]]
+            coefficient = None if coefficients is None else coefficients[group[0]]
+            if not scenario.problem.stable(scenario.values(values), coefficient):
+                return False
+        return True
+
+    def abscissa(self, values: Values, enough: float = np.inf) -> float:
+        """Return the largest `Problem.abscissa` of all loops; from `enough` on any such value."""
+        largest = -np.inf
+        for group in self.groups:
+            scenario = self.scenarios[group[0]]
+            largest = max(largest, scenario.problem.abscissa(scenario.values(values)))
+            if largest >= enough:
+                break
+        return largest
+
+    def growth(self, values: Values) -> float:
+        """Return the largest real part of a pole of any loop [1/s]."""
+        firsts = [self.scenarios[group[0]] for group in self.groups]
+        return max(s.problem.growth(s.values(values)) for s in firsts)
+
+    def total(self, costs: Sequence[float] | FloatArray) -> float:
+        """Return what the objective makes of the scenarios' costs."""
+        values = np.asarray(costs, dtype=np.float64)
+        if self.objective is Objective.WORST:
+            return float(values.max())
+        if self.objective is Objective.REGRET:
+            return float((values / [s.best for s in self.scenarios]).max())
+        weights = np.array([s.weight for s in self.scenarios])
+        return float(np.sqrt(weights @ values**2 / weights.sum()))

@@ -1,0 +1,77 @@
+"""The problem of synthesis: a plant, a law, what shakes them, what counts and what limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from models.plant.linear import LinearPlant
+
+from ..limits.limits import Limit
+from ..loop.disturbance import Disturbance
+from ..loop.element import DragElement, with_drag
+from ..structures.structure import Law
+
+__all__ = ["Goal", "Problem", "Values"]
+
+FloatArray = npt.NDArray[np.float64]
+Values = Sequence[float] | FloatArray
+
+PADE = 5  # order of the delay model that the stability guard sees
+_SLOW = 1e-4  # no real pole slower than this share of the plant's slowest one
+_DECAY = 1e-9  # a pole must lie this far left, relative to the size of the largest one
+
+
+class Goal(Enum):
+    """What a programme looks for."""
+
+    COST = "least variance within the limits"
+    SEA = "largest disturbance for which the limits can be kept"
+    RELAX = "least factor on the chosen limits for which they can be kept"
+    FEASIBLE = "least violation of the limits"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Problem:
+    """The question: plant, law, what shakes it, what is minimised, what limits it."""
+
+    plant: LinearPlant
+    law: Law
+    disturbances: tuple[Disturbance, ...]
+    minimise: dict[str, float]
+    limits: tuple[Limit, ...]
+    drag: DragElement | None = None
+
+    @cached_property
+    def rational(self) -> LinearPlant:
+        """The plant with Pade models for its delays, for the stability guard."""
+        return self.plant.without_delays(PADE)
+
+    @cached_property
+    def slow_point(self) -> float:
+        """Point -decay on the real axis that no closed-loop pole may pass [1/s]."""
+        sizes = np.abs(self.plant.poles())
+        return -_SLOW * float(sizes[sizes > 1e-6 * sizes.max(initial=1.0)].min(initial=1.0))
+
+    def growth(self, values: Values) -> float:
+        """Return the largest real part of a closed-loop pole [1/s], drag as the plant holds it."""
+        matrix = self.law.closed_loop_matrix(self.rational, [float(v) for v in values])
+        return float(np.linalg.eigvals(matrix).real.max(initial=-np.inf))
+
+    def abscissa(self, values: Values, coefficient: float | None = None) -> float:
+        """Return the largest real part of a closed-loop pole over the size of the largest."""
+        plant = self.rational
+        if self.drag is not None and coefficient is not None:
+            plant = with_drag(plant, self.drag, coefficient)
+        matrix = self.law.closed_loop_matrix(plant, [float(v) for v in values])
+        poles = np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
+        return float(poles.real.max(initial=-1.0) / max(1.0, float(np.abs(poles).max(initial=1.0))))
+
+    def stable(self, values: Values, coefficient: float | None = None) -> bool:
+        """Return whether the closed loop is stable."""
+        return self.abscissa(values, coefficient) < -_DECAY

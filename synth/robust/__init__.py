@@ -1,0 +1,1 @@
+"""Robust design: families of plants, schedules, worst cases, mu."""

@@ -1,0 +1,290 @@
+"""A family of plants and seas: what one set of gains has to hold.
+
+    case + what varies + sea states -> Family -> corners, grid, random draws -> cases
+
+Parameters of the case are named by their dotted paths; a list of numbers stands for the whole
+range between its ends, a `Choice` for its values alone.  The sea states are few and each has
+an occurrence, as in a scatter diagram.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError
+from models.case.case import Case
+from models.spread.fields import ALIASES
+
+from .sea_states import SeaState as SeaState
+from .sea_states import read_scatter as read_scatter
+
+__all__ = ["Axis", "Choice", "Family", "Member", "SeaState", "read_scatter"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_MOST_CORNERS = 4096
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Values of a parameter with nothing in between: layers of a drum, types of a load."""
+
+    values: tuple[Any, ...]
+
+    def __init__(self, *values: Any) -> None:
+        object.__setattr__(self, "values", values)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axis:
+    """One parameter that varies: its path, its values, and whether it takes those between."""
+
+    path: str
+    values: tuple[Any, ...]
+    continuous: bool
+
+    @property
+    def low(self) -> float:
+        """Lower end of a continuous axis."""
+        return float(min(self.values))
+
+    @property
+    def high(self) -> float:
+        """Upper end of a continuous axis."""
+        return float(max(self.values))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Member:
+    """A point of the parameters, in their axes' order, in a sea state by its index."""
+
+    point: tuple[Any, ...]
+    sea: int = 0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Family:
+    """All plants and seas that a case stands for.
+
+    Attributes
+    ----------
+    case
+        The case that is varied.
+    axes
+        What varies.
+    seas
+        Sea states with their occurrence.
+    """
+
+    case: Case
+    axes: tuple[Axis, ...]
+    seas: tuple[SeaState, ...]
+
+    @classmethod
+    def of(
+        cls,
+        case: Case,
+        vary: Mapping[str, Sequence[Any] | Choice],
+        seas: Sequence[SeaState | Sequence[float]] | None = None,
+    ) -> Family:
+        """Return the family of a case.
+
+        Parameters
+        ----------
+        case
+            The case.
+        vary
+            By dotted path (or `depth`, `payload`, `added_mass`, `stiffness`, `radius`,
+            `delay`): values, of which numbers span a range, or a `Choice`.  Added mass and
+            submerged weight grow with `payload.mass` unless they are varied themselves.
+        seas
+            `SeaState`, (H_s, T_p) or (H_s, T_p, occurrence); the case's own if left out.
+
+        Raises
+        ------
+        InputError
+            If a path is unknown, a value is not valid, or there is nothing to vary.
+        """
+        axes = tuple(_axis(case, ALIASES.get(path, path), v) for path, v in vary.items())
+        paths = [axis.path for axis in axes]
+        if len(set(paths)) < len(paths):
+            raise InputError(f"family: a path is given twice, got {', '.join(paths)}")
+        states = [_sea(s) for s in seas] if seas else [_own_sea(case)]
+        if not sum(s.occurrence for s in states) > 0.0:
+            raise InputError("family: at least one sea state must have an occurrence above 0")
+        return cls(case=case, axes=axes, seas=tuple(s for s in states if s.occurrence > 0.0))
+
+    @property
+    def occurrence(self) -> FloatArray:
+        """Occurrence of each sea state, adding up to 1."""
+        weights = np.array([s.occurrence for s in self.seas])
+        return np.asarray(weights / weights.sum())
+
+    @property
+    def continuous(self) -> tuple[int, ...]:
+        """Indices of the axes that take every value between their ends."""
+        return tuple(i for i, a in enumerate(self.axes) if a.continuous and a.low < a.high)
+
+    def corners(self) -> list[Member]:
+        """Return the ends of all ranges and all choices, in every sea state.
+
+        Raises
+        ------
+        InputError
+            If there are more than 4096.
+        """
+        ends = [(a.low, a.high) if a.continuous else a.values for a in self.axes]
+        return list(self._product(ends))
+
+    def grid(self) -> list[Member]:
+        """Return all combinations of the values given, in every sea state."""
+        return list(self._product([a.values for a in self.axes]))
+
+    def nominal(self) -> list[Member]:
+        """Return the case's own point, moved into the ranges, in every sea state."""
+        point = []
+        for axis in self.axes:
+            own = _value(self.case, axis.path)
+            if axis.continuous:
+                middle = 0.5 * (axis.low + axis.high)
+                point.append(min(max(middle if own is None else own, axis.low), axis.high))
+            else:
+                point.append(own if own in axis.values else axis.values[0])
+        return [Member(point=tuple(point), sea=k) for k in range(len(self.seas))]
+
+    def draw(self, count: int, seed: int) -> list[Member]:
+        """Return random members: uniform in the ranges and choices, seas by occurrence."""
+        rng = np.random.default_rng(seed)
+        columns: list[list[Any]] = []
+        for axis in self.axes:
+            if axis.continuous:
+                columns.append([float(v) for v in rng.uniform(axis.low, axis.high, count)])
+            else:
+                columns.append([axis.values[i] for i in rng.integers(len(axis.values), size=count)])
+        seas = rng.choice(len(self.seas), size=count, p=self.occurrence)
+        points = zip(*columns, strict=True) if columns else [()] * count
+        return [Member(point=p, sea=int(k)) for p, k in zip(points, seas, strict=True)]
+
+    def case_at(self, member: Member) -> Case:
+        """Return the case of a member.
+
+        Raises
+        ------
+        InputError
+            If the values are not valid together.
+        """
+        return self.case.replace({**self.changes(member), **self._sea_changes(member)})
+
+    def changes(self, member: Member) -> dict[str, Any]:
+        """Return a member's parameters by path, without its sea."""
+        given = dict(zip((a.path for a in self.axes), member.point, strict=True))
+        mass = given.get("payload.mass")
+        if mass is not None:
+            payload = self.case.payload
+            share = mass / payload.mass
+            together = {
+                "payload.added_mass": payload.hydrodynamic_mass,
+                "payload.submerged_weight": payload.submerged_weight,
+            }
+            given |= {path: share * v for path, v in together.items() if path not in given}
+        return given
+
+    def name_of(self, member: Member) -> str:
+        """Return a member's values in words."""
+        parts = [f"{a.path} {_text(v)}" for a, v in zip(self.axes, member.point, strict=True)]
+        if len(self.seas) > 1 or not parts:
+            parts.append(str(self.seas[member.sea]))
+        return ", ".join(parts)
+
+    def _sea_changes(self, member: Member) -> dict[str, float]:
+        return self.seas[member.sea].changes(self.case)
+
+    def _product(self, values: Sequence[Sequence[Any]]) -> Iterator[Member]:
+        distinct = [tuple(dict.fromkeys(v)) for v in values]
+        total = math.prod(len(v) for v in distinct) * len(self.seas)
+        if total > _MOST_CORNERS:
+            raise InputError(
+                f"family: at most {_MOST_CORNERS} combinations can be listed, got {total}; "
+                "vary fewer parameters"
+            )
+        for point in itertools.product(*distinct):
+            for k in range(len(self.seas)):
+                yield Member(point=point, sea=k)
+
+
+def _axis(case: Case, path: str, values: Sequence[Any] | Choice) -> Axis:
+    """Return an axis, its values read like those of a case file."""
+    if path.startswith(("sea.", "vessel.")):
+        raise InputError(f"family: {path} cannot be varied; sea states are given as seas")
+    choice = isinstance(values, Choice)
+    raw = values.values if isinstance(values, Choice) else tuple(values)
+    if not raw:
+        raise InputError(f"family: {path} must have at least one value, got none")
+    read = []
+    for value in raw:
+        if isinstance(value, bool | int | float) or choice:
+            read.append(value)
+            continue
+        read.append(_read(case, path, value))
+    numbers = all(isinstance(v, int | float) and not isinstance(v, bool) for v in read)
+    axis = Axis(path=path, values=tuple(read), continuous=numbers and not choice)
+    probe = Family(case=case, axes=(axis,), seas=(_own_sea(case),))
+    for value in axis.values:
+        probe.case_at(Member(point=(value,)))  # a wrong path or value is told here
+    return axis
+
+
+def _read(case: Case, path: str, text: Any) -> Any:
+    """Return a value with a unit in SI, as the field at a path reads it."""
+    from pydantic import TypeAdapter, ValidationError
+
+    *sections, key = path.split(".")
+    section = _value(case, ".".join(sections)) if sections else case
+    field = type(section).model_fields.get(key) if section is not None else None
+    if field is None:
+        return _value(case.replace({path: text}), path)  # tells what is wrong with the path
+    kind: Any = field.annotation
+    if field.metadata:
+        kind = Annotated[(field.annotation, *field.metadata)]
+    try:
+        return TypeAdapter(kind).validate_python(text)
+    except ValidationError as error:
+        reason = error.errors()[0]["msg"]
+        raise InputError(f"family: {path}: {reason}") from None
+
+
+def _value(case: Case, path: str) -> Any:
+    """Return the value at a dotted path, None where there is none."""
+    found: Any = case
+    for part in path.split("."):
+        found = found[int(part)] if part.isdigit() else getattr(found, part, None)
+    if path == "payload.added_mass" and found is None:
+        return case.payload.hydrodynamic_mass
+    return found
+
+
+def _sea(given: SeaState | Sequence[float]) -> SeaState:
+    if isinstance(given, SeaState):
+        return given
+    if not 2 <= len(given) <= 3:
+        raise InputError(f"family: a sea must be (H_s, T_p[, occurrence]), got {tuple(given)}")
+    return SeaState(
+        significant_height=float(given[0]),
+        peak_period=float(given[1]),
+        occurrence=float(given[2]) if len(given) == 3 else 1.0,
+    )
+
+
+def _own_sea(case: Case) -> SeaState:
+    return SeaState(significant_height=case.sea.significant_height)
+
+
+def _text(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, int | float) else str(value)

@@ -1,0 +1,315 @@
+r"""Gains that follow the rope's length: smooth functions through optimised nodes.
+
+    case + lengths -> gains at a few nodes -> spline in log L -> checked between the nodes
+                   -> where it does not hold or costs too much: one more node -> GainSchedule
+
+Every gain is a cubic spline over log L, linear between two nodes; at any length it is a fixed
+combination of its values at the nodes.  So the nodes' gains are tuned together, by the
+programme of a family whose members are lengths, each with its blend of the nodes
+(`synth.question.family_problem`).  Lengths between the nodes at which a limit leaks become members.
+The length changes slowly against the loop: each length is a loop of its own.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError, check_range
+from models.basics.threads import one_thread
+from models.case.case import Case
+
+from ..design.tuning import tuning_of
+from ..question.family_problem import FamilyProblem, Objective, Scenario
+from ..search.family_search import FamilyFound, search_family
+from ..search.multistart import Found, search
+from ..search.polishing import KEPT
+from .family import Family, Member
+from .family_plants import FamilyPlants
+from .gain_schedule import LENGTH
+from .gain_schedule import GainSchedule as GainSchedule
+from .gain_schedule import SchedulePoint as SchedulePoint
+from .gain_schedule import blend_of as blend_of
+from .worst_case import exact_figures
+
+__all__ = ["GainSchedule", "SchedulePoint", "blend_of", "schedule_gains"]
+
+FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+_STARTS = 6
+_STANDS_OUT = 0.02  # of a log cost above both neighbours', from which it is searched again
+_ALONE = 4  # starts of a length's own best, besides its neighbour's
+_MOST_NODES = 9
+_MOST_ROUNDS = 12
+_CLOSE = 0.10  # what a schedule may lose against gains of its own at any length, relatively
+
+
+@one_thread()
+def schedule_gains(
+    case: Case,
+    lengths: tuple[float, float],
+    *,
+    checks: int = 33,
+    close: float = _CLOSE,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> GainSchedule:
+    """Return gains over the rope's length that hold everywhere between two lengths.
+
+    Parameters
+    ----------
+    case
+        The case; its own length does not matter.
+    lengths
+        Shortest and longest rope [m].
+    checks
+        Lengths, evenly in log L, at which the schedule has to hold.
+    close
+        What it may lose against gains of its own at any of them, relatively, before it gets
+        one more node.
+    seed
+        Of the searches at the nodes.
+    progress
+        Called as progress(stage, done, total).
+
+    Raises
+    ------
+    InputError
+        If the lengths are not in order, or the case does not allow them.
+    """
+    shortest, longest = (float(v) for v in lengths)
+    if not 0.0 < shortest < longest:
+        raise InputError(f"gain schedule: lengths must be two ascending ones, got {lengths}")
+    check_range("gain schedule", "checks", checks, low=5, high=500)
+    work = _Work(case, np.geomspace(shortest, longest, int(checks)), seed, progress)
+    return work.schedule(close)
+
+
+class _Work:
+    """What one schedule takes: the loop at each checked length, its own best gains."""
+
+    def __init__(
+        self, case: Case, lengths: FloatArray, seed: int, progress: Progress | None
+    ) -> None:
+        self.case, self.lengths, self._seed = case, lengths, seed
+        self._tell = progress or (lambda stage, done, total: None)
+        family = Family.of(case, {LENGTH: [float(lengths[0]), float(lengths[-1])]})
+        self.plants = FamilyPlants(family)
+        self.members = [Member(point=(float(v),)) for v in lengths]
+        self.middles = np.sqrt(lengths[1:] * lengths[:-1])
+
+    @cached_property
+    def own(self) -> list[Found | None]:
+        """The best gains of each checked length alone, by continuation from its neighbour."""
+        found: list[Found | None] = []
+        guesses = [list(g) for g in self.plants.guesses]
+        for k, member in enumerate(self.members):
+            self._tell("the best of each length", k, len(self.members))
+            problem = self.plants.scenario(member).problem
+            starts = _STARTS if not found else _ALONE
+            one = search(problem, starts, self._seed, guesses)
+            good = one.solved is not None and one.excess <= KEPT
+            found.append(one if good else None)
+            if good and one.solved is not None:
+                guesses = [[float(v) for v in one.solved.values]]
+        for k in [*range(len(found) - 2, -1, -1), *range(1, len(found))]:
+            self._mend(found, k)
+        return found
+
+    def _mend(self, found: list[Found | None], index: int) -> None:
+        """Search again at a length whose cost stands out, from its neighbours' gains.
+
+        A search may end in a worse basin at one length of many; its neighbours tell.
+        """
+        beside = [k for k in (index - 1, index + 1) if 0 <= k < len(found)]
+        near = [f.solved for k in beside if (f := found[k]) is not None and f.solved is not None]
+        here = found[index]
+        if not near:
+            return
+        usual = max(s.objective for s in near) + _STANDS_OUT
+        if here is not None and here.solved is not None and here.solved.objective <= usual:
+            return
+        problem = self.plants.scenario(self.members[index]).problem
+        again = search(problem, _ALONE, self._seed, [[float(v) for v in s.values] for s in near])
+        if again.solved is None or again.excess > KEPT:
+            return
+        if here is None or here.solved is None or again.solved.objective < here.solved.objective:
+            found[index] = again
+
+    def schedule(self, close: float) -> GainSchedule:
+        """Return the schedule, its nodes added until it holds and costs little."""
+        own = self.own
+        lost = [float(v) for v, f in zip(self.lengths, own, strict=True) if f is None]
+        names = tuple(p.name for p in self.plants.law.parameters)
+        if lost:
+            status = f"no gains keep the limits at a length of {lost[0]:.4g} m"
+            return self._made([0, len(own) - 1], np.zeros((2, len(names))), [], False, status)
+        nodes = [0, len(own) - 1]
+        members = {float(self.lengths[i]) for i in (0, len(own) // 2, len(own) - 1)}
+        best: tuple[list[int], FloatArray, list[SchedulePoint], int] | None = None
+        for k in range(_MOST_ROUNDS):
+            self._tell("tuning the nodes together", k, _MOST_ROUNDS)
+            gains = self._tuned(nodes, sorted(members))
+            more = _widest(nodes)
+            if gains is not None:
+                points = [self._point(nodes, gains, float(v)) for v in self.lengths]
+                wrong = [p for p in points if not p.ok]
+                looked = len(points)
+                if not wrong:
+                    between = [self._point(nodes, gains, float(v)) for v in self.middles]
+                    wrong, looked = [p for p in between if not p.ok], looked + len(between)
+                fresh = [p for p in wrong if p.length not in members]
+                if fresh:
+                    members |= _spread(fresh, self.lengths)
+                    continue
+                if not wrong:
+                    best = nodes, gains, points, looked
+                    losses = [p.payload_rms / p.best_rms - 1.0 for p in points]
+                    if max(losses) <= close:
+                        break
+                    more = int(np.argmax(losses))
+                    if more in nodes:
+                        more = _widest(nodes)
+            if more is None or len(nodes) >= _MOST_NODES:
+                break
+            nodes = sorted({*nodes, more})
+            members |= {float(self.lengths[i]) for i in nodes}
+        if best is None:
+            status = f"no schedule of {_MOST_NODES} nodes keeps the limits at every length"
+            values = np.array([f.solved.values for f in own if f is not None and f.solved])
+            return self._made(nodes, values[nodes], [], False, status)
+        return self._finished(*best, close)
+
+    def _finished(
+        self,
+        nodes: list[int],
+        gains: FloatArray,
+        points: list[SchedulePoint],
+        looked: int,
+        close: float,
+    ) -> GainSchedule:
+        chosen = np.unique(np.linspace(0, len(self.lengths) - 1, 5).astype(int))
+        passed = 0
+        for n, i in enumerate(chosen):
+            self._tell("verify", n, len(chosen))
+            passed += self._verified(nodes, gains, int(i))
+        loss = max(p.payload_rms / p.best_rms for p in points) - 1.0
+        status = (
+            f"holds at {looked} lengths with {len(nodes)} nodes, at most "
+            f"{100.0 * loss:.1f} % worse than gains of their own"
+        )
+        if passed < len(chosen):
+            status = f"not verified: {passed} of {len(chosen)} lengths passed"
+        elif loss > close:
+            status += f", more than the {100.0 * close:.0f} % asked for"
+        made = self._made(nodes, gains, points, passed == len(chosen), status)
+        return replace(made, verified=(passed, len(chosen)))
+
+    def _made(
+        self,
+        nodes: Sequence[int],
+        gains: FloatArray,
+        points: Sequence[SchedulePoint],
+        ok: bool,
+        status: str,
+    ) -> GainSchedule:
+        return GainSchedule(
+            case=self.case,
+            lengths=self.lengths[list(nodes)],
+            gains=gains,
+            names=tuple(p.name for p in self.plants.law.parameters),
+            amplifier=self.plants.nominal.amplifier,
+            ok=ok,
+            status=status,
+            points=tuple(points),
+        )
+
+    def _tuned(self, nodes: Sequence[int], members: Sequence[float]) -> FloatArray | None:
+        """Return the gains at the nodes that serve some lengths best together."""
+        parameters = self.plants.law.parameters
+        count = len(parameters)
+        starts = np.array([f.solved.values for f in self.own if f is not None and f.solved])
+        found: FamilyFound | None = None
+        scenarios = []
+        for length in members:
+            weights = blend_of(self.lengths[list(nodes)], length)
+            scenario = self.plants.scenario(Member(point=(length,)))
+            blend = np.asarray(np.kron(weights, np.eye(count)), dtype=np.float64)
+            scenarios.append(replace(scenario, blend=blend, best=self._best(length)))
+        every = tuple(
+            replace(p, name=f"{p.name} at {self.lengths[node]:.4g} m")
+            for node in nodes
+            for p in parameters
+        )
+        problem = FamilyProblem(
+            scenarios=tuple(scenarios), objective=Objective.REGRET, parameters=every
+        )
+        guesses = [starts[list(nodes)].ravel()]
+        # Between nodes in different basins a spline may be unstable: then one set for all.
+        guesses += [np.tile(starts[k], len(nodes)) for k in (0, len(starts) // 2, -1)]
+        stable = [g for g in guesses if problem.stable(g)]
+        if stable:
+            found = search_family(problem, len(stable), self._seed, stable, only_guesses=True)
+        if found is None or found.solved is None or found.excess > 10.0 * KEPT:
+            return None
+        return np.asarray(found.solved.values.reshape(len(nodes), count))
+
+    def _point(self, nodes: Sequence[int], gains: FloatArray, length: float) -> SchedulePoint:
+        values = [float(v) for v in blend_of(self.lengths[list(nodes)], length) @ gains]
+        figures = exact_figures(self.plants, values, Member(point=(length,)))
+        return SchedulePoint(
+            length=length,
+            payload_rms=figures.payload_rms,
+            # No worse than what is done: a search of its own may have missed it by a hair.
+            best_rms=min(self._best(length), figures.payload_rms),
+            max_sensitivity=figures.max_sensitivity,
+            use=figures.use,
+            limit=figures.limit,
+            growth=figures.growth,
+        )
+
+    def _best(self, length: float) -> float:
+        """Return what gains of its own do at a length [m], between those looked at in between."""
+        costs = [float(f.solved.objective) for f in self.own if f is not None and f.solved]
+        return float(np.exp(np.interp(np.log(length), np.log(self.lengths), costs)))
+
+    def _verified(self, nodes: Sequence[int], gains: FloatArray, index: int) -> bool:
+        """Return whether other code confirms the loop at one length."""
+        from ..search.polishing import view_of
+
+        scenario: Scenario = self.plants.scenario(self.members[index])
+        own = self.own[index]
+        assert own is not None
+        assert own.solved is not None
+        values = blend_of(self.lengths[list(nodes)], float(self.lengths[index])) @ gains
+        solved = replace(own.solved, values=np.asarray(values), coefficient=None)
+        view = view_of(scenario.problem, solved)
+        drag = scenario.problem.drag is not None
+        solved = replace(solved, coefficient=view.coefficient if drag else None)
+        tuning = tuning_of(scenario.problem, Found(solved=solved, view=view, excess=0.0))
+        failed = tuning.verify().failed
+        return not [name for name in failed if not name.startswith("limits")]
+
+
+def _widest(nodes: Sequence[int]) -> int | None:
+    """Return the middle of the widest gap between nodes, if there is anything in it."""
+    gap, first = max((b - a, a) for a, b in itertools.pairwise(nodes))
+    return None if gap < 2 else first + gap // 2
+
+
+def _spread(points: Sequence[SchedulePoint], lengths: FloatArray) -> set[float]:
+    """Return the worst of each run of neighbouring lengths that do not hold."""
+    step = 1.5 * float(np.log(lengths[1] / lengths[0]))
+    runs: list[list[SchedulePoint]] = []
+    for point in points:
+        if runs and np.log(point.length / runs[-1][-1].length) < step:
+            runs[-1].append(point)
+        else:
+            runs.append([point])
+    return {max(run, key=lambda p: p.use).length for run in runs}

@@ -1,0 +1,340 @@
+"""The members of a family that hurt most, and what thousands of random ones say.
+
+    gains + family -> corners, Sobol points -> the worst of them, zoomed in on -> members to add
+    gains + family -> 10 000 draws -> share that is stable, worst figures -> DrawCheck
+
+Everything goes through `synth.robust.loop_stack`, which no search uses.  Peaks of narrow resonances
+and limits that need crossings (gain and delay margins, roll-off) are looked at exactly, one
+by one, for the members that are worst already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import qmc
+
+from models.basics.checks import InputError, read_only
+from models.basics.intervals import share
+
+from ..limits.limits import Limit
+from ..limits.margin_limits import MaxSensitivity
+from ..loop.assess import Assessment
+from ..question.family_problem import Objective
+from ..question.question import PAYLOAD
+from .family import Member
+from .family_plants import FamilyPlants
+from .loop_stack import StackView, consistent_stack
+from .plant_stack import PlantStack
+
+__all__ = ["DrawCheck", "Figures", "draw_check", "exact_figures", "figures_of", "worst_members"]
+
+FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+_SAMPLES = 256  # Sobol points of a search for the worst
+_TOP = 6  # of them that are zoomed in on
+_AROUND = 24  # points around each in a round of zooming
+_ZOOMS = 3
+_CHUNK = 1000  # draws that are looked at between two words of progress
+_QUANTILES = (0.5, 0.9, 0.99, 1.0)
+LOOSE = 5e-3  # relative excess over a limit that a draw on common nodes may have
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figures:
+    """What gains do to one member.
+
+    Attributes
+    ----------
+    member
+        The member.
+    growth
+        Largest real part of a pole [1/s].
+    payload_rms, max_sensitivity
+        [m] and [-]; infinite where the loop is unstable.
+    use, limit
+        Largest use of a limit, and which.
+    """
+
+    member: Member
+    growth: float
+    payload_rms: float
+    max_sensitivity: float
+    use: float
+    limit: str
+
+    @property
+    def stable(self) -> bool:
+        """Whether the loop is stable."""
+        return self.growth < 0.0
+
+    def hurt(self, level: float) -> float:
+        """Return how much the member asks for more than a cost `level` and the limits give."""
+        if not self.stable:
+            return np.inf
+        return float(np.log(max(self.payload_rms / level, self.use)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DrawCheck:
+    """What random members of the family say about gains.
+
+    Attributes
+    ----------
+    count, stable, kept
+        Draws, how many are stable, and how many keep every limit that was looked at (to 0.5 %).
+    interval
+        95 % confidence interval of the share that is stable (Clopper and Pearson 1934).
+    worst_rms, worst_use
+        The draws with the largest payload motion, and with the largest use of a limit.
+    quantiles
+        Payload rms [m] that 50, 90, 99 and 100 % of the stable draws stay below.
+    payload_rms, max_sensitivity
+        Of the stable draws [m], [-].
+    seed
+        Of the draws.
+    """
+
+    count: int
+    stable: int
+    kept: int
+    interval: tuple[float, float]
+    worst_rms: Figures
+    worst_use: Figures
+    quantiles: Mapping[float, float]
+    payload_rms: FloatArray
+    max_sensitivity: FloatArray
+    seed: int
+
+    def __str__(self) -> str:
+        """Return the verdict in a line."""
+        return (
+            f"{self.stable} of {self.count} random draws are stable (95 % confidence: at least "
+            f"{100.0 * self.interval[0]:.2f} %), {self.kept} keep the limits"
+        )
+
+
+def figures_of(
+    plants: FamilyPlants, values: Sequence[float], members: Sequence[Member]
+) -> list[Figures]:
+    """Return what gains do to many members, on common nodes."""
+    stack = plants.stack(members)
+    nodes, densities = plants.shaken(members)
+    controller = plants.law.controller([float(v) for v in values])
+    loops = consistent_stack(stack, controller, nodes, densities, plants.nominal.drag_before)
+    limits = [lim for lim in plants.nominal.limits if lim.drive or isinstance(lim, MaxSensitivity)]
+    outputs = sorted({PAYLOAD, *(o for limit in limits for o in limit.outputs)})
+    moments = loops.moments(outputs, nodes, densities)
+    peaks, growth = loops.max_sensitivity(), loops.growth
+    stable = loops.stable
+    found = []
+    for k, member in enumerate(members):
+        if not stable[k]:
+            found.append(_unstable(member, max(float(growth[k]), 1e-300)))
+            continue
+        sigmas = {name: (float(m[0][k]), float(m[1][k])) for name, m in moments.items()}
+        view = StackView(max_sensitivity=float(peaks[k]), sigmas=sigmas)
+        use, name = 0.0, ""
+        for limit in limits:
+            own = _at_rest(limit, stack, k)
+            used = own.use(own.measure(view))  # type: ignore[arg-type]  # all that it asks for
+            if used > use:
+                use, name = used, limit.name
+        found.append(
+            Figures(
+                member=member,
+                growth=float(growth[k]),
+                payload_rms=view.sigma(PAYLOAD),
+                max_sensitivity=float(peaks[k]),
+                use=use,
+                limit=name,
+            )
+        )
+    return found
+
+
+def exact_figures(plants: FamilyPlants, values: Sequence[float], member: Member) -> Figures:
+    """Return what gains do to one member: every limit, refined nodes, exact delays."""
+    problem = plants.scenario(member).problem
+    view = Assessment(
+        problem.plant,
+        problem.law.controller([float(v) for v in values]),
+        problem.disturbances,
+        drag=problem.drag,
+    )
+    growth = float(view.poles.real.max())
+    if growth >= 0.0:
+        return _unstable(member, growth)
+    uses = {limit.name: limit.use(limit.measure(view)) for limit in problem.limits}
+    name = max(uses, key=lambda n: uses[n], default="")
+    return Figures(
+        member=member,
+        growth=growth,
+        payload_rms=view.sigma(PAYLOAD),
+        max_sensitivity=view.max_sensitivity,
+        use=uses.get(name, 0.0),
+        limit=name,
+    )
+
+
+def worst_members(
+    plants: FamilyPlants,
+    values: Sequence[float],
+    level: float,
+    objective: Objective,
+    *,
+    tolerance: float,
+    most: int = 2,
+    seed: int = 0,
+    known: Sequence[Member] = (),
+) -> list[Figures]:
+    """Return members that hurt more than a tolerance, the worst first; none if there is none.
+
+    Parameters
+    ----------
+    plants, values
+        The family and the gains.
+    level
+        The cost [m] that the gains are said to hold; it counts for the worst case only.
+    tolerance
+        Of the logarithm of cost over level, and of use of a limit.
+    most
+        How many to return.
+    seed
+        Of the Sobol points.
+    known
+        Members that are in the set already.
+    """
+    family = plants.family
+    count_cost = objective is Objective.WORST
+    level = level if count_cost else np.inf
+    # The corners where there are few: extremes of a smooth thing are mostly at ends.
+    try:
+        members = family.corners()
+    except InputError:
+        members = []
+    members = members[:_SAMPLES] + _sobol(plants, seed)
+    found = figures_of(plants, values, members)
+    best = sorted(found, key=lambda f: -f.hurt(level))[:_TOP]
+    width = 0.25
+    for _ in range(_ZOOMS if family.continuous else 0):
+        around = [m for f in best for m in _around(plants, f.member, width, seed)]
+        seed += 1
+        best = sorted([*best, *figures_of(plants, values, around)], key=lambda f: -f.hurt(level))
+        best = best[:_TOP]
+        width *= 0.35
+    exact: list[Figures] = []
+    for candidate in best:
+        if candidate.member in known or any(candidate.member == f.member for f in exact):
+            continue
+        if all(_apart(plants, candidate.member, f.member) for f in exact):
+            exact.append(exact_figures(plants, values, candidate.member))
+    worse = [f for f in exact if f.hurt(level) > tolerance]
+    return sorted(worse, key=lambda f: -f.hurt(level))[:most]
+
+
+def draw_check(
+    plants: FamilyPlants,
+    values: Sequence[float],
+    count: int,
+    seed: int = 1,
+    progress: Progress | None = None,
+) -> DrawCheck:
+    """Return what `count` random members say about gains."""
+    members = plants.family.draw(count, seed)
+    every: list[Figures] = []
+    for at in range(0, count, _CHUNK):
+        if progress is not None:
+            progress("random draws", at, count)
+        every += figures_of(plants, values, members[at : at + _CHUNK])
+    if progress is not None:
+        progress("random draws", count, count)
+    stable = [f for f in every if f.stable]
+    rms = np.array([f.payload_rms for f in stable])
+    kept = sum(1 for f in stable if f.use <= 1.0 + LOOSE)
+    unstable = [f for f in every if not f.stable]
+    certain = share(len(stable), count)
+    return DrawCheck(
+        count=count,
+        stable=len(stable),
+        kept=kept,
+        interval=(certain.low, certain.high),
+        worst_rms=max(unstable or stable, key=lambda f: f.payload_rms),
+        worst_use=max(unstable or stable, key=lambda f: f.use),
+        quantiles={q: float(np.quantile(rms, q)) if rms.size else np.inf for q in _QUANTILES},
+        payload_rms=read_only(rms),
+        max_sensitivity=read_only(np.array([f.max_sensitivity for f in stable])),
+        seed=seed,
+    )
+
+
+def _unstable(member: Member, growth: float) -> Figures:
+    return Figures(
+        member=member,
+        growth=growth,
+        payload_rms=np.inf,
+        max_sensitivity=np.inf,
+        use=np.inf,
+        limit="stability",
+    )
+
+
+def _at_rest(limit: Limit, stack: PlantStack, index: int) -> Limit:
+    """Return a limit with the static value of one plant of a stack."""
+    name = getattr(limit, "output", None) or getattr(limit, "torque", None)
+    if name is None or not hasattr(limit, "static") or name not in stack.static:
+        return limit
+    changed: Limit = replace(limit, static=float(stack.static[name][index]))  # type: ignore[call-arg]
+    return changed
+
+
+def _sobol(plants: FamilyPlants, seed: int) -> list[Member]:
+    family = plants.family
+    if not family.continuous:
+        return []
+    count = len(family.axes)
+    points = qmc.Sobol(count + 1, seed=seed).random_base2(int(np.log2(_SAMPLES)))
+    edges = np.cumsum(family.occurrence)
+    members = []
+    for row in points:
+        point = []
+        for axis, u in zip(family.axes, row[:count], strict=True):
+            if axis.continuous:
+                point.append(axis.low + float(u) * (axis.high - axis.low))
+            else:
+                point.append(axis.values[min(int(u * len(axis.values)), len(axis.values) - 1)])
+        sea = min(int(np.searchsorted(edges, row[-1])), len(edges) - 1)
+        members.append(Member(point=tuple(point), sea=sea))
+    return members
+
+
+def _around(plants: FamilyPlants, member: Member, width: float, seed: int) -> list[Member]:
+    """Return points about a member, as far as `width` of each range, in all seas by turns."""
+    family, rng = plants.family, np.random.default_rng(seed)
+    members = []
+    for k in range(_AROUND):
+        point = list(member.point)
+        for i in family.continuous:
+            axis = family.axes[i]
+            step = width * (axis.high - axis.low) * rng.uniform(-1.0, 1.0)
+            point[i] = min(max(float(point[i]) + step, axis.low), axis.high)
+        sea = member.sea if k % 3 else int(rng.integers(len(family.seas)))
+        members.append(Member(point=tuple(point), sea=sea))
+    return members
+
+
+def _apart(plants: FamilyPlants, a: Member, b: Member) -> bool:
+    """Return whether two members differ by more than a hundredth of some range."""
+    if a.sea != b.sea:
+        return True
+    for i, axis in enumerate(plants.family.axes):
+        if axis.continuous and axis.high > axis.low:
+            if abs(a.point[i] - b.point[i]) > 0.01 * (axis.high - axis.low):
+                return True
+        elif a.point[i] != b.point[i]:
+            return True
+    return False

@@ -1,0 +1,1 @@
+"""Limit cycles of a saturated loop, by describing functions."""

@@ -1,0 +1,1 @@
+"""The search for parameters: starts, programmes, polishing, following."""

@@ -1,0 +1,268 @@
+"""The search over a family: many starts, all loops at once, the best answers polished.
+
+    FamilyProblem -> starts that stabilise every loop -> IPOPT from each
+                  -> exchange of nodes on every loop -> FamilyFound
+
+The same steps as `synth.search.multistart` takes for one loop, with its candidates, nodes and
+looks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..loop.assess import Assessment
+from ..question.family_problem import FamilyProblem
+from ..question.problem import Problem, Values
+from .family_polish import PER_DECADE, looks_at, polish_family, shaken_by_all, view_from
+from .family_programme import FamilyProgramme, FamilySolved
+from .multistart import Start
+from .nodes import cost_nodes, margin_nodes
+from .polishing import KEPT, thinned
+from .programme import Pace
+from .starts import candidates, pick_spread, stabilise
+
+__all__ = ["FamilyFound", "begin_points", "coarse_programme", "polish_family", "search_family"]
+
+FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+_CANDIDATES = 512
+_TRIES = 3  # starts that are tried for each that is to arrive
+_SAMPLE = 4  # starts whose loops the nodes of the first pass are made for
+_POLISHED = 12  # distinct answers that are polished at most: the best of the first may leak most
+_AGREE = 1e-4  # answers whose objectives differ by less, relatively, are one answer
+_BROKEN = 3.0  # weight of the largest broken limit in the merit of a candidate
+_WORST = 20.0  # what broken limits may add to the merit of a candidate
+_MOST_VIEWS = 40  # points of which each loop's merit is taken
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FamilyFound:
+    """What a search over a family found.
+
+    Attributes
+    ----------
+    solved
+        The best answer, or None if nothing stabilises every loop.
+    views
+        A look at each scenario's loop.
+    excess
+        Largest relative excess over a limit of any scenario.
+    starts, agreed
+        Every start, and how many arrived at the best answer.
+    reference
+        Searched parameters at which every loop is briskly stable.
+    """
+
+    solved: FamilySolved | None
+    views: tuple[Assessment, ...] = ()
+    excess: float = np.inf
+    starts: tuple[Start, ...] = ()
+    agreed: int = 0
+    reference: FloatArray | None = None
+
+    @property
+    def costs(self) -> FloatArray:
+        """The scenarios' costs on refined quadrature."""
+        if self.solved is None:
+            return np.zeros(0)
+        return self.solved.costs
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Simultaneous(Problem):
+    """The first scenario's problem, whose loop counts as stable where every loop is."""
+
+    family: FamilyProblem
+
+    @classmethod
+    def of(cls, family: FamilyProblem) -> _Simultaneous:
+        first = family.scenarios[0].problem
+        return cls(
+            plant=first.plant,
+            law=first.law,
+            disturbances=first.disturbances,
+            minimise=first.minimise,
+            limits=first.limits,
+            drag=first.drag,
+            family=family,
+        )
+
+    def growth(self, values: Values) -> float:
+        return self.family.growth(values)
+
+    def stable(self, values: Values, coefficient: float | None = None) -> bool:
+        del coefficient
+        return self.family.stable(values)
+
+
+def search_family(
+    family: FamilyProblem,
+    starts: int = 8,
+    seed: int = 0,
+    guesses: Sequence[Values] = (),
+    progress: Progress | None = None,
+    only_guesses: bool = False,
+) -> FamilyFound:
+    """Return the best answer of a multi-start search over a family.
+
+    Parameters
+    ----------
+    family
+        The scenarios and the objective.
+    starts, seed
+        Size and seed of the search.
+    guesses
+        Searched parameters to start from before any that are drawn.
+    progress
+        Called as progress(stage, done, total).
+    only_guesses
+        Draw nothing: start from the guesses alone, if any of them is stable.
+    """
+    tell = progress or (lambda stage, done, total: None)
+    kept = [np.asarray(g, dtype=np.float64) for g in guesses]
+    begins = [g for g in kept if family.stable(g)] if only_guesses else []
+    if not begins:
+        begins = begin_points(family, _TRIES * starts, seed, kept)
+    if not begins:
+        return FamilyFound(solved=None)
+    reference = min(begins, key=family.abscissa)
+    programme = coarse_programme(family, begins, reference)
+    records: list[Start] = []
+    first: list[FamilySolved] = []
+    count = min(starts, len(begins))
+    for begin in begins:
+        if len(first) >= count:
+            break
+        tell("starts", len(first), count)
+        solved = programme.solve(programme.pack(begin))
+        stable = family.stable(solved.values, solved.coefficients)
+        good = stable and solved.converged
+        records.append(
+            Start(
+                begin=begin,
+                end=solved.values,
+                cost=float(np.exp(solved.objective)) if good else np.inf,
+                converged=solved.converged,
+                stable=stable,
+                message=solved.message,
+                iterations=solved.iterations,
+            )
+        )
+        if good:
+            first.append(solved)
+    tell("starts", count, count)
+    if not first:
+        solved = min(
+            (programme.solve(programme.pack(b), pace=Pace.NEAR) for b in begins[:2]),
+            key=lambda s: (not s.converged, programme.violations(programme.pack(s.values))[1]),
+        )
+        views, excess = looks_at(family, solved)
+        return FamilyFound(
+            solved=solved,
+            views=views,
+            excess=max(excess, 1e-3),
+            starts=tuple(records),
+            reference=reference,
+        )
+    distinct: list[FamilySolved] = []
+    for solved in sorted(first, key=lambda s: s.objective):
+        if all(abs(solved.objective - other.objective) > _AGREE for other in distinct):
+            distinct.append(solved)
+    best: tuple[FamilySolved, tuple[Assessment, ...], float] | None = None
+    sound = _second_pass(family, distinct[:_POLISHED], reference)
+    origin = sound[0][0]
+    for k, (came_from, solved) in enumerate(sound):
+        tell("polish", k, len(sound))
+        if best is not None and best[2] <= KEPT and solved.objective > best[0].objective:
+            break  # polishing only adds nodes, that is constraints: it cannot get better
+        candidate = polish_family(family, solved, reference)
+        rank = candidate[2] > KEPT, candidate[0].objective
+        if best is None or rank < (best[2] > KEPT, best[0].objective):
+            best, origin = candidate, came_from
+    assert best is not None
+    tell("polish", 1, 1)
+    return FamilyFound(
+        solved=best[0],
+        views=best[1],
+        excess=best[2],
+        starts=tuple(records),
+        agreed=sum(1 for s in first if abs(s.objective - origin.objective) <= _AGREE),
+        reference=reference,
+    )
+
+
+def begin_points(
+    family: FamilyProblem, count: int, seed: int, guesses: Sequence[Values] = ()
+) -> list[FloatArray]:
+    """Return points at which every loop is stable, the most promising first."""
+    groups = [family.scenarios[g[0]] for g in family.groups]
+    points = [np.asarray(g, dtype=np.float64)[None] for g in guesses]
+    if all(s.blend is None for s in groups):
+        chosen = groups[:: max(1, len(groups) // 4)]
+        points += [candidates(s.problem, _CANDIDATES // len(chosen), seed) for s in chosen]
+    if not points:
+        return []
+    every = np.vstack(points)
+    growths = np.array([family.abscissa(p, enough=0.0) for p in every])
+    stable = every[growths < -1e-9]
+    if len(stable) < count:
+        rest = np.where(growths < 0.0, np.inf, growths)
+        found = stabilise(_Simultaneous.of(family), every, rest, count)
+        stable = np.vstack([stable, *[f[None] for f in found if family.abscissa(f) < -1e-9]])
+    if not len(stable):
+        return []
+    # The guesses stay in front: who gives one knows why.
+    given = [p for p in stable[: len(guesses)] if any(np.array_equal(p, g) for g in guesses)]
+    order = np.array([family.abscissa(p) for p in stable])
+    kept = [stable[i] for i in pick_spread(stable, order, family.scales, _MOST_VIEWS)]
+    programme = coarse_programme(family, kept, kept[0])
+    merit = []
+    for point in kept:
+        costs, broken = programme.violations(programme.pack(point))
+        total = family.total(np.exp(np.minimum(np.nan_to_num(costs, nan=_WORST), _WORST)))
+        # A loop too fast for its margins has the least cost of all: it must not come first.
+        merit.append(np.log(total) + min(_WORST, _BROKEN * broken))
+    ranked = pick_spread(np.array(kept), np.array(merit), family.scales, count)
+    return [*given, *(kept[i] for i in ranked)][: max(count, len(given))]
+
+
+def _second_pass(
+    family: FamilyProblem, first: Sequence[FamilySolved], reference: FloatArray
+) -> list[tuple[FamilySolved, FamilySolved]]:
+    """Return (where it came from, answer) again with nodes where any leaked, the best first."""
+    held = [np.zeros(0) for _ in family.groups]
+    for solved in first:
+        views, _ = looks_at(family, solved)
+        for k, group in enumerate(family.groups):
+            limits = family.scenarios[group[0]].problem.limits
+            held[k] = thinned([held[k], *(lim.critical(views[group[0]]) for lim in limits)])
+    programme = coarse_programme(family, [s.values for s in first], reference, held)
+    pairs = []
+    for old in first:
+        new = programme.solve(programme.pack(old.values, old.coefficients), pace=Pace.NEAR)
+        sound = new.converged and family.stable(new.values, new.coefficients)
+        pairs.append((old, new if sound else old))
+    return sorted(pairs, key=lambda pair: pair[1].objective)
+
+
+def coarse_programme(
+    family: FamilyProblem,
+    begins: Sequence[FloatArray],
+    reference: FloatArray,
+    held: Sequence[FloatArray] | None = None,
+) -> FamilyProgramme:
+    """Return a programme on nodes that suit the starts, with those `held` for each group."""
+    nodes, omega = [], []
+    for k, group in enumerate(family.groups):
+        first = family.scenarios[group[0]]
+        views = [view_from(first, begin) for begin in begins[:_SAMPLE]]
+        nodes.append(cost_nodes(shaken_by_all(family, group), views, rtol=1e-4))
+        margins = margin_nodes(first.problem, [v.poles for v in views], PER_DECADE)
+        omega.append(margins if held is None else np.union1d(margins, held[k]))
+    return FamilyProgramme(family, nodes, omega, reference=reference, tolerance=1e-6)

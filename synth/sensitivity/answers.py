@@ -1,0 +1,220 @@
+"""A fixed design on a world that changes: one face for gains and for every other structure.
+
+    GainDesign | StructureDesign -> Answers -> closed loop on any case, with any gain moved
+
+The controller is that of the design whatever the case becomes: sensitivity is about a world that
+differs from the one designed for.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError, SolverError
+from models.basics.physics_warning import PhysicsWarning
+from models.basics.white import White
+from models.case.case import Case
+from models.hook.hook import HookMotion
+from models.plant.plant import build_plant
+from models.plant.plant_data import PlantData
+from models.sensing.plant import sensed_plant, sensed_spectra
+
+from ..design.design import GainDesign
+from ..design.structure_design import StructureDesign
+from ..loop.assess import Assessment
+from ..loop.controller import Controller
+from ..loop.disturbance import Disturbance, disturbances
+from ..loop.element import DragElement
+from ..question.question import HOOK, pose
+from ..question.structure_question import SampledNoise
+from ..structures.structure import Law
+from .differences import derivative
+from .fields import numbers_of
+
+__all__ = ["Answers", "answers_of"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Answers:
+    """A design as sensitivity sees it.
+
+    Attributes
+    ----------
+    case, masses
+        The case that the figures hold for, and its rope masses.
+    law, names, values, units
+        The structure bound to its plant, its parameters' names, values and units.
+    measurements
+        What it hears of the plant with all sensors; None for the bare plant's payload signals.
+    reference
+        The drag before compensation [N s/m]: where a consistent drag is counted from.
+    drag
+        The design's own drag coefficient [N s/m], which is that of the unchanged case.
+    """
+
+    case: Case
+    masses: int
+    law: Law
+    names: tuple[str, ...]
+    values: tuple[float, ...]
+    units: Mapping[str, str]
+    measurements: tuple[str, ...] | None
+    reference: float
+    drag: float | None
+
+    @property
+    def stochastic(self) -> bool:
+        """Whether the drag is linearised with the response."""
+        return self.case.payload.fixed_drag is None and self._quadratic(self.case) > 0.0
+
+    @property
+    def fixed_drag(self) -> float:
+        """The case's own linear drag, if it gives one [N s/m]."""
+        return self.case.payload.fixed_drag or 0.0
+
+    @property
+    def shaken_by(self) -> tuple[str, ...]:
+        """Sections of the case that the disturbances' spectra depend on."""
+        sensors = () if self.measurements is None else ("sensors.",)
+        return ("sea.", "vessel.", *sensors)
+
+    @cached_property
+    def disturbances(self) -> tuple[Disturbance, ...]:
+        """What shakes the plant."""
+        return self.disturbances_of(self.case)
+
+    def disturbances_of(self, case: Case) -> tuple[Disturbance, ...]:
+        """Return what shakes the plant of a changed case."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PhysicsWarning)
+            hook = HookMotion.from_case(case)
+        if self.measurements is None:
+            return disturbances({HOOK: hook}, (HOOK,))
+        heard = set(self.measurements)
+        spectra = {
+            source: SampledNoise(intensity=value.intensity) if isinstance(value, White) else value
+            for source, value in sensed_spectra(case, hook).items()
+            if source == HOOK
+            or (source == "mru.error" and "mru.heave" in heard)
+            or source.removesuffix("_noise") in heard
+        }
+        return disturbances(spectra, tuple(spectra))
+
+    def view(
+        self, case: Case | None = None, *, gain: str | None = None, factor: float = 1.0
+    ) -> Assessment | None:
+        """Return the closed loop on a case, a gain times a factor; None if it is unstable."""
+        here = self.case if case is None else case
+        values = [
+            value * (factor if name == gain or gain == "A" else 1.0)
+            for name, value in zip(self.names, self.values, strict=True)
+        ]
+        if gain is not None and gain != "A" and gain not in self.names:
+            raise InputError(f"sensitivity: there is no gain {gain!r}; there are: {self.names}")
+        quadratic = self._quadratic(here)
+        stochastic = here.payload.fixed_drag is None and quadratic > 0.0
+        start = self.reference if stochastic else here.payload.fixed_drag or 0.0
+        plant = (
+            build_plant(here, self.masses).linearise(drag=start)
+            if self.measurements is None
+            else sensed_plant(here, masses=self.masses, drag=start).select(
+                measurements=self.measurements
+            )
+        )
+        drag = DragElement(quadratic=quadratic, reference=start) if stochastic else None
+        view = Assessment(
+            plant,
+            self.controller(values),
+            self.disturbances if case is None else self.disturbances_of(here),
+            drag=drag,
+            coefficient=self.drag if case is None and gain is None else None,
+        )
+        try:
+            return view if view.stable else None
+        except SolverError:
+            return None  # no drag agrees: unstable with any
+
+    def controller(self, values: list[float]) -> Controller:
+        """Return the controller of some values."""
+        return self.law.controller(values)
+
+    def with_number(self, path: str, factor: float) -> Answers | None:
+        """Return the same design with a number of its case, or a gain, times a factor."""
+        if path.startswith("gains."):
+            name = path.removeprefix("gains.")
+            values = [
+                value * (factor if known == name else 1.0)
+                for known, value in zip(self.names, self.values, strict=True)
+            ]
+            return replace(self, values=tuple(values), drag=None)
+        number = next(n for n in numbers_of(self.case) if n.path == path)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PhysicsWarning)
+            try:
+                case = self.case.replace(number.change(number.value * factor))
+            except InputError:
+                return None  # at the end of its range
+        return replace(self, case=case, drag=None)
+
+    def law_slopes(self, s: ComplexArray) -> Iterator[tuple[str, float, ComplexArray]]:
+        """Yield name, value and the slope of C(s) of every parameter that is not zero."""
+        for name, value in zip(self.names, self.values, strict=True):
+            if value != 0.0:
+                yield name, value, self.law_slope(name, s)
+
+    def law_slope(self, name: str, s: ComplexArray) -> ComplexArray:
+        """Return the slope of C(s) in a parameter, (k, nu, ny)."""
+        at = self.names.index(name)
+
+        def response(value: float) -> ComplexArray:
+            values = list(self.values)
+            values[at] = value
+            return self.controller(values).response_at(s)
+
+        return np.asarray(derivative(response, self.values[at], common=True), np.complex128)
+
+    @staticmethod
+    def _quadratic(case: Case) -> float:
+        return PlantData.from_case(case).quadratic_drag
+
+
+def answers_of(design: GainDesign | StructureDesign) -> Answers:
+    """Return a design as sensitivity sees it."""
+    if isinstance(design, StructureDesign):
+        posed = design.posed
+        names = tuple(p.name for p in posed.law.parameters)
+        stochastic = posed.question.drag is not None
+        return Answers(
+            case=design.case,
+            masses=design.masses,
+            law=posed.law,
+            names=names,
+            values=tuple(design.parameters[name] for name in names),
+            units=design.units,
+            measurements=tuple(posed.plant.measurements),
+            reference=posed.question.drag_before,
+            drag=design.drag if stochastic else None,
+        )
+    case = design.sea_case
+    question = pose(case, design.masses)
+    scale = design.gains["A"] / question.amplifier
+    return Answers(
+        case=case,
+        masses=design.masses,
+        law=question.structure.bind(question.plant),
+        names=("a", "a1", "a2"),
+        values=tuple(scale * design.gains[name] for name in ("a", "a1", "a2")),
+        units={},
+        measurements=None,
+        reference=question.drag_before,
+        drag=design.drag if question.drag is not None else None,
+    )

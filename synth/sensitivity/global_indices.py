@@ -1,0 +1,235 @@
+r"""Which numbers matter over their whole ranges: Sobol's indices of a figure's variance.
+
+    ranges -> two Sobol designs A, B and their crossings -> one sweep -> indices with intervals
+
+The first-order index of a number is the share of the figure's variance that knowing it alone
+would take away, the total index the share that is left when all others are known (Sobol, Math.
+Comput. Simul. 55, 2001; estimator: Saltelli et al., Comput. Phys. Commun. 181, 2010, as in
+`scipy.stats.sobol_indices`).  What is unstable has no rms: a base point of which any crossing is
+unstable is left out with all its crossings, counted, and never averaged in; the indices are then
+those of the stable part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError, check_range, read_only
+from models.spread import Spread
+
+from .rows import evaluate_rows
+
+if TYPE_CHECKING:
+    from ..design.design import GainDesign
+    from ..design.structure_design import StructureDesign
+
+__all__ = ["SobolIndices", "indices_of", "sobol_indices"]
+
+FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+Evaluate = Callable[[FloatArray], FloatArray]
+
+_FEWEST = 32  # base points without which an index means nothing
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SobolIndices:
+    """Sobol's indices of one figure.
+
+    Attributes
+    ----------
+    figure
+        The figure.
+    paths
+        The numbers that vary, (d,).
+    first, total
+        First-order and total indices (d,) [-].
+    first_interval, total_interval
+        Their bootstrap intervals (d, 2) [-].
+    confidence
+        Level of the intervals [-].
+    samples, kept
+        Base points drawn, and those used: the largest power of two of which all crossings are
+        stable.
+    evaluations, unstable
+        Cases computed, and those of them that are unstable.
+    """
+
+    figure: str
+    paths: tuple[str, ...]
+    first: FloatArray
+    total: FloatArray
+    first_interval: FloatArray
+    total_interval: FloatArray
+    confidence: float
+    samples: int
+    kept: int
+    evaluations: int
+    unstable: int
+
+    def __post_init__(self) -> None:
+        for name in ("first", "total", "first_interval", "total_interval"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def share_unstable(self) -> float:
+        """Share of the cases that are unstable [-]."""
+        return self.unstable / self.evaluations
+
+    def __str__(self) -> str:
+        """Return a small tree, the largest total first."""
+        order = np.argsort(-self.total)
+        lines = [
+            f"SobolIndices of {self.figure}: {self.evaluations} cases, "
+            f"{self.unstable} of them unstable and left out"
+        ]
+        for k in order:
+            low, high = self.total_interval[k]
+            lines.append(
+                f"├ {self.paths[k]}: first {self.first[k]:.3f}, total {self.total[k]:.3f} "
+                f"({low:.3f} to {high:.3f})"
+            )
+        lines[-1] = "└" + lines[-1][1:]
+        return "\n".join(lines)
+
+
+def sobol_indices(
+    design: GainDesign | StructureDesign,
+    spread: Spread,
+    *,
+    samples: int = 1024,
+    figure: str = "payload_rms",
+    seed: int = 0,
+    confidence: float = 0.95,
+    progress: Progress | None = None,
+) -> SobolIndices:
+    """Return Sobol's indices of a figure of a design over a spread.
+
+    Parameters
+    ----------
+    design
+        The design; its controller is fixed.
+    spread
+        Independent ranges of at least two numbers.
+    samples
+        Base points, a power of two; the sweep has samples times (numbers + 2) cases.
+    figure
+        A variable of `synth.sweeps.frequency.frequency_sweep`, or ``modulus_margin``, 1/M_s.
+    seed, confidence
+        Seed of the design and of the bootstrap; level of the intervals.
+    progress
+        Called with a word, the cases done and their count.
+
+    Raises
+    ------
+    InputError
+        If the spread has correlations, or hardly any case is stable.
+    """
+    ready, evaluate = evaluate_rows(design, spread, figure, progress)
+    return indices_of(
+        evaluate, ready, samples=samples, figure=figure, seed=seed, confidence=confidence
+    )
+
+
+def indices_of(
+    evaluate: Evaluate,
+    spread: Spread,
+    *,
+    samples: int,
+    figure: str = "figure",
+    seed: int = 0,
+    confidence: float = 0.95,
+    resamples: int = 199,
+) -> SobolIndices:
+    """Return Sobol's indices of any function of a spread's rows.
+
+    Parameters
+    ----------
+    evaluate
+        From rows (n, d) to values (n,); NaN where there is none (unstable).
+    spread
+        Independent ranges in plain numbers (`Spread.on`).
+    samples, figure, seed, confidence
+        As in `sobol_indices`.
+    resamples
+        Of the bootstrap.
+
+    Raises
+    ------
+    InputError
+        As in `sobol_indices`.
+    """
+    from scipy.stats import sobol_indices as estimate
+
+    check_range("sensitivity", "confidence", confidence, low=0.5, high=0.9999)
+    check_range("sensitivity", "samples", samples, low=_FEWEST, high=2**22)
+    if samples & (samples - 1):
+        raise InputError(f"sensitivity: samples must be a power of two, got {samples}")
+    if spread.correlations:
+        raise InputError("sensitivity: Sobol's indices need independent ranges, got correlations")
+    A, B = _pair(spread, samples, seed)
+    d = A.shape[1]
+    crossed = []
+    for k in range(d):
+        rows = A.copy()
+        rows[:, k] = B[:, k]
+        crossed.append(rows)
+    values = evaluate(np.concatenate([A, B, *crossed])).reshape(d + 2, samples)
+    good = np.isfinite(values).all(axis=0)
+    unstable = int(np.count_nonzero(~np.isfinite(values)))
+    if np.count_nonzero(good) < _FEWEST:
+        raise InputError(
+            f"sensitivity: only {np.count_nonzero(good)} of {samples} base points are stable with "
+            f"all their crossings, {_FEWEST} are needed: narrow the ranges"
+        )
+    # The estimator wants a power of two; the first so many of a Sobol sequence are balanced too.
+    kept = values[:, good][:, : 2 ** int(np.log2(np.count_nonzero(good)))]
+    spreads = np.ptp(kept)
+    if spreads <= 1e-12 * np.abs(kept).max():
+        raise InputError(f"sensitivity: {figure} does not move over these ranges")
+    answer: Any = estimate(
+        func={"f_A": kept[:1], "f_B": kept[1:2], "f_AB": kept[2:, None, :]}, n=kept.shape[1]
+    )
+    boot: Any = answer.bootstrap(confidence_level=confidence, n_resamples=resamples)
+    return SobolIndices(
+        figure=figure,
+        paths=spread.paths,
+        first=np.ravel(answer.first_order),
+        total=np.ravel(answer.total_order),
+        first_interval=_interval(boot.first_order),
+        total_interval=_interval(boot.total_order),
+        confidence=confidence,
+        samples=samples,
+        kept=int(kept.shape[1]),
+        evaluations=values.size,
+        unstable=unstable,
+    )
+
+
+def _pair(spread: Spread, samples: int, seed: int) -> tuple[FloatArray, FloatArray]:
+    """Return two independent designs: the halves of one Sobol sequence of twice the dimension."""
+    from scipy.stats import qmc
+
+    d = len(spread.paths)
+    points = qmc.Sobol(2 * d, seed=np.random.default_rng(seed)).random(samples)
+    points = np.clip(points, 1e-12, 1.0 - 1e-12)  # a normal distribution has no ends
+    return on_ranges(spread, points[:, :d]), on_ranges(spread, points[:, d:])
+
+
+def on_ranges(spread: Spread, points: FloatArray) -> FloatArray:
+    """Return rows of values from points of the unit cube, (n, d)."""
+    columns: Sequence[FloatArray] = [
+        distribution.quantile(points[:, j])
+        for j, distribution in enumerate(spread.distributions.values())
+    ]
+    return np.stack(columns, axis=1)
+
+
+def _interval(interval: Any) -> FloatArray:
+    ends = interval.confidence_interval
+    return np.stack([np.ravel(ends.low), np.ravel(ends.high)], axis=1)

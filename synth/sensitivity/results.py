@@ -1,0 +1,189 @@
+"""What a sensitivity study hands over: elasticities, largest first, and designs moved in full.
+
+`elasticity.sensitivity` computes them; figures and commands show them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.basics.checks import InputError
+
+from ..question.question import PAYLOAD
+from .answers import Answers, answers_of
+from .fields import numbers_of
+from .slopes import changed
+
+if TYPE_CHECKING:
+    from ..design.design import GainDesign
+    from ..design.structure_design import StructureDesign
+
+__all__ = ["FIGURES", "Elasticity", "Moved", "Sensitivity"]
+
+FIGURES = ("payload_rms", "max_sensitivity", "torque_rms", "speed_rms")
+"""The figures of a design that have elasticities."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Elasticity:
+    """How a design answers to one number.
+
+    Attributes
+    ----------
+    path
+        Dotted path of the number in the case, or ``gains.`` and the name of a gain.
+    value, unit
+        What it is now [in its unit, SI]; of a table's column the factor 1.
+    payload_rms, max_sensitivity, torque_rms, speed_rms
+        d ln(figure) / d ln(number) [-].  An optimal design often has several peaks of |S| at its
+        limit; then M_s has a kink, and the slope is that of the peak which moves most.
+    curvature
+        d2 ln(payload_rms) / d ln(number)2 [-]; None where it was not asked for.
+    """
+
+    path: str
+    value: float
+    unit: str
+    payload_rms: float
+    max_sensitivity: float
+    torque_rms: float
+    speed_rms: float
+    curvature: float | None = None
+
+    def predicted(self, share: float) -> float:
+        """Return the factor on the payload's rms if the number grows by a share [-]."""
+        x = np.log1p(share)
+        return float(np.exp(self.payload_rms * x + 0.5 * (self.curvature or 0.0) * x * x))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Moved:
+    """A design with one number moved, recomputed in full.
+
+    Attributes
+    ----------
+    path, share
+        The number, and the share by which it was moved.
+    payload_rms
+        The payload's rms then [m]; infinite if the loop is unstable.
+    max_sensitivity
+        M_s then [-]; infinite if the loop is unstable.
+    """
+
+    path: str
+    share: float
+    payload_rms: float
+    max_sensitivity: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sensitivity:
+    """What matters most to a design; `sensitivity` makes it.
+
+    Attributes
+    ----------
+    design
+        The design asked about.
+    payload_rms, max_sensitivity, torque_rms, speed_rms
+        Its figures [m], [-], [N m], [rad/s].
+    elasticities
+        One for every number that has any effect, that with the largest effect on the payload's
+        rms first.
+    without_effect
+        Paths of the numbers that do nothing to these figures.
+    stepping
+        Paths of numbers at which something steps, as the drum's radius does where one more turn
+        of a thinner rope fits into a layer: they have no elasticity there.
+    """
+
+    design: GainDesign | StructureDesign
+    payload_rms: float
+    max_sensitivity: float
+    torque_rms: float
+    speed_rms: float
+    elasticities: tuple[Elasticity, ...]
+    without_effect: tuple[str, ...]
+    stepping: tuple[str, ...] = ()
+
+    def __getitem__(self, path: str) -> Elasticity:
+        """Return the elasticity of a number by its path.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        for entry in self.elasticities:
+            if entry.path == path:
+                return entry
+        raise InputError(f"sensitivity: {path!r} has no elasticity here")
+
+    @cached_property
+    def _answers(self) -> Answers:
+        return answers_of(self.design)
+
+    def moved(self, share: float = 0.1, paths: Sequence[str] | None = None) -> tuple[Moved, ...]:
+        """Recompute the design with numbers moved one at a time.
+
+        Parameters
+        ----------
+        share
+            By which share [-]; the thesis's Figure 32 has 0.1.
+        paths
+            Which; by default the gains, as in that figure.
+
+        Raises
+        ------
+        InputError
+            If a path is unknown.
+        """
+        wanted = [e.path for e in self.elasticities if e.path.startswith("gains.")]
+        numbers = {n.path: n for n in numbers_of(self._answers.case)}
+        found = []
+        for path in wanted if paths is None else paths:
+            if path.startswith("gains."):
+                view = self._answers.view(gain=path.removeprefix("gains."), factor=1.0 + share)
+            elif path in numbers:
+                case = changed(self._answers.case, numbers[path], numbers[path].value * (1 + share))
+                view = self._answers.view(case)
+            else:
+                raise InputError(f"sensitivity: there is no number {path!r} in the case")
+            found.append(
+                Moved(
+                    path=path,
+                    share=share,
+                    payload_rms=view.sigma(PAYLOAD) if view is not None else np.inf,
+                    max_sensitivity=view.max_sensitivity if view is not None else np.inf,
+                )
+            )
+        return tuple(found)
+
+    def to_csv(self) -> str:
+        """Return all elasticities as a table, one row for each number; zeros included."""
+        lines = ["path,value,unit," + ",".join(f"dln({n})/dln(path)" for n in FIGURES)]
+        lines[0] += ",d2ln(payload_rms)/dln(path)2,note"
+        for e in self.elasticities:
+            cells = [repr(float(getattr(e, name))) for name in ("value", *FIGURES)]
+            curvature = "" if e.curvature is None else repr(e.curvature)
+            lines.append(",".join([e.path, cells[0], e.unit, *cells[1:], curvature, ""]))
+        lines += [f"{path},,,0,0,0,0,,no effect" for path in self.without_effect]
+        lines += [f"{path},,,,,,,,steps at its value" for path in self.stepping]
+        return "\n".join(lines) + "\n"
+
+    def __str__(self) -> str:
+        """Return a small tree, the largest first."""
+        lines = [
+            f"Sensitivity of {self.design.case.name}: payload {1e3 * self.payload_rms:.4g} mm rms,"
+            f" M_s {self.max_sensitivity:.3g}"
+        ]
+        shown = [e for e in self.elasticities if abs(e.payload_rms) >= 0.01][:12]
+        lines += [f"├ {e.path}: {e.payload_rms:+.3f} % per cent" for e in shown]
+        rest = len(self.elasticities) - len(shown)
+        lines += [f"├ {path}: steps here, no elasticity" for path in self.stepping]
+        lines.append(f"└ {rest} more with less, {len(self.without_effect)} without any")
+        return "\n".join(lines)

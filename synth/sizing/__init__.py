@@ -1,0 +1,1 @@
+"""Winch sizing, co-design, what a limit is worth, Pareto fronts."""

@@ -1,0 +1,350 @@
+r"""Co-design: gear ratio and drum radius together with the gains, for a given motor.
+
+    case, ranges -> optimum of the gains behind each gear, from neighbour to neighbour
+                 -> golden section on log n (and log r) -> slope by the envelope theorem -> CoDesign
+
+The gear enters plant and limits: reflected inertia I_D/n^2, speed n/r of the haul, torque r/n of
+the tension.  So it is searched around the gains, whose optimum behind a neighbouring gear is a
+start that needs two rounds of the exchange.  That the outer search has arrived is checked by
+another route: the derivative of the optimum by the envelope theorem
+(`synth.sizing.follow.slope`), zero at a smooth optimum, pointing out of the range at its ends, and
+of either sign at a corner, where one limit hands over to another.
+
+A drum of another radius keeps its width and the thickness of its wall: its inertia goes with the
+cube.  Nearly everything hangs on n/r alone, so the pair is searched in n/r and r, whose optima
+hardly depend on each other; a drum that gains nothing stays as it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from models.basics.checks import InputError, check_range
+from models.basics.threads import one_thread
+from models.case.case import Case
+
+from ..design.structure_design import StructureDesign
+from ..design.structure_search import optimise_structure
+from ..search.multistart import Progress
+from .follow import Answer, Posed, follow, slope
+from .motor import changed
+from .sizing_design import designed
+
+__all__ = ["CoDesign", "CoPoint", "co_design", "gear_changes"]
+
+_GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+_GRID = 7  # gears that are tried before the golden section
+_FINE = 2e-3  # of the logarithm of the gear
+_RADII = 3  # golden sections along the radius and back
+_STEP = 1e-4  # of the logarithm, for the slope
+_GAIN = 1e-3  # share of the rms that another drum must gain at least
+_SMOOTH = 0.02  # slope below which an optimum is one without a corner
+_DRUM = 3.0  # inertia of a drum over its radius
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CoPoint:
+    """The best gains behind one gear; `payload_rms` is infinite where no gains keep the limits."""
+
+    gear: float
+    radius: float
+    payload_rms: float
+    binding: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CoDesign:
+    """The answer of `co_design`.
+
+    Attributes
+    ----------
+    case, structure
+        The case given and the controller structure.
+    ok, status
+        Whether the design is verified; the sentence for the user.
+    gear, radius
+        The best ratio [-] and drum radius [m].
+    payload_rms, given_rms
+        Of the payload there, and behind the case's own gear (infinite if its limits cannot be
+        kept) [m].
+    slope
+        d log(rms) / d log(gear) at the answer, by the envelope theorem; nan where it is unknown.
+    points
+        All gears that were tried, by ratio.
+    best_case, design
+        The case with that gear, and its gains, verified.
+    """
+
+    case: Case
+    structure: str
+    ok: bool
+    status: str
+    gear: float
+    radius: float
+    payload_rms: float
+    given_rms: float
+    slope: float
+    points: tuple[CoPoint, ...]
+    best_case: Case | None
+    design: StructureDesign | None
+
+    def to_csv(self) -> str:
+        """Return the gears that were tried as CSV, SI units."""
+        lines = ["gear,radius,payload_rms,limited_by"]
+        for p in self.points:
+            figures = f"{p.gear:.8g},{p.radius:.8g},{p.payload_rms:.8g}"
+            lines.append(f"{figures},{' '.join(p.binding)}")
+        return "\n".join(lines) + "\n"
+
+
+@dataclass(kw_only=True)
+class _Gears:
+    """The optimum behind each gear, as far as it was looked at."""
+
+    case: Case
+    structure: str
+    masses: int
+    begin: Answer | None
+    tell: Progress
+    answers: dict[tuple[float, float], Answer | None] = field(default_factory=dict)
+
+    def problem(self, gear: float, radius: float) -> Any:
+        """Return the problem behind a gear."""
+        case = changed(
+            self.case, {"limits.drive": "report", **gear_changes(self.case, gear, radius)}
+        )
+        posed = Posed.of(case, self.structure, self.masses)
+        enforced = self.case.limits.drive == "enforce"
+        return posed.problem((*posed.loop, *(posed.drive if enforced else ())))
+
+    def at(self, gear: float, radius: float) -> Answer | None:
+        """Return the optimum behind a gear, from the nearest that is known."""
+        key = gear, radius
+        if key not in self.answers:
+            done = len(self.answers)
+            self.tell("gears", done, done + 1)
+            known = [k for k, answer in self.answers.items() if answer is not None]
+            known.sort(key=lambda k: _apart(k, key))
+            near = self.answers[known[0]] if known else self.begin
+            problem = self.problem(gear, radius)
+            found = None
+            if near is not None:
+                found = follow(problem, [near.carried(problem)], near=near)
+            if found is None and self.begin is not None and near is not self.begin:
+                found = follow(problem, [self.begin.carried(problem)], near=self.begin)
+            self.answers[key] = found
+        return self.answers[key]
+
+    def cost(self, gear: float, radius: float) -> float:
+        """Return the payload's rms there [m]; infinite where the limits cannot be kept."""
+        answer = self.at(gear, radius)
+        return answer.payload_rms if answer is not None else math.inf
+
+
+@one_thread()
+def co_design(
+    case: Case,
+    *,
+    gear: tuple[float, float] | None = None,
+    radius: tuple[float, float] | None = None,
+    structure: str = "payload-feedback",
+    starts: int = 4,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> CoDesign:
+    """Return the gear, and the drum radius if asked for, with which the payload is stillest.
+
+    Parameters
+    ----------
+    case
+        The case, with its motor.
+    gear
+        Lowest and highest ratio; by default the case's over and times 2.5.
+    radius
+        Smallest and largest radius of the drum [m]; by default the case's own is kept.
+    structure
+        Controller structure, see `synth.structures.winch_structures.structure_names`.
+    starts, seed
+        Size and seed of the search that everything begins from.
+    progress
+        Called as progress(stage, done, total).
+
+    Raises
+    ------
+    InputError
+        If a range does not rise, or there is no such structure.
+    """
+    own, r0 = case.winch.gearbox.ratio, case.drum_radius
+    low, high = _range("gear", gear or (own / 2.5, own * 2.5), 0.1, 1e4, "")
+    radii = None if radius is None else _range("radius", radius, 0.02, 25.0, "m")
+    tell: Progress = progress or (lambda stage, done, total: None)
+    first = optimise_structure(case, structure, starts, seed, progress=progress)
+    if not first.parameters:
+        raise InputError(f"co-design: {first.status}")
+    search = _Gears(
+        case=case,
+        structure=structure,
+        masses=first.masses,
+        begin=_begin(first),
+        tell=tell,
+    )
+    given = search.cost(own, r0)
+    r = r0 if radii is None else min(max(r0, radii[0]), radii[1])
+    best = _best_gear(search, low, high, r)
+    if radii is not None:
+        for _ in range(_RADII):
+            ratio = best / r
+            inside = max(radii[0], low / ratio), min(radii[1], high / ratio)
+            other = _golden(lambda x, q=ratio: search.cost(q * x, x), *inside)  # type: ignore[misc]
+            if search.cost(ratio * other, other) > (1.0 - _GAIN) * search.cost(best, r):
+                break
+            r, best = other, _best_gear(search, low, high, other, near=ratio * other)
+    return _finished(search, best, r, given, (low, high))
+
+
+def gear_changes(case: Case, gear: float, radius: float | None = None) -> dict[str, float]:
+    """Return the changes by dotted path that give a case another gear and drum radius [m]."""
+    changes = {"winch.gearbox.ratio": gear}
+    if radius is not None and radius != case.drum_radius:
+        changes["winch.drum.radius"] = radius
+        changes["winch.drum.inertia"] = (
+            case.winch.drum.inertia * (radius / case.drum_radius) ** _DRUM
+        )
+    return changes
+
+
+def _begin(first: StructureDesign) -> Answer | None:
+    posed = Posed.of(first.case, first.structure, first.masses)
+    enforced = first.case.limits.drive == "enforce" and first.drive_kept
+    problem = posed.problem((*posed.loop, *(posed.drive if enforced else ())))
+    values = [first.parameters[p.name] for p in problem.law.parameters]
+    coefficient = first.drag if problem.drag is not None else None
+    return follow(problem, [np.array(values)], coefficient=coefficient)
+
+
+def _best_gear(
+    search: _Gears, low: float, high: float, radius: float, near: float | None = None
+) -> float:
+    """Return the best gear at a radius: a grid, from the known outwards, then golden section."""
+    if near is None:
+        grid = np.geomspace(low, high, _GRID)
+        own = search.case.winch.gearbox.ratio
+    else:
+        grid = np.geomspace(max(low, near / 1.3), min(high, near * 1.3), 5)
+        own = near
+    order = sorted((float(g) for g in grid), key=lambda g: abs(math.log(g / own)))
+    for gear in order:
+        search.at(gear, radius)
+    # An edge of what is feasible lies between a gear that is and one that is not.
+    known = sorted(g for g, r in search.answers if r == radius and low <= g <= high)
+    at = min(range(len(known)), key=lambda i: search.cost(known[i], radius))
+    ends = known[max(at - 1, 0)], known[min(at + 1, len(known) - 1)]
+    best = _golden(lambda g: search.cost(g, radius), *ends)
+    return min((best, known[at]), key=lambda g: search.cost(g, radius))
+
+
+def _golden(cost: Callable[[float], float], low: float, high: float) -> float:
+    """Return where a function is least between two ends, on a logarithmic scale."""
+    a, b = math.log(low), math.log(high)
+    one, two = b - _GOLDEN * (b - a), a + _GOLDEN * (b - a)
+    first, second = cost(math.exp(one)), cost(math.exp(two))
+    while b - a > _FINE:
+        if first <= second:
+            b, two, second = two, one, first
+            one = b - _GOLDEN * (b - a)
+            first = cost(math.exp(one))
+        else:
+            a, one, first = one, two, second
+            two = a + _GOLDEN * (b - a)
+            second = cost(math.exp(two))
+    return math.exp(one if first <= second else two)
+
+
+def _finished(
+    search: _Gears, gear: float, radius: float, given: float, ends: tuple[float, float]
+) -> CoDesign:
+    case, answer = search.case, search.at(gear, radius)
+    points = tuple(
+        CoPoint(
+            gear=g,
+            radius=r,
+            payload_rms=a.payload_rms if a is not None else math.inf,
+            binding=_binding(a) if a is not None else (),
+        )
+        for (g, r), a in sorted(search.answers.items())
+    )
+    result = CoDesign(
+        case=case,
+        structure=search.structure,
+        ok=False,
+        status="no gains keep the limits behind any of these gears",
+        gear=gear,
+        radius=radius,
+        payload_rms=math.inf,
+        given_rms=given,
+        slope=math.nan,
+        points=points,
+        best_case=None,
+        design=None,
+    )
+    if answer is None:
+        return result
+    best_case = changed(case, gear_changes(case, gear, radius))
+    design = designed(best_case, search.structure, answer, search.masses, search.tell)
+    tilt = slope(answer, search.problem(gear * math.exp(_STEP), radius), _STEP)
+    binding = _binding(answer)
+    text = f"the best gear is {gear:.4g}" + (
+        "" if radius == case.drum_radius else f", drum {radius:.4g} m"
+    )
+    text += f": the payload moves {1e3 * answer.payload_rms:.4g} mm rms"
+    if math.isfinite(given):
+        text += f" instead of {1e3 * given:.4g} mm behind {case.winch.gearbox.ratio:g}"
+    if binding:
+        text += f"; {', '.join(binding)} bind"
+    if min(gear / ends[0], ends[1] / gear) < math.exp(2.0 * _FINE):
+        text += "; it stands at an end of the range"
+    elif abs(tilt) > _SMOOTH:
+        beside = [
+            a for (g, r), a in sorted(search.answers.items()) if r == radius and a is not None
+        ]
+        at = beside.index(answer)
+        sides = [_binding(a)[:1] for a in (*beside[max(at - 1, 0) : at], *beside[at + 1 : at + 2])]
+        names = dict.fromkeys(name for side in sides for name in side)
+        text += f"; it stands at a corner, between {' and '.join(names)}" if len(names) > 1 else ""
+    if design is not None and not design.ok:
+        text += f"; {design.status}"
+    return replace(
+        result,
+        ok=design is not None and design.ok,
+        status=text,
+        payload_rms=answer.payload_rms,
+        slope=tilt,
+        best_case=best_case,
+        design=design,
+    )
+
+
+def _binding(answer: Answer) -> tuple[str, ...]:
+    prices = answer.solved.prices
+    return tuple(
+        sorted((n for n, p in prices.items() if abs(p) > 1e-4), key=lambda n: -abs(prices[n]))
+    )
+
+
+def _apart(one: tuple[float, float], other: tuple[float, float]) -> float:
+    return sum(abs(math.log(a / b)) for a, b in zip(one, other, strict=True))
+
+
+def _range(
+    name: str, ends: tuple[float, float], low: float, high: float, unit: str
+) -> tuple[float, float]:
+    first = check_range("co-design", name, ends[0], low=low, high=high, unit=unit)
+    last = check_range("co-design", name, ends[1], low=low, high=high, unit=unit)
+    if not first < last:
+        raise InputError(f"co-design: {name} must rise from low to high, got {first:g} to {last:g}")
+    return first, last

@@ -1,0 +1,340 @@
+r"""Following an optimum from case to case: solved again from its neighbour's answer.
+
+    Posed (case, structure) + neighbour's Answer -> programme on inherited nodes -> Answer
+
+A sweep over gear ratios, motors or seas solves nearly the same problem again and again.  Each
+solve begins at its neighbour's answer and with the frequencies at which that one pressed a
+limit, so one or two rounds of the exchange (`synth.search.polishing`) suffice.  `slope` gives the
+derivative of the optimum by the envelope theorem: that of the Lagrangian at the answer,
+
+.. math:: dJ^*/d\theta = \partial_\theta (\log J + \lambda^T g),
+
+with the multipliers of every row, so that a limit that is pressed at several frequencies at once
+is counted right.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from typing_extensions import override
+
+from models.basics.physics_warning import PhysicsWarning
+from models.basics.quadrature import Quadrature
+from models.case.case import Case
+
+from ..design.structure_design import StructureDesign
+from ..limits.case_limits import drive_limits
+from ..limits.limits import Limit
+from ..loop.assess import Assessment
+from ..question.problem import Goal, Problem
+from ..question.question import PAYLOAD
+from ..question.structure_question import StructureQuestion, pose_structure
+from ..search.multistart import begin_points
+from ..search.nodes import cost_nodes, margin_nodes
+from ..search.polishing import look, polish, thinned, view_of
+from ..search.programme import Pace, Programme, Solved
+
+__all__ = ["Answer", "Posed", "begin_from", "follow", "slope"]
+
+FloatArray = npt.NDArray[np.float64]
+
+EXCESS = 1e-4  # relative excess over a limit that an answer on the way may have
+_ROUNDS = 5  # of the exchange of nodes
+_FRESH = 3  # starts where no neighbour's answer is stable
+_MOST_HELD = 200  # frequencies that are inherited
+_RTOL = 1e-6  # of the integrals on the way
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Posed:
+    """A case and a structure with all limits of the drive, whether the case enforces them or not.
+
+    Attributes
+    ----------
+    question
+        As `synth.design.structure_search` sees it.
+    loop, drive
+        Limits of the loop, and those of motor, drive and rope.
+    """
+
+    question: StructureQuestion
+    loop: tuple[Limit, ...]
+    drive: tuple[Limit, ...]
+
+    @classmethod
+    def of(cls, case: Case, structure: str, masses: int | None = None) -> Posed:
+        """Return a case posed for a structure on a number of rope masses."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PhysicsWarning)
+            # Posed as one that reports: a motor may be too small for the load at rest.
+            reporting = case.replace({"limits.drive": "report"})
+            question = pose_structure(reporting, structure, masses)
+            drive = drive_limits(reporting, question.plant)
+        return cls(question=question, loop=question.limits, drive=drive)
+
+    @property
+    def masses(self) -> int:
+        """Rope masses of the plant."""
+        return self.question.question.masses
+
+    def problem(self, limits: Sequence[Limit]) -> Problem:
+        """Return the problem with some limits."""
+        return self.question.problem(limits)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Answer:
+    """An optimum and what its neighbours need of it.
+
+    Attributes
+    ----------
+    problem, solved, view
+        The problem, the solver's answer, and a look at it.
+    excess
+        Largest relative excess over a limit that was to be kept.
+    nodes, omega, held
+        Where its spectra were integrated and its margins held, and which of those frequencies
+        the exchange added [rad/s].
+    multipliers
+        Of every row of the programme, (m,).
+    vector
+        The programme's vector.
+    """
+
+    problem: Problem
+    solved: Solved
+    view: Assessment
+    excess: float
+    nodes: Quadrature
+    omega: FloatArray
+    held: FloatArray
+    multipliers: FloatArray
+    vector: FloatArray
+
+    @property
+    def payload_rms(self) -> float:
+        """Standard deviation of the payload [m]."""
+        return self.view.sigma(PAYLOAD)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The structure's parameters by name."""
+        return self.problem.law.named([float(v) for v in self.solved.values])
+
+    def uses(self) -> dict[str, float]:
+        """Return the use of every limit by name."""
+        return {lim.name: lim.use(lim.measure(self.view)) for lim in self.problem.limits}
+
+    def carried(self, problem: Problem) -> FloatArray:
+        """Return the parameters for another problem, each as large for it as here."""
+        old, new = self.problem.law.parameters, problem.law.parameters
+        ratio = np.array([b.scale / a.scale for a, b in zip(old, new, strict=True)])
+        return _inside(problem, self.solved.values * ratio)
+
+
+class _Priced(Programme):
+    """A programme that keeps the multipliers of its last solve."""
+
+    last: dict[str, FloatArray]
+
+    @override
+    def _solver(self, pace: Pace) -> Any:
+        solver = super()._solver(pace)
+        programme = self
+
+        class Keeping:
+            """The solver, remembered."""
+
+            def __call__(self, **given: Any) -> Any:
+                answer = solver(**given)
+                programme.last = {
+                    name: np.array(answer[name], dtype=np.float64).ravel()
+                    for name in ("x", "lam_g")
+                }
+                return answer
+
+            def stats(self) -> Any:
+                return solver.stats()
+
+        return Keeping()
+
+
+def begin_from(problem: Problem, design: StructureDesign | Sequence[float]) -> FloatArray:
+    """Return a design's parameters, or given ones, as a start for a problem."""
+    if isinstance(design, StructureDesign):
+        names = [p.name for p in problem.law.parameters]
+        return _inside(problem, np.array([design.parameters[name] for name in names]))
+    return _inside(problem, np.array(design, dtype=np.float64))
+
+
+def follow(
+    problem: Problem,
+    begins: Sequence[FloatArray],
+    *,
+    near: Answer | None = None,
+    goal: Goal = Goal.COST,
+    relaxed: Sequence[str] = (),
+    coefficient: float | None = None,
+    extra: float = 0.0,
+    fine: bool = False,
+    rounds: int = _ROUNDS,
+) -> Answer | None:
+    """Return the optimum of a problem from starts close to it, or None if none arrives.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    begins
+        Starts; those that do not stabilise the loop are left out.
+    near
+        A neighbour's answer, whose margin frequencies are held too.
+    goal, relaxed, extra
+        See `synth.search.programme.Programme`; `extra` begins the variable of the goal.
+    coefficient
+        Drag coefficient to begin with [N s/m].
+    rounds
+        Most rounds of the exchange; with one the answer is a rough one.
+    fine
+        Whether to polish the answer until no limit is broken by more than 1e-5.
+    """
+    drag = problem.drag
+    if drag is not None and coefficient is None:
+        coefficient = near.solved.coefficient if near is not None else drag.reference
+    starts = [b for b in begins if problem.stable(b, coefficient)]
+    if not starts and len(begins):
+        starts = begin_points(problem, _FRESH, 0, [list(b) for b in begins])
+    best: Answer | None = None
+    for begin in starts:
+        found = _arrived(problem, begin, near, goal, relaxed, coefficient, extra, rounds)
+        if found is not None and (best is None or found.solved.objective < best.solved.objective):
+            best = found
+    if best is None or not fine:
+        return best
+    solved, view, excess = polish(problem, best.solved, starts[0], goal, relaxed)
+    if not solved.converged or excess > max(best.excess, EXCESS):
+        return best
+    return replace(best, solved=solved, view=view, excess=excess)
+
+
+def slope(answer: Answer, changed: Problem, step: float) -> float:
+    """Return d log(cost) of the optimum per `step`, by the envelope theorem.
+
+    Parameters
+    ----------
+    answer
+        An optimum with the goal COST.
+    changed
+        The same problem with one figure changed by `step` [unit of the figure].
+    step
+        By how much.
+    """
+    here = _lagrangian(answer, answer.problem, answer.vector)
+    vector = answer.vector.copy()
+    parameters = answer.problem.law.parameters
+    for k, (old, new) in enumerate(zip(parameters, changed.law.parameters, strict=True)):
+        vector[k] *= old.scale / new.scale  # the same parameter in the units of its new size
+    return (_lagrangian(answer, changed, vector) - here) / step
+
+
+def _lagrangian(answer: Answer, problem: Problem, vector: FloatArray) -> float:
+    programme = Programme(problem, answer.nodes, answer.omega, reference=answer.solved.values)
+    bounds = np.array([limit.bound for limit in problem.limits], dtype=np.float64)
+    cost, rows = programme.evaluate(vector, bounds)
+    flat = np.array(rows, dtype=np.float64).ravel()
+    prices = answer.multipliers.copy()
+    # The row that keeps slow poles off is normalised by the reference: it has no price.
+    prices[-1 if problem.drag is None else -2] = 0.0
+    return float(cost) + float(np.dot(prices, flat))
+
+
+def _arrived(
+    problem: Problem,
+    begin: FloatArray,
+    near: Answer | None,
+    goal: Goal,
+    relaxed: Sequence[str],
+    coefficient: float | None,
+    extra: float,
+    rounds: int,
+) -> Answer | None:
+    view = _looked(problem, begin, coefficient)
+    held = near.held if near is not None else np.zeros(0)
+    solved: Solved | None = None
+    best: Answer | None = None
+    for k in range(rounds):
+        nodes = cost_nodes(problem, [view], rtol=_RTOL)
+        omega = np.union1d(margin_nodes(problem, [view.poles], 40), held)
+        programme = _Priced(
+            problem, nodes, omega, goal, reference=begin, relaxed=relaxed, tolerance=1e-8
+        )
+        values = begin if solved is None else solved.values
+        start = programme.pack(
+            values,
+            coefficient if solved is None else solved.coefficient,
+            extra if solved is None else solved.extra,
+        )
+        again = _solved(programme, start, first=k == 0 and near is None)
+        if again is None:
+            break
+        solved = again
+        view, excess = look(problem, solved, goal, relaxed)
+        answer = Answer(
+            problem=problem,
+            solved=solved,
+            view=view,
+            excess=excess,
+            nodes=nodes,
+            omega=omega,
+            held=_fewer(view, problem, held),
+            multipliers=programme.last["lam_g"],
+            vector=programme.last["x"],
+        )
+        if best is None or answer.excess < best.excess:
+            best = answer
+        if excess <= 0.5 * EXCESS:
+            return answer
+        held = _fewer(view, problem, held)
+    rough = rounds < _ROUNDS
+    return best if best is not None and (rough or best.excess <= 10.0 * EXCESS) else None
+
+
+def _fewer(view: Assessment, problem: Problem, held: FloatArray) -> FloatArray:
+    """Return the frequencies that a neighbour should hold: where limits are pressed, and were."""
+    extremes = [f(view) for limit in problem.limits for f in (limit.critical, limit.worst)]
+    recent = held[:: 1 + held.size // _MOST_HELD]
+    return np.union1d(recent, thinned(extremes))
+
+
+def _solved(programme: _Priced, start: FloatArray, *, first: bool) -> Solved | None:
+    for pace in (Pace.FAR, Pace.NEAR) if first else (Pace.NEAR, Pace.FAR):
+        solved = programme.solve(start, pace=pace)
+        if solved.converged and programme.problem.stable(solved.values, solved.coefficient):
+            return solved
+    return None
+
+
+def _looked(problem: Problem, values: FloatArray, coefficient: float | None) -> Assessment:
+    solved = Solved(
+        values=values,
+        coefficient=coefficient,
+        objective=0.0,
+        extra=0.0,
+        converged=True,
+        message="",
+        iterations=0,
+        prices={},
+    )
+    return view_of(problem, solved)
+
+
+def _inside(problem: Problem, values: FloatArray) -> FloatArray:
+    low = np.array([p.low for p in problem.law.parameters])
+    high = np.array([p.high for p in problem.law.parameters])
+    return np.asarray(np.clip(values, low, high))

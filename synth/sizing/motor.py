@@ -1,0 +1,141 @@
+r"""A family of motors: the case's own, larger or smaller, behind any gear.
+
+    case, scale s, gear ratio n -> case
+
+Geometrically similar machines with the same shear stress in the air gap: the torque grows with
+the volume, T ~ l^3, the rotor's inertia with J ~ l^5, so J ~ T^(5/3) (dimensional analysis, as
+Budinger, Liscouet, Hospital, Mare: "Estimation models for the preliminary design of
+electromechanical actuators", Proc. IMechE G 226 (2012) 243-259, set up theirs).  Speeds and the
+ratio of peak to continuous torque are kept, so the power goes with the torque.  The supply of a DC
+motor keeps its voltage, hence K_T and K_omega: the current goes with the torque, resistance and
+inductance against it (the same share of losses, the same electrical time constant).  Friction
+goes with the torque, couplings and brake on the motor's shaft with the rotor, and the drive's own
+speed regulator keeps its bandwidth on both.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from models.basics.checks import check_range
+from models.basics.physics_warning import PhysicsWarning
+from models.case.case import Case
+from models.rig.winch import DCMotor
+
+__all__ = ["INERTIA_EXPONENT", "MotorData", "changed", "motor_changes", "with_motor"]
+
+INERTIA_EXPONENT = 5.0 / 3.0
+"""Of the rotor's inertia over the torque."""
+
+_DRIVE = ("torque_continuous", "torque_peak", "power", "current_continuous", "current_peak")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotorData:
+    """A motor in the figures that one buys it by.
+
+    Attributes
+    ----------
+    torque_continuous, torque_peak
+        At the shaft [N m].
+    speed
+        Rated speed: base speed of an AC motor, highest speed of a DC motor [rad/s].
+    power
+        Rated power, continuous torque times that speed [W].
+    inertia
+        Of the rotor [kg m2].
+    """
+
+    torque_continuous: float
+    torque_peak: float
+    speed: float
+    power: float
+    inertia: float
+
+    @classmethod
+    def of(cls, case: Case) -> MotorData:
+        """Return the motor of a case."""
+        motor, drive = case.winch.motor, case.winch.drive
+        speed = case.winch.speed_limit if isinstance(motor, DCMotor) else motor.base_speed
+        return cls(
+            torque_continuous=drive.torque_continuous,
+            torque_peak=drive.torque_peak,
+            speed=speed,
+            power=drive.torque_continuous * speed,
+            inertia=motor.inertia,
+        )
+
+
+def motor_changes(
+    case: Case, scale: float = 1.0, *, exponent: float = INERTIA_EXPONENT
+) -> dict[str, float]:
+    """Return the changes by dotted path that make a case's motor `scale` times as large.
+
+    Parameters
+    ----------
+    case
+        The case, its motor the one of scale 1.
+    scale
+        Continuous torque over that of the case's motor.
+    exponent
+        Of the inertia over the torque.
+
+    Raises
+    ------
+    InputError
+        If the scale is not above 0.
+    """
+    check_range("motor", "scale", scale, low=0.0, open_low=True)
+    motor, drive, box = case.winch.motor, case.winch.drive, case.winch.gearbox
+    inertia = scale**exponent
+    changes = {
+        "winch.motor.inertia": motor.inertia * inertia,
+        "winch.motor.viscous_friction": motor.viscous_friction * scale,
+        "winch.motor.coulomb_friction": motor.coulomb_friction * scale,
+        "winch.gearbox.inertia": box.inertia * inertia,
+    }
+    if isinstance(motor, DCMotor):
+        changes["winch.motor.resistance"] = motor.resistance / scale
+        changes["winch.motor.inductance"] = motor.inductance / scale
+    else:
+        changes["winch.motor.speed_gain"] = motor.speed_gain * inertia
+    for name in _DRIVE:
+        value = getattr(drive, name)
+        if value is not None:
+            changes[f"winch.drive.{name}"] = value * scale
+    return changes
+
+
+def with_motor(
+    case: Case,
+    scale: float = 1.0,
+    gear: float | None = None,
+    *,
+    exponent: float = INERTIA_EXPONENT,
+) -> Case:
+    """Return a case with its motor `scale` times as large behind a gear of ratio `gear`.
+
+    Parameters
+    ----------
+    case, scale, exponent
+        See `motor_changes`.
+    gear
+        Turns of the motor per turn of the drum; by default the case's.
+    """
+    changes: dict[str, float] = motor_changes(case, scale, exponent=exponent)
+    if gear is not None:
+        changes["winch.gearbox.ratio"] = gear
+    return changed(case, changes)
+
+
+def changed(case: Case, changes: Mapping[str, Any]) -> Case:
+    """Return a case with changes, without its remarks on the physics.
+
+    A search looks at motors and seas that nobody has asked for.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PhysicsWarning)
+        return case.replace(changes)

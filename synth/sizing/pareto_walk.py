@@ -1,0 +1,263 @@
+"""Walking along a Pareto front: one programme, a bound that moves, each solve from its neighbour's.
+
+    answers of searches -> predictor, warm solve, next bound ... -> best answer at each bound
+
+Walks begin at the answers of multi-start searches, go both ways and end where another walk has
+been with a better answer.  Each solve begins at the point that its two neighbours lead to, with
+the multipliers of the nearer one, so that a few iterations do.  What leaks between the nodes is
+seen on a dense grid, and becomes a node on the way; nodes that nothing came near for a while are
+dropped.  What leaves here is a front on moderate nodes, for `synth.sizing.pareto_exchange`.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from ..loop.assess import Assessment
+from ..question.problem import Problem
+from ..search.nodes import cost_nodes, margin_nodes
+from ..search.polishing import thinned, view_of
+from ..search.programme import Pace, Programme, Solved
+
+__all__ = ["Walk", "local_programme", "with_bound"]
+
+FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+Place = tuple[float, FloatArray]  # a step, and the programme's vector there
+
+_SAME = 1e-6  # log costs that differ by less are the same answer
+_LEAK = 5e-3  # relative excess over a limit that an answer may leak between the nodes
+_SUSPECT = 5e-3  # largest row on the dense grid from which on an answer is looked at
+_TRIES = 6  # at one bound
+_PARTS = (1, 3, 10)  # of a step to the next bound
+_RENEWALS = 80  # of the nodes, over a front
+_REMEMBERED = 5  # leaks whose neighbourhoods are nodes
+_VIEWS = 9  # loops that make the nodes of a programme
+_DENSE = 250  # nodes per decade of the grid on which leaks are seen
+_SPARSE = 30  # margin nodes per decade where nothing is known to be critical
+_CRITICAL = 100  # critical frequencies that a programme has as nodes, about
+_LEAST_STEP = 1e-12  # between two bounds, relative
+
+
+class Walk:
+    """Walks along the bounds of one programme, and the best answer found at each."""
+
+    def __init__(self, problem: Problem, name: str, bounds: FloatArray) -> None:
+        self.problem, self.name, self.bounds = problem, name, bounds
+        self.begins: list[tuple[int, FloatArray, float | None]] = []
+        self.best: list[Solved | None] = [None] * len(bounds)
+        limit = next(lim for lim in problem.limits if lim.name == name)
+        self.bound = limit.bound  # that the programme is made with
+        # As `Programme.solve` takes it: a bound relative to the one it was made with.
+        self._at_least = limit.at_least
+        self.steps = [(b / limit.bound - 1.0) * (1 if limit.at_least else -1) for b in bounds]
+        self.reference = np.zeros(0)
+        self._held: deque[FloatArray] = deque(maxlen=_REMEMBERED)
+        self._views: list[Assessment] = []
+        self._renewed = 0
+
+    def go(self, tell: Progress) -> None:
+        """Walk both ways from every beginning, then look at what is out of order."""
+        problem = self.problem
+        stable = [b for b in self.begins if problem.stable(b[1], b[2])]
+        self.reference = min((b[1] for b in stable), key=problem.abscissa)
+        self._views = [_looked(problem, values, coefficient) for _, values, coefficient in stable]
+        poles = [view.poles for view in self._views[:4]]
+        nodes = cost_nodes(problem, self._views[:_VIEWS], rtol=1e-5)
+        dense = margin_nodes(problem, poles, _DENSE)
+        self._dense = Programme(problem, nodes, dense, reference=self.reference)
+        self._state_again()
+        for k, (at, values, coefficient) in enumerate(stable):
+            tell("walking along the front", k, len(stable))
+            x = self.programme.pack(values, coefficient)
+            self._along(range(at, len(self.bounds)), x)
+            self._along(range(at - 1, -1, -1), x)
+        self._put_in_order()
+
+    def _put_in_order(self) -> None:
+        """Begin again where a point is missing or worse than its tighter neighbour.
+
+        What serves a tight bound serves a looser one.
+        """
+        tighter_first = range(len(self.bounds))
+        if self.steps[0] < self.steps[-1]:
+            tighter_first = tighter_first[::-1]
+        for order in (tighter_first, tighter_first[::-1]):
+            for i, j in itertools.pairwise(order):
+                one, other = self.best[i], self.best[j]
+                if one is None:
+                    continue
+                worse = order is tighter_first and (
+                    other is not None and one.objective < other.objective - _SAME
+                )
+                if other is None or worse:
+                    x = self.programme.pack(one.values, one.coefficient)
+                    self._along(_from(order, j), x)
+
+    def _state_again(self) -> None:
+        self.programme = local_programme(
+            self.problem, self._views, list(self._held), self.reference, rtol=1e-5
+        )
+
+    def _along(self, order: Sequence[int], x: FloatArray) -> None:
+        """Go on from bound to bound until another walk has been there with a better answer."""
+        before: tuple[float, FloatArray] | None = None
+        last: Solved | None = None
+        for n, i in enumerate(order):
+            here = (self.steps[order[n - 1]], x) if n > 0 else None
+            solved = self._reached(before, here or (self.steps[i], x), self.steps[i], last)
+            if solved is None:
+                return
+            known = self.best[i]
+            if known is not None and solved.objective > known.objective - _SAME:
+                if n > 0 or known.objective < solved.objective - _SAME:
+                    return
+            else:
+                self.best[i] = solved
+            before = here
+            x, last = self.programme.pack(solved.values, solved.coefficient), solved
+
+    def _reached(
+        self, before: Place | None, here: Place, step: float, last: Solved | None
+    ) -> Solved | None:
+        """Return an answer at a step from where a walk stands, in smaller steps if it must be."""
+        for parts in _PARTS:
+            at, behind, solved = here, before, last
+            for k in range(1, parts + 1):
+                target = here[0] + (step - here[0]) * k / parts
+                ahead = at[1] if behind is None else _led(behind, at, target)
+                solved = self._solved(at[1], ahead, target, solved)
+                if solved is None:
+                    break
+                behind, at = at, (target, self.programme.pack(solved.values, solved.coefficient))
+            if solved is not None:
+                return solved
+            if here[0] == step:
+                return None
+        return None
+
+    def _solved(
+        self, x: FloatArray, ahead: FloatArray, step: float, last: Solved | None
+    ) -> Solved | None:
+        """Return a stable answer at a step that does not leak between the nodes, if any."""
+        own = with_bound(self.problem, self.name, self._bound(step))
+        loop = [limit for limit in own.limits if not limit.drive]
+        for _ in range(_TRIES):
+            solved = self._answer(x, ahead, last, {self.name: step})
+            if solved is None:
+                return None
+            view = self._leaking(solved, own, step)
+            if view is None:
+                return solved
+            if self._renewed >= _RENEWALS:
+                return None
+            # It slipped through between the nodes: where it did becomes a node.
+            self._renewed += 1
+            # Only what is merely close may be thinned out.
+            near = thinned([limit.critical(view) for limit in loop], _CRITICAL)
+            self._held.append(np.concatenate([near, *(limit.worst(view) for limit in loop)]))
+            self._state_again()
+        return None
+
+    def _bound(self, step: float) -> float:
+        """Return the bound at a step."""
+        return float(self.bound * (1.0 + (step if self._at_least else -step)))
+
+    def _answer(
+        self, x: FloatArray, ahead: FloatArray, last: Solved | None, tighten: dict[str, float]
+    ) -> Solved | None:
+        """Return a stable answer on the nodes, by the quickest way that leads to one."""
+        programme, stable = self.programme, self.problem.stable
+        if last is not None:
+            for start in (ahead, x):
+                near = programme.follow(start, last, tighten)
+                if near is not None and stable(near.values, near.coefficient):
+                    return near
+        for pace in (Pace.NEAR, Pace.FAR):
+            solved = programme.solve(x, tighten=tighten, pace=pace)
+            if solved.converged and stable(solved.values, solved.coefficient):
+                return solved
+        return None
+
+    def _leaking(self, solved: Solved, own: Problem, step: float) -> Assessment | None:
+        """Return a look at an answer that leaks through a limit, None if it does not."""
+        x = self._dense.pack(solved.values, solved.coefficient)
+        rows = self._dense.violations(x, {self.name: step})[1]
+        loop = [limit for limit in own.limits if not limit.drive]
+        if all(rows[limit.name] < _SUSPECT for limit in loop):
+            return None
+        view = view_of(own, solved)
+        leaks = any(lim.use(lim.measure(view)) >= 1.0 + _LEAK for lim in loop)
+        return view if leaks else None
+
+
+def local_programme(
+    problem: Problem,
+    views: Sequence[Assessment],
+    held: Sequence[FloatArray],
+    reference: FloatArray,
+    rtol: float,
+    per_decade: int = _SPARSE,
+) -> Programme:
+    """Return a programme whose nodes suit a few loops of a front.
+
+    Parameters
+    ----------
+    problem, reference
+        The problem with the bound that its programmes are made with, and a briskly stable point.
+    views
+        Loops whose poles and critical frequencies make nodes.
+    held
+        Further margin nodes [rad/s].
+    rtol
+        Of the variances.
+    per_decade
+        Margin nodes where nothing is known to be critical.
+    """
+    chosen = list(views)[:_VIEWS]
+    critical = [limit.critical(view) for view in chosen for limit in problem.limits]
+    omega = margin_nodes(problem, [view.poles for view in chosen[:4]], per_decade)
+    return Programme(
+        problem,
+        cost_nodes(problem, chosen, rtol=rtol),
+        np.unique(np.concatenate([omega, thinned(critical, _CRITICAL), *held])),
+        reference=reference,
+        tolerance=1e-8,
+    )
+
+
+def with_bound(problem: Problem, name: str, bound: float) -> Problem:
+    """Return the problem with another bound of one of its limits."""
+    limits = tuple(replace(m, bound=bound) if m.name == name else m for m in problem.limits)
+    return replace(problem, limits=limits)
+
+
+def _led(before: Place, here: Place, step: float) -> FloatArray:
+    """Return where two points of a walk lead to at the next step, by a straight line."""
+    gap = here[0] - before[0]
+    if abs(gap) < _LEAST_STEP:
+        return here[1]
+    share = np.clip((step - here[0]) / gap, 0.0, 2.0)
+    return np.asarray(here[1] + share * (here[1] - before[1]), dtype=np.float64)
+
+
+def _from(order: Sequence[int], first: int) -> list[int]:
+    """Return the part of an order from one of its entries on."""
+    listed = list(order)
+    return listed[listed.index(first) :]
+
+
+def _looked(problem: Problem, values: FloatArray, coefficient: float | None) -> Assessment:
+    return Assessment(
+        problem.plant,
+        problem.law.controller([float(v) for v in values]),
+        problem.disturbances,
+        drag=problem.drag,
+        coefficient=coefficient,
+    )

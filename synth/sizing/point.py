@@ -1,0 +1,343 @@
+r"""The smallest motor behind one gear that meets a target, and what limits it.
+
+    Posed -> least factor on the motor's ratings -> larger rotor -> again -> SizePoint
+
+For a rotor of fixed inertia the least factor f on torque, current and power with which target and
+all other limits can be kept is one programme (`Goal.RELAX`).  A motor that much larger has a
+larger rotor, which takes torque to accelerate: the scale s sought is the first root of log f(s), f
+the factor on the ratings of a motor of scale s.  Where f stays above one, falling and then rising
+with the motor, it is the motor's own inertia that stops it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError, check_range
+from models.basics.units import parse_quantity
+from models.case.case import Case
+
+from ..limits.limits import Limit
+from ..limits.signal_limits import Rms
+from ..question.problem import Goal, Problem
+from .follow import Answer, Posed, follow
+from .motor import MotorData, changed, with_motor
+
+__all__ = [
+    "AT_REST",
+    "RATINGS",
+    "TARGET",
+    "Least",
+    "SizePoint",
+    "least_motor",
+    "sea_factor",
+    "target_of",
+    "with_target",
+]
+
+FloatArray = npt.NDArray[np.float64]
+
+TARGET = "payload.displacement.rms"
+"""Name of the target among the limits."""
+AT_REST = "the load at rest"
+"""What binds where any motor that holds the load does the rest too."""
+RATINGS = (
+    "motor.torque.peak",
+    "motor.torque.continuous",
+    "motor.current.peak",
+    "motor.current.continuous",
+    "motor.power.peak",
+)
+"""Limits that grow with the motor; the others (speed, voltage, rope) stay."""
+
+_SETTLED = 1e-3  # of the logarithm of the scale
+_STEPS = 12
+_LEAST_STEP = 0.1  # of the logarithm of the scale, where no motor was found yet
+_LARGEST = 1e3  # scale that is looked at
+_ABOVE = 1.0 + 1e-6  # the load at rest, at least
+_FAR = 1.0  # guess of the factor's logarithm where that of the neighbour does not serve
+_BINDING = 5e-3  # a limit that is used up to this share of itself binds
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SizePoint:
+    """The smallest motor behind one gear.
+
+    Attributes
+    ----------
+    gear
+        Turns of the motor per turn of the drum.
+    scale
+        Continuous torque over that of the case's motor; infinite if no motor does it.
+    motor
+        Its figures; None if no motor does it.
+    payload_rms
+        Of the payload [m].
+    binding
+        Names of the limits that bind, or of those that stop it.
+    parameters
+        The controller's, by name.
+    """
+
+    gear: float
+    scale: float
+    motor: MotorData | None
+    payload_rms: float
+    binding: tuple[str, ...]
+    parameters: Mapping[str, float]
+
+    @property
+    def feasible(self) -> bool:
+        """Whether there is such a motor."""
+        return math.isfinite(self.scale)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Least:
+    """A point with the answer that its neighbours begin from."""
+
+    point: SizePoint
+    answer: Answer | None
+
+
+def with_target(posed: Posed, target: float) -> tuple[Limit, ...]:
+    """Return all limits of a case and that of the payload's rms [m]."""
+    return (*posed.loop, *posed.drive, Rms(bound=target, output="payload.displacement"))
+
+
+def least_motor(
+    case: Case,
+    structure: str,
+    gear: float,
+    target: float,
+    *,
+    masses: int,
+    near: Answer,
+    scale: float = 1.0,
+) -> Least:
+    """Return the smallest motor behind a gear.
+
+    Parameters
+    ----------
+    case, structure
+        The case, its motor the one of scale 1, and the structure.
+    gear, target
+        Ratio of the gear [-] and rms that the payload may have [m].
+    masses
+        Rope masses.
+    near
+        An answer nearby, to begin from.
+    scale
+        Scale to begin with.
+    """
+    known: list[tuple[float, float]] = []
+    rest = math.log(_at_rest(case, gear))
+    size, answer, extra = max(math.log(scale), rest), near, 0.0
+    while len(known) < _STEPS:
+        problem = _problem(case, structure, gear, target, math.exp(size), masses)
+        found = _rated(problem, answer, extra)
+        if found is None:
+            return Least(point=_stopped(problem, answer, gear), answer=None)
+        answer, extra = found, found.solved.extra
+        known.append((size, extra))
+        if abs(extra) < _SETTLED or (extra < 0.0 and size <= rest):
+            at_rest = extra <= -_SETTLED
+            return Least(point=_point(case, gear, size, found, at_rest=at_rest), answer=found)
+        step = _next(known, rest)
+        if step is None or step > math.log(_LARGEST):
+            break
+        size = step
+    return Least(point=_none(gear, ("motor.inertia",)), answer=answer)
+
+
+def sea_factor(
+    case: Case, structure: str, height: float, target: float, *, masses: int, near: Answer
+) -> Answer | None:
+    """Return the answer with the least factor on target and drive in a sea of height H_s [m].
+
+    At a factor of one or less (its `extra` at most 0) the winch meets the target there.
+    """
+    posed = Posed.of(changed(case, {"sea.significant_height": height}), structure, masses)
+    problem = posed.problem(with_target(posed, target))
+    relaxed = [m.name for m in problem.limits if m.drive and not m.at_least]
+    return follow(
+        problem,
+        _starts(near, problem),
+        near=near,
+        goal=Goal.RELAX,
+        relaxed=relaxed,
+        extra=near.solved.extra,
+    )
+
+
+def _at_rest(case: Case, gear: float) -> float:
+    """Return the scale of the motor that just holds the load at rest, through the losses."""
+    drive, box = case.winch.drive, case.winch.gearbox
+    torque = case.static_torque_budget * box.ratio / gear
+    rating = drive.torque_continuous
+    if drive.current_continuous is not None:
+        rating = min(rating, drive.current_continuous * case.winch.torque_constant)
+    return _ABOVE * torque / rating
+
+
+def _rated(problem: Problem, near: Answer, extra: float) -> Answer | None:
+    """Return the answer with the least factor on the motor's ratings."""
+    ratings = [m.name for m in problem.limits if m.name in RATINGS]
+    for guess in (extra, _FAR):
+        found = follow(
+            problem,
+            _starts(near, problem),
+            near=near,
+            goal=Goal.RELAX,
+            relaxed=ratings,
+            extra=guess,
+        )
+        if found is not None:
+            return found
+    return None
+
+
+def _problem(
+    case: Case, structure: str, gear: float, target: float, scale: float, masses: int
+) -> Problem:
+    posed = Posed.of(with_motor(case, scale, gear), structure, masses)
+    return posed.problem(with_target(posed, target))
+
+
+def _starts(near: Answer, problem: Problem) -> list[FloatArray]:
+    """Return starts from a neighbour: as large for the new plant as for its own, or as it is."""
+    carried, plain = near.carried(problem), near.solved.values
+    starts = [carried] if problem.stable(carried, near.solved.coefficient) else []
+    return starts or [plain]
+
+
+def _next(known: Sequence[tuple[float, float]], rest: float) -> float | None:
+    """Return the next logarithm of the scale to look at, or None if no motor does it.
+
+    The factor that is missing falls with the motor until its own rotor takes what it adds, and
+    rises again: sought is the first root, from the left.
+    """
+    points = sorted(known)
+    enough = [s for s, over in points if over <= 0.0]
+    if enough:
+        right, over = next(pair for pair in points if pair[1] <= 0.0)
+        short = [pair for pair in points if pair[0] < right]
+        if not short:
+            return max(rest, right + min(over, -_SETTLED))  # exact if the rotor weighed nothing
+        left, missing = short[-1]
+        share = missing / (missing - over)
+        return left + min(0.9, max(0.1, share)) * (right - left)
+    at = min(range(len(points)), key=lambda i: points[i][1])
+    size, missing = points[at]
+    if at == len(points) - 1:
+        return size + max(missing, _LEAST_STEP)
+    if at == 0:
+        return None if size <= rest else max(rest, size - max(missing, _LEAST_STEP))
+    (x1, y1), (x2, y2), (x3, y3) = points[at - 1 : at + 2]
+    # The parabola through the three; if it stays above zero by far, so does the factor.
+    one, two = (y2 - y1) / (x2 - x1), (y3 - y2) / (x3 - x2)
+    bend = (two - one) / (x3 - x1)
+    if bend <= 0.0:
+        return None
+    lowest = 0.5 * (x1 + x2 - one / bend)
+    value = y2 + (lowest - x2) * (one + bend * (lowest - x1))
+    if value > 0.5 * y2 or x3 - x1 < _LEAST_STEP or abs(lowest - x2) < 0.1 * _LEAST_STEP:
+        return None
+    return lowest
+
+
+def _point(case: Case, gear: float, size: float, answer: Answer, *, at_rest: bool) -> SizePoint:
+    # The last factor is within 0.1 % of one, and counts.
+    scale = math.exp(size + max(answer.solved.extra, 0.0))
+    uses = answer.uses()
+    factor = math.exp(answer.solved.extra)
+    names = [n for n, use in uses.items() if use / (factor if n in RATINGS else 1.0) > 1 - _BINDING]
+    # The target binds at every smallest motor: that goes without saying.
+    names = [name for name in names if name != TARGET]
+    prices = answer.solved.prices
+    return SizePoint(
+        gear=gear,
+        scale=scale,
+        motor=MotorData.of(with_motor(case, scale, gear)),
+        payload_rms=answer.payload_rms,
+        binding=(*((AT_REST,) if at_rest else ()), *sorted(names, key=lambda n: -abs(prices[n]))),
+        parameters=answer.parameters,
+    )
+
+
+def _stopped(problem: Problem, near: Answer, gear: float) -> SizePoint:
+    """Return a point that no motor of the family reaches, with what stops it.
+
+    With all limits of the drive and the target relaxed by one factor, those that stay broken
+    though they do not grow with the motor are what stops it.
+    """
+    relaxed = [m.name for m in problem.limits if m.drive and not m.at_least]
+    wide = follow(
+        problem,
+        _starts(near, problem),
+        near=near,
+        goal=Goal.RELAX,
+        relaxed=relaxed,
+        extra=0.5,
+        rounds=1,
+    )
+    if wide is None:
+        return _none(gear, ("stability",))
+    uses, prices = wide.uses(), wide.solved.prices
+    broken = {n: u for n, u in uses.items() if u > 1.0 + _BINDING and n not in RATINGS}
+    fixed = sorted((n for n in broken if n != TARGET), key=lambda n: -broken[n])
+    if fixed:
+        return _none(gear, tuple(fixed))
+    loop = [m.name for m in problem.limits if not m.drive and uses[m.name] > 1.0 - _BINDING]
+    loop.sort(key=lambda n: -abs(prices[n]))
+    return _none(gear, tuple(loop) or (TARGET,))
+
+
+def _none(gear: float, names: tuple[str, ...]) -> SizePoint:
+    return SizePoint(
+        gear=gear,
+        scale=math.inf,
+        motor=None,
+        payload_rms=math.inf,
+        binding=names,
+        parameters={},
+    )
+
+
+def target_of(target: float | str, hook_rms: float) -> float:
+    """Return a target as an rms of the payload [m].
+
+    Parameters
+    ----------
+    target
+        A number in metres, a text with a unit of length (``20 mm``), with ``%`` of the hook's
+        rms motion, or with ``dB`` below it.
+    hook_rms
+        Of the hook [m].
+
+    Raises
+    ------
+    InputError
+        If it is none of these, or not between 0 and the hook's motion.
+    """
+    text = target.strip() if isinstance(target, str) else ""
+    try:
+        if text.endswith("%"):
+            value = 0.01 * float(text[:-1]) * hook_rms
+        elif text.lower().endswith("db"):
+            value = hook_rms * 10.0 ** (-abs(float(text[:-2])) / 20.0)
+        else:
+            value = parse_quantity(target, "length")
+    except ValueError as error:
+        if isinstance(error, InputError) and not text:
+            raise InputError(f"target: {error}") from None
+        raise InputError(
+            "target: must be a length, a share of the hook's motion or a reduction, as in 20 mm, "
+            f"5 % or 26 dB, got {target!r}"
+        ) from None
+    return check_range("size", "target", value, low=0.0, high=100.0, unit="m", open_low=True)

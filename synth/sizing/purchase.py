@@ -1,0 +1,269 @@
+r"""What is worth buying: how the optimum depends on each limit, sensor, delay and on the gear.
+
+    case or design -> optimum (`synth.sizing.follow`) -> items
+        -> price, optimised again with the item a little better, and twice as good -> Worth
+
+Two routes to the same number.  The *price* is the derivative of the optimum by the envelope
+theorem: that of the Lagrangian with the multipliers of every row, for a limit its multiplier.  The
+*elasticity* comes from gains that were optimised again with the figure a little better.  Where the
+optimum is smooth they agree; where limits are about to change hands, and for margins that are
+pressed at several frequencies at once, the second one counts.  Last, the figure is made twice as
+good and the gains are optimised once more: what stillness that buys is what the list is sorted by.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from models.basics.threads import one_thread
+from models.case.case import Case
+
+from ..design.structure_design import StructureDesign
+from ..design.structure_search import optimise_structure
+from ..limits.limits import Limit
+from ..question.problem import Problem
+from ..search.multistart import Progress
+from .follow import Answer, Posed, begin_from, follow, slope
+from .purchase_items import Item, limit_items, part_items
+
+__all__ = ["Worth", "WorthRow", "worth"]
+
+_STEP = 0.05  # of the logarithm, for the elasticity
+_SMALL = 1e-4  # of the logarithm, for the price
+_FREE = 1e-6  # price below which a limit is one that does not bind
+_SHARES = (1.0, 0.5, 0.25, 0.125)  # of a factor of two, for the gear
+_WORTH = 0.01  # share of the rms below which nothing is worth its money
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WorthRow:
+    """What one figure is worth.
+
+    Attributes
+    ----------
+    item
+        The figure: its name, value, unit, and what kind of thing it is.
+    price, elasticity
+        d log(rms) / d log(figure) by the envelope theorem, and by optimising again with the
+        figure 5 % better; nan where the figure is zero or that could not be done.
+    per_step
+        What the payload's rms changes by if the figure gets better by its natural step [m].
+    factor, twice_rms
+        What the figure is multiplied by to be twice as good (a gear as far as the drive stands),
+        and the payload rms with it [m]; nan if that could not be done.
+    gain
+        What of the rms that takes away [m].
+    """
+
+    item: Item
+    price: float
+    elasticity: float
+    per_step: float
+    factor: float
+    twice_rms: float
+    gain: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Worth:
+    """The answer of `worth`.
+
+    Attributes
+    ----------
+    case, structure
+        The case and the controller structure.
+    ok, status
+        Whether the optimum to begin with is one; the sentence for the user.
+    payload_rms
+        At the optimum [m].
+    rows
+        By what the figure twice as good takes away, most first.
+    """
+
+    case: Case
+    structure: str
+    ok: bool
+    status: str
+    payload_rms: float
+    rows: tuple[WorthRow, ...]
+
+    @property
+    def first(self) -> WorthRow | None:
+        """The row to buy first: not a margin, which is given away, and not the gear."""
+        sold = [row for row in self.rows if row.item.sold and row.gain > _WORTH * self.payload_rms]
+        return sold[0] if sold else None
+
+    def to_csv(self) -> str:
+        """Return the rows as CSV, SI units."""
+        lines = ["item,kind,value,unit,price,elasticity,step,rms_per_step,rms_twice_as_good"]
+        for row in self.rows:
+            item = row.item
+            figures = (row.price, row.elasticity, item.step, row.per_step, row.twice_rms)
+            numbers = ["" if math.isnan(v) else f"{v:.8g}" for v in figures]
+            lines.append(",".join([item.name, item.kind, f"{item.value:.8g}", item.unit, *numbers]))
+        return "\n".join(lines) + "\n"
+
+
+@one_thread()
+def worth(
+    case: Case | StructureDesign,
+    *,
+    structure: str = "payload-feedback",
+    starts: int = 4,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Worth:
+    """Return what each limit, sensor, delay and the gear of a case are worth.
+
+    Parameters
+    ----------
+    case
+        A case, or a design of `optimise_structure`, whose structure counts then.
+    structure
+        Controller structure, see `synth.structures.winch_structures.structure_names`.
+    starts, seed
+        Size and seed of the search for the optimum.
+    progress
+        Called as progress(stage, done, total).
+
+    Raises
+    ------
+    InputError
+        If there is no such structure.
+    """
+    if isinstance(case, StructureDesign):
+        design = case
+    else:
+        design = optimise_structure(case, structure, starts, seed, progress=progress)
+    tell: Progress = progress or (lambda stage, done, total: None)
+    result = Worth(
+        case=design.case,
+        structure=design.structure,
+        ok=False,
+        status=design.status,
+        payload_rms=design.payload_rms,
+        rows=(),
+    )
+    if not design.parameters or not design.drive_kept:
+        return result
+    posed = Posed.of(design.case, design.structure, design.masses)
+    problem = _problem(posed, design.case)
+    coefficient = design.drag if problem.drag is not None else None
+    here = follow(problem, [begin_from(problem, design)], coefficient=coefficient)
+    if here is None:
+        return replace(result, status="the optimum could not be followed")
+    items = [
+        *limit_items(problem.limits),
+        *part_items(design.case, design.posed.structure.measurements, posed),
+    ]
+    rows = []
+    for k, item in enumerate(items):
+        tell("what each thing is worth", k, len(items))
+        rows.append(_row(design, here, item))
+    rows.sort(key=lambda row: -row.gain if math.isfinite(row.gain) else 0.0)
+    result = replace(result, ok=True, payload_rms=here.payload_rms, rows=tuple(rows))
+    return replace(result, status=_sentence(result))
+
+
+def _row(design: StructureDesign, here: Answer, item: Item) -> WorthRow:
+    """Return what one figure is worth, by both routes."""
+    price = _price(design, here, item)
+    factor = 2.0 if item.better > 0 else 0.5
+    row = WorthRow(
+        item=item,
+        price=price,
+        elasticity=0.0,
+        per_step=0.0,
+        factor=factor,
+        twice_rms=here.payload_rms,
+        gain=0.0,
+    )
+    if item.limit is not None and abs(price) < _FREE:
+        return row  # a limit that does not bind: looser, it leaves the optimum where it is
+    way = item.better or (-1 if price > 0.0 else 1)
+    rms = here.payload_rms
+    if item.value == 0.0:
+        return row  # as good as it gets
+    near = _again(design, here, item, math.exp(way * _STEP), here)
+    twice = None
+    for share in _SHARES if item.kind == "gear" else (1.0,):
+        # Half or twice the gear may be more than the drive stands: then as much as it does.
+        factor = 2.0 ** (way * share)
+        twice = _again(design, here, item, factor, near or here)
+        if twice is not None:
+            break
+    step = way * item.step / item.value
+    elasticity = math.nan if near is None else math.log(near.payload_rms / rms) / (way * _STEP)
+    slope_used = elasticity if math.isfinite(elasticity) else price
+    return replace(
+        row,
+        elasticity=elasticity,
+        per_step=rms * math.expm1(slope_used * math.log1p(step)) if step > -1.0 else math.nan,
+        factor=factor,
+        twice_rms=twice.payload_rms if twice is not None else math.nan,
+        gain=rms - twice.payload_rms if twice is not None else 0.0,
+    )
+
+
+def _price(design: StructureDesign, here: Answer, item: Item) -> float:
+    """Return d log(rms) / d log(figure) by the envelope theorem; nan if the figure is zero."""
+    if item.value == 0.0:
+        return math.nan
+    if item.limit is not None:
+        return -item.better * abs(here.solved.prices[item.limit])
+    changed = _changed(design, here, item, math.exp(_SMALL))
+    return slope(here, changed, _SMALL) if changed is not None else math.nan
+
+
+def _again(
+    design: StructureDesign, here: Answer, item: Item, factor: float, near: Answer
+) -> Answer | None:
+    """Return the optimum with a figure times a factor."""
+    problem = _changed(design, here, item, factor)
+    if problem is None:
+        return None
+    begins = (
+        [near.carried(problem), here.carried(problem)]
+        if near is not here
+        else [here.carried(problem)]
+    )
+    return follow(problem, begins, near=here)
+
+
+def _changed(design: StructureDesign, here: Answer, item: Item, factor: float) -> Problem | None:
+    if item.limit is not None:
+        limits = [
+            replace(m, bound=m.bound * factor) if m.name == item.limit else m
+            for m in here.problem.limits
+        ]
+        return replace(here.problem, limits=tuple(limits))
+    case = item.case(design.case, factor)
+    if case is None:
+        return None
+    return _problem(Posed.of(case, design.structure, design.masses), design.case)
+
+
+def _problem(posed: Posed, case: Case) -> Problem:
+    drive: Sequence[Limit] = posed.drive if case.limits.drive == "enforce" else ()
+    return posed.problem((*posed.loop, *drive))
+
+
+def _sentence(result: Worth) -> str:
+    """Return what to buy first."""
+    rms = 1e3 * result.payload_rms
+    first = result.first
+    if first is not None:
+        text = (
+            f"buy first: {first.item.name}; twice as good leaves {1e3 * first.twice_rms:.4g} mm "
+            f"rms instead of {rms:.4g} mm"
+        )
+    else:
+        text = f"nothing that is sold takes one per cent off the {rms:.4g} mm rms"
+    given = [r for r in result.rows if not r.item.sold and r.gain > _WORTH * result.payload_rms]
+    if given:
+        other = given[0]
+        value = other.item.value * other.factor
+        text += f"; {other.item.name} at {value:.4g} would leave {1e3 * other.twice_rms:.4g} mm"
+    return text

@@ -1,0 +1,341 @@
+"""Sizing: the smallest motor and gear that hold a payload still enough in a given sea.
+
+    case, target, H_s -> best without a motor's limits (is it possible at all?)
+        -> smallest motor behind each gear, from neighbour to neighbour -> golden section
+        -> chosen motor and gear -> gains within its limits, verified -> Sizing
+
+Motors are the case's own, scaled (`synth.sizing.motor`), or those of a catalogue
+(`synth.sizing.catalogue`).  Speeds are the same all through the family, so the smallest torque is
+the smallest power too.  The other way round the sizing says what the case's own winch can do: how
+still it holds the payload in that sea, and in how high a sea it still meets the target.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import InputError, check_range
+from models.basics.threads import one_thread
+from models.case.case import Case
+from models.plant.rope import MAX_MASSES
+
+from ..search.multistart import Progress, search
+from ..search.polishing import KEPT
+from .catalogue import Choice, choose, read_catalogue
+from .follow import EXCESS, Answer, Posed, follow
+from .motor import MotorData, changed, with_motor
+from .point import Least, least_motor, target_of
+from .sizing_design import designed, why_not
+from .sizing_result import Sizing as Sizing
+from .sizing_sea import highest_sea
+
+__all__ = ["Sizing", "size_winch"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_SPAN = 2.5  # gears that are tried: the case's over and times this
+_FINE = 0.03  # of the logarithm of the gear, to which the best is found
+_GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+_ROOM = 1.005  # by which the chosen motor is larger than the smallest
+
+
+@dataclass(kw_only=True)
+class _Search:
+    """What a sizing knows on its way."""
+
+    case: Case
+    structure: str
+    target: float
+    masses: int
+    free: Answer
+    tell: Progress
+    found: dict[float, Least]
+
+    def at(self, gear: float) -> Least:
+        """Return the smallest motor behind a gear, from the nearest that is known."""
+        if gear not in self.found:
+            known = [g for g, least in self.found.items() if least.point.feasible]
+            nearest = min(known, key=lambda g: abs(math.log(g / gear)), default=None)
+            near = self.found[nearest] if nearest is not None else None
+            self.found[gear] = least_motor(
+                self.case,
+                self.structure,
+                gear,
+                self.target,
+                masses=self.masses,
+                near=near.answer if near is not None and near.answer is not None else self.free,
+                scale=near.point.scale if near is not None else 1.0,
+            )
+        return self.found[gear]
+
+
+@one_thread()
+def size_winch(
+    case: Case,
+    *,
+    target: float | str,
+    height: float | str | None = None,
+    structure: str = "payload-feedback",
+    gear: tuple[float, float] | None = None,
+    points: int = 9,
+    motors: str | Path | Sequence[Mapping[str, Any]] | None = None,
+    starts: int = 4,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Sizing:
+    """Return the smallest motor and gear with which the payload moves no more than a target.
+
+    Parameters
+    ----------
+    case
+        The case; its motor is the one that is scaled.  All its limits are enforced.
+    target
+        Rms of the payload [m], or a text: ``20 mm``, ``5 %`` of the hook's rms, ``26 dB`` below
+        it.
+    height
+        Significant wave height H_s [m] or a text; by default the case's.
+    structure
+        Controller structure, see `synth.structures.winch_structures.structure_names`.
+    gear
+        Lowest and highest ratio of the gear; by default the case's over and times 2.5.
+    points
+        Gears on the curve.
+    motors
+        A catalogue: a CSV file or its rows, see `synth.sizing.catalogue.read_catalogue`.
+    starts, seed
+        Size and seed of the search that everything begins from.
+    progress
+        Called as progress(stage, done, total).
+
+    Returns
+    -------
+    Sizing
+        Not ok, with the limit that stops it, if no motor meets the target.
+
+    Raises
+    ------
+    InputError
+        If the target, a range or the catalogue is wrong, or there is no such structure.
+    """
+    check_range("size", "points", points, low=3, high=101)
+    check_range("size", "starts", starts, low=1, high=4096)
+    ratio = case.winch.gearbox.ratio
+    low, high = gear if gear is not None else (ratio / _SPAN, ratio * _SPAN)
+    check_range("size", "gear", low, low=0.1, high=1e4)
+    if not low < high <= 1e4:
+        raise InputError(f"size: gear must rise to at most 10000, got {low:g} to {high:g}")
+    changes: dict[str, Any] = {"limits.drive": "report"}
+    if height is not None:
+        changes["sea.significant_height"] = height
+    base = changed(case, changes)
+    catalogue = None if motors is None else read_catalogue(motors, base)
+    tell: Progress = progress or (lambda stage, done, total: None)
+    masses: int | None = None
+    while True:
+        sizing, used, near = _sized(
+            base, target, structure, (low, high), int(points), masses, starts, seed, tell
+        )
+        design = sizing.design
+        coarse = design is not None and not design.ok and base.rope.lumping != "thesis"
+        if not coarse or 2 * used > MAX_MASSES:
+            break
+        masses = 2 * used  # it stands on its own rope only: once more on twice the masses
+    if catalogue is None or near is None or sizing.unlimited_rms > sizing.target:
+        return sizing
+    choice = choose(
+        base, structure, sizing.target, catalogue, (low, high), masses=used, near=near, tell=tell
+    )
+    if isinstance(choice, str):
+        return replace(sizing, ok=False, status=f"{sizing.status}; {choice}")
+    return _with_choice(sizing, structure, choice, used, tell)
+
+
+def _sized(
+    base: Case,
+    target: float | str,
+    structure: str,
+    gears: tuple[float, float],
+    count: int,
+    masses: int | None,
+    starts: int,
+    seed: int,
+    tell: Progress,
+) -> tuple[Sizing, int, Answer | None]:
+    posed = Posed.of(base, structure, masses)
+    hook = float(posed.question.question.hook.displacement.rms)
+    aim = target_of(target, hook)
+    rope = [lim for lim in posed.drive if lim.name.startswith("rope.")]
+    problem = posed.problem((*posed.loop, *rope))
+    found = search(problem, starts, seed, [], tell)
+    ok = found.solved is not None and found.solved.converged and found.excess <= KEPT
+    free = None
+    if ok and found.solved is not None:
+        free = follow(problem, [found.solved.values], coefficient=found.solved.coefficient)
+    empty = Sizing(
+        case=base,
+        structure=structure,
+        target=aim,
+        hook_rms=hook,
+        ok=False,
+        status="no stable loop keeps the limits, whatever the motor",
+        unlimited_rms=free.payload_rms if free is not None else math.inf,
+        points=(),
+        chosen=None,
+        sized_case=None,
+        design=None,
+        given_rms=math.inf,
+        highest_height=0.0,
+    )
+    if free is None:
+        return empty, posed.masses, None
+    walk = _Search(
+        case=base,
+        structure=structure,
+        target=aim,
+        masses=posed.masses,
+        free=free,
+        tell=tell,
+        found={},
+    )
+    if free.payload_rms <= aim:
+        _walked(walk, np.geomspace(*gears, count))
+    given = _given(walk, posed)
+    result = replace(
+        empty,
+        points=tuple(walk.found[g].point for g in sorted(walk.found)),
+        given_rms=given.payload_rms if given is not None else math.inf,
+        highest_height=highest_sea(
+            base, structure, target, masses=posed.masses, near=given or free, tell=tell
+        ),
+    )
+    feasible = [g for g, least in walk.found.items() if least.point.feasible]
+    if not feasible:
+        return replace(result, status=why_not(result, free)), posed.masses, free
+    best = min(feasible, key=lambda g: walk.found[g].point.scale)
+    least = walk.found[best]
+    return _chosen(result, walk, least), posed.masses, least.answer
+
+
+def _walked(walk: _Search, grid: FloatArray) -> None:
+    """Walk over the gears from the case's own outwards, then home in on the best."""
+    own = math.log(walk.case.winch.gearbox.ratio)
+    order = np.argsort(np.abs(np.log(grid) - own), kind="stable")
+    start = int(order[0])
+    total = len(grid) + 6
+    later: list[int] = []
+    for way in (range(start, len(grid)), range(start - 1, -1, -1)):
+        up, held = way.step > 0, False
+        for i in way:
+            walk.tell("the smallest motor behind each gear", len(walk.found), total)
+            feasible = walk.at(float(grid[i])).point.feasible
+            # What stops it there (speed, inertia, and below a motor that does) stops it further on.
+            if not feasible and (up or held):
+                later += way[way.index(i) + 1 :]
+                break
+            held = feasible
+    if not any(least.point.feasible for least in walk.found.values()):
+        for i in later:
+            walk.tell("the smallest motor behind each gear", len(walk.found), total)
+            walk.at(float(grid[i]))
+    gears = sorted(g for g, least in walk.found.items() if least.point.feasible)
+    if not gears:
+        return
+    known = sorted(walk.found)
+    at = known.index(min(gears, key=lambda g: walk.found[g].point.scale))
+    ends = known[max(at - 1, 0)], known[min(at + 1, len(known) - 1)]
+    _golden(walk, math.log(ends[0]), math.log(ends[1]), total)
+
+
+def _golden(walk: _Search, low: float, high: float, total: int) -> None:
+    """Home in on the gear with the smallest motor by golden section."""
+
+    def size(log_gear: float) -> float:
+        walk.tell("the best gear", min(len(walk.found), total), total)
+        # Three digits: a gear is ordered by a number.
+        return walk.at(float(f"{math.exp(log_gear):.3g}")).point.scale
+
+    one, two = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    first, second = size(one), size(two)
+    while high - low > _FINE:
+        if first <= second:
+            high, two, second = two, one, first
+            one = high - _GOLDEN * (high - low)
+            first = size(one)
+        else:
+            low, one, first = one, two, second
+            two = low + _GOLDEN * (high - low)
+            second = size(two)
+
+
+def _given(walk: _Search, posed: Posed) -> Answer | None:
+    """Return the best that the case's own winch does, or None if its limits cannot be kept."""
+    walk.tell("the winch as it is", 0, 1)
+    problem = posed.problem((*posed.loop, *posed.drive))
+    own = walk.case.winch.gearbox.ratio
+    known = [a for g, least in walk.found.items() if (a := least.answer) is not None and g > 0.0]
+    nearest = sorted(known, key=lambda a: abs(_gear_of(walk, a) / own - 1.0))[:1]
+    begins = [a.carried(problem) for a in [*nearest, walk.free]]
+    answer = follow(problem, begins, coefficient=walk.free.solved.coefficient)
+    return answer if answer is not None and answer.excess <= 10.0 * EXCESS else None
+
+
+def _gear_of(walk: _Search, answer: Answer) -> float:
+    return next(g for g, least in walk.found.items() if least.answer is answer)
+
+
+def _chosen(sizing: Sizing, walk: _Search, best: Least) -> Sizing:
+    """Return the sizing with the chosen motor, and with its gains, verified."""
+    point, answer = best.point, best.answer
+    assert answer is not None
+    scale = point.scale * _ROOM
+    walk.tell("the gains of the chosen motor", 0, 1)
+    chosen_case = changed(with_motor(walk.case, scale, point.gear), {"limits.drive": "enforce"})
+    design = designed(chosen_case, walk.structure, answer, walk.masses, walk.tell)
+    point = replace(point, scale=scale, motor=MotorData.of(chosen_case))
+    met = design is not None and design.payload_rms <= sizing.target * (1.0 + KEPT)
+    motor = point.motor
+    assert motor is not None
+    text = (
+        f"the smallest motor has {1e-3 * motor.power:.4g} kW ({1e-3 * motor.torque_continuous:.4g} "
+        f"kN m, {1e-3 * motor.torque_peak:.4g} kN m at the peak) behind a gear of "
+        f"{point.gear:g}; {' and '.join(point.binding[:2])} bind"
+    )
+    if design is None:
+        text += "; its gains could not be settled within its limits"
+    elif not design.ok:
+        text += f"; {design.status}"
+    return replace(
+        sizing,
+        ok=design is not None and design.ok and met,
+        status=text,
+        chosen=point,
+        sized_case=chosen_case,
+        design=design,
+    )
+
+
+def _with_choice(
+    sizing: Sizing, structure: str, choice: Choice, masses: int, tell: Progress
+) -> Sizing:
+    """Return the sizing with a motor out of the catalogue instead of one of any size."""
+    design = designed(choice.case, structure, choice.answer, masses, tell)
+    ok = design is not None and design.ok and design.payload_rms <= sizing.target * (1.0 + KEPT)
+    text = (
+        f"{choice.name} behind a gear of {choice.gear:g} is the smallest motor of the catalogue "
+        f"that does it, with {100.0 * choice.spare:.3g} % of its limits to spare"
+    )
+    return replace(
+        sizing,
+        ok=ok,
+        status=f"{text}; of any size: {sizing.status}",
+        choice=choice,
+        sized_case=choice.case,
+        design=design,
+    )

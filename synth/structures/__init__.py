@@ -1,0 +1,1 @@
+"""Controller structures: parameters to C(s)."""

@@ -1,0 +1,278 @@
+r"""Filter sections with parameters: what controller structures are put together from.
+
+Each section is one transfer function with named, bounded parameters.  It says the same thing
+three times, for the optimiser (`response`, numbers or symbols), for the guard of its search
+(`characteristic`, the monic denominator) and for everything that runs or checks the controller
+(`matrices`, a state-space form).
+
+* `RollOff`: w^2 / (s^2 + 2 z w s + w^2), static gain 1
+* `LeadLag`: (1 + s/w_z) / (1 + s/w_p), static gain 1
+* `Notch`: (s^2 + 2 b d w s + w^2) / (s^2 + 2 b w s + w^2), static gain 1
+* `Integral`: (s + w) / s, static gain infinite
+* `LeadTime`: (1 + tau s) / (1 + s/w), static gain 1
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .structure import Parameter
+
+__all__ = ["Integral", "LeadLag", "LeadTime", "Matrices", "Notch", "RollOff", "Section", "series"]
+
+FloatArray = npt.NDArray[np.float64]
+Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section(ABC):
+    """A transfer function with parameters.
+
+    Parameters
+    ----------
+    name
+        What its parameters' names begin with: a corner becomes ``<name>.corner``.
+    """
+
+    name: str
+
+    @property
+    @abstractmethod
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The parameters, in the order in which the methods take their values."""
+
+    @abstractmethod
+    def response(self, values: Sequence[Any], s: Any) -> Any:
+        """Return the transfer function at s, numbers or a `synth.loop.phasor.Phasor`."""
+
+    @abstractmethod
+    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
+        """Return the monic denominator at s."""
+
+    @abstractmethod
+    def matrices(self, values: Sequence[float]) -> Matrices:
+        """Return A (n, n), B (n, 1), C (1, n), D (1, 1)."""
+
+    def guess(self, points: FloatArray) -> FloatArray:
+        """Return parameter values (m, k) from uniform `points` (m, k): sizes evenly in decades."""
+        found = np.empty_like(points)
+        for k, parameter in enumerate(self.parameters):
+            low, high = parameter.low, parameter.high
+            if low > 0.0:
+                found[:, k] = low * (high / low) ** points[:, k]
+            else:
+                found[:, k] = low + (high - low) * points[:, k]
+        return found
+
+    def _parameter(self, name: str, limits: Range, unit: str = "") -> Parameter:
+        low, high = limits
+        scale = float(np.sqrt(low * high)) if low > 0.0 else high
+        return Parameter(name=f"{self.name}.{name}", scale=scale, low=low, high=high, unit=unit)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RollOff(Section):
+    """Second-order low-pass w^2 / (s^2 + 2 z w s + w^2).
+
+    Parameters
+    ----------
+    corner, damping
+        Bounds of w [rad/s] and z [-].
+    """
+
+    corner: Range
+    damping: Range = (0.2, 2.0)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Corner and damping."""
+        return (
+            self._parameter("corner", self.corner, "rad/s"),
+            self._parameter("damping", self.damping),
+        )
+
+    def response(self, values: Sequence[Any], s: Any) -> Any:
+        """Return the transfer function."""
+        return (1.0 / self.characteristic(values, s)) * (values[0] * values[0])
+
+    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
+        """Return s^2 + 2 z w s + w^2."""
+        w, z = values
+        return s * (s + 2.0 * z * w) + w * w
+
+    def matrices(self, values: Sequence[float]) -> Matrices:
+        """Return states scaled by the corner: their sizes are those of the signal."""
+        w, z = values
+        A = np.array([[0.0, w], [-w, -2.0 * z * w]])
+        return A, np.array([[0.0], [w]]), np.array([[1.0, 0.0]]), np.zeros((1, 1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeadLag(Section):
+    """First-order lead or lag (1 + s/w_z) / (1 + s/w_p).
+
+    Parameters
+    ----------
+    zero, pole
+        Bounds of w_z and w_p [rad/s]: a lead has w_z < w_p, a lag w_z > w_p.
+    """
+
+    zero: Range
+    pole: Range
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Zero and pole."""
+        return (
+            self._parameter("zero", self.zero, "rad/s"),
+            self._parameter("pole", self.pole, "rad/s"),
+        )
+
+    def response(self, values: Sequence[Any], s: Any) -> Any:
+        """Return the transfer function."""
+        zero, pole = values
+        return (s + zero) * (1.0 / (s + pole)) * (pole / zero)
+
+    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
+        """Return s + w_p."""
+        return s + values[1]
+
+    def matrices(self, values: Sequence[float]) -> Matrices:
+        """Return one state, the low-passed input."""
+        zero, pole = values
+        high = pole / zero
+        return (
+            np.array([[-pole]]),
+            np.array([[pole]]),
+            np.array([[1.0 - high]]),
+            np.array([[high]]),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Notch(Section):
+    """Notch (s^2 + 2 b d w s + w^2) / (s^2 + 2 b w s + w^2).
+
+    Parameters
+    ----------
+    frequency, width, depth
+        Bounds of w [rad/s], b [-] and d [-], which is the gain at w.
+    """
+
+    frequency: Range
+    width: Range = (0.05, 2.0)
+    depth: Range = (0.0, 1.0)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Frequency, width and depth."""
+        return (
+            self._parameter("frequency", self.frequency, "rad/s"),
+            self._parameter("width", self.width),
+            self._parameter("depth", self.depth),
+        )
+
+    def response(self, values: Sequence[Any], s: Any) -> Any:
+        """Return the transfer function."""
+        w, b, d = values
+        return (s * (s + 2.0 * b * d * w) + w * w) * (1.0 / self.characteristic(values, s))
+
+    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
+        """Return s^2 + 2 b w s + w^2."""
+        w, b, _ = values
+        return s * (s + 2.0 * b * w) + w * w
+
+    def matrices(self, values: Sequence[float]) -> Matrices:
+        """Return states scaled by the frequency."""
+        w, b, d = values
+        A = np.array([[0.0, w], [-w, -2.0 * b * w]])
+        C = np.array([[0.0, 2.0 * b * (d - 1.0)]])
+        return A, np.array([[0.0], [w]]), C, np.ones((1, 1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Integral(Section):
+    """Integral action (s + w) / s.
+
+    Parameters
+    ----------
+    corner
+        Bounds of w [rad/s], above zero: with w = 0 the integrator would act on nothing and be
+        there all the same.
+    """
+
+    corner: Range
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Corner."""
+        return (self._parameter("corner", self.corner, "rad/s"),)
+
+    def response(self, values: Sequence[Any], s: Any) -> Any:
+        """Return the transfer function."""
+        return (1.0 / s) * values[0] + 1.0
+
+    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
+        """Return s."""
+        del values
+        return s
+
+    def matrices(self, values: Sequence[float]) -> Matrices:
+        """Return one state, the integral times the corner."""
+        one = np.ones((1, 1))
+        return np.zeros((1, 1)), one * values[0], one, one
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeadTime(Section):
+    """What a signal will be a lead time ahead, as far as its bandwidth goes.
+
+    (1 + tau s) / (1 + s/w): the extrapolation x + tau x' behind a low-pass.
+
+    Parameters
+    ----------
+    time, bandwidth
+        Bounds of tau [s] and w [rad/s].
+    """
+
+    time: Range = (0.0, 2.0)
+    bandwidth: Range = field(default=(2.0, 60.0))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Lead time and bandwidth."""
+        return (
+            self._parameter("lead", self.time, "s"),
+            self._parameter("bandwidth", self.bandwidth, "rad/s"),
+        )
+
+    def response(self, values: Sequence[Any], s: Any) -> Any:
+        """Return the transfer function."""
+        time, w = values
+        return (s * time + 1.0) * (1.0 / (s + w)) * w
+
+    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
+        """Return s + w."""
+        return s + values[1]
+
+    def matrices(self, values: Sequence[float]) -> Matrices:
+        """Return one state, the low-passed input."""
+        time, w = values
+        high = time * w
+        return np.array([[-w]]), np.array([[w]]), np.array([[1.0 - high]]), np.array([[high]])
+
+
+def series(first: Matrices, then: Matrices) -> Matrices:
+    """Return two systems one behind the other; the first may have many inputs."""
+    A1, B1, C1, D1 = first
+    A2, B2, C2, D2 = then
+    n1, n2 = len(A1), len(A2)
+    A = np.block([[A1, np.zeros((n1, n2))], [B2 @ C1, A2]])
+    return A, np.vstack([B1, B2 @ D1]), np.hstack([D2 @ C1, C2]), D2 @ D1

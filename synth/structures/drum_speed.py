@@ -1,0 +1,271 @@
+r"""The drum-speed loop: from a speed that is wanted to a drive command.
+
+::
+
+    w_ref -+---------------------> feed ------------------+
+           |                                              v
+           +--(+)--> e --> Kp + Ki T/(z - 1) ----------->(+)<-- static command
+               ^-               ^                         |
+               |                +--- tracking <--(+)<-----+--> u asked --> drive
+          motor speed                             ^- ... drive.applied (+)
+
+Everything that commands a speed of the rope (velocity feed-forward, constant tension) does it
+through this loop.  The motor obeys J w' = kappa (u - u_static) - D w - (change of the load's
+torque), with
+
+* DC motor: kappa = K_T/R, D = B + K_T K_omega/R, u in volts;
+* AC motor with a speed regulator of gain G: kappa = G, D = B + G, u in rad/s;
+* AC motor without: kappa = 1, D = B, u in N m.
+
+The static command holds the load.  ``feed`` = D/kappa is what a steady speed costs: for a DC
+motor its back-EMF and a little friction, for a regulated AC motor the reference itself.  Kp
+makes the loop as fast as it is asked to be, J omega_b = D + kappa Kp; a regulated AC drive has
+its own gain, and Kp is zero.  Ki makes it critically damped, kappa Ki = J omega_b^2/4
+(overdamped where the motor of itself is faster than that), and takes away what the static
+command got wrong, such as the gear's losses.
+
+The bandwidth follows from what delays the loop: the command is held over T, the speed is a mean
+over T, the torque builds up in 1/omega_T (or L/R).  omega_b is a quarter of one over their sum,
+so that they take a quarter of a radian from the phase margin at omega_b.  Motor speed and motor
+torque belong to the same shaft, hence the loop is passive whatever hangs on the rope: rope
+modes do not limit it, delays do.
+
+Anti-windup is by back-calculation (K. J. Astrom and T. Hagglund, PID Controllers, 2nd ed.,
+chapter 3): what the drive did not follow is taken from the integral at a rate of omega_b/2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import SynthesisError, check_range
+from models.case.case import Case
+from models.plant.plant import MEAN_LOSSES, Plant, build_plant
+from models.plant.plant_data import PlantData
+from models.sensing.control import Recursion
+
+from .recursive import checked_sample_time, make_recursion
+from .sampling import sampled_loop
+
+__all__ = ["DrumSpeedLoop", "SteadyMotion"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_OWNER = "drum-speed loop"
+_PHASE = 0.25  # what all delays together may take at omega_b [rad]
+_MARGIN = 2.0  # gain margin that is checked [-]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteadyMotion:
+    """The motor as the controllers see it: J w' = kappa (u - u_static) - D w.
+
+    Attributes
+    ----------
+    inertia
+        J at the motor's shaft, the load not included [kg m2].
+    torque_gain
+        kappa [N m per unit of the command].
+    damping
+        D [N m s/rad].
+    own_gain
+        How much of the motor's speed the motor itself takes from the command: K_omega [V s/rad]
+        of a DC motor, 1 of a regulated AC motor, 0.
+    lag
+        Time in which the torque builds up [s].
+    per_rope_speed
+        Motor speed per speed of the rope, n/r [rad/m].
+    """
+
+    inertia: float
+    torque_gain: float
+    damping: float
+    own_gain: float
+    lag: float
+    per_rope_speed: float
+
+    @classmethod
+    def of(cls, data: PlantData) -> SteadyMotion:
+        """Return it for a plant's numbers."""
+        if data.motor == "dc":
+            gain, own, lag = (
+                data.torque_constant / data.resistance,
+                data.back_emf_constant,
+                data.inductance / data.resistance,
+            )
+        else:
+            regulated = data.speed_gain > 0.0
+            gain, own = (data.speed_gain, 1.0) if regulated else (1.0, 0.0)
+            lag = 0.0 if math.isinf(data.torque_bandwidth) else 1.0 / data.torque_bandwidth
+        return cls(
+            inertia=data.inertia,
+            torque_gain=gain,
+            damping=data.viscous_friction + gain * own,
+            own_gain=own,
+            lag=lag,
+            per_rope_speed=data.gear_ratio / data.drum_radius,
+        )
+
+    @property
+    def feed(self) -> float:
+        """Command per motor speed in steady motion, D/kappa."""
+        return self.damping / self.torque_gain
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DrumSpeedLoop:
+    """The drum-speed loop of a case; `from_case` makes it.
+
+    Attributes
+    ----------
+    motor
+        The motor's numbers.
+    static
+        Command that holds the load.
+    proportional, integral
+        Kp [command s/rad], Ki [command/rad].
+    bandwidth
+        omega_b [rad/s].
+    tracking
+        Rate at which the integral follows a drive that does not obey [1/s].
+    speed_limit
+        Highest motor speed that is asked for [rad/s].
+    sample_time
+        T [s].
+    """
+
+    motor: SteadyMotion
+    static: float
+    proportional: float
+    integral: float
+    bandwidth: float
+    tracking: float
+    speed_limit: float
+    sample_time: float
+
+    @classmethod
+    def from_case(
+        cls,
+        case: Case,
+        *,
+        sample_time: float = 0.02,
+        bandwidth: float | None = None,
+        plant: Plant | None = None,
+    ) -> DrumSpeedLoop:
+        """Return the loop of a case.
+
+        Parameters
+        ----------
+        case
+            The case.
+        sample_time
+            T [s].
+        bandwidth
+            omega_b [rad/s]; by default that which the delays in the loop allow.  What the
+            motor has of itself is not taken away.
+        plant
+            The case's plant, if it is there already.
+
+        Raises
+        ------
+        InputError
+            If the sample time or the bandwidth is out of its range.
+        SynthesisError
+            If the loop is not stable on the linear plant, or not with twice the gains.
+        """
+        checked_sample_time(_OWNER, sample_time)
+        plant = build_plant(case) if plant is None else plant
+        point, motor = plant.operating_point(MEAN_LOSSES), SteadyMotion.of(plant.data)
+        allowed = _PHASE / (sample_time + motor.lag)
+        wanted = allowed
+        if bandwidth is not None:
+            wanted = check_range(
+                _OWNER, "bandwidth", bandwidth, low=0.0, unit="rad/s", open_low=True
+            )
+        own = motor.damping / motor.inertia
+        regulated = plant.data.motor == "ac" and plant.data.speed_gain > 0.0
+        extra = 0.0 if regulated else max(0.0, wanted - own) * motor.inertia
+        # The integral must not be faster than the delays allow, however fast the motor itself.
+        reached = min(wanted, own) if regulated else wanted
+        loop = cls(
+            motor=motor,
+            static=point.command,
+            proportional=extra / motor.torque_gain,
+            integral=0.25 * motor.inertia * reached**2 / motor.torque_gain,
+            bandwidth=own if regulated else max(own, wanted),
+            tracking=min(0.5 * reached, 1.0 / sample_time),
+            speed_limit=case.winch.speed_limit,
+            sample_time=float(sample_time),
+        )
+        loop._check(case, plant)
+        return loop
+
+    @property
+    def initial(self) -> FloatArray:
+        """State before the first sample: the integral, and the command asked for last."""
+        return np.array([0.0, self.static])
+
+    def command(
+        self, state: ca.SX, rope_speed: ca.SX, measured: Mapping[str, ca.SX]
+    ) -> tuple[ca.SX, ca.SX]:
+        """Return (next state, command) for a wanted speed of the rope, symbols.
+
+        Parameters
+        ----------
+        state
+            (2, 1), see `initial`.
+        rope_speed
+            Wanted speed of the rope at the drum, positive hauling in [m/s]; cut to what the
+            motor can turn.
+        measured
+            What is measured, by name.
+        """
+        wanted = self.motor.per_rope_speed * rope_speed
+        wanted = ca.fmin(self.speed_limit, ca.fmax(-self.speed_limit, wanted))
+        error = wanted - measured["motor.speed"]
+        share = self.tracking * self.sample_time
+        integral = state[0] + share * (measured["drive.applied"] - state[1])
+        command = self.static + (self.motor.feed * wanted + self.proportional * error + integral)
+        return ca.vertcat(integral + self.integral * self.sample_time * error, command), command
+
+    def recursion(self) -> Recursion:
+        """Return the loop alone, following ``reference.velocity`` as the speed of the rope."""
+        return make_recursion(
+            self.initial, lambda xc, m: self.command(xc, m["reference.velocity"], m)
+        )
+
+    def delay_at(self, omega: float) -> float:
+        """Return by how much the speed is late at a frequency [rad/s], load constant [s].
+
+        The half sample of hold that every command waits is included.
+        """
+        m, s = self.motor, 1j * omega
+        torque = m.torque_gain / (1.0 + s * m.lag)
+        held = torque * np.exp(-0.5 * s * self.sample_time)  # only the command is held
+        friction = m.damping - m.torque_gain * m.own_gain
+        regulated = held * (self.proportional + self.integral / s)
+        forward = held * m.feed + regulated
+        back = m.inertia * s + friction + torque * m.own_gain + regulated
+        return float(-np.angle(forward / back) / omega)
+
+    def _check(self, case: Case, plant: Plant) -> None:
+        for more in (1.0, _MARGIN):
+            louder = replace(
+                self, proportional=more * self.proportional, integral=more * self.integral
+            )
+            loop = sampled_loop(case, plant, louder.recursion(), self.sample_time)
+            if not loop.stable:
+                largest = float(np.abs(loop.poles()).max())
+                twice = "" if more == 1.0 else f"{more:g} times the gains of "
+                raise SynthesisError(
+                    f"{_OWNER}: with {twice}a bandwidth of {self.bandwidth:.3g} rad/s at a sample "
+                    f"time of {self.sample_time:g} s the loop is unstable on the linear plant "
+                    f"(largest eigenvalue {largest:.6g}); ask for a lower bandwidth or a shorter "
+                    "sample time"
+                )

@@ -1,0 +1,264 @@
+"""A free controller of low order, for any number of inputs and measurements.
+
+Its parameters are those of `synth.structures.canonical`: n (nu + ny) numbers for order n, plus nu
+ny for a direct term.  Random controllers of this kind are seldom stable in a loop, so the
+candidates are LQG designs (`synth.structures.lqg`) for weights and noises of many sizes, reduced to
+the order.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import block_diag
+
+from models.basics.checks import InputError, SynthesisError
+from models.plant.linear import LinearPlant
+
+from ..loop.controller import Controller
+from .canonical import BlockForm
+from .lqg import Estimator, Regulator, designs, estimator, projected, reduced, regulator, weighing
+from .structure import Bounds, Law, Parameter, Structure, check_bounds, gain_scales, pace
+from .whitened import whitened
+
+if TYPE_CHECKING:
+    from ..question.problem import Problem
+
+__all__ = ["LowOrder"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+_PADE = 4  # of the delays, in the designs that candidates are made of
+_SIDE = 12  # so many regulators times so many filters
+
+
+@dataclass(frozen=True, init=False)
+class LowOrder(Structure):
+    """A free controller x' = A x + B y, u = C x + D y of order n.
+
+    Noise on every measurement and a weight on every input (or a limit that does as much) belong
+    to the question: without them the best controller has an infinite gain.
+
+    Parameters
+    ----------
+    order
+        Number of states n, at least 1.
+    proper
+        Whether there is a direct term D; strictly proper if not.
+    stable
+        Whether the controller itself must be stable.
+    bounds
+        Bounds by parameter name.  Block k has ``alpha0[k]``, ``alpha1[k]`` (its poles are the
+        roots of s^2 + alpha1 s + alpha0), ``B[k.1,y]``, ``B[k.2,y]`` and ``C[u,k.1]``,
+        ``C[u,k.2]`` with the signals' names; D has ``D[u,y]``.
+    """
+
+    order: int
+    proper: bool = False
+    stable: bool = False
+    bounds: Bounds = field(default_factory=dict)
+
+    def __init__(
+        self,
+        order: int,
+        *,
+        proper: bool = False,
+        stable: bool = False,
+        bounds: Bounds | None = None,
+    ) -> None:
+        if isinstance(order, bool) or not isinstance(order, int) or order < 1:
+            raise InputError(f"LowOrder: order must be a whole number of at least 1, got {order!r}")
+        object.__setattr__(self, "order", order)
+        object.__setattr__(self, "proper", proper)
+        object.__setattr__(self, "stable", stable)
+        object.__setattr__(self, "bounds", dict(bounds or {}))
+
+    def bind(self, plant: LinearPlant, response_scale: Bounds | None = None) -> Law:
+        """Return the law; see `Structure.bind`."""
+        return _LowOrderLaw(plant, self)
+
+
+class _LowOrderLaw(Law):
+    """The structure's law."""
+
+    def __init__(self, plant: LinearPlant, structure: LowOrder) -> None:
+        nu, ny = len(plant.inputs), len(plant.measurements)
+        if not (nu and ny):
+            raise InputError("LowOrder: the plant must have an input and a measurement")
+        self._plant = plant
+        self._structure = structure
+        self._form = BlockForm(structure.order, nu, ny)
+        self._direct = slice(self._form.count, None) if structure.proper else slice(0, 0)
+        self.parameters = tuple(self._named_parameters())
+        check_bounds("LowOrder", structure.bounds, [p.name for p in self.parameters])
+        self.dimensions = 4 + len(self.parameters)
+
+    def _named_parameters(self) -> Iterable[Parameter]:
+        plant, form = self._plant, self._form
+        middle = pace(plant)
+        entries = [(i, j) for i in range(form.nu) for j in range(form.ny)]
+        gains = np.reshape(gain_scales(plant, entries), (form.nu, form.ny))
+        # The share of each input in a loop gain of one; an input's size against another's.
+        inputs = np.exp(np.log(gains).mean(axis=1))
+        for k, block in enumerate(form.blocks, start=1):
+            powers = [middle ** (i + 1) for i in range(block.size)]
+            alphas = ["alpha1", "alpha0"] if block.size == 2 else ["alpha0"]
+            for name, scale in zip(alphas, powers, strict=True):
+                yield self._parameter(f"{name}[{k}]", scale, positive=self._structure.stable)
+            for i, scale in enumerate(powers):
+                for y, gain in zip(plant.measurements, gains[block.row], strict=True):
+                    yield self._parameter(f"B[{k}.{i + 1},{y}]", gain * scale)
+            for i, u in enumerate(plant.inputs):
+                for j in range(block.size if i != block.row else 0):
+                    ratio = inputs[i] / inputs[block.row] / middle**j
+                    yield self._parameter(f"C[{u},{k}.{j + 1}]", ratio)
+        if self._structure.proper:
+            for (i, j), gain in zip(entries, gains.ravel(), strict=True):
+                name = f"D[{plant.inputs[i]},{plant.measurements[j]}]"
+                yield self._parameter(name, gain)
+
+    def _parameter(self, name: str, scale: float, *, positive: bool = False) -> Parameter:
+        low, high = self._structure.bounds.get(name, (-np.inf, np.inf))
+        if positive:
+            low = max(low, 1e-6 * scale)
+        return Parameter(name=name, scale=float(scale), low=float(low), high=float(high))
+
+    def response(self, values: Sequence[Any], s: Any) -> list[list[Any]]:
+        result = self._form.response(values, s)
+        for k, gain in enumerate(values[self._direct]):
+            i, j = divmod(k, self._form.ny)
+            result[i][j] = result[i][j] + gain
+        return result
+
+    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
+        return self._form.characteristic(values, s)
+
+    def controller(self, values: Sequence[float]) -> Controller:
+        A, B, C, D = self._matrices(values)
+        names = self._plant.measurements, self._plant.inputs
+        return Controller(A=A, B=B, C=C, D=D, measurements=names[0], inputs=names[1])
+
+    def closed_loop_matrix(self, plant: LinearPlant, values: Sequence[float]) -> FloatArray:
+        # The optimiser asks for this at every step: no checks, no objects.
+        A, B, C, D = self._matrices(values)
+        n, m = len(plant.A), len(plant.A) + len(A)
+        loop = np.zeros((m, m))
+        on_plant, on_states = D @ plant.C, C  # u = on_plant x + on_states xk
+        if np.any(D) and np.any(plant.D):
+            inverse = np.linalg.inv(np.eye(len(D)) - D @ plant.D)
+            on_plant, on_states = inverse @ on_plant, inverse @ on_states
+        loop[:n, :n] = plant.A + plant.B @ on_plant
+        loop[:n, n:] = plant.B @ on_states
+        loop[n:, :n] = B @ (plant.C + plant.D @ on_plant)
+        loop[n:, n:] = A + B @ plant.D @ on_states
+        return loop
+
+    def _matrices(
+        self, values: Sequence[float]
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        numbers = np.asarray(values, dtype=np.float64)
+        D = np.zeros((self._form.nu, self._form.ny))
+        D.flat[: numbers[self._direct].size] = numbers[self._direct]
+        return *self._form.matrices(numbers), D
+
+    def values(self, controller: Controller) -> FloatArray:
+        """Return the parameters of a controller, whose order may be lower than the law's."""
+        missing = self._structure.order - len(controller.A)
+        A, B, C = controller.A, controller.B, controller.C
+        if missing > 0:
+            A = block_diag(A, -np.diag(pace(self._plant) * (1.0 + 0.3 * np.arange(missing))))
+            B = np.vstack([B, np.zeros((missing, self._form.ny))])
+            C = np.hstack([C, np.ones((self._form.nu, missing))])
+        direct = controller.D.ravel() if self._structure.proper else np.zeros(0)
+        return np.concatenate([self._form.values(A, B, C), direct])
+
+    def guesses(self, problem: Problem, omega: FloatArray) -> FloatArray:
+        """Return LQG designs for the problem's own weights and spectra.
+
+        The first is the optimum where the noises are white, every input is weighed and every
+        measurement is noisy; the others charge more for the inputs or trust the measurements
+        less.  The last are static gains behind fast poles.
+        """
+        plant = whitened(self._plant.without_delays(_PADE), problem.disturbances)
+        regulators, filters = designs(plant, problem.minimise, omega)
+        full = np.ones((self._form.nu, self._form.ny), dtype=np.bool_)
+        gains = [projected(plant, design, full) for design in regulators]
+        fast = [
+            self.values(self._swift(gain, share * float(omega[-1])))
+            for gain in gains
+            for share in (0.03, 0.3, 3.0)
+        ]
+        if self._structure.proper:
+            names = plant.measurements, plant.inputs
+            fast += [self.values(Controller.static(gain, *names)) for gain in gains]
+        found = self._family(plant, regulators, filters)
+        return self._clipped(np.vstack([found, *fast]))
+
+    def draw(self, points: FloatArray, omega: FloatArray, yu: ComplexArray) -> FloatArray:
+        plant = self._plant.without_delays(_PADE)
+        sizes = np.abs(yu) ** 2 + 1e-12 * np.max(np.abs(yu) ** 2, axis=0) + 1e-300
+        at = np.minimum((points[:, :2] * omega.size).astype(int), omega.size - 1)
+        tilt = 10.0 ** (2.0 * points[:, 2:4] - 1.0)
+        uneven = np.linspace(-1.0, 1.0, self._form.ny)
+        regulators, filters = [], []
+        for k in range(min(_SIDE, len(points))):
+            # Bandwidths are drawn: with such weights the loop crosses over near that frequency.
+            weights = tilt[k, 0] ** uneven / sizes[at[k, 0]].mean(axis=1)
+            effort = weights @ sizes[at[k, 0]]
+            noise = tilt[k, 1] ** uneven * sizes[at[k, 1]].sum(axis=1)
+            with contextlib.suppress(SynthesisError):
+                Q, R, S = weighing(plant.C, plant.D, weights)
+                regulators.append(regulator(plant, Q, R + np.diag(effort), S))
+            with contextlib.suppress(SynthesisError):
+                W = plant.B @ plant.B.T
+                filters.append(estimator(plant, W, np.diag(noise), np.zeros_like(plant.C.T)))
+        known = self._family(plant, regulators, filters)[: len(points)]
+        scales = np.array([p.scale for p in self.parameters])
+        signed = 2.0 * points[len(known) :, 4:] - 1.0
+        if not len(known):  # no such design exists: any size, any sign
+            spread = np.sign(signed) * 10.0 ** (4.0 * np.abs(signed) - 3.0)
+            return self._clipped(spread * scales)
+        # The rest are the known ones with every parameter changed, more and more.
+        rows = np.arange(len(signed))
+        reach = np.linspace(0.1, 1.5, max(1, len(signed)))[:, None]
+        near = known[rows % len(known)]
+        return self._clipped(np.vstack([known, near * np.exp(reach * signed)]))
+
+    def _swift(self, gain: FloatArray, pole: float) -> Controller:
+        """Return the most important directions of a static gain behind poles near -`pole`."""
+        left, sizes, right = np.linalg.svd(gain, full_matrices=False)
+        keep = min(self._structure.order, len(sizes))
+        poles = pole * (1.0 + 0.3 * np.arange(keep))
+        return Controller(
+            A=-np.diag(poles),
+            B=(poles * sizes[:keep])[:, None] * right[:keep],
+            C=left[:, :keep],
+            D=np.zeros_like(gain),
+            measurements=self._plant.measurements,
+            inputs=self._plant.inputs,
+        )
+
+    def _family(
+        self, plant: LinearPlant, regulators: Sequence[Regulator], filters: Sequence[Estimator]
+    ) -> FloatArray:
+        """Return the parameters of every regulator with every filter, equal ranks first."""
+        pairs = sorted(
+            ((i, j) for i in range(len(regulators)) for j in range(len(filters))),
+            key=lambda pair: (max(pair), sum(pair)),
+        )
+        order = self._structure.order
+        found = [self.values(reduced(plant, regulators[i], filters[j], order)) for i, j in pairs]
+        if not found:
+            return np.zeros((0, len(self.parameters)))
+        return self._clipped(np.array(found))
+
+    def _clipped(self, values: FloatArray) -> FloatArray:
+        low = [p.low for p in self.parameters]
+        high = [p.high for p in self.parameters]
+        return np.asarray(np.clip(values, low, high), dtype=np.float64)

@@ -1,0 +1,166 @@
+"""Controllers that are a recursion: one formula for the compiled loop and for a step in Python.
+
+    law (CasADi symbols) --> Recursion --> compiled into the loop, or RecursiveController.step
+
+Every controller of this package derives from `RecursiveController`: it writes its law once, as
+a symbolic function of its state and of what is measured (`models.sensing.control`).  `step`
+evaluates that very function, so that a controller called from Python and one compiled into the
+simulation give the same commands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import check_range
+from models.plant.plant import OperatingPoint
+from models.sensing.control import MEASURED, Measurement, Recursion
+
+__all__ = ["RecursiveController", "at_rest", "make_recursion"]
+
+FloatArray = npt.NDArray[np.float64]
+Signals = Mapping[str, ca.SX]
+Law = Callable[[ca.SX, Signals], tuple[ca.SX, ca.SX]]
+
+_SHORTEST, _LONGEST = 1e-4, 10.0  # sample times [s]
+
+
+def make_recursion(initial: npt.ArrayLike, law: Law) -> Recursion:
+    """Return the recursion of a law.
+
+    Parameters
+    ----------
+    initial
+        State before the first sample, (nxc,).
+    law
+        Called once, as law(state, measured) with symbols, `measured` by the names of
+        `MEASURED`; returns the next state, (nxc, 1), and the command.
+    """
+    start = np.atleast_1d(np.asarray(initial, dtype=np.float64))
+    state, vector = ca.SX.sym("xc", start.size), ca.SX.sym("m", len(MEASURED))
+    following, command = law(state, {name: vector[i] for i, name in enumerate(MEASURED)})
+    function = ca.Function(
+        "controller",
+        [state, vector],
+        [ca.densify(ca.SX(following)), ca.densify(ca.SX(command))],
+        ["xc", "m"],
+        ["xc_next", "u"],
+    )
+    return Recursion(function=function, initial=start)
+
+
+def at_rest(point: OperatingPoint) -> Measurement:
+    """Return what perfect sensors tell when nothing moves: static tension, torque, command."""
+    return Measurement.of(
+        {
+            "payload.valid": 1.0,
+            "mru.valid": 1.0,
+            "rope.tension": point.tension,
+            "motor.torque": point.torque,
+            "drive.applied": point.command,
+        }
+    )
+
+
+class _Stepper:
+    """A recursion with a state: what changes while its controller stays the same."""
+
+    def __init__(self, recursion: Recursion, state: FloatArray | None = None) -> None:
+        self._recursion = recursion
+        self._state = np.array(recursion.initial if state is None else state)
+        self._next, self._command = np.empty_like(self._state), np.empty(1)
+        self._seen = np.zeros(len(MEASURED))
+        # The arrays' addresses are bound once: a call then costs a microsecond, not fifty.
+        buffer: Any  # CasADi's stubs ask for an address and a size
+        buffer, self._evaluate = recursion.function.buffer()
+        given: tuple[Any, Any] = self._state, self._seen
+        made: tuple[Any, Any] = self._next, self._command
+        for i in (0, 1):
+            buffer.set_arg(i, memoryview(given[i]))
+            buffer.set_res(i, memoryview(made[i]))
+        self._buffer = buffer  # which `evaluate` needs alive
+
+    def reset(self) -> None:
+        self._state[:] = self._recursion.initial
+
+    def step(self, values: FloatArray) -> float:
+        self._seen[:] = values
+        self._evaluate()
+        self._state[:] = self._next
+        return float(self._command[0])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _Stepper, (self._recursion, self._state.copy())
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecursiveController:
+    """A controller made of a recursion; obeys `models.sensing.control.Controller`.
+
+    What it is never changes; what it remembers from one step to the next does, and `reset`
+    forgets it.
+
+    Parameters
+    ----------
+    name
+        What it is called in results.
+    sample_time
+        Time from one step to the next [s], 0.0001 to 10.
+    recursion
+        The law.
+    brake
+        Whether the drum is held by its brake instead of the motor.
+
+    Raises
+    ------
+    InputError
+        If the sample time is out of its range.
+    """
+
+    name: str
+    sample_time: float
+    recursion: Recursion = field(repr=False)
+    brake: bool = False
+    _stepper: _Stepper = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        checked_sample_time(self.name, self.sample_time)
+        object.__setattr__(self, "_stepper", _Stepper(self.recursion))
+
+    def _set(self, **fields: object) -> None:
+        """Set fields of a subclass that has an `__init__` of its own."""
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)
+
+    def _adopt(self, name: str, sample_time: float, initial: npt.ArrayLike, law: Law) -> None:
+        """Set the fields of this class; the last thing that such an `__init__` does."""
+        checked_sample_time(name, sample_time)
+        self._set(name=name, sample_time=float(sample_time))
+        self._set(recursion=make_recursion(initial, law))
+        self._set(_stepper=_Stepper(self.recursion))
+
+    def reset(self) -> None:
+        """Forget every earlier measurement."""
+        self._stepper.reset()
+
+    def step(self, measurement: Measurement, time: float) -> float:
+        """Return the drive command, its static part included [V, rad/s or N m]."""
+        del time  # no law here depends on it
+        return self._stepper.step(measurement.values)
+
+
+def checked_sample_time(owner: str, sample_time: float) -> float:
+    """Return a sample time that is within its range [s].
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    return check_range(owner, "sample_time", sample_time, low=_SHORTEST, high=_LONGEST, unit="s")

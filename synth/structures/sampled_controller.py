@@ -1,0 +1,143 @@
+"""A linear controller in continuous time, sampled, and what keeps its states from winding up.
+
+`synth.controllers.linear_feedback` is made of these matrices; they know nothing of a case.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+
+from models.basics.checks import InputError, SynthesisError, check_range
+from models.basics.signals import pick
+from models.plant.discrete import zero_order_hold
+
+from ..loop.controller import Controller
+
+__all__ = ["Matrices", "low_pass_matrices", "sampled", "tracking_gain"]
+
+FloatArray = npt.NDArray[np.float64]
+Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+
+_OWNER = "linear feedback"
+METHODS = ("tustin", "zoh")
+_SLOWEST = 0.5  # frequencies above which a controller's gains are compared [rad/s]
+
+
+def sampled(
+    controller: Controller,
+    sample_time: float,
+    *,
+    method: str = "tustin",
+    prewarp: float | None = None,
+) -> Matrices:
+    """Return (A, B, C, D) of a controller sampled every `sample_time` [s].
+
+    Parameters
+    ----------
+    controller
+        x' = A x + B y, u = C x + D y.
+    sample_time
+        T [s].
+    method
+        ``tustin``: s = k (z - 1)/(z + 1), k = 2/T; ``zoh``: the measurements held over T.
+    prewarp
+        With Tustin's rule, the frequency omega at which it is exact, k = omega/tan(omega T/2)
+        [rad/s].
+
+    Raises
+    ------
+    InputError
+        If the method is unknown, the frequency not below pi/T, or k an eigenvalue of A.
+    """
+    pick(_OWNER, "method", METHODS, (method,))
+    A, B, C, D = controller.A, controller.B, controller.C, controller.D
+    n = len(A)
+    if method == "zoh":
+        if prewarp is not None:
+            raise InputError(f"{_OWNER}: prewarp is for the method 'tustin' only, got {prewarp!r}")
+        return *zero_order_hold(A, B, sample_time), C, D
+    k = 2.0 / sample_time
+    if prewarp is not None:
+        check_range(
+            _OWNER,
+            "prewarp",
+            prewarp,
+            low=0.0,
+            high=math.pi / sample_time,
+            unit="rad/s",
+            open_low=True,
+            open_high=True,
+        )
+        k = prewarp / math.tan(0.5 * prewarp * sample_time)
+    if n and np.abs(np.linalg.eigvals(A) - k).min() < 1e-9 * k:
+        raise InputError(
+            f"{_OWNER}: sample_time must be another one, or the method 'zoh': the controller "
+            f"has a pole at {k:.6g} 1/s, which Tustin's rule maps to infinity"
+        )
+    inverse = np.linalg.inv(np.eye(n) - A / k)
+    Bd = 2.0 / k * inverse @ B
+    return inverse @ (np.eye(n) + A / k), Bd, C @ inverse, D + 0.5 * C @ Bd
+
+
+def low_pass_matrices(n: int, bandwidth: float | None, sample_time: float) -> Matrices:
+    """Return n first-order low-passes side by side, sampled; nothing but D = 1 without one."""
+    if bandwidth is None:
+        return np.zeros((0, 0)), np.zeros((0, n)), np.zeros((n, 0)), np.eye(n)
+    omega = check_range(_OWNER, "filter_bandwidth", bandwidth, low=0.0, unit="rad/s", open_low=True)
+    names = tuple(f"y{i}" for i in range(n))
+    one = np.eye(n)
+    low_pass = Controller(
+        A=-omega * one, B=omega * one, C=one, D=0.0 * one, measurements=names, inputs=names
+    )
+    return sampled(low_pass, sample_time)
+
+
+def tracking_gain(matrices: Matrices, sample_time: float) -> FloatArray:
+    """Return the gain K_b, (n, 1), of anti-windup by back-calculation.
+
+    x+ = A x + B e + K_b (u_applied - u_asked), u_asked = C x + D e: while the drive has its own
+    way A - K_b C rules.  K_b is the gain of a Kalman filter, hence that matrix is stable for
+    every controller whose lasting states reach its output.  The noise of each e is one that, on
+    its own, moves u by one unit above 0.5 rad/s, and that of the drive's answer is one unit.
+
+    Parameters
+    ----------
+    matrices
+        A, B, C, D of the sampled controller, one output.
+    sample_time
+        T [s].
+
+    Raises
+    ------
+    SynthesisError
+        If a state that does not decay is not seen at the output or not reached from e.
+    """
+    A, B, C, D = matrices
+    n = len(A)
+    omega = np.geomspace(min(_SLOWEST, 0.5 * math.pi / sample_time), math.pi / sample_time, 60)
+    z = np.exp(1j * omega * sample_time)
+    try:
+        inside = z[:, None, None] * np.eye(n) - A
+        inner = np.linalg.solve(inside, np.broadcast_to(B, (z.size, *B.shape)))
+        size = np.abs(C @ inner + D).max(axis=(0, 1))
+        noise = B / np.where(size > 0.0, size, 1.0)
+        P = scipy.linalg.solve_discrete_are(A.T, C.T, noise @ noise.T, np.eye(1))
+        gain = A @ P @ C.T / (1.0 + C @ P @ C.T)
+        radius = float(np.abs(np.linalg.eigvals(A - gain @ C)).max())
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise _not_held() from error
+    if not radius < 1.0:
+        raise _not_held()
+    return np.asarray(gain, dtype=np.float64)
+
+
+def _not_held() -> SynthesisError:
+    return SynthesisError(
+        f"{_OWNER}: no anti-windup holds this controller: a state that does not decay is not "
+        "seen at its output or not reached by what it hears; leave such states out, or set "
+        "anti_windup to False"
+    )

@@ -1,0 +1,216 @@
+r"""A winch's controller as a diagram: payload feedback, drum loop, feed-forward, tension.
+
+::
+
+    payload --> a, a1, a2 --> filters ------------------------------+
+                                                                    v
+    MRU -----> gain, lead --+--> drum: position, speed --> [PI] --(+)--> command
+    encoder ---------------(-)
+
+A drive that takes a torque or a voltage holds the drum by a loop of its own,
+
+    u = -k [w + (n/r) g X + ((n/r) g G Z + (1 + d) (n/r) G Z')],    G = f (1 + tau s)/(1 + s/w_b),
+
+with X the haul and Z the hook's heave as the reference unit shows it: the drum is asked to be at
+-f Z(t + tau) and to move at its derivative.  d is what a steady speed costs in command (back-EMF
+and friction over k), known and fed forward.  A drive with a speed regulator of its own takes the
+speed itself, u = -(n/r) [g (X + G Z) + G Z'].  Integral action, where a structure has it, stands
+behind the sum.
+
+Payload feedback alone is the 1975 thesis's eq. 30, u = -A (a P'' + a1 P' + a2 P), behind a
+roll-off, a lead, a notch or integral action.  On top of a drum loop the payload asks for a speed
+of the drum, -(ca P'' + cv P' + cp P) behind a roll-off: ca [s] makes the haul follow the payload's
+speed and so damps the rope's resonance, cv [-] makes the rope stiffer, cp [1/s] takes drift out.
+
+`synth.structures.winch_structures` gives each of them for a case by its name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from models.basics.checks import InputError, check_range
+from models.basics.signals import pick
+from models.plant.linear import LinearPlant
+
+from .blocks import LeadTime, Section
+from .diagram import Branch, Group, Weight
+from .drum_speed import SteadyMotion
+from .structure import PAYLOAD_MEASUREMENTS, Bounds, Law, Parameter, Structure, gain_scales
+from .winch_law import ASKED, WinchLaw
+
+__all__ = ["TRANSPARENT", "WinchStructure"]
+
+SAMPLE_TIME = 0.01  # that the drum loop must leave room for [s]
+TRANSPARENT = 500.0  # a roll-off with this corner is hardly there [rad/s]
+_PHASE = 0.25  # what sampling and drive may take from the drum loop at its bandwidth [rad]
+_LEAST_BANDWIDTH = 0.3  # of the drum loop [rad/s]
+_TENSION = "rope.tension"
+_HAUL, _SPEED, _HEAVE, _HEAVE_RATE = "drum.haul", "motor.speed", "mru.heave", "mru.heave_rate"
+_GAINS = ("a", "a1", "a2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class WinchStructure(Structure):
+    """A structure put together from payload feedback, drum loop, feed-forward and tension.
+
+    Attributes
+    ----------
+    name
+        What it is called.
+    motor
+        The motor as the drum loop sees it.
+    regulated
+        Whether the drive has a speed regulator of its own: its command is a speed.
+    amplifier
+        The fixed gain A of payload feedback.
+    pace
+        Frequency of the rope's first axial mode [rad/s], which sizes what the payload asks for.
+    filters
+        Sections behind the payload's gains.
+    hears_payload, drum, heave
+        Whether there is payload feedback, a drum loop, feed-forward of the heave.
+    tension
+        Stiffness of the rope [N/m] if the drum loop follows its tension, else None.
+    bounds
+        Bounds by parameter name, in the parameter's unit.
+    """
+
+    name: str
+    motor: SteadyMotion
+    regulated: bool = False
+    amplifier: float = 1.0
+    pace: float = 1.0
+    filters: tuple[Section, ...] = ()
+    hears_payload: bool = True
+    drum: bool = False
+    heave: bool = False
+    tension: float | None = None
+    bounds: Bounds = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_range("structure", "amplifier", self.amplifier, low=0.0, open_low=True)
+        if not (self.hears_payload or self.drum):
+            raise InputError("structure: it must hear the payload or have a drum loop")
+
+    @property
+    def measurements(self) -> tuple[str, ...]:
+        """Names of what it hears, in the order of the sensed plant."""
+        return (
+            *(PAYLOAD_MEASUREMENTS if self.hears_payload else ()),
+            *((_HEAVE, _HEAVE_RATE) if self.heave else ()),
+            *((_HAUL,) if self.drum else ()),
+            *((_SPEED,) if self.drum and not self.regulated else ()),
+            *((_TENSION,) if self.tension is not None else ()),
+        )
+
+    def bind(self, plant: LinearPlant, response_scale: Bounds | None = None) -> Law:
+        """Return the law; see `Structure.bind`."""
+        pick(self.name, "measurement", plant.measurements, self.measurements)
+        if len(plant.inputs) != 1:
+            raise InputError(f"{self.name}: the plant must have one input, got {plant.inputs}")
+        return WinchLaw(plant, self)
+
+    @property
+    def widest(self) -> float:
+        """Bandwidth of the drum loop that sampling and the drive leave room for [rad/s]."""
+        return _PHASE / (SAMPLE_TIME + self.motor.lag)
+
+    def speed_gain(self, bandwidth: float) -> float:
+        """Return k for a bandwidth of the drum loop, without rope and load."""
+        wanted = self.motor.inertia * bandwidth - self.motor.damping
+        floor = 0.02 * self.motor.inertia * _LEAST_BANDWIDTH
+        return max(wanted, floor) / self.motor.torque_gain
+
+    def gains(self, plant: LinearPlant) -> list[Parameter]:
+        """Return the parameters that are not those of sections."""
+        found = []
+        command = plant.units.get(plant.inputs[0], "-")
+        if self.hears_payload and self.drum:
+            units = ("s", "-", "1/s")
+            for k, (name, unit) in enumerate(zip(ASKED, units, strict=True)):
+                found.append(Parameter(name=name, scale=0.3 * self.pace ** (k - 1), unit=unit))
+        elif self.hears_payload:
+            columns = [plant.measurements.index(name) for name in PAYLOAD_MEASUREMENTS]
+            scales = gain_scales(plant, [(0, j) for j in columns]) / self.amplifier
+            for name, y, scale in zip(_GAINS, PAYLOAD_MEASUREMENTS, scales, strict=True):
+                unit = f"({command})/({plant.units.get(y, '-')})"
+                found.append(Parameter(name=name, scale=float(scale), unit=unit))
+        if self.drum and not self.regulated:
+            low, high = self.speed_gain(0.0), self.speed_gain(self.widest)
+            unit = f"{command} s/rad"
+            name = "drum.speed_gain"
+            found.append(Parameter(name=name, scale=0.3 * high, low=low, high=high, unit=unit))
+        if self.drum:
+            low, high = 1e-3, 0.5 * self.widest
+            scale = 0.02 if self.tension is not None else 1.0
+            name = "drum.position_gain"
+            found.append(Parameter(name=name, scale=scale, low=low, high=high, unit="1/s"))
+        if self.heave:
+            name = "heave.gain"
+            found.append(Parameter(name=name, scale=0.1, low=0.0, high=2.0, unit="-"))
+        if self.tension is not None:
+            most, name = self.widest / self.tension, "tension.gain"
+            scale = 0.1 * most
+            found.append(Parameter(name=name, scale=scale, low=0.0, high=most, unit="m/s/N"))
+        return found
+
+    def groups(self) -> list[Group]:
+        """Return the diagram."""
+        found = []
+        names = zip(PAYLOAD_MEASUREMENTS, ASKED if self.drum else _GAINS, strict=True)
+        if self.hears_payload and not self.drum:
+            weights = {y: _product(-self.amplifier, name) for y, name in names}
+            found.append(Group(branches=(Branch(weights=weights, sections=self.filters),)))
+        if self.drum:
+            branches = [Branch(weights=self._drum_weights())]
+            if self.hears_payload:
+                asked = {y: self._asked(name) for y, name in names}
+                branches.append(Branch(weights=asked, sections=self.filters))
+            if self.heave:
+                lead = LeadTime(name="heave", bandwidth=(1.0, 100.0))
+                branches.append(Branch(weights=self._heave_weights(), sections=(lead,)))
+            found.append(Group(branches=tuple(branches)))
+        return found
+
+    def _asked(self, *names: str) -> Weight:
+        """Return the weight of a signal that asks for so much speed of the rope."""
+        ratio, feed = self.motor.per_rope_speed, self.motor.feed
+        plain = _product(-ratio, *names)
+        if self.regulated:
+            return plain
+
+        def weight(p: Mapping[str, Any]) -> Any:
+            return plain(p) * (p["drum.speed_gain"] + feed)
+
+        return weight
+
+    def _drum_weights(self) -> dict[str, Weight]:
+        ratio, gains = self.motor.per_rope_speed, ("drum.speed_gain", "drum.position_gain")
+        weights = {_HAUL: _product(-ratio, *gains[self.regulated :])}
+        if not self.regulated:
+            weights[_SPEED] = _product(-1.0, "drum.speed_gain")
+        if self.tension is not None:
+            weights[_TENSION] = self._asked("tension.gain")
+        return weights
+
+    def _heave_weights(self) -> dict[str, Weight]:
+        ratio, gains = self.motor.per_rope_speed, ("drum.speed_gain", "drum.position_gain")
+        return {
+            _HEAVE: _product(-ratio, *gains[self.regulated :], "heave.gain"),
+            _HEAVE_RATE: self._asked("heave.gain"),
+        }
+
+
+def _product(factor: float, *names: str) -> Weight:
+    """Return the weight that is a number times parameters."""
+
+    def weight(p: Mapping[str, Any]) -> Any:
+        result: Any = factor
+        for name in names:
+            result = p[name] * result
+        return result
+
+    return weight

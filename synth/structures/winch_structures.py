@@ -1,0 +1,97 @@
+"""The controller structures of a winch by name: what can be asked for, and what it consists of.
+
+`structure_named` gives each of them for a case; `synth.design.structure_design` optimises it.  How
+they are put together is said in `synth.structures.winch_diagram`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from models.basics.signals import pick
+from models.case.case import Case
+from models.plant.plant_data import PlantData
+from models.plant.rope import fixed_top_modes
+
+from .blocks import Integral, LeadLag, Notch, RollOff, Section
+from .drum_speed import SteadyMotion
+from .low_order_feedback import LowOrderFeedback as LowOrderFeedback
+from .winch_diagram import TRANSPARENT
+from .winch_diagram import WinchStructure as WinchStructure
+
+__all__ = ["DESCRIPTIONS", "LowOrderFeedback", "WinchStructure", "structure_named"]
+__all__ += ["structure_names"]
+
+#: What each structure is, for tables and help texts.
+DESCRIPTIONS: Mapping[str, str] = {
+    "payload-feedback": "the thesis's three gains on the payload's motion",
+    "payload-feedback-rolloff": "... behind a second-order roll-off",
+    "payload-feedback-lead": "... behind a first-order lead or lag",
+    "payload-feedback-notch": "... behind a notch and a second-order roll-off",
+    "payload-feedback-integral": "... with integral action and a second-order roll-off",
+    "drum-feedback": "... rolled off, on top of a drum loop",
+    "feed-forward": "drum loop that follows the reference unit's heave, gain and lead time",
+    "combined": "drum loop, feed-forward of heave, payload feedback rolled off",
+    "constant-tension": "drum loop that follows the rope's tension",
+    "low-order-4": "a free controller of the payload's motion, of order 4 (or any)",
+}
+_LOW_ORDER = re.compile(r"low-order-([1-9]\d?)$")
+
+
+def structure_names() -> tuple[str, ...]:
+    """Return the names of the structures."""
+    return tuple(DESCRIPTIONS)
+
+
+def structure_named(name: str, case: Case) -> WinchStructure | LowOrderFeedback:
+    """Return a structure for a case.
+
+    Parameters
+    ----------
+    name
+        One of `structure_names`; ``low-order-n`` has any order n from 1 to 99.
+    case
+        The case: its motor, drum, rope and gains.
+
+    Raises
+    ------
+    InputError
+        If there is no structure of that name.
+    """
+    if (order := _LOW_ORDER.match(name)) is not None:
+        return LowOrderFeedback(order=int(order[1]))
+    pick("structures", "structure", structure_names(), (name,))
+    data = PlantData.from_case(case)
+    amplifier = case.gains.A if case.gains is not None else 1.0
+    modes = fixed_top_modes(
+        data.axial_stiffness, data.rope_length, data.mass_per_length, data.payload_mass, 2
+    )
+    feedback = name.removeprefix("payload-feedback") if name.startswith("payload") else None
+    corner = (1.0, TRANSPARENT)
+    sections: dict[str, tuple[Section, ...]] = {
+        "": (),
+        "-rolloff": (RollOff(name="rolloff", corner=corner),),
+        "-lead": (LeadLag(name="lead", zero=(0.05, 100.0), pole=(0.5, 200.0)),),
+        "-notch": (
+            Notch(name="notch", frequency=(0.5 * modes[1], 2.0 * modes[1])),
+            RollOff(name="rolloff", corner=corner),
+        ),
+        "-integral": (
+            Integral(name="integral", corner=(0.002, 0.5)),
+            RollOff(name="rolloff", corner=corner),
+        ),
+    }
+    payload = name != "feed-forward" and name != "constant-tension"
+    return WinchStructure(
+        name=name,
+        motor=SteadyMotion.of(data),
+        regulated=data.motor == "ac" and data.speed_gain > 0.0,
+        amplifier=amplifier,
+        pace=float(modes[0]),
+        filters=sections["-rolloff" if feedback is None else feedback] if payload else (),
+        hears_payload=payload,
+        drum=feedback is None,
+        heave=name in ("feed-forward", "combined"),
+        tension=data.stiffness if name == "constant-tension" else None,
+    )

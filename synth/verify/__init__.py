@@ -1,0 +1,1 @@
+"""The second look at a design, by code that the search did not use."""

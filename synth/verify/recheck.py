@@ -1,0 +1,152 @@
+"""Checks that a verified winch and a verified tuning share: stability and margins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import StillhookError
+from models.plant.linear import LinearPlant
+
+from .nyquist import Curve, CurveMargins
+from .recompute import LawMatrices, Loop, closed_matrices
+from .verification import Check, agreement, failure
+from .winding import Winding, count_unstable, open_loop_poles
+
+__all__ = [
+    "PADE",
+    "TIGHT",
+    "closed_loop_marks",
+    "guarded",
+    "inverse_agreement",
+    "loop_margins",
+    "margin_checks",
+    "pade_order",
+    "pole_check",
+    "winding_check",
+    "winding_of_plant",
+]
+
+ComplexArray = npt.NDArray[np.complex128]
+
+PADE = 8  # order of the delay models: those of the optimiser have five or six
+_LATE, _LATE_PADE = 0.2, 12  # delay beyond which that is too little [s], and the order it takes
+TIGHT = 1e-4  # of margins, drag and limits on the design's own plant
+
+
+def guarded(name: str, make: Callable[[], list[Check]]) -> list[Check]:
+    """Return some checks, or one that failed if they cannot be computed at all."""
+    try:
+        return make()
+    except (StillhookError, np.linalg.LinAlgError, ValueError, ArithmeticError, KeyError) as error:
+        return [failure(name, f"could not be computed: {error}")]
+
+
+def winding_of_plant(plant: LinearPlant, law: LawMatrices, marks: npt.ArrayLike = ()) -> Winding:
+    """Count the unstable poles of a loop on a linear plant, delays exact.
+
+    Parameters
+    ----------
+    plant
+        The plant.
+    law
+        The controller around it, u = +C y.
+    marks
+        Further points [1/s] near which the loop is lively, such as its closed-loop poles.
+    """
+    poles = np.concatenate([open_loop_poles(plant.A), open_loop_poles(law.A)])
+    loop = Loop(plant=plant.response_at, law=law, marks=poles)
+    # A direct path that is late turns for ever; one that is not ends at a number.
+    through = np.eye(len(plant.inputs)) - law.D @ plant.D
+    limit = 1.0 if any(plant.delays) else float(np.linalg.det(through))
+    if limit == 0.0:
+        return Winding(
+            unstable=-1,
+            marginal=0,
+            open_loop=0,
+            radius=math.inf,
+            tail=math.inf,
+            points=0,
+            failure="the loop is not well posed: I - D_c D is singular",
+        )
+    return count_unstable(loop.difference, poles=poles, marks=marks, at_infinity=limit)
+
+
+def winding_check(winding: Winding, on: str) -> Check:
+    """Return the check that a winding number says "stable"."""
+    if winding.failure:
+        return failure("winding number", f"on {on}: {winding.failure}")
+    note = f"unstable poles on {on}, exact delay; {winding.points} points up to |s| = "
+    note += f"{winding.radius:.3g} 1/s, beyond it |L| < {max(winding.tail, 1e-9):.2g}"
+    if winding.open_loop:
+        note += f"; {winding.open_loop} open-loop poles are unstable"
+    if winding.marginal:
+        note += f"; {winding.marginal} closed-loop poles lie on the imaginary axis"
+    return Check(
+        name="winding number",
+        ok=winding.stable,
+        claimed=0.0,
+        found=float(winding.unstable + winding.marginal),
+        note=note,
+    )
+
+
+def pade_order(plant: LinearPlant) -> int:
+    """Return the order of delay models that tells a loop's poles, rope and all."""
+    return _LATE_PADE if max(plant.delays, default=0.0) > _LATE else PADE
+
+
+def pole_check(name: str, plant: LinearPlant, law: LawMatrices, on: str, slowest: float) -> Check:
+    """Return the check that all poles with Pade delays lie left of -slowest [1/s]."""
+    order = pade_order(plant)
+    poles = np.linalg.eigvals(closed_matrices(plant.without_delays(order), law)[0])
+    growth = float(poles.real.max(initial=-np.inf))
+    return Check(
+        name=name,
+        ok=growth < -slowest,
+        found=growth,
+        note=f"largest real part [1/s] of {poles.size} poles on {on}, Pade order {order}",
+    )
+
+
+def closed_loop_marks(plant: LinearPlant, law: LawMatrices) -> ComplexArray:
+    """Return the poles [1/s] of open and closed loop, without integrators."""
+    closed = closed_matrices(plant.without_delays(pade_order(plant)), law)[0]
+    poles = [open_loop_poles(plant.A), open_loop_poles(law.A), np.linalg.eigvals(closed)]
+    found = np.concatenate(poles)
+    return np.asarray(found[np.abs(found) > 0.0], dtype=np.complex128)
+
+
+def loop_margins(loop: Loop) -> CurveMargins:
+    """Return the worst margins over all loops broken at an input."""
+    found = Curve(loop.broken(0), loop.marks).margins
+    for index in range(1, loop.inputs):
+        found = found.worse(Curve(loop.broken(index), loop.marks).margins)
+    return found
+
+
+def margin_checks(claimed: object, found: CurveMargins) -> list[Check]:
+    """Return the checks of a `synth.loop.margins.Margins` against figures found by root finding."""
+
+    def of(name: str) -> tuple[float, float]:
+        return float(getattr(claimed, name)), float(getattr(found, name))
+
+    return [
+        agreement("margins.max_sensitivity", *of("max_sensitivity"), TIGHT),
+        inverse_agreement("margins.gain", *of("gain")),
+        agreement("margins.gain_down", *of("gain_down"), TIGHT, scale=1.0),
+        agreement("margins.phase", *of("phase"), TIGHT, "[rad]", scale=0.1),
+        agreement("margins.delay", *of("delay"), TIGHT, "[s]", scale=1e-3),
+        agreement("margins.disk", *of("disk"), TIGHT),
+    ]
+
+
+def inverse_agreement(name: str, claimed: float, found: float) -> Check:
+    """Return the check that two gain margins agree: thousands and no bound are the same."""
+    same = abs(1.0 / claimed - 1.0 / found) <= TIGHT
+    check = agreement(name, claimed, found, TIGHT, "difference of 1/gain")
+    return replace(check, ok=bool(same))

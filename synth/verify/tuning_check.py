@@ -1,0 +1,241 @@
+"""The second look at an answer of `synth.design.tuning`, on any linear plant.
+
+Poles with other Pade models, the winding number with exact delays, margins by root finding,
+the cost by other quadrature and, where all disturbances are white, by a Lyapunov equation,
+every limit, the drag, and whether the parameters are those of the controller.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.threads import one_thread
+from models.plant.linear import LinearPlant
+
+from ..loop.controller import Controller
+from ..loop.disturbance import White
+from .claims import limit_demand
+from .nyquist import CurveMargins
+from .recheck import (
+    PADE,
+    TIGHT,
+    closed_loop_marks,
+    guarded,
+    inverse_agreement,
+    loop_margins,
+    margin_checks,
+    pole_check,
+    winding_check,
+    winding_of_plant,
+)
+from .recompute import LawMatrices, Loop, Source, imaginary, lyapunov_variances, moments
+from .verification import Check, Verification, agreement, failure
+
+if TYPE_CHECKING:
+    from ..design.tuning import Tuning
+
+__all__ = ["verify_tuning"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+_DECAY = 1e-10  # of a pole, over the size of the fastest one, to count as stable
+_COST = 1e-6  # cost by another quadrature or a Lyapunov equation
+_PADE_COST = 1e-3  # ... by a Lyapunov equation with Pade models for the delays
+_SAME = 1e-9  # controller from the parameters against the controller
+
+
+@one_thread()
+def verify_tuning(tuning: Tuning) -> Verification:
+    """Check an answer of `synth.design.tuning` by code that the optimiser did not use.
+
+    Parameters
+    ----------
+    tuning
+        The answer, with the question it answers.
+
+    Returns
+    -------
+    Verification
+        `ok` only if the closed loop is stable with the exact delays and every claim was met.
+    """
+    if tuning.controller is None:
+        return Verification.of([failure("controller", "there is none")], "")
+    view = _View(tuning, tuning.controller)
+    checks = guarded("stability", view.stability)
+    if not all(check.ok for check in checks):
+        return Verification.of(checks, "")
+    steps: Mapping[str, Callable[[], list[Check]]] = {
+        "parameters": view.parameters,
+        "margins": view.margins,
+        "cost": view.cost,
+        "coefficient": view.drag,
+        "limits": view.limits,
+    }
+    for name, step in steps.items():
+        checks += guarded(name, step)
+    return Verification.of(
+        checks, f"verified: stable with the exact delays, {len(checks)} checks passed"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """A tuned loop, put together again."""
+
+    tuning: Tuning
+    controller: Controller
+
+    @cached_property
+    def plant(self) -> LinearPlant:
+        """The plant with its drag: force = -(C - reference) velocity."""
+        plant, element = self.tuning.problem.plant, self.tuning.problem.drag
+        if element is None or self.tuning.coefficient is None:
+            return plant
+        row = plant.outputs.index(element.velocity)
+        column = plant.disturbances.index(element.force)
+        more = element.reference - self.tuning.coefficient
+        velocity, force = plant.Cz[row], more * plant.E[:, column]
+        return replace(
+            plant,
+            A=plant.A + np.outer(force, velocity),
+            C=plant.C + more * np.outer(plant.F[:, column], velocity),
+            Cz=plant.Cz + more * np.outer(plant.Fz[:, column], velocity),
+        )
+
+    @cached_property
+    def law(self) -> LawMatrices:
+        return LawMatrices.of(self.controller, self.plant)
+
+    @cached_property
+    def loop(self) -> Loop:
+        marks = closed_loop_marks(self.plant, self.law)
+        return Loop(
+            plant=self.plant.response_at,
+            law=self.law,
+            marks=marks,
+            inputs=len(self.plant.inputs),
+        )
+
+    @cached_property
+    def curve_margins(self) -> CurveMargins:
+        return loop_margins(self.loop)
+
+    @cached_property
+    def sources(self) -> list[Source]:
+        return [
+            Source(name=d.name, density=d.density, band=d.band, splits=d.splits)
+            for d in self.tuning.problem.disturbances
+        ]
+
+    @cached_property
+    def intensities(self) -> dict[str, float] | None:
+        """Intensities of the disturbances, or None if one of them is not white."""
+        found = {}
+        for disturbance in self.tuning.problem.disturbances:
+            origin = getattr(disturbance.density, "__self__", None)
+            if not isinstance(origin, White):
+                return None
+            found[disturbance.name] = origin.intensity
+        return found
+
+    def stability(self) -> list[Check]:
+        fastest = float(np.abs(self.loop.marks).max(initial=1.0))
+        return [
+            winding_check(winding_of_plant(self.plant, self.law, self.loop.marks), "the plant"),
+            pole_check("poles", self.plant, self.law, "the plant", _DECAY * fastest),
+        ]
+
+    def parameters(self) -> list[Check]:
+        """Return the check that the parameters named make the controller handed over."""
+        law = self.tuning.problem.law
+        again = law.controller([self.tuning.parameters[p.name] for p in law.parameters])
+        sizes = np.abs(self.loop.marks)
+        s = imaginary(np.geomspace(0.1, 10.0, 7) * float(np.median(sizes)) if sizes.size else [1.0])
+        pair = [LawMatrices.of(c, self.plant)(s) for c in (self.controller, again)]
+        size = float(np.abs(pair[0]).max(initial=0.0))
+        apart = float(np.abs(pair[0] - pair[1]).max(initial=0.0))
+        return [
+            Check(
+                name="parameters",
+                ok=apart <= _SAME * size,
+                claimed=0.0,
+                found=apart / size if size else apart,
+                tolerance=_SAME,
+                note="relative difference of the controller they make",
+            )
+        ]
+
+    def margins(self) -> list[Check]:
+        if self.tuning.margins is None:
+            return [failure("margins", "the loop is stable but no margins are claimed")]
+        return margin_checks(self.tuning.margins, self.curve_margins)
+
+    def cost(self) -> list[Check]:
+        weights = self.tuning.problem.minimise
+        found = self._moments(list(weights), (0,))
+        checks = [
+            agreement(
+                "cost", self.tuning.cost, _cost(weights, found), _COST, "by quad_vec, exact delays"
+            )
+        ]
+        if self.intensities is None:
+            return checks
+        late = any(self.plant.delays)
+        rational = self.plant.without_delays(PADE, at="measurements")
+        variances = lyapunov_variances(rational, self.law, self.intensities)
+        by_time = _cost(weights, {name: (variances[name],) for name in weights})
+        note = "by a Lyapunov equation" + (" with Pade delays" if late else "")
+        tolerance = _PADE_COST if late else _COST
+        return [*checks, agreement("cost.time", self.tuning.cost, by_time, tolerance, note)]
+
+    def drag(self) -> list[Check]:
+        element, claimed = self.tuning.problem.drag, self.tuning.coefficient
+        if element is None:
+            return []
+        if claimed is None:
+            return [failure("coefficient", "there is drag but no coefficient is claimed")]
+        sigma = math.sqrt(self._moments([element.velocity], (0,))[element.velocity][0])
+        needed = element.quadratic * math.sqrt(8.0 / math.pi) * sigma
+        return [agreement("coefficient", claimed, needed, TIGHT, "q sqrt(8/pi) sigma")]
+
+    def limits(self) -> list[Check]:
+        checks = []
+        for limit in self.tuning.problem.limits:
+            name = f"limits.{limit.name}"
+            use = self.tuning.limits.get(limit.name)
+            if use is None:
+                checks.append(failure(name, "the problem states it, the answer does not"))
+                continue
+            demand = limit_demand(limit)
+            found = {
+                output: self._moments([output], orders)[output]
+                for output, orders in demand.orders.items()
+            }
+            value = demand.measured(self.loop, self.curve_margins, found)
+            if demand.kind == "gain":
+                check = inverse_agreement(name, use.value, value)
+            else:
+                check = agreement(name, use.value, value, TIGHT)
+            if self.tuning.ok and not demand.kept(value, TIGHT):
+                note = f"the answer counts as good but breaks the bound {demand.bound:.6g}"
+                check = replace(check, ok=False, note=note)
+            checks.append(check)
+        return checks
+
+    def _moments(
+        self, outputs: Sequence[str], orders: tuple[int, ...]
+    ) -> dict[str, tuple[float, ...]]:
+        delay = max(self.plant.delays, default=0.0)
+        return moments(self.loop, outputs, self.sources, orders=orders, delay=delay)
+
+
+def _cost(weights: Mapping[str, float], found: Mapping[str, tuple[float, ...]]) -> float:
+    return math.sqrt(sum(weight * found[name][0] for name, weight in weights.items()))

@@ -1,0 +1,294 @@
+"""Case files that cannot be read, YAML and TOML with their lines, and writing files."""
+
+from __future__ import annotations
+
+import os
+import re
+import textwrap
+import tomllib
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from models import InputError, load_case, template_text, write_text_atomically
+from models.casefile.toml import toml_lines
+from models.casefile.yaml_lines import read_yaml
+
+
+class TestFiles:
+    def test_missing_file(self, tmp_path):
+        with pytest.raises(InputError) as caught:
+            load_case(tmp_path / "my.yaml")
+        assert str(caught.value) == (
+            f"{tmp_path}/my.yaml: no such case file or bundled case; bundled cases: landing, "
+            "subsea-crane, thesis-1975, thesis-1975-rope"
+        )
+
+    def test_mistyped_name(self):
+        with pytest.raises(InputError) as caught:
+            load_case("thesis-1957")
+        assert str(caught.value) == (
+            "thesis-1957: no such case file or bundled case; did you mean 'thesis-1975'?"
+        )
+
+    def test_template_is_no_bundled_case(self):
+        with pytest.raises(InputError, match="template: no such case file"):
+            load_case("template")
+
+    def test_folder(self, tmp_path):
+        with pytest.raises(InputError) as caught:
+            load_case(tmp_path)
+        assert str(caught.value) == f"{tmp_path}: is a folder; a case file is wanted"
+
+    def test_unreadable(self, tmp_path, monkeypatch):
+        def refuse(*_, **__):  # root, who may run the tests, may read every file
+            raise PermissionError(13, "Permission denied")
+
+        monkeypatch.setattr(Path, "read_text", refuse)
+        with pytest.raises(InputError, match=r"my\.yaml: cannot be read: Permission denied"):
+            load_case(tmp_path / "my.yaml")
+
+    @pytest.mark.parametrize(
+        ("content", "message"),
+        [
+            (b"", "is empty; `stillhook new` writes a case to start from"),
+            (b"# only a comment\n", "is empty; `stillhook new` writes a case to start from"),
+            (
+                b"- 1\n- 2\n",
+                "must hold sections (sea:, vessel:, rope:, ...) at the top, got a list",
+            ),
+            (
+                b"Dear sir or madam\n",
+                "must hold sections (sea:, vessel:, rope:, ...) at the top, "
+                "got 'Dear sir or madam'",
+            ),
+            (b"\x89PNG\r\n\x1a\n\x00", "is not a text file in UTF-8 (byte 0)"),
+            (b"a: \x00\n", "is not YAML: unacceptable character #x0000"),
+            (b"---\na: 1\n---\nb: 2\n", "must hold one YAML document, got 2"),
+        ],
+    )
+    def test_not_a_case(self, tmp_path, content, message):
+        path = tmp_path / "my.yaml"
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=re.escape(f"my.yaml: {message}")) as caught:
+            load_case(path)
+        assert "\n" not in str(caught.value)
+
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            ("sea:\n\tspectrum: jonswap\n", "my.yaml:2: is indented with a tab; YAML wants spaces"),
+            ("sea: [1, 2\n", "my.yaml:2: is not YAML: expected ',' or ']', but got '<stream end>'"),
+            ("a: 1\nb: c: d\n", "my.yaml:2: is not YAML: mapping values are not allowed here"),
+            ("a: 'b\n", "my.yaml:2: is not YAML: found unexpected end of stream"),
+            ("a: !force 3\n", "my.yaml:1: is not YAML: could not determine a constructor for the"),
+            ("a: *b\n", "my.yaml:1: is not YAML: found undefined alias 'b'"),
+        ],
+    )
+    def test_not_yaml(self, tmp_path, text, message):
+        path = tmp_path / "my.yaml"
+        path.write_text(text)
+        with pytest.raises(InputError) as caught:
+            load_case(path)
+        assert message in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+    def test_repeated_keys_are_all_named(self, tmp_path):
+        path = tmp_path / "my.yaml"
+        path.write_text("name: one\nrope:\n  mass: 1\n  length: 2\n  mass: 3\nname: other\n")
+        with pytest.raises(InputError) as caught:
+            load_case(path)
+        assert str(caught.value).splitlines() == [
+            f"{path}:5: rope.mass: is given twice, first in line 3",
+            f"{path}:6: name: is given twice, first in line 1",
+        ]
+
+    def test_aliases_that_never_end(self, tmp_path):
+        path = tmp_path / "my.yaml"
+        path.write_text("a: &a [*a]\n")
+        with pytest.raises(InputError, match=r"my\.yaml: is nested deeper than 20 levels"):
+            load_case(path)
+        laughs = ["a0: &a0 [x, x, x, x, x, x, x, x, x]"]
+        laughs += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, 10)]
+        path.write_text("\n".join(laughs))
+        with pytest.raises(InputError, match="has more than 100000 entries"):
+            load_case(path)
+
+    def test_yaml_is_version_1_2(self):
+        data, _ = read_yaml("a: 1e6\nb: no\nc: 12:30\nd: 010\ne: 1.6E8\n", "test")
+        assert data == {"a": 1e6, "b": "no", "c": "12:30", "d": 10, "e": 1.6e8}
+
+    @given(st.text(max_size=60))
+    def test_any_text_gives_a_case_or_a_sentence(self, text):
+        message = ""
+        try:
+            read_yaml(text, "my.yaml")
+        except InputError as error:
+            message = str(error)
+        assert message == "" or message.startswith("my.yaml")
+
+    def test_bundled_names_win_over_files(self, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "thesis-1975").write_text("not: a case\n")
+        assert load_case("thesis-1975").name == "thesis-1975"
+        with pytest.raises(InputError, match=r"\n\./thesis-1975:1: not: unknown key"):
+            load_case("./thesis-1975")
+
+
+TOML = textwrap.dedent(
+    '''\
+    stillhook = 1                      # line 1
+    name = "a [section] = in a text"
+    description = """
+    several lines
+    rope = 3
+    """
+    "quoted.key" = 'literal \\'
+
+    [sea]
+    spectrum = "jonswap"               # line 10
+    significant_height = "2 m"
+    peak_period = 9
+
+    [vessel.heave_rao]
+    omega = [
+      0.3, 0.6,                        # line 16, with a ] in the comment
+      "0.1 Hz",
+    ]
+    amplitude = [1, 1, 0.8]
+
+    [rope]                             # line 21
+    diameter = "50 mm"
+    axial_stiffness = 2.428e8
+    payload.mass = 1
+    table = { a = 1, b = { c = [2, 3] }, d = "}" }
+
+    [[winch.drum.layers]]              # line 27
+    pitch_diameter = 1
+    rope_on_drum = 100
+    [[winch.drum.layers]]
+    pitch_diameter = 1.1               # line 31
+    rope_on_drum = 200
+    [winch.drum.layers.extra]
+    x = """a ""quoted"" text"""
+    y = 2024-01-01T12:00:00Z           # line 35
+    '''
+)
+
+
+class TestToml:
+    def test_lines(self):
+        tomllib.loads(TOML)
+        lines = toml_lines(TOML)
+        assert {path: line for path, line in lines.items() if len(path) <= 1} == {
+            (): 1,
+            ("stillhook",): 1,
+            ("name",): 2,
+            ("description",): 3,
+            ("quoted.key",): 7,
+            ("sea",): 9,
+            ("vessel",): 14,
+            ("rope",): 21,
+            ("winch",): 27,
+        }
+        assert lines["sea", "peak_period"] == 12
+        assert lines["vessel", "heave_rao"] == 14
+        assert [lines["vessel", "heave_rao", "omega", i] for i in range(3)] == [16, 16, 17]
+        assert lines["vessel", "heave_rao", "amplitude"] == 19
+        assert lines["rope", "payload", "mass"] == 24
+        assert lines["rope", "table", "b", "c", 1] == 25
+        assert lines["rope", "table", "d"] == 25
+        layers = ("winch", "drum", "layers")
+        assert [lines[*layers, i, "rope_on_drum"] for i in range(2)] == [29, 32]
+        assert lines[*layers, 1, "extra", "y"] == 35
+
+    def test_scanner_finds_every_path_that_the_parser_finds(self):
+        def paths(value, path=()):
+            items = value.items() if isinstance(value, dict) else ()
+            items = enumerate(value) if isinstance(value, list) else items
+            return {path}.union(*(paths(item, (*path, key)) for key, item in items))
+
+        assert set(toml_lines(TOML)) == paths(tomllib.loads(TOML))
+        assert toml_lines(TOML.replace("\n", "\r\n")) == toml_lines(TOML)
+
+    @given(
+        st.dictionaries(
+            st.text("ab.\"' ", max_size=3),
+            st.one_of(
+                st.integers(),
+                st.text("a\"'\\]}#=\n ", max_size=6),
+                st.lists(st.lists(st.text("],[", max_size=3), max_size=3), max_size=3),
+            ),
+            max_size=4,
+        )
+    )
+    def test_scanner_on_awkward_keys_and_texts(self, tree):
+        def basic(text):
+            escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+            return f'"{escaped}"'
+
+        def written(value):
+            if isinstance(value, list):
+                return f"[{', '.join(map(written, value))}]"
+            return basic(value) if isinstance(value, str) else str(value)
+
+        text = "\n".join(f"{basic(key)} = {written(value)}" for key, value in tree.items())
+        assert tomllib.loads(text) == tree
+        lines = toml_lines(text)
+        assert [lines[(key,)] for key in tree] == list(range(1, len(tree) + 1))
+
+    def test_errors_have_their_line(self, tmp_path):
+        path = tmp_path / "my.toml"
+        path.write_text(TOML)
+        with pytest.raises(InputError) as caught:
+            load_case(path)
+        lines = str(caught.value).splitlines()
+        assert f"{path}:7: quoted.key: unknown key" in lines[0] + lines[1]
+        assert f"{path}:24: rope.payload: unknown key" in "".join(lines)
+        assert f"{path}:33: winch.drum.layers[1].extra: unknown key" in "".join(lines)
+        assert f"{path}:21: rope.length: is missing; it must be a length" in "".join(lines)
+
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            ("a = 1\nb =\n", "my.toml:2: is not TOML: Invalid value"),
+            ("a = 1\na = 2\n", "my.toml:2: is not TOML: Cannot overwrite a value"),
+            ("", "my.toml: is empty; `stillhook new` writes a case to start from"),
+        ],
+    )
+    def test_not_toml(self, tmp_path, text, message):
+        path = tmp_path / "my.toml"
+        path.write_text(text)
+        with pytest.raises(InputError) as caught:
+            load_case(path)
+        assert str(caught.value) == f"{tmp_path}/{message}"
+
+
+class TestWriting:
+    def test_replaces_the_old_file_and_leaves_nothing_else(self, tmp_path):
+        path = tmp_path / "my.yaml"
+        path.write_text("old")
+        assert write_text_atomically(path, template_text()) == path
+        assert path.read_text() == template_text()
+        assert [item.name for item in tmp_path.iterdir()] == ["my.yaml"]
+
+    def test_missing_folder(self, tmp_path):
+        with pytest.raises(InputError, match=r"my\.yaml: cannot be written: No such file or dir"):
+            write_text_atomically(tmp_path / "none" / "my.yaml", "text")
+
+    def test_a_failure_leaves_the_old_file(self, tmp_path, monkeypatch):
+        path = tmp_path / "my.yaml"
+        path.write_text("old")
+
+        def fail(*_):
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr(os, "replace", fail)
+        with pytest.raises(
+            InputError, match=r"my\.yaml: cannot be written: No space left on device"
+        ):
+            write_text_atomically(path, "new")
+        assert path.read_text() == "old"
+        assert [item.name for item in tmp_path.iterdir()] == ["my.yaml"]

@@ -1,0 +1,170 @@
+"""Equivalent linear drag by quadrature, Monte Carlo and energy."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import scipy.integrate
+from hypothesis import given
+from hypothesis import strategies as st
+from plant_numbers import THESIS
+
+from models import load_case
+from models.basics.checks import InputError, SolverError
+from models.plant.drag import (
+    consistent_drag,
+    energy_equivalent,
+    gaussian_gain,
+    gaussian_mean,
+    stochastic_equivalent,
+)
+from models.plant.plant import build_plant
+
+NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(200)
+WEIGHTS = WEIGHTS / math.sqrt(2.0 * math.pi)
+
+
+def test_energy_of_a_sine_is_the_same() -> None:
+    q, amplitude, omega = 10_500.0, 0.7, 1.1
+    C = energy_equivalent(q, amplitude, omega)
+
+    def power(t: float, linear: bool) -> float:
+        v = amplitude * omega * math.cos(omega * t)
+        return (C * v if linear else q * abs(v) * v) * v
+
+    period = 2.0 * math.pi / omega
+    lost = [
+        scipy.integrate.quad(power, 0.0, period, args=(linear,), epsabs=0.0)[0]
+        for linear in (True, False)
+    ]
+    assert lost[0] == pytest.approx(lost[1], rel=1e-8)
+    # the 1975 thesis writes it with rho C_D A, twice our q (eq. 13)
+    assert pytest.approx(4.0 / (3.0 * math.pi) * 2.0 * q * omega * amplitude) == C
+
+
+def test_thesis_drag_belongs_to_an_amplitude_of_12_cm() -> None:
+    """1187 N s/m with C_D = 1.05, 20 m2, 1000 kg/m3 at T = 5.7 s."""
+    assert energy_equivalent(10_500.0, 0.12, 2.0 * math.pi / 5.7) == pytest.approx(1187.0, rel=0.02)
+
+
+@pytest.mark.parametrize(("sigma", "current"), [(0.4, 0.0), (0.4, 0.3), (0.2, -0.9), (1.5, 0.2)])
+def test_gain_and_mean_agree_with_monte_carlo(sigma: float, current: float) -> None:
+    rng = np.random.default_rng(1975)
+    v = sigma * rng.standard_normal(1_000_000)
+    force = np.abs(v + current) * (v + current)
+    assert gaussian_gain(sigma, current) == pytest.approx(np.mean(force * v) / sigma**2, rel=5e-3)
+    assert gaussian_mean(sigma, current) == pytest.approx(np.mean(force), abs=5e-3 * sigma)
+
+
+@given(sigma=st.floats(1e-3, 10.0), current=st.floats(-5.0, 5.0))
+def test_gain_is_the_mean_slope(sigma: float, current: float) -> None:
+    """E[f'] by quadrature split at the kink, and d mean / d current (Price's theorem)."""
+    kink = -current / sigma
+    total = 0.0
+    for low, high in ((-12.0, min(max(kink, -12.0), 12.0)), (min(max(kink, -12.0), 12.0), 12.0)):
+        x, w = np.polynomial.legendre.leggauss(80)
+        x = 0.5 * (high - low) * x + 0.5 * (high + low)
+        bell = np.exp(-0.5 * x**2) / math.sqrt(2.0 * math.pi)
+        total += 0.5 * (high - low) * float(w @ (2.0 * np.abs(sigma * x + current) * bell))
+    assert gaussian_gain(sigma, current) == pytest.approx(total, rel=1e-6)
+    step = 1e-4 * sigma
+    slope = (gaussian_mean(sigma, current + step) - gaussian_mean(sigma, current - step)) / 2 / step
+    assert gaussian_gain(sigma, current) == pytest.approx(slope, rel=1e-5)
+
+
+def test_limits_of_the_gain() -> None:
+    assert gaussian_gain(0.3) == pytest.approx(math.sqrt(8.0 / math.pi) * 0.3)
+    assert gaussian_gain(0.0, -0.7) == pytest.approx(1.4)
+    assert gaussian_gain(1e-9, -0.7) == pytest.approx(1.4)
+    assert gaussian_mean(0.0, -0.7) == pytest.approx(-0.49)
+    assert gaussian_mean(1e-9, -0.7) == pytest.approx(-0.49)
+    assert gaussian_mean(0.5, 0.0) == 0.0
+    assert stochastic_equivalent(100.0, 0.3) == pytest.approx(100.0 * gaussian_gain(0.3))
+
+
+def test_gain_has_the_least_mean_square_error() -> None:
+    sigma = 0.6
+    v = sigma * NODES
+    force = np.abs(v) * v
+
+    def error(gain: float) -> float:
+        return float(WEIGHTS @ (force - gain * v) ** 2)
+
+    best = gaussian_gain(sigma)
+    assert error(best) < min(error(0.99 * best), error(1.01 * best))
+
+
+def test_the_case_file_has_the_same_formulae() -> None:
+    case = load_case("thesis-1975-rope")
+    q = case.payload.quadratic_drag
+    drag = case.payload.drag
+    assert drag.method == "stochastic"
+    assert drag.linear_coefficient(q, 0.4) == pytest.approx(stochastic_equivalent(q, 0.4))
+    energy = case.replace(
+        {"payload.drag": {"method": "energy", "amplitude": 0.3, "frequency": 1.1}}
+    )
+    assert energy.payload.fixed_drag == pytest.approx(energy_equivalent(q, 0.3, 1.1))
+
+
+# ---- consistent with the motion
+
+
+def test_consistent_drag_solves_its_equation() -> None:
+    """White force of intensity W on a mass: sigma_v^2 = W/(2 C M), C^3 = q^2 (8/pi) W/(2 M)."""
+    q, intensity, mass = 10_500.0, 4e6, 9e4
+    C = consistent_drag(
+        q, lambda C: math.sqrt(intensity / (2.0 * C * mass)) if C > 0.0 else math.inf
+    )
+    assert pytest.approx((q**2 * 8.0 / math.pi * intensity / (2.0 * mass)) ** (1.0 / 3.0)) == C
+
+
+def test_consistent_drag_on_the_winch_plant() -> None:
+    """Hook heave as a narrow band at the rope's resonance, where substitution swings."""
+    plant = build_plant(THESIS)
+    omega = np.linspace(0.85, 1.05, 81)
+    spectrum = np.exp(-0.5 * ((omega - 0.944) / 0.02) ** 2)
+
+    def velocity_rms(C: float) -> float:
+        v = plant.linearise(drag=C).response(omega).column("payload.velocity", "hook.heave")
+        return math.sqrt(np.trapezoid(np.abs(v) ** 2 * spectrum, omega))
+
+    C = consistent_drag(THESIS.quadratic_drag, velocity_rms, tolerance=1e-8)
+    again = stochastic_equivalent(THESIS.quadratic_drag, velocity_rms(C))
+    assert pytest.approx(again, rel=1e-6) == C
+    assert C > 1e3
+
+
+def test_a_current_adds_drag() -> None:
+    still = consistent_drag(1e4, lambda C: 1.0 / (1.0 + C / 1e4))
+    moving = consistent_drag(1e4, lambda C: 1.0 / (1.0 + C / 1e4), current=0.8)
+    assert moving > still
+    sigma = 1.0 / (1.0 + moving / 1e4)
+    assert moving == pytest.approx(1e4 * gaussian_gain(sigma, 0.8))
+
+
+def test_without_drag_or_motion_there_is_none() -> None:
+    assert consistent_drag(0.0, lambda C: 1.0) == 0.0
+    assert consistent_drag(1e4, lambda C: 0.0) == 0.0
+
+
+def test_a_plant_that_drag_cannot_calm_is_said() -> None:
+    with pytest.raises(SolverError, match="no linear drag coefficient agrees with the motion"):
+        consistent_drag(1e4, lambda C: math.inf)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: energy_equivalent(-1.0, 1.0, 1.0), "quadratic must be at least 0 N s2/m2"),
+        (lambda: energy_equivalent(1.0, -1.0, 1.0), "amplitude must be at least 0 m, got -1.0"),
+        (lambda: energy_equivalent(1.0, 1.0, math.nan), "frequency must be .*got nan"),
+        (lambda: gaussian_gain(-0.1), "sigma must be at least 0 m/s, got -0.1"),
+        (lambda: gaussian_mean(0.1, math.inf), "current must be a finite number.*got inf"),
+        (lambda: consistent_drag(-1.0, lambda C: 1.0), "quadratic must be at least 0"),
+    ],
+)
+def test_bad_numbers_are_named(call: object, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        call()  # type: ignore[operator]

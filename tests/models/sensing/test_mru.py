@@ -1,0 +1,346 @@
+"""The motion reference unit: high-pass, error, delay, against analysis and by statistics."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.integrate
+import scipy.signal
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from models import InputError
+from models.rig.sensors import MRU
+from models.sensing.mru import MruModel
+
+TS = 0.05
+QUIET = MRU(heave_filter_period=30.0, noise_floor=0.0, noise_fraction=0.0)
+NOISY = MRU(heave_filter_period=30.0, noise_floor=0.05, noise_bandwidth=1.0, delay=0.12)
+
+
+def model(mru, **kwargs):
+    return MruModel(mru, **({"sample_time": TS, "heave_rms": 0.5, "seed": 0} | kwargs))
+
+
+def run(unit, displacement, velocity):
+    return unit.block(unit.initial(displacement[0], velocity[0]), displacement, velocity)[0]
+
+
+def sine(omega, n, step=TS, phase=0.4):
+    t = step * np.arange(n)
+    return t, np.cos(omega * t + phase), -omega * np.sin(omega * t + phase)
+
+
+def phasor(t, values, omega):
+    """Complex amplitude of a sine in a series, by least squares."""
+    fit = np.column_stack((np.cos(omega * t), -np.sin(omega * t)))
+    (re_part, im_part), *_ = np.linalg.lstsq(fit, values, rcond=None)
+    return complex(re_part, im_part)
+
+
+def error_of(unit, n):
+    """The error alone: what a unit shows of a hook that does not move."""
+    still = np.zeros(n)
+    block = run(unit, still, still)
+    return block.heave, block.heave_rate
+
+
+class TestPerfect:
+    def test_without_a_unit_the_motion_is_shown_as_it_is(self):
+        unit = model(None)
+        _, z, v = sine(0.7, 50)
+        block = run(unit, z, v)
+        assert np.array_equal(block.heave, z)
+        assert np.array_equal(block.heave_rate, v)
+        assert np.array_equal(block.valid, np.ones(50))
+        assert unit.settling_time == unit.error_rms == unit.delay == 0.0
+        assert np.array_equal(unit.transfer([0.0, 3.0]), [1.0, 1.0])
+        assert not unit.noise_density([0.5, 1.0]).any()
+
+    def test_a_unit_can_be_perfect_but_for_its_delay(self):
+        unit = model(MRU(noise_floor=0.0, noise_fraction=0.0, delay=0.15))
+        _, z, v = sine(0.7, 50)
+        block = run(unit, z, v)
+        assert np.array_equal(block.heave[3:], z[:-3])
+        assert np.array_equal(block.heave_rate[3:], v[:-3])
+        assert unit.settling_time == 0.15
+
+
+class TestFilter:
+    @pytest.mark.parametrize("omega", [0.1, 0.21, 0.6, 1.5])
+    def test_a_sine_meets_the_transfer(self, omega):
+        unit = model(replace_delay(QUIET, 0.2))
+        n = 8000
+        t, z, v = sine(omega, n)
+        block = run(unit, z, v)
+        late = t > 4.0 * unit.settling_time
+        true = phasor(t, z, omega)
+        expected = complex(unit.transfer(omega))
+        heave = phasor(t[late], block.heave[late], omega) / true
+        rate = phasor(t[late], block.heave_rate[late], omega) / (1j * omega * true)
+        # Exact but for the cubic between samples, (omega Ts)^4/384 of the motion.
+        assert abs(heave - expected) < 2e-7
+        assert abs(rate - expected) < 2e-7
+
+    def test_slow_heave_is_ahead_as_a_butterworth_filter_makes_it(self):
+        unit = model(QUIET)
+        omega = np.array([0.05, 0.2, 0.4, 0.8])
+        b, a = scipy.signal.butter(2, 2 * math.pi / 30.0, "high", analog=True)
+        _, expected = scipy.signal.freqs(b, a, omega)
+        np.testing.assert_allclose(unit.transfer(omega), expected, rtol=1e-12)
+        # arctan(sqrt(2) r/(1 - r^2)) with r = corner/omega, at 0.4 rad/s some 52 degrees.
+        r = 2 * math.pi / 30.0 / 0.4
+        lead = math.atan2(math.sqrt(2.0) * r, 1.0 - r**2)
+        t, z, v = sine(0.4, 6000)
+        block = run(unit, z, v)
+        late = t > 150.0
+        got = np.angle(phasor(t[late], block.heave[late], 0.4) / phasor(t, z, 0.4))
+        assert got == pytest.approx(lead, abs=1e-6)
+        assert 40.0 < math.degrees(lead) < 60.0
+
+    def test_agrees_with_an_ode_solver(self):
+        w = 2 * math.pi / 30.0
+
+        def z(t):
+            return 0.4 * np.sin(0.5 * t) + 0.2 * np.sin(1.3 * t + 1.0) + 0.1
+
+        def v(t):
+            return 0.2 * np.cos(0.5 * t) + 0.26 * np.cos(1.3 * t + 1.0)
+
+        t = TS * np.arange(1200)
+        solution = scipy.integrate.solve_ivp(
+            lambda t, q: [q[1], z(t) - math.sqrt(2) * w * q[1] - w**2 * q[0]],
+            (0.0, t[-1]),
+            [0.0, 0.0],
+            t_eval=t,
+            rtol=1e-10,
+            atol=1e-12,
+        )
+        q, rate = solution.y
+        heave = z(t) - math.sqrt(2) * w * rate - w**2 * q
+        block = run(model(QUIET), z(t), v(t))
+        np.testing.assert_allclose(block.heave, heave, atol=2e-8)
+        np.testing.assert_allclose(
+            block.heave_rate, v(t) - math.sqrt(2) * w * heave - w**2 * rate, atol=2e-8
+        )
+
+    def test_rate_is_the_derivative_of_heave(self):
+        unit = model(NOISY, sample_time=0.002, heave_frequency=0.7)
+        _, z, v = sine(0.7, 20_000, 0.002)
+        block = run(unit, z, v)
+        slope = (block.heave[2:] - block.heave[:-2]) / 0.004
+        # The error's second derivative is white noise: differences are rough by sqrt(step).
+        rough = math.sqrt(2.0 * math.sqrt(2.0) * 0.05**2 * 0.002)
+        assert np.abs(slope - block.heave_rate[1:-1]).max() < 5.0 * rough
+
+    def test_a_known_frequency_leaves_no_transient(self):
+        omega = 0.6
+        unit = model(replace_delay(QUIET, 0.73), heave_frequency=omega)
+        t, z, v = sine(omega, 2000)
+        block = run(unit, z, v)
+        amplitude = complex(unit.transfer(omega)) * np.exp(0.4j)
+        # 0.73 s is 14.6 samples: (1 - 0.6) 0.6 (omega Ts)^2/2 is lost to interpolation.
+        tolerance = 0.12 * (omega * TS) ** 2 + 1e-7
+        np.testing.assert_allclose(
+            block.heave, (amplitude * np.exp(1j * omega * t)).real, atol=tolerance
+        )
+        np.testing.assert_allclose(
+            block.heave_rate,
+            (1j * omega * amplitude * np.exp(1j * omega * t)).real,
+            atol=tolerance,
+        )
+
+    def test_otherwise_a_hundredth_is_left_after_the_settling_time(self):
+        unit = model(QUIET)
+        t, z, v = sine(0.6, 2000)
+        transient = run(unit, z, v).heave - run(replace(unit, heave_frequency=0.6), z, v).heave
+        assert unit.settling_time == pytest.approx(31.1, abs=0.1)
+        after = np.abs(transient[t > unit.settling_time]).max()
+        # The envelope exp(-w t/sqrt(2)) falls to 1 %; the ripple below it may gain sqrt(2).
+        assert 0.0 < after < 0.01 * math.sqrt(2.0) * np.abs(transient).max()
+        assert np.abs(transient).max() > 0.1
+
+
+class TestError:
+    def test_is_the_larger_of_floor_and_fraction(self):
+        mru = MRU(noise_floor=0.05, noise_fraction=0.05)
+        assert model(mru, heave_rms=0.5).error_rms == 0.05
+        assert model(mru, heave_rms=3.0).error_rms == pytest.approx(0.15)
+
+    def test_density_integrates_to_the_variance(self):
+        unit = model(NOISY)
+        variance, _ = scipy.integrate.quad(unit.noise_density, 0.0, math.inf)
+        assert variance == pytest.approx(0.05**2, rel=1e-8)
+        b, a = scipy.signal.butter(2, 1.0, analog=True)
+        omega = np.array([0.1, 1.0, 5.0])
+        shape = np.abs(scipy.signal.freqs(b, a, omega)[1]) ** 2
+        density = unit.noise_density(omega)
+        np.testing.assert_allclose(density / unit.noise_density(0.0), shape, rtol=1e-9)
+
+    @pytest.mark.parametrize(("width", "step"), [(1.0, 0.05), (4.0, 0.5), (0.2, 0.05)])
+    def test_has_its_rms_and_its_rate(self, width, step):
+        mru = MRU(noise_floor=0.05, noise_bandwidth=width)
+        n = 400_000
+        heave, rate = error_of(model(mru, sample_time=step, seed=4), n)
+        s = 0.05
+        for series, variance in ((heave, s**2), (rate, (width * s) ** 2)):
+            spread = variance_spread(series, variance)
+            assert abs(np.mean(series**2) - variance) < 3.0 * spread
+        # A stationary process is not correlated with its own derivative at the same time.
+        both = np.mean(heave * rate) / (width * s**2)
+        assert abs(both) < 3.0 * variance_spread(heave, s**2) / s**2
+
+    def test_is_stationary_from_the_first_sample(self):
+        first = np.array(
+            [[series[0] for series in error_of(model(NOISY, seed=seed), 1)] for seed in range(400)]
+        )
+        for values, rms in zip(first.T, (0.05, 0.05), strict=True):
+            ratio = np.mean(values**2) / rms**2
+            assert abs(ratio - 1.0) < 3.0 * math.sqrt(2.0 / 400)
+
+    def test_has_its_spectrum(self):
+        unit = model(MRU(noise_floor=0.05, noise_bandwidth=1.0), seed=8)
+        heave, rate = error_of(unit, 1024 * 400)
+        omega, mean = averaged_periodogram(heave, 1024)
+        _, of_rate = averaged_periodogram(rate, 1024)
+        use = (omega > 0.2) & (omega < 4.0)
+        assert use.sum() > 25
+        for got, power in ((mean, 0), (of_rate, 2)):
+            ratio = got[use] / (unit.noise_density(omega[use]) * omega[use] ** power)
+            # Each ratio is a mean of 400 exponential numbers.
+            assert abs(ratio.mean() - 1.0) < 3.0 / math.sqrt(400 * use.sum())
+            assert np.abs(ratio - 1.0).max() < 4.5 / math.sqrt(400)
+
+    def test_seeds(self):
+        first, again, other = (error_of(model(NOISY, seed=s), 100)[0] for s in (1, 1, 2))
+        assert np.array_equal(first, again)
+        assert not np.array_equal(first, other)
+
+
+def test_response_to_random_motion_meets_transfer_and_noise():
+    # Motion of random harmonics, in segments of one period: no leakage, so that the cross spectrum
+    # over a segment is the transfer plus the error's own harmonics.
+    unit = model(replace_delay(NOISY, 0.2), seed=3)
+    size, segments = 1024, 120
+    period = size * TS
+    lines = np.arange(3, 60)
+    omega = 2 * math.pi * lines / period
+    rng = np.random.default_rng(5)
+    wave = (rng.standard_normal(len(lines)) + 1j * rng.standard_normal(len(lines))) * 0.1
+    half = np.zeros((2, size // 2 + 1), dtype=complex)
+    half[0, lines], half[1, lines] = wave, 1j * omega * wave
+    z, v = np.fft.irfft(half * size / 2, size)
+    whole = run(unit, np.tile(z, segments + 4), np.tile(v, segments + 4))
+    late = slice(4 * size, None)  # over 200 s: the transient is gone
+    for series, power in ((whole.heave[late], 0), (whole.heave_rate[late], 1)):
+        lines_of = np.fft.rfft(series.reshape(segments, size), axis=1)[:, lines] * 2 / size
+        got = (lines_of / (wave * (1j * omega) ** power)).mean(axis=0)
+        density = unit.noise_density(omega) * omega ** (2 * power)
+        # A density S gives harmonics with |amplitude|^2 of 2 S d omega on average.
+        noise = 2.0 * density * 2 * math.pi / period
+        variance = noise / (np.abs(wave) ** 2 * omega ** (2 * power)) / segments
+        off = np.abs(got - unit.transfer(omega)) ** 2 / variance
+        assert off.max() < 10.0  # exponential: 1 in 22 000 each
+        assert abs(off.mean() - 1.0) < 3.0 / math.sqrt(len(lines))
+
+
+class TestChunks:
+    @settings(max_examples=40)
+    @given(
+        st.lists(st.integers(1, 200), min_size=1, max_size=8),
+        st.sampled_from([0.0, 0.04, 0.05, 0.33, 2.0]),
+        st.booleans(),
+    )
+    def test_do_not_matter(self, counts, delay, gap):
+        outages = [(1.0, 3.0), (7.0, 7.1)] if gap else []
+        unit = model(replace_delay(NOISY, delay), outages=outages, heave_frequency=0.6)
+        _, z, v = sine(0.7, sum(counts))
+        whole = run(unit, z, v)
+        state, at = unit.initial(z[0], v[0]), 0
+        for count in counts:
+            cut = slice(at, at + count)
+            block, state = unit.block(state, z[cut], v[cut])
+            at += count
+            assert state.sample == at
+            for name in ("heave", "heave_rate", "valid"):
+                got, wanted = getattr(block, name), getattr(whole, name)[cut]
+                np.testing.assert_allclose(got, wanted, rtol=1e-12, atol=1e-14)
+
+    def test_a_state_can_be_used_twice(self):
+        unit = model(NOISY)
+        _, z, v = sine(0.7, 300)
+        _, state = unit.block(unit.initial(z[0], v[0]), z[:100], v[:100])
+        first, again = (unit.block(state, z[100:], v[100:])[0] for _ in range(2))
+        assert np.array_equal(first.heave, again.heave)
+
+
+def test_delay_between_samples_is_exact_on_average():
+    unit = model(MRU(noise_floor=0.0, noise_fraction=0.0, delay=0.12))  # 2.4 samples
+    line = 3.0 + 0.5 * TS * np.arange(100)
+    block = run(unit, line, np.full(100, 0.5))
+    np.testing.assert_allclose(block.heave[3:], line[3:] - 0.5 * 0.12, rtol=1e-13)
+    assert block.heave[0] == 3.0
+
+
+def test_outage_holds_the_last_values():
+    unit = model(NOISY, outages=[(0.0, 0.2), (1.0, 2.0)])
+    _, z, v = sine(0.7, 100)
+    block = run(unit, z, v)
+    free = run(replace(unit, outages=()), z, v)
+    gone = np.flatnonzero(block.valid == 0.0)
+    assert gone.tolist() == [*range(4), *range(20, 40)]
+    assert np.array_equal(block.heave[:4], np.zeros(4))
+    assert np.array_equal(block.heave[20:40], np.full(20, free.heave[19]))
+    assert np.array_equal(block.heave_rate[20:40], np.full(20, free.heave_rate[19]))
+    assert np.array_equal(block.heave[40:], free.heave[40:])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"sample_time": -1.0}, "MRU: sample_time must be above 0 s, got -1.0"),
+        ({"heave_rms": math.nan}, "MRU: heave_rms must be at least 0 m, got nan"),
+        ({"heave_frequency": 0.0}, "MRU: heave_frequency must be above 0 rad/s, got 0.0"),
+        ({"seed": -3}, "MRU: seed must be a whole number of at least 0, got -3"),
+        ({"outages": [(1.0, 1.0)]}, "MRU: outages must be pairs (start, end) in s with start"),
+    ],
+)
+def test_refused(arguments, message):
+    with pytest.raises(InputError, match=re.escape(message)):
+        model(NOISY, **arguments)
+
+
+def test_refuses_motions_that_do_not_fit():
+    unit = model(NOISY)
+    state = unit.initial(0.0, 0.0)
+    with pytest.raises(InputError, match="velocity must have as many samples as displacement"):
+        unit.block(state, [0.0, 1.0], [0.0])
+    with pytest.raises(InputError, match="got 0 and 0"):
+        unit.block(state, [], [])
+    with pytest.raises(InputError, match="MRU: displacement must be finite numbers, got nan at"):
+        unit.block(state, [0.0, math.nan], [0.0, 0.0])
+
+
+def replace_delay(mru, delay):
+    return MRU(**(dict(mru) | {"delay": delay}))
+
+
+def averaged_periodogram(series, size):
+    """One-sided variance density [per rad/s] with a Hann window, on average over segments."""
+    window = np.sin(np.pi * np.arange(size) / size) ** 2
+    segments = series.reshape(-1, size) * window
+    power = np.abs(np.fft.rfft(segments, axis=1)) ** 2
+    omega = 2 * math.pi * np.fft.rfftfreq(size, TS)
+    return omega, power.mean(axis=0) * TS / (math.pi * np.sum(window**2))
+
+
+def variance_spread(series, variance):
+    """Standard error of the mean square of a Gaussian series, from its own correlation."""
+    n = len(series)
+    spectrum = np.abs(np.fft.rfft(series, 2 * n)) ** 2
+    correlation = np.fft.irfft(spectrum)[: n // 100] / n / variance
+    return variance * math.sqrt(2.0 / n * (1.0 + 2.0 * np.sum(correlation[1:] ** 2)))

@@ -1,0 +1,460 @@
+"""Every reader against a table that was written in its format, and against real files."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.io import savemat
+from vessel_tables import (
+    DATA,
+    mss_vessel,
+    orcaflex_text,
+    shipx_text,
+    swinging,
+    wamit_text,
+)
+
+from models.basics.checks import InputError
+from models.sea.sea import SeaSpectrum
+from models.vessel import VesselRaos, bundled_vessels, read_raos, write_raos
+from models.vessel.assemble import grid
+from models.vessel.readers.orcaflex import parse_orcaflex
+
+RAOS = swinging()
+SHIP = swinging(symmetric=True)
+MSS = DATA / "mss"
+OFX = DATA / "mafredo"
+needs_mss = pytest.mark.skipif(not MSS.is_dir(), reason="the real files are not here")
+needs_ofx = pytest.mark.skipif(not OFX.is_dir(), reason="the real files are not here")
+
+
+def put(folder: Path, name: str, content: str | bytes) -> Path:
+    path = folder / name
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+def mat(raos: VesselRaos, speeds: int = 1) -> bytes:
+    target = io.BytesIO()
+    savemat(target, mss_vessel(raos, speeds))
+    return target.getvalue()
+
+
+def same(found: VesselRaos, wanted: VesselRaos, tolerance: float = 1e-7) -> None:
+    assert np.allclose(found.omega, wanted.omega, rtol=1e-7)
+    assert np.allclose(found.heading, wanted.heading, atol=1e-8)
+    assert np.allclose(found.values, wanted.values, rtol=tolerance, atol=1e-9)
+
+
+WRITERS: dict[str, tuple[str, Callable[[VesselRaos], str | bytes]]] = {
+    "wamit": ("swing.4", wamit_text),
+    "orcaflex": ("swing.yml", orcaflex_text),
+    "shipx": ("swing.re1", lambda raos: shipx_text({0.0: raos})),
+    "mss": ("swing.mat", mat),
+}
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_a_table_in_any_format_is_read_back_by_contents_alone(kind: str, tmp_path: Path) -> None:
+    name, write = WRITERS[kind]
+    found = read_raos(put(tmp_path, name, write(RAOS)))
+    same(found, RAOS)
+    assert found.notes
+    # The name may be any.
+    same(read_raos(put(tmp_path, "table.dat", write(RAOS))), RAOS)
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_half_of_a_symmetric_vessel_is_completed(kind: str, tmp_path: Path) -> None:
+    half = replace(SHIP, heading=SHIP.heading[:7], values=SHIP.values[:, :7])
+    found = read_raos(put(tmp_path, WRITERS[kind][0], WRITERS[kind][1](half)))
+    if kind == "orcaflex":  # its files tell, and this one tells of none
+        assert found.heading.size == 7
+        return
+    same(found, SHIP)
+    assert any("taken as symmetric" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_what_is_written_reads_back_to_the_last_digit(suffix: str, tmp_path: Path) -> None:
+    raos = replace(
+        RAOS, origin=(1.25, -0.1, 3.0), phase_origin=(7.0, 0.3), depth=48.5, speed=2.5,
+        notes=("first: a, b", "second"),
+    )  # fmt: skip
+    found = read_raos(write_raos(tmp_path / f"out{suffix}", raos), check=False)
+    assert np.array_equal(found.values, raos.values)
+    assert np.array_equal(found.omega, raos.omega)
+    assert np.allclose(found.heading, raos.heading, rtol=1e-15, atol=1e-15)
+    for field in ("name", "origin", "phase_origin", "depth", "speed", "notes", "source"):
+        assert getattr(found, field) == getattr(raos, field)
+    with pytest.raises(InputError, match=r"must end in \.csv or \.nc"):
+        write_raos(tmp_path / "out.txt", raos)
+
+
+def test_a_csv_of_ones_own_tells_its_convention_in_remarks(tmp_path: Path) -> None:
+    lines = [
+        "# a table from a model test", "# name: tug", "# origin: -3, 0, 1.5", "# phase: lags",
+        "# heave: down", "# headings: from", "# turning: clockwise", "# depth: 60",
+        "period [s]; heading [deg]; heave_amp; heave_phase [rad]; roll_amp [deg/m]; roll_phase",
+    ]  # fmt: skip
+    k = float(replace(RAOS, depth=60.0).wave_number(2.0 * math.pi / 40.0))
+    for period in (40.0, 10.0):
+        for heading in range(0, 360, 45):
+            # Down is the other sign; from starboard is towards port, where roll is -i k.
+            size = math.degrees(k) * abs(math.sin(math.radians(heading)))
+            late = 0.5 * math.pi if heading < 180 else -0.5 * math.pi
+            lines.append(f"{period}; {heading}; 0.9; {math.pi}; {size}; {late}")
+    raos = read_raos(put(tmp_path, "tug.csv", "\n".join(lines)))
+    assert raos.name == "tug"
+    assert raos.origin == (-3.0, 0.0, 1.5)
+    assert raos.depth == 60.0
+    towards_port = raos.response(raos.omega[0], 0.5 * math.pi)
+    assert towards_port[2] == pytest.approx(0.9)
+    assert towards_port[3] == pytest.approx(-1j * k)
+    assert any("no columns for surge, sway, pitch, yaw" in note for note in raos.notes)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        ("heave_real", "heaves_real", "a column must be a motion"),
+        ("heave_imag", "heave_real", "each once"),
+        ("omega [rad/s]", "omega [furlongs]", "first column must be omega"),
+        ("heading [deg]", "direction", "second column must be heading"),
+        ("roll_real", "roll_real [inch]", r"unit \[inch\] of roll_real is not known"),
+        ("# depth: inf", "# depth: shallow", "depth must be a number, got 'shallow'"),
+        ("# origin: 0.0, 0.0, 0.0", "# origin: 0.0, 0.0", "origin must be 3 numbers"),
+        ("# speed: 0.0", "# speed: 0.0\n# phase: early", "phase must be one of leads, lags"),
+    ],
+)
+def test_a_csv_that_is_wrong_is_answered_by_field(
+    before: str, after: str, words: str, tmp_path: Path
+) -> None:
+    text = write_raos(tmp_path / "a.csv", RAOS).read_text()
+    assert before in text
+    with pytest.raises(InputError, match=words):
+        read_raos(put(tmp_path, "b.csv", text.replace(before, after, 1)), file_format="csv")
+
+
+def test_wamit_takes_frequencies_a_length_limits_and_several_bodies(tmp_path: Path) -> None:
+    by_frequency = wamit_text(RAOS, length=246.0, frequency=True)
+    same(read_raos(put(tmp_path, "a.4", by_frequency), length=246.0), RAOS)
+    with pytest.raises(InputError, match=r"a length of 2\d\d m"):
+        read_raos(tmp_path / "a.4")
+    limits = " -1.0 0.0 3 1.0 0.0 1.0 0.0\n 0.0 0.0 3 0.0 0.0 0.0 0.0\n"
+    found = read_raos(put(tmp_path, "b.4", limits + wamit_text(RAOS)))
+    same(found, RAOS)
+    assert any("2 rows of zero or infinite period left out" in note for note in found.notes)
+    second = re.sub(r"(?m)^(\S+ \S+) +(\d)", lambda m: f"{m[1]} {int(m[2]) + 6}", wamit_text(SHIP))
+    both = put(tmp_path, "c.4", wamit_text(RAOS) + second)
+    same(read_raos(both, body=1), RAOS)
+    same(read_raos(both, body=2), SHIP)
+    with pytest.raises(InputError, match="2 bodies"):
+        read_raos(both)
+    with pytest.raises(InputError, match="body must be one of 1, 2, got 3"):
+        read_raos(both, body=3)
+
+
+def test_what_a_file_does_not_tell_can_be_told(tmp_path: Path) -> None:
+    # Headings of one side that neither begin at 0 nor end at 180 deg.
+    part = replace(SHIP, heading=SHIP.heading[2:6], values=SHIP.values[:, 2:6])
+    path = put(tmp_path, "a.4", wamit_text(part))
+    assert read_raos(path).heading.size == 4
+    told = read_raos(path, symmetry="xz plane", waves="period", depth=70.0, origin=(3.0, 0.0, 1.0))
+    assert told.heading_deg == pytest.approx([60, 90, 120, 150, 210, 240, 270, 300])
+    assert np.allclose(told.values, SHIP.values[:, [2, 3, 4, 5, 7, 8, 9, 10]], rtol=1e-7)
+    assert (told.depth, told.origin, told.phase_origin) == (70.0, (3.0, 0.0, 1.0), (3.0, 0.0))
+    with pytest.raises(InputError, match="symmetry must be one of none, xz plane"):
+        read_raos(path, symmetry="nearly")
+    with pytest.raises(InputError, match="waves must be one of period, frequency; got 'length'"):
+        read_raos(path, waves="length")
+    away = replace(RAOS, phase_origin=(60.0, 0.0), depth=30.0)
+    text = orcaflex_text(away, phase_origin="[60, 0, 0]")
+    shallow = read_raos(put(tmp_path, "a.yml", text), depth=30.0, check=False)
+    assert np.allclose(shallow.values, away.with_phase_origin((0.0, 0.0)).values, rtol=1e-7)
+
+
+def test_shipx_and_mss_give_the_speed_that_is_asked_for(tmp_path: Path) -> None:
+    fast = replace(RAOS, values=RAOS.values * np.linspace(1.0, 0.6, 8)[:, None, None])
+    ship = put(tmp_path, "a.re1", shipx_text({0.0: RAOS, 5.144: fast}))
+    same(read_raos(ship), RAOS)
+    found = read_raos(ship, speed=5.144)
+    same(found, fast)
+    assert found.speed == 5.144
+    with pytest.raises(InputError, match=r"speed must be one of 0, 5\.144 m/s, got 3 m/s"):
+        read_raos(ship, speed=3.0)
+    vessel = put(tmp_path, "a.mat", mat(RAOS, speeds=2))
+    assert read_raos(vessel, speed=1.0).speed == 1.0
+
+
+@pytest.mark.parametrize("wave", ["amplitude", "max wave slope", "wave steepness"])
+@pytest.mark.parametrize("waves", ["period (s)", "frequency (rad/s)", "frequency (Hz)"])
+@pytest.mark.parametrize("key", ["RAOPeriodOrFrequency", "RAOPeriodOrFreq"])
+def test_orcaflex_units_of_waves_and_angles(
+    wave: str, waves: str, key: str, tmp_path: Path
+) -> None:
+    for angles in ("degrees", "radians"):
+        text = orcaflex_text(RAOS, wave=wave, waves=waves, key=key, angles=angles)
+        same(read_raos(put(tmp_path, "a.yml", text)), RAOS)
+
+
+@pytest.mark.parametrize("sense", ["leads", "lags"])
+@pytest.mark.parametrize(
+    "relative_to", ["crest", "trough", "zero up-crossing", "zero down-crossing"]
+)
+def test_orcaflex_phases_and_positive_directions(
+    sense: str, relative_to: str, tmp_path: Path
+) -> None:
+    for n, phases in enumerate(("degrees", "radians")):
+        signs = (-1, 1, -1, 1, 1, -1) if n else (1, -1, 1, -1, -1, 1)
+        text = orcaflex_text(
+            RAOS, sense=sense, relative_to=relative_to, phases=phases, signs=signs,
+            spread_out=bool(n),
+        )  # fmt: skip
+        same(read_raos(put(tmp_path, "a.yml", text)), RAOS)
+
+
+@pytest.mark.parametrize(
+    ("symmetry", "directions"),
+    [
+        ("xz plane", [0, 1, 2, 3, 4, 5, 6]),
+        ("xz plane", [6, 9, 8, 7, 10, 11, 0]),
+    ],
+)
+def test_orcaflex_symmetry_gives_the_other_side(
+    symmetry: str, directions: list[int], tmp_path: Path
+) -> None:
+    text = orcaflex_text(SHIP, symmetry=symmetry, directions=directions)
+    same(read_raos(put(tmp_path, "a.yml", text)), SHIP)
+
+
+def test_orcaflex_two_planes_make_a_circle_of_a_quadrant(tmp_path: Path) -> None:
+    box = replace(SHIP, values=SHIP.values.copy())
+    values = box.values.copy()
+    values[:, :, 2] = values[:, 3:4, 2]  # as high ahead as astern
+    box = replace(box, values=values)
+    text = orcaflex_text(box, symmetry="xz and yz planes", directions=[0, 1, 2, 3])
+    same(read_raos(put(tmp_path, "a.yml", text)), box)
+
+
+def test_orcaflex_phase_origin_is_another_point_than_the_rao_origin(tmp_path: Path) -> None:
+    placed = replace(RAOS, origin=(4.0, -1.0, 2.0), phase_origin=(4.0, -1.0))
+    away = placed.with_phase_origin((30.0, 5.0))
+    text = orcaflex_text(away, phase_origin="[30, 5, ~]")
+    found = read_raos(put(tmp_path, "a.yml", text))
+    same(found, placed)
+    assert found.origin == (4.0, -1.0, 2.0)
+    assert found.phase_origin == (4.0, -1.0)
+    assert any("x = 30 m, y = 5 m" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        ("    RAOPhaseConvention: leads\n", "", "RAOPhaseConvention is missing"),
+        ("RAOWaveUnit: amplitude", "RAOWaveUnit: furlong", "RAOWaveUnit must be one of amplitude"),
+        ("UnitsSystem: SI", "UnitsSystem: US", "UnitsSystem must be SI, got 'US'"),
+        ("VesselTypes:", "VesselKinds:", "no list of VesselTypes"),
+        ("DisplacementRAOs:", "OtherRAOs:", "it may have load RAOs only"),
+        ("RAODirection: 30", "RAODirection: north", "RAODirection must be a number"),
+        ("Symmetry: None", "Symmetry: Circular", "must have 1 heading, got 12"),
+    ],
+)
+def test_an_orcaflex_file_that_is_wrong_is_answered_by_key(
+    before: str, after: str, words: str, tmp_path: Path
+) -> None:
+    text = orcaflex_text(RAOS)
+    assert before in text
+    with pytest.raises(InputError, match=words):
+        read_raos(put(tmp_path, "a.yml", text.replace(before, after, 1)))
+
+
+def test_what_is_no_rao_file_is_said_to_be_none(tmp_path: Path) -> None:
+    for name, content, words in (
+        ("a.yml", "name: subsea-crane\nsea: {}\n", "no RAO file of a kind that is known"),
+        ("a.bin", bytes(range(256)) * 4, "a binary file of no kind"),
+        ("a.txt", "   \n", "the file is empty"),
+        ("a.re8", shipx_text({0.0: RAOS}).replace("MOTION", "FORCE"), "holds forces"),
+        ("a.mat", b"MATLAB 7.3 MAT-file" + bytes(600), "version 7.3 are not read"),
+    ):
+        with pytest.raises(InputError, match=words):
+            read_raos(put(tmp_path, name, content))
+    with pytest.raises(InputError, match="there is no such file"):
+        read_raos(tmp_path / "lost.csv")
+    with pytest.raises(InputError, match="no bundled vessel of this name"):
+        read_raos("queen-mary")
+    with pytest.raises(InputError, match="format must be one of csv"):
+        read_raos(put(tmp_path, "a.4", wamit_text(RAOS)), file_format="aqwa")
+    with pytest.raises(InputError, match="draught says nothing about a wamit file"):
+        read_raos(tmp_path / "a.4", draught="deep")
+    with pytest.raises(InputError, match="there is no such file"):
+        read_raos(tmp_path)
+
+
+@pytest.mark.parametrize("kind", ["wamit", "shipx", "orcaflex"])
+def test_a_file_that_was_cut_off_says_so(kind: str, tmp_path: Path) -> None:
+    name, write = WRITERS[kind]
+    text = str(write(RAOS))
+    lines = text.splitlines(keepends=True)
+    end = len(lines) * 2 // 3
+    with pytest.raises(InputError, match=r"cut off|missing|YAML"):
+        read_raos(put(tmp_path, name, "".join(lines[:end])))
+
+
+def test_a_wamit_line_that_contradicts_itself_is_found(tmp_path: Path) -> None:
+    lines = wamit_text(RAOS).splitlines()
+    words = lines[40].split()
+    words[4] = str(float(words[4]) + 180.0)
+    with pytest.raises(InputError, match="contradicts itself"):
+        read_raos(put(tmp_path, "a.4", "\n".join([*lines[:40], " ".join(words), *lines[41:]])))
+
+
+def test_a_heading_that_is_there_twice_must_say_the_same() -> None:
+    rows = np.ones((4, 6))
+    omega = [0.3, 0.6, 0.3, 0.6]
+    turn = 2.0 * math.pi
+    w, b, table = grid("file", omega, [0.0, 0.0, turn, turn - 1e-9], rows)
+    assert (w.size, b.size, table.shape) == (2, 1, (2, 1, 6))
+    rows[2] *= 1.5
+    with pytest.raises(InputError, match="is there twice, with other numbers"):
+        grid("file", omega, [0.0, 0.0, turn, turn], rows)
+
+
+# Real files.
+
+
+@needs_mss
+def test_the_supply_vessel_of_mss_and_of_shipx_is_one() -> None:
+    text, matlab = read_raos(MSS / "supply.re1"), read_raos(MSS / "supply.mat")
+    assert text.values.shape == matlab.values.shape == (36, 36, 6)
+    assert np.allclose(text.heading, matlab.heading, atol=1e-12)
+    assert np.allclose(text.values, matlab.values, rtol=0.0, atol=1e-12)
+    assert text.name == "Supply"
+    assert text.origin == pytest.approx((-5.38592, 0.0, 0.0))
+
+
+@needs_mss
+@pytest.mark.parametrize("file", ["supply.re1", "supply.mat"])
+@pytest.mark.parametrize(
+    ("heading", "y", "period", "sigma", "velocity"),
+    [
+        (180.0, 15.0, 7.0, 0.357, 0.313),
+        (180.0, -15.0, 9.0, 0.516, 0.372),
+        (180.0, 15.0, 13.0, 0.602, 0.327),
+        (150.0, 15.0, 9.0, 0.419, 0.317),
+        (150.0, -15.0, 9.0, 0.691, 0.494),
+        (90.0, 15.0, 9.0, 0.385, 0.324),
+        (90.0, -15.0, 9.0, 0.967, 0.714),
+    ],
+)
+def test_the_crane_tip_of_the_supply_vessel_moves_as_others_computed(
+    file: str, heading: float, y: float, period: float, sigma: float, velocity: float
+) -> None:
+    # JONSWAP, gamma 3.3, H_s 2.5 m, the tip 25 m abaft the point whose motions the RAOs are.
+    raos = read_raos(MSS / file)
+    sea = SeaSpectrum(kind="jonswap", significant_height=2.5, peak_period=period, gamma=3.3)
+    omega = np.linspace(raos.omega[0], raos.omega[-1], 4001)
+    rows = raos.heave_at((raos.origin[0] - 25.0, y, 10.0), math.radians(heading))
+
+    def deviations(heave: np.ndarray) -> tuple[float, float]:
+        density = np.abs(heave) ** 2 * sea.density(omega)
+        rate = np.trapezoid(omega**2 * density, omega)
+        return math.sqrt(np.trapezoid(density, omega)), math.sqrt(rate)
+
+    # They went straight from row to row in the complex plane: the same figures to their digits.
+    straight = np.interp(omega, raos.omega, rows.real) + 1j * np.interp(
+        omega, raos.omega, rows.imag
+    )
+    assert deviations(straight) == pytest.approx((sigma, velocity), rel=0.006)
+    # That cuts the corners of a phase which turns 60 deg a row where T_p is 7 s: 3 % too little.
+    ours = deviations(
+        raos.at((raos.origin[0] - 25.0, y, 0.0)).response(omega, math.radians(heading))[:, 2]
+    )
+    assert ours == pytest.approx((sigma, velocity), rel=0.035 if period == 7.0 else 0.02)
+    assert ours == pytest.approx(deviations(CubicSpline(raos.omega, rows)(omega)), rel=0.005)
+
+
+@needs_mss
+def test_the_tanker_of_wamit_keeps_the_limits_of_long_waves() -> None:
+    tanker = read_raos(MSS / "tanker.4")
+    k = tanker.wave_number(tanker.omega[0])
+    assert tanker.omega[0] == pytest.approx(2.0 * math.pi / 163.88)
+    head, beam = tanker.response(tanker.omega[0], [math.pi, 0.5 * math.pi])
+    assert head[2] == pytest.approx(1.0, abs=2e-3)
+    assert head[4] / k == pytest.approx(-1j, abs=6e-3)
+    assert beam[3] / k == pytest.approx(-1j, abs=1e-2)
+
+
+@needs_ofx
+def test_two_conventions_of_orcaflex_give_the_same_complex_loads() -> None:
+    files = ("refcase_ofx_lags.yml", "refcase_ofx_leads_zero_down.yml")
+    lags, leads = (
+        parse_orcaflex(name, (OFX / name).read_text("utf-8-sig"), kind="load") for name in files
+    )
+    largest = np.abs(lags.values).max()
+    assert np.allclose(lags.values, leads.values, rtol=0.0, atol=1e-12 * largest)
+    # Another reader has 324.2107 - 54.6653i kN/m for heave at 1 rad/s, with e^{-i omega t}.
+    row = int(np.argmin(np.abs(lags.omega - 1.0)))
+    found = lags.values[row, 2, 2] / 1e3
+    assert lags.heading_deg[2] == pytest.approx(90.0)
+    assert complex(found) == pytest.approx(324.2107 + 54.6653j, abs=1e-3)
+
+
+@needs_ofx
+def test_the_barge_of_orcaflex_feels_the_loads_that_capytaine_computed() -> None:
+    import h5py
+
+    # One barge, two programs, two meshes.  Its middle is at (2.53, 0) in OrcaFlex's file, where
+    # load and phase refer to, and at (0, 0) in Capytaine's.
+    text = (OFX / "barge_100x30x4_q1.yml").read_text("utf-8-sig")
+    orcaflex = parse_orcaflex("barge", text, kind="load")
+    assert orcaflex.origin == pytest.approx((2.53, 0.0, -1.974))
+    with h5py.File(OFX / "barge_100x30x4.nc") as file:
+        parts = [file[key][()] for key in ("diffraction_force", "Froude_Krylov_force")]
+        omega = file["omega"][()]
+        degrees = np.degrees(file["wave_direction"][()])
+        dofs = [name.decode() for name in file["influenced_dof"][()]]
+    total = parts[0] + parts[1]
+    force = np.conj(total[0] + 1j * total[1])  # Capytaine's time factor is e^{-i omega t}
+    rows = np.flatnonzero((orcaflex.omega > 0.25) & (orcaflex.omega < 1.1))
+    assert rows.size == 11
+    for name, mode in (("Surge", 0), ("Sway", 1), ("Heave", 2)):
+        largest = np.abs(force[:, :, dofs.index(name)]).max()
+        for column, heading in enumerate(degrees):
+            if round(float(heading), 6) % 45.0:
+                continue  # not a row of both
+            theirs = CubicSpline(omega, force[:, column, dofs.index(name)])(orcaflex.omega[rows])
+            ours = orcaflex.response(orcaflex.omega[rows], math.radians(heading))[:, mode]
+            assert np.abs(ours - theirs).max() < 0.035 * largest, (name, heading)
+
+
+def test_the_bundled_vessel_is_read_by_name_and_keeps_the_limits() -> None:
+    names = [name for name, _ in bundled_vessels()]
+    assert "osv-83m" in names
+    vessel = read_raos("osv-83m")
+    assert vessel.name == "osv-83m"
+    assert vessel.heading.size >= 24
+    assert np.allclose(vessel.mirrored().values, vessel.values, atol=1e-3)
+
+
+@needs_mss
+@needs_ofx
+def test_reading_takes_less_than_a_second() -> None:
+    read_raos(MSS / "supply.mat")  # the first import
+    for path in (MSS / "supply.mat", MSS / "supply.re1", MSS / "tanker.4"):
+        start = time.process_time()
+        read_raos(path)
+        assert time.process_time() - start < 1.0
+    start = time.process_time()
+    text = (OFX / "refcase_ofx_lags.yml").read_text("utf-8-sig")
+    parse_orcaflex("refcase", text, kind="load")
+    assert time.process_time() - start < 1.0

@@ -1,0 +1,557 @@
+"""The linear predictive controller: its programme, its answers, and what it never does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cvxpy_programme import oracle
+from mpc_cases import WEIGHTS, case_of, controller_of
+
+import stillhook as sh
+from models.plant.drive import DriveLimits
+from models.sensing.control import MEASURED, Measurement
+from models.simulation.simulation import prepare
+from mpc.forecast.sea_predictor import SeaPredictor
+from mpc.linear.condensed import WATCHED, default_blocking, path_of_sea, sea_at_end
+from mpc.linear.linear import LinearMPC
+from mpc.programme.qp import SoftQP, kkt_residual
+
+_NAN = float("nan")
+
+
+def state_of(controller: LinearMPC, rng: np.random.Generator, size: float) -> np.ndarray:
+    model = controller.model
+    chi = np.zeros(model.size)
+    n = model.winch.size
+    chi[:n] = size * rng.normal(size=n) * model.scale[:n]
+    chi[model.sea_at] = rng.normal(size=model.sea.order)
+    at = model.constants_at.start
+    chi[at : at + 2] = rng.normal(size=2) * [1e4, 100.0]
+    return chi
+
+
+def question_of(controller: LinearMPC, chi: np.ndarray):
+    _, gradient, free = controller.products.known(chi)
+    speed = float(controller.model.winch.speed @ chi[: controller.model.winch.size])
+    moves = len(controller.programme.blocks)
+    low, high = controller._window.bounds(speed, np.zeros(moves), math.inf)
+    return controller.products.question(gradient, free, low, high), low, high
+
+
+def simulated_cost(controller: LinearMPC, chi: np.ndarray, v: np.ndarray) -> tuple[float, dict]:
+    """The cost of moves and the watched signals, by stepping the model sample by sample."""
+    p, model, weights = controller.programme, controller.model, controller.regulator
+    winch = model.winch
+    d = p.unit * np.repeat(v, p.blocks)
+    at = model.constants_at.start
+    c = chi[at : at + 2]
+    x, sea = chi[: winch.size], chi[model.sea_at]
+    shown = model.hook[:, model.sea_at]
+    over = model.A[model.sea_at, model.sea_at]
+    cost, seen = 0.0, {}
+    steady = winch.steady @ c
+    for j in range(p.steps):
+        seen["speed", j] = winch.speed @ x
+        seen["tension", j] = winch.tension @ x + winch.tension_from_hook @ (shown @ sea)
+        seen["command", j] = winch.back * (winch.speed @ x) + d[j] / winch.gain
+        after = over @ sea
+        ends = np.concatenate([shown @ sea, shown @ after])
+        x = winch.A @ x + winch.B[:, 0] * d[j] + winch.from_hook @ ends + winch.from_constants @ c
+        sea = after
+        cost += weights.weight * (d[j] - steady) ** 2
+        if j + 1 < p.steps:
+            cost += (winch.payload @ x) ** 2
+    seen["speed", p.steps] = winch.speed @ x
+    seen["tension", p.steps] = winch.tension @ x + winch.tension_from_hook @ (shown @ sea)
+    zeta = np.concatenate([sea, c])
+    cost += x @ weights.P @ x + 2.0 * x @ weights.N @ zeta
+    return cost / p.cost, seen
+
+
+@pytest.mark.parametrize("name", ["thesis-1975", "subsea-crane"])
+def test_programme_is_the_cost_of_stepping_the_model(name):
+    controller = controller_of(name, horizon=2.0)
+    rng = np.random.default_rng(0)
+    chi = state_of(controller, rng, 1.0)
+    (f, lower, _), _, _ = question_of(controller, chi)
+    p, n = controller.programme, len(controller.programme.blocks)
+    base, _ = simulated_cost(controller, chi, np.zeros(n))
+    for _ in range(4):
+        v = rng.normal(size=n)
+        cost, seen = simulated_cost(controller, chi, v)
+        assert 0.5 * v @ p.H @ v + f @ v == pytest.approx(cost - base, rel=1e-8, abs=1e-8 * base)
+        rows = controller.products.rows @ v
+        for k, (j, kind) in enumerate(zip(p.at, p.kind, strict=True)):
+            # row + free response = signal, in units of its limit
+            free = controller.products.low[k] - lower[n + k]
+            if WATCHED[kind] == "command" and not controller.model.winch.dc:
+                continue
+            wanted = seen[WATCHED[kind], j] * controller.products.scale[k]
+            assert rows[k] + free == pytest.approx(wanted, rel=1e-7, abs=1e-9)
+
+
+def test_gradient_and_hessian_agree_with_finite_differences_of_the_cost():
+    controller = controller_of("thesis-1975", horizon=1.0)
+    chi = state_of(controller, np.random.default_rng(1), 1.0)
+    (f, _, _), _, _ = question_of(controller, chi)
+    n = len(f)
+    for k in range(0, n, 3):
+        e = np.zeros(n)
+        e[k] = 0.5
+        up, down = (simulated_cost(controller, chi, s * e)[0] for s in (1.0, -1.0))
+        middle = simulated_cost(controller, chi, np.zeros(n))[0]
+        assert up - down == pytest.approx(f[k], rel=1e-6, abs=1e-9)
+        assert 4.0 * (up + down - 2.0 * middle) == pytest.approx(
+            controller.programme.H[k, k], rel=1e-6
+        )
+
+
+@pytest.mark.parametrize("name", ["thesis-1975", "thesis-1975-rope", "subsea-crane"])
+def test_without_active_limits_it_is_the_linear_quadratic_regulator(name):
+    controller = controller_of(name, horizon=3.0, blocking=(1,) * 60)
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        chi = 1e-3 * state_of(controller, rng, 0.1)
+        question, _, _ = question_of(controller, chi)
+        solved = controller.qp.solve(*question)
+        if (solved.multipliers != 0.0).any():
+            continue
+        wanted = -float(controller.regulator.feedback(controller.model) @ chi)
+        assert solved.v[0] * controller.programme.unit == pytest.approx(wanted, rel=1e-6, abs=1e-6)
+        break
+    else:
+        pytest.fail("every state was limited")
+
+
+def test_it_agrees_with_the_plain_statement_in_cvxpy():
+    _compare_with_oracle("thesis-1975", states=60, horizon=1.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["thesis-1975", "subsea-crane"])
+def test_it_agrees_with_the_plain_statement_in_cvxpy_on_a_thousand_states(name):
+    _compare_with_oracle(name, states=1000, horizon=2.0)
+
+
+def programme_cost(qp: SoftQP, question, v: np.ndarray) -> float:
+    f, lower, upper = question
+    n = len(f)
+    value = qp.rows @ v
+    over = np.maximum(np.maximum(value - upper[n:], lower[n:] - value), 0.0)
+    soft = 0.5 * qp.quadratic * over @ over + qp.linear * over.sum()
+    return float(0.5 * v @ qp.H @ v + f @ v + soft)
+
+
+def _compare_with_oracle(name: str, *, states: int, horizon: float) -> None:
+    controller = controller_of(name, horizon=horizon)
+    plain, model = oracle(controller), controller.model
+    p, winch = controller.programme, model.winch
+    rng = np.random.default_rng(3)
+    active = agreed = unproved = 0
+    ahead = np.linalg.matrix_power(model.A[model.sea_at, model.sea_at], p.steps)
+    for _ in range(states):
+        chi = state_of(controller, rng, float(rng.choice([0.1, 0.5, 1.0])))
+        question, low, high = question_of(controller, chi)
+        solved = controller.qp.solve(*question)
+        # 1e-6 is what counts as proved, and where the arithmetic ends for a state this far off
+        # (measured: all on one spring, all but two of a thousand on the crane, those to 2e-6).
+        residual = kkt_residual(controller.qp, *question, solved)
+        unproved += int(residual >= 1e-6)
+        assert residual < 1e-5
+        plain.state.value = chi[: winch.size]
+        at = model.constants_at.start
+        plain.constants.value = chi[at : at + 2]
+        plain.path.value = (path_of_sea(model, p.steps) @ chi[model.sea_at]).reshape(-1, 2)
+        plain.end.value = ahead @ chi[model.sea_at]
+        plain.low.value, plain.high.value = low, high
+        moves = plain.solve()
+        theirs, ours = (programme_cost(controller.qp, question, v) for v in (moves, solved.v))
+        assert ours <= theirs + 1e-8 * (1.0 + abs(theirs))
+        # Where the cost is flat, equal costs to twelve digits leave the move open by some 1e-5.
+        agreed += int(abs(moves[0] - solved.v[0]) < 1e-6)
+        if theirs <= ours + 1e-12 * (1.0 + abs(ours)):
+            assert moves[0] == pytest.approx(solved.v[0], abs=1e-4)
+        active += int((solved.multipliers != 0.0).any())
+    assert active > states / 2
+    assert unproved <= (0.0 if name == "thesis-1975" else 0.003) * states
+    # the others: a flat cost, or Clarabel stops short of the optimum at a cost above ours
+    # (measured: all but a few of a thousand on one spring, 936 on the crane)
+    assert agreed >= (0.97 if name == "thesis-1975" else 0.9) * states
+
+
+def test_a_soft_limit_that_costs_more_is_violated_less():
+    controller = controller_of("thesis-1975", horizon=2.0, excursion=0.02)
+    rng = np.random.default_rng(4)
+    chi = state_of(controller, rng, 0.3)
+    question, _, _ = question_of(controller, chi)
+    rows, H = controller.products.rows, controller.programme.H
+    n = len(H)
+    beyond = []
+    for price in (1e-8, 1e-4, 1.0):
+        qp = SoftQP(H, rows, quadratic=price, linear=1e-2 * price)
+        v = qp.solve(*question).v
+        value = rows @ v
+        over = np.maximum(value - question[2][n:], 0.0) + np.maximum(question[1][n:] - value, 0.0)
+        beyond.append(float((over**2).sum()))
+    assert beyond[0] > beyond[1] > beyond[2] > 0.0
+
+
+def test_cold_and_warm_starts_agree():
+    controller = controller_of("thesis-1975")
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        question, _, _ = question_of(controller, state_of(controller, rng, 1.0))
+        warm = controller.qp.solve(*question).v
+        cold = SoftQP(
+            controller.qp.H,
+            controller.qp.rows,
+            quadratic=controller.qp.quadratic,
+            linear=controller.qp.linear,
+        ).solve(*question)
+        assert cold.v == pytest.approx(warm, abs=1e-9)
+
+
+def test_blocks_grow_and_fill_the_horizon():
+    for horizon in (0.2, 1.0, 3.0, 6.0, 8.0, 10.0, 20.0):
+        blocks = default_blocking(horizon, 0.05)
+        assert sum(blocks) == round(horizon / 0.05)
+        assert blocks[0] == 1
+    assert len(default_blocking(8.0, 0.05)) < 35
+    with pytest.raises(sh.InputError, match=r"horizon must be in \[0.2, 100\] s, got 0.1"):
+        default_blocking(0.1, 0.05)
+
+
+def test_the_path_tells_the_state_of_the_sea_at_its_end():
+    controller = controller_of("thesis-1975")
+    model = controller.model
+    rng = np.random.default_rng(6)
+    over = model.A[model.sea_at, model.sea_at]
+    added = (model.G @ model.G.T)[model.sea_at, model.sea_at]
+    root = np.linalg.cholesky(added + 1e-15 * np.eye(len(added)))
+    known = controller.estimator.sea_covariance
+    doubt = np.linalg.cholesky(known + 1e-12 * np.eye(len(known)))
+    shown = model.hook[:, model.sea_at]
+    from_path, from_sea = sea_at_end(model, 120, known)
+    later = np.linalg.matrix_power(over, 40)
+    errors, without = [], []
+    for _ in range(300):
+        sea, path = rng.normal(size=len(over)), []
+        estimate = sea + doubt @ rng.normal(size=len(over))
+        for j in range(121):
+            if j > 0:
+                sea = over @ sea + root @ rng.normal(size=len(over))
+            path.append(shown @ sea)
+        guess = from_path @ np.concatenate(path) + from_sea @ estimate
+        blind = np.linalg.matrix_power(over, 120) @ estimate
+        errors.append(float(shown[0] @ later @ (sea - guess)))
+        without.append(float(shown[0] @ later @ (sea - blind)))
+    # two seconds on, next to all that matters of the state is known
+    assert np.std(errors) < 0.25 * np.std(without)
+
+
+def run_of(controller: LinearMPC, seconds: float = 120.0, **options: object):
+    wanted = {"seeds": [1], "duration": seconds, "settle": 40.0, **options}
+    return sh.simulate(controller.case, controller, **wanted).runs[0]  # type: ignore[arg-type]
+
+
+def test_every_answer_of_a_saturated_run_is_optimal_and_within_the_drives_limits():
+    controller = controller_of("thesis-1975", 2.43)
+    worst, commands = 0.0, []
+
+    class Watched:
+        name, sample_time = controller.name, controller.sample_time
+        foresee = staticmethod(controller.foresee)
+
+        def reset(self) -> None:
+            controller.reset()
+
+        def step(self, measurement: Measurement, time: float) -> float:
+            nonlocal worst
+            command = controller.step(measurement, time)
+            assert controller.question is not None
+            assert controller.solved is not None
+            worst = max(worst, kkt_residual(controller.qp, *controller.question, controller.solved))
+            commands.append(command)
+            return command
+
+    run = sh.simulate(controller.case, Watched(), seeds=[1], duration=120.0, settle=40.0).runs[0]
+    assert worst < 1e-6
+    assert run.statistics.value("payload rms") < 0.4
+    assert np.abs(commands).max() <= 805.0
+    counts = controller.counts
+    assert counts["shifted"] == counts["safe"] == counts["late"] == 0
+    torque = run["motor.torque"]
+    assert np.abs(torque).max() <= 11_880.0 * (1.0 + 1e-9)
+    assert np.mean(np.abs(torque) > 11_000.0) > 0.2
+
+
+def test_it_holds_where_the_thesis_loses_lock():
+    case = case_of("thesis-1975", 1.25)
+    controller = controller_of("thesis-1975", 1.25)
+    free = {"limits": DriveLimits(torque=11_880.0), "lock_limit": 0.5}
+    thesis = sh.simulate(
+        case.replace({"winch.drive.speed": 1000.0, "winch.drive.voltage": None}),
+        "feedback",
+        seeds=[0],
+        duration=240.0,
+        settle=30.0,
+        sample_time=0.005,
+        **free,
+    ).runs[0]
+    ours = sh.simulate(case, controller, seeds=[0], duration=240.0, settle=30.0).runs[0]
+    assert not math.isnan(thesis.statistics.value("lost lock at"))
+    assert ours.statistics.value("payload rms") < 0.01
+
+
+def test_preview_beats_the_seas_own_forecast_and_that_beats_none():
+    case = case_of("thesis-1975", 1.9)
+    rms = {}
+    for predictor in ("kalman", "preview", "ar"):
+        controller = LinearMPC(case, weights=WEIGHTS["thesis-1975"], predictor=predictor)
+        assert controller.name == {"kalman": "mpc"}.get(predictor, f"mpc-{predictor}")
+        run = run_of(controller, 240.0, settle=120.0)
+        rms[predictor] = run.statistics.value("payload rms")
+    short = controller_of("thesis-1975", 1.9, horizon=1.0)
+    rms["short"] = run_of(short, 240.0, settle=120.0).statistics.value("payload rms")
+    assert rms["preview"] < 0.6 * rms["kalman"]
+    assert rms["kalman"] < rms["short"]
+    assert rms["ar"] < 3.0 * rms["kalman"]
+
+
+def test_a_predictor_of_the_users_own_gives_what_the_name_gives():
+    case = case_of("thesis-1975", 1.25)
+    own = SeaPredictor(case, sample_time=0.05, horizon=8.0)
+    controller = LinearMPC(case, weights=WEIGHTS["thesis-1975"], predictor=own)
+    assert run_of(controller, 90.0).statistics.value("payload rms") < 0.03
+    with pytest.raises(sh.InputError, match=r"must forecast 161 leads every 0\.05 s, got 81"):
+        LinearMPC(
+            case,
+            weights=WEIGHTS["thesis-1975"],
+            predictor=SeaPredictor(case, sample_time=0.05, horizon=4.0),
+        )
+
+
+def test_a_run_can_be_repeated_to_the_bit():
+    controller = controller_of("thesis-1975", 2.43)
+    first, again = run_of(controller, 60.0), run_of(controller, 60.0)
+    assert np.array_equal(first["drive.command"], again["drive.command"])
+
+
+@pytest.mark.parametrize("weight", [0.9, 1.1])
+def test_a_load_of_another_weight_is_held_in_its_place(weight):
+    controller = controller_of("thesis-1975", 0.5)
+    weight_of = controller.case.payload.submerged_weight
+    run = run_of(controller, 240.0, parameters={"payload.submerged_weight": weight * weight_of})
+    last = run["payload.displacement"][len(run.time) // 2 :]
+    assert abs(float(last.mean())) < 2e-3
+    # counted from where it hangs at rest, it is the tension that is more than expected
+    found = controller.estimator.state[controller.model.constants_at][3]
+    assert found == pytest.approx((weight - 1.0) * weight_of, rel=0.05)
+
+
+def test_a_load_is_lowered_as_it_is_asked():
+    case = case_of("subsea-crane")
+    controller = controller_of("subsea-crane")
+    runs = sh.simulate(
+        case,
+        controller,
+        scenario="lower",
+        options={"distance": 1.0, "speed": 0.1},
+        seeds=[0],
+        duration=120.0,
+    )
+    run = runs.runs[0]
+    error = run["payload.displacement"] - run["reference.displacement"]
+    assert run["reference.displacement"].min() < -0.9
+    assert float(np.sqrt(np.mean(error**2))) < 0.02
+
+
+def test_estimate_is_as_good_as_the_filter_says():
+    controller = controller_of("thesis-1975", 1.0)
+    states = []
+
+    class Watched:
+        name, sample_time = "watched", controller.sample_time
+
+        def reset(self) -> None:
+            controller.reset()
+
+        def step(self, measurement: Measurement, time: float) -> float:
+            command = controller.step(measurement, time)
+            states.append(controller.estimator.state.copy())
+            return command
+
+    run = sh.simulate(
+        controller.case, Watched(), seeds=[3], duration=300.0, settle=60.0, store_step=0.05
+    ).runs[0]
+    model, n = controller.model, controller.model.winch.size
+    chi = np.array(states)
+    hook = chi @ model.hook[0]
+    payload = chi[:, :n] @ model.winch.payload
+    later = slice(1200, None)
+    P, C = controller.estimator.covariance, model.C
+    P = P - controller.estimator.gain @ C @ P
+    # The filter doubts more than is true here: it is better than it says, but not by much.
+    said = math.sqrt(float(model.hook[0] @ P @ model.hook[0]))
+    assert 0.1 * said < np.std((hook - run["hook.heave"])[later]) < 1.1 * said
+    assert np.std((payload - run["payload.displacement"])[later]) < 1e-4
+    # two seconds ahead: the error of the forecast is what its covariance says
+    steps = 40
+    for _ in range(steps):
+        P = model.A @ P @ model.A.T + model.G @ model.G.T
+    ahead = path_of_sea(model, steps)[2 * steps]
+    error = (chi[:, model.sea_at] @ ahead)[1200:-steps] - run["hook.heave"][1200 + steps :]
+    said = math.sqrt(float(model.hook[0] @ P @ model.hook[0]))
+    assert np.std(error) == pytest.approx(said, rel=0.15)
+
+
+def random_measurement(rng: np.random.Generator, controller: LinearMPC) -> Measurement:
+    winch = controller.model.winch
+    size = float(rng.choice([0.1, 1.0, 5.0]))
+    values = {
+        "payload.acceleration": rng.normal() * size,
+        "payload.velocity": rng.normal() * size,
+        "payload.displacement": rng.normal() * size,
+        "payload.age": float(rng.choice([0.0, 0.0, 0.1, 3.0])),
+        "payload.valid": float(rng.random() > 0.3),
+        "mru.heave": rng.normal() * size,
+        "mru.heave_rate": rng.normal() * size,
+        "mru.valid": float(rng.random() > 0.1),
+        "drum.haul": rng.normal() * size,
+        "motor.speed": rng.normal() * 80.0,
+        "rope.tension": winch.rest_tension * (1.0 + 0.3 * rng.normal()),
+        "motor.torque": rng.normal() * 8000.0,
+        "drive.applied": winch.rest_command + rng.normal() * 300.0,
+    }
+    for name in values:
+        if rng.random() < 0.05:
+            values[name] = float(rng.choice([_NAN, math.inf, -math.inf]))
+    return Measurement.of(values)
+
+
+@pytest.mark.parametrize("name", ["thesis-1975", "subsea-crane"])
+def test_whatever_is_measured_every_command_is_finite_and_within_limits(name):
+    controller = controller_of(name, thermal=True)
+    rng = np.random.default_rng(7)
+    winch, limits = controller.model.winch, DriveLimits.from_case(controller.case)
+    steps = 10_000 if name == "thesis-1975" else 2_000
+    for k in range(steps):
+        if k % 50 == 0:
+            controller.reset()
+        command = controller.step(random_measurement(rng, controller), 0.05 * k)
+        assert math.isfinite(command)
+        assert abs(command) <= limits.voltage or not winch.dc
+        torque = winch.torque(command, controller.estimator.speed) + winch.rest_torque
+        # beyond the peak by no more than keeps the drive there to the end of the sample
+        inside = abs(torque) <= 1.5 * limits.torque
+        # beyond the speed that the voltage can brake, the drive cuts the rest
+        assert inside or abs(command) == limits.voltage
+    counts = controller.counts
+    assert counts["steps"] == (k % 50) + 1
+
+
+def test_without_a_plan_it_goes_on_with_the_last_and_then_holds_the_drum():
+    controller = controller_of("thesis-1975", 1.9)
+    run_of(controller, 60.0)
+    plan = controller.solved
+    assert plan is not None
+    winch = controller.model.winch
+    calm = Measurement.of(
+        {
+            "payload.valid": 1.0,
+            "mru.valid": 1.0,
+            "drive.applied": winch.rest_command,
+            "rope.tension": winch.rest_tension,
+        }
+    )
+    controller.qp.solve = lambda *_: replace(plan, ok=False)  # type: ignore[method-assign]
+    before = controller.counts
+    blocks = np.repeat(plan.v, controller.programme.blocks)
+    for k in range(controller.programme.steps + 3):
+        command = controller.step(calm, 0.05 * k)
+        given = winch.torque(command, controller.estimator.speed) / controller.programme.unit
+        if k + 1 < len(blocks):
+            low, high = controller._window.bounds(
+                controller.estimator.speed, np.zeros(len(plan.v)), math.inf, controller._changes
+            )
+            kept = min(max(blocks[k + 1], low[0]), high[0])
+            if low[0] + 1e-6 < kept < high[0] - 1e-6:
+                assert given == pytest.approx(kept, abs=1e-9)
+        else:
+            assert command == pytest.approx(winch.rest_command)
+    counts = controller.counts
+    assert counts["shifted"] - before["shifted"] == len(blocks) - 1
+    assert counts["safe"] - before["safe"] == 4
+
+
+def test_a_deadline_that_is_missed_is_counted_and_the_last_plan_shifted():
+    controller = controller_of("thesis-1975", 1.9, deadline=1e-7)
+    run_of(controller, 20.0, settle=5.0)
+    counts = controller.counts
+    assert counts["late"] + counts["safe"] + counts["shifted"] >= counts["steps"]
+    assert counts["safe"] == counts["steps"]
+
+
+def test_the_thermal_budget_keeps_the_windings_within_their_rating():
+    case = case_of("thesis-1975", 2.43).replace({"winch.motor.thermal_time_constant": "60 s"})
+    hot = LinearMPC(case, weights=WEIGHTS["thesis-1975"])
+    kept = LinearMPC(case, weights=WEIGHTS["thesis-1975"], thermal=True)
+    rises = []
+    for controller in (hot, kept):
+        run = sh.simulate(case, controller, seeds=[0], duration=300.0, settle=30.0).runs[0]
+        rises.append(float(run["motor.temperature"].max()) / case.winch.motor.temperature_rise)
+    assert rises[0] > 1.15
+    # never less than what holds the load: 1.2 times the static torque, squared over the rating
+    assert rises[1] < 1.06
+
+
+def test_the_torque_changes_no_faster_than_it_may():
+    rate = 20_000.0
+    controller = controller_of("thesis-1975", 1.9, torque_rate=rate, prove=True)
+    free = controller_of("thesis-1975", 1.9)
+    fastest = {}
+    for one in (controller, free):
+        heard: list[float] = []
+
+        class Watched:
+            name, sample_time = "watched", 0.05
+
+            def reset(self) -> None:
+                one.reset()  # noqa: B023
+
+            def step(self, measurement: Measurement, time: float) -> float:
+                command = one.step(measurement, time)  # noqa: B023
+                heard.append(one._asked)  # noqa: B023
+                return command
+
+        sh.simulate(one.case, Watched(), seeds=[1], duration=90.0, settle=40.0)
+        fastest["slow" if one is controller else "free"] = np.abs(np.diff(heard)).max() / 0.05
+    assert fastest["slow"] <= rate * (1.0 + 1e-6)
+    assert fastest["free"] > 2.0 * rate
+    assert controller.counts["unproved"] == 0
+
+
+def test_the_names_of_what_it_hears_are_those_of_the_simulator():
+    assert len(MEASURED) == len(set(MEASURED))
+    simulation = prepare(case_of("thesis-1975"), controller_of("thesis-1975"))
+    assert simulation.controller.name == "mpc"
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"sample_time": 0.0}, "sample_time must be above 0 s"),
+        ({"horizon": 0.1}, "horizon must be in"),
+        ({"blocking": (1, 0)}, "blocking must be whole numbers of at least 1"),
+        ({"predictor": "crystal ball"}, "one of kalman, ar, preview"),
+        ({"excursion": -1.0}, "excursion must be above 0 m"),
+        ({"deadline": 0.0}, "deadline must be above 0 s"),
+        ({"torque_rate": 0.0}, "torque_rate must be above 0 N m/s"),
+    ],
+)
+def test_bad_arguments_get_one_clear_sentence(options, text):
+    with pytest.raises(sh.InputError, match=text):
+        controller_of("thesis-1975", **options)

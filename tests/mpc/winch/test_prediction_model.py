@@ -1,0 +1,289 @@
+"""The sampled world of predictive control, against differential equations and other libraries."""
+
+from __future__ import annotations
+
+import control
+import numpy as np
+import pytest
+import scipy.linalg
+from mpc_cases import WEIGHTS, case_of
+from scipy.integrate import solve_ivp
+
+from models import SolverError
+from models.hook.hook import HookMotion
+from models.plant.plant import build_plant
+from models.sensing.plant import MEASURED
+from mpc.programme.holds import hermite_hold, noisy_hold, root_of
+from mpc.winch.doubling import lyapunov, riccati
+from mpc.winch.doubts import doubted
+from mpc.winch.estimator import kalman_covariance, kalman_gain
+from mpc.winch.planning import plan_model
+from mpc.winch.prediction import CONSTANTS, prediction_model
+from mpc.winch.regulation import regulator
+from mpc.winch.sampled import sampled_winch
+from mpc.winch.unsaturated import Unsaturated
+from mpc.winch.weights import OFF, saturates, tune_weights
+
+NAMES = ("thesis-1975", "thesis-1975-rope", "subsea-crane")
+
+
+def test_cubic_motion_over_a_sample_moves_the_state_as_the_differential_equation_does():
+    rng = np.random.default_rng(0)
+    A, E, T = rng.normal(size=(5, 5)), rng.normal(size=(5, 2)), 0.3
+    z0, v0, z1, v1 = ends = rng.normal(size=4)
+
+    def cubic(t: float) -> tuple[float, float]:
+        s = t / T
+        z = (
+            z0 * (1 - 3 * s**2 + 2 * s**3)
+            + T * v0 * (s - 2 * s**2 + s**3)
+            + z1 * (3 * s**2 - 2 * s**3)
+            + T * v1 * (s**3 - s**2)
+        )
+        v = (
+            (6 * s**2 - 6 * s) / T * (z0 - z1)
+            + v0 * (1 - 4 * s + 3 * s**2)
+            + v1 * (3 * s**2 - 2 * s)
+        )
+        return z, v
+
+    x0 = rng.normal(size=5)
+    found = solve_ivp(
+        lambda t, x: A @ x + E @ cubic(t), (0.0, T), x0, rtol=1e-11, atol=1e-12, method="DOP853"
+    ).y[:, -1]
+    assert scipy.linalg.expm(A * T) @ x0 + hermite_hold(A, E, T) @ ends == pytest.approx(
+        found, abs=1e-9
+    )
+
+
+def test_noise_over_a_sample_has_the_covariance_of_its_integral():
+    rng = np.random.default_rng(1)
+    A, B, T = rng.normal(size=(4, 4)), rng.normal(size=(4, 2)), 0.2
+    over, added = noisy_hold(A, B, T)
+    assert over == pytest.approx(scipy.linalg.expm(A * T))
+    t = (np.arange(2000) + 0.5) / 2000 * T
+    parts = [scipy.linalg.expm(A * s) @ B for s in t]
+    integral = sum(part @ part.T for part in parts) * T / 2000
+    assert added == pytest.approx(integral, rel=1e-5)
+    assert root_of(added) @ root_of(added).T == pytest.approx(added)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_torque_at_the_start_of_a_sample_is_the_input_and_the_command_is_held(name):
+    winch = sampled_winch(case_of(name))
+    rng = np.random.default_rng(2)
+    plant, T = winch.plant, winch.sample_time
+    x = rng.normal(size=winch.size) * np.maximum(np.abs(winch.moved).max(axis=1), 1e-3)
+    torque, force = 800.0, 3000.0
+    speed = float(winch.speed @ x)
+    deviation = winch.command(torque, speed) - winch.rest_command
+    assert winch.torque(winch.command(torque, speed), speed) == pytest.approx(torque)
+    pushed = plant.E[:, plant.disturbances.index("payload.force")] * force
+    held = plant.B[:, 0] * deviation + pushed
+    n = len(x)
+    block = np.zeros((n + 1, n + 1))
+    block[:n, :n], block[:n, n] = plant.A, held
+    found = (scipy.linalg.expm(block * T) @ np.append(x, 1.0))[:n]
+    ours = winch.A @ x + winch.B[:, 0] * torque + winch.from_constants[:, 0] * force
+    assert ours == pytest.approx(found, rel=1e-9, abs=1e-9 * np.abs(found).max())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_load_that_hangs_elsewhere_stays_there(name):
+    winch = sampled_winch(case_of(name))
+    shift = winch.moved[:, 0]
+    assert winch.A @ shift == pytest.approx(shift, abs=1e-8 * np.abs(shift).max())
+    assert winch.payload @ shift == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_steady_input_holds_the_payload_against_a_constant_force_and_torque(name):
+    winch = sampled_winch(case_of(name))
+    for k, size in enumerate((5000.0, 300.0)):
+        push = winch.from_constants[:, k] * size + winch.B[:, 0] * winch.steady[k] * size
+        n = winch.size
+        system = np.vstack([winch.A - np.eye(n), winch.payload])
+        x = np.linalg.lstsq(system, np.append(-push, 0.0), rcond=None)[0]
+        still = winch.A @ x + push
+        assert np.abs(still - x).max() < 1e-7 * max(float(np.abs(x).max()), 1e-6)
+        assert abs(winch.payload @ x) < 1e-9
+
+
+def test_the_model_of_the_sea_has_the_spectrum_of_the_hook():
+    case = case_of("thesis-1975")
+    model, hook = prediction_model(case), HookMotion.from_case(case)
+    at = model.sea_at
+    added = (model.G @ model.G.T)[at, at]
+    P = scipy.linalg.solve_discrete_lyapunov(model.A[at, at], added)
+    shown = model.hook[:, at] @ P @ model.hook[:, at].T
+    assert np.sqrt(shown[0, 0]) == pytest.approx(hook.displacement.rms, rel=0.01)
+    # the tail beyond the band of the waves weighs more in the velocity
+    assert np.sqrt(shown[1, 1]) == pytest.approx(hook.velocity.rms, rel=0.02)
+    assert model.sea.shape_error < 0.03
+
+
+def test_late_signals_are_linear_between_what_is_on_its_way():
+    model = prediction_model(case_of("subsea-crane"))
+    T = model.winch.sample_time
+    rng = np.random.default_rng(3)
+    chi = [rng.normal(size=model.size)]
+    for _ in range(3):
+        chi.append(model.A @ chi[-1])
+    now = [model.now @ state for state in chi]
+    for delay, weights in ((0.0, (1.0, 0.0)), (0.03, (0.4, 0.6)), (T, (0.0, 1.0))):
+        row = model.late_row("payload.velocity", delay)
+        wanted = weights[0] * now[3][1] + weights[1] * now[2][1]
+        assert row @ chi[3] == pytest.approx(wanted)
+    usual = model.C[MEASURED.index("payload.velocity")]
+    assert usual == pytest.approx(model.late_row("payload.velocity", 0.03))
+    # longer than what is remembered
+    assert model.late_row("payload.velocity", 9.0).any()
+
+
+def test_a_force_on_the_payload_is_felt_by_its_accelerometer():
+    model = prediction_model(case_of("thesis-1975"))
+    mass = build_plant(model.winch.case).data.payload_mass + 16_200.0
+    row = model.now[0]
+    assert row[model.constants_at][0] == pytest.approx(1.0 / mass, rel=1e-3)
+    assert CONSTANTS[0] == "payload.force"
+
+
+def test_doubling_agrees_with_a_schur_form_and_says_when_there_is_no_solution():
+    rng = np.random.default_rng(4)
+    A, C, Q = 1.2 * rng.normal(size=(6, 6)) / 2.5, rng.normal(size=(2, 6)), np.eye(6)
+    found = riccati(A, C, Q)
+    assert found == pytest.approx(scipy.linalg.solve_discrete_are(A.T, C.T, Q, np.eye(2)))
+    stable = A / np.abs(np.linalg.eigvals(A)).max() * 0.95
+    assert lyapunov(stable, Q) == pytest.approx(scipy.linalg.solve_discrete_lyapunov(stable, Q))
+    assert lyapunov(stable / 0.9, Q) is None
+    with pytest.raises(SolverError, match="no stabilising solution"):
+        riccati(2.0 * np.eye(2), np.array([[1.0, 0.0]]), np.eye(2))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_filter_covariance_solves_its_equation_and_missing_signals_make_it_worse(name):
+    model = doubted(prediction_model(case_of(name)), WEIGHTS[name].doubts)
+    P = kalman_covariance(model)
+    everything = np.ones(len(model.R), dtype=bool)
+    gain = kalman_gain(model, P, everything)
+    left = np.eye(model.size) - gain @ model.C
+    kept = left @ P @ left.T + (gain * model.R) @ gain.T
+    again = model.A @ kept @ model.A.T + model.G @ model.G.T
+    s = np.sqrt(np.diag(P))
+    assert np.abs((again - P) / np.outer(s, s)).max() < 1e-4  # of the standard deviations
+    assert np.abs(np.linalg.eigvals(model.A - model.A @ gain @ model.C)).max() < 1.0
+    without = everything.copy()
+    without[3:5] = False
+    lesser = P - kalman_gain(model, P, without) @ model.C @ P
+    assert model.hook[0] @ lesser @ model.hook[0] >= model.hook[0] @ kept @ model.hook[0]
+    assert not kalman_gain(model, P, without)[:, 3:5].any()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_regulator_is_what_a_long_backward_recursion_of_the_whole_state_ends_at(name):
+    model = prediction_model(case_of(name))
+    found = regulator(model, 0.1)
+    winch = model.winch
+    n, nz = winch.size, len(found.Phi)
+    A = np.block([[np.array(winch.A), found.Gamma], [np.zeros((nz, n)), found.Phi]])
+    B = np.vstack([winch.B, np.zeros((nz, 1))])
+    payload = np.concatenate([winch.payload, np.zeros(nz)])
+    # in d' = d - d_inf zeta the cost is p^2 + rho d'^2
+    A[:n] += np.outer(B[:n, 0], np.concatenate([np.zeros(n), found.steady]))
+    scale = np.concatenate([model.scale[:n], np.ones(nz)])
+    A, b = A / scale[:, None] * scale, B[:, 0] / scale
+    Q = np.outer(payload * scale, payload * scale)
+    V = np.zeros_like(Q)
+    for _ in range(3000):
+        gain = b @ V @ A / (b @ V @ b + found.weight)
+        V = Q + A.T @ V @ A - np.outer(gain, A.T @ V @ b)
+        V = 0.5 * (V + V.T)
+    gain = gain / scale
+    assert pytest.approx(gain[:n], rel=1e-5, abs=1e-6 * np.abs(gain).max()) == found.K
+    assert found.K_disturbance + found.steady == pytest.approx(
+        gain[n:], rel=1e-4, abs=1e-5 * np.abs(gain[n:]).max()
+    )
+    V = V / np.outer(scale, scale)
+    size = np.abs(V[:n, n:]).max()
+    assert V[:n, n:] == pytest.approx(found.N, rel=1e-3, abs=1e-4 * size)
+
+
+def test_sensitivity_agrees_with_python_control():
+    model = doubted(prediction_model(case_of("thesis-1975")), WEIGHTS["thesis-1975"].doubts)
+    loop = Unsaturated(model=model, regulator=regulator(model, 0.03))
+    T = model.winch.sample_time
+    omega = np.geomspace(0.05, 50.0, 40)
+    kept = np.r_[0 : model.winch.size, model.constants_at.stop : model.size]
+    A, C = np.array(model.A), model.C[:, kept]
+    winch = model.winch
+    A[: winch.size, : winch.size] -= (
+        winch.back * winch.gain * np.outer(model.B[: winch.size, 0], winch.speed)
+    )
+    plant = control.ss(
+        A[np.ix_(kept, kept)], model.B[kept] * winch.gain, C, np.zeros((len(C), 1)), T
+    )
+    law = control.ss(*loop.controller, T)
+    through = plant(np.exp(1j * omega * T))
+    back = law(np.exp(1j * omega * T))
+    product = np.einsum("ik,ik->k", back[0], through[:, 0])
+    assert loop.sensitivity(omega, at="command") == pytest.approx(1.0 / (1.0 - product), rel=1e-6)
+    assert loop.growth() < 1.0
+    assert loop.max_sensitivity() >= np.abs(loop.sensitivity(omega)).max() - 1e-2
+
+
+def test_payload_in_the_modelled_sea_agrees_with_a_long_simulation_of_the_model():
+    case = case_of("thesis-1975")
+    truth = prediction_model(case)
+    model = doubted(truth, WEIGHTS["thesis-1975"].doubts)
+    loop = Unsaturated(model=model, regulator=regulator(model, 0.3))
+    rng = np.random.default_rng(5)
+    row = loop.regulator.feedback(model)
+    chi, ahead, found = np.zeros(truth.size), np.zeros(model.size), []
+    roots = np.sqrt(truth.R)
+    G = np.array(truth.G)
+    G[truth.constants_at] = 0.0
+    for _ in range(60_000):
+        y = truth.C @ chi + roots * rng.normal(size=len(roots))
+        estimate = ahead + loop.gain @ (y - truth.C @ ahead)
+        d = -float(row @ estimate)
+        # the true input follows from the command, which the estimated speed went into
+        command = truth.winch.command(d, float(truth.winch.speed @ estimate[: truth.winch.size]))
+        true = truth.winch.torque(command, float(truth.winch.speed @ chi[: truth.winch.size]))
+        found.append(float(truth.winch.payload @ chi[: truth.winch.size]))
+        chi = truth.A @ chi + truth.B[:, 0] * true + G @ rng.normal(size=G.shape[1])
+        ahead = model.A @ estimate + model.B[:, 0] * d
+    assert np.std(found[2000:]) == pytest.approx(loop.payload_rms_under(truth), rel=0.08)
+
+
+def test_tuned_weights_are_stable_on_every_plant_that_they_have_to_get_along_with():
+    case = case_of("thesis-1975", 1.25)
+    weights = tune_weights(case)
+    model = doubted(prediction_model(case), weights.doubts)
+    planned = plan_model(model, weights.stiffness)
+    loop = Unsaturated(model=model, regulator=regulator(planned, weights.torque))
+    assert loop.max_sensitivity() == pytest.approx(weights.max_sensitivity)
+    assert weights.max_sensitivity <= 2.0
+    for off in OFF:
+        plant = prediction_model(case, off=off)
+        assert loop.growth(plant) < 1.0
+        for share in (0.45, 0.7):  # of the torque, where the drive saturates
+            assert loop.growth(plant, share=share) < 1.0 + 1e-6
+    assert tune_weights(case) is weights  # asked again, it need not search
+    assert max(weights.payload_rms) < 0.02 * model.waves[0]
+    # Better than where the search began, by the measure that it has.
+    first = doubted(prediction_model(case), WEIGHTS["thesis-1975"].doubts)
+    begun = Unsaturated(model=first, regulator=regulator(first, 0.1))
+    assert weights.payload_rms[0] < begun.payload_rms_under(prediction_model(case))
+
+
+def test_a_drive_saturates_where_the_sea_asks_for_more_than_its_peak():
+    assert [saturates(prediction_model(case_of("thesis-1975", h))) for h in (0.5, 1.25)] == [
+        False,
+        True,
+    ]
+    assert not saturates(prediction_model(case_of("subsea-crane")))
+
+
+def test_margins_that_no_weights_have_are_said_to_be_out_of_reach():
+    with pytest.raises(SolverError, match=r"no weights are stable .* with M_s <= 1\.0001"):
+        tune_weights(case_of("thesis-1975", 0.5), max_sensitivity=1.0001)

@@ -1,0 +1,145 @@
+r"""The programme of the linear controller once more, as one would write it down: in CVXPY.
+
+Every state is a variable, every limit a constraint, nothing is eliminated.  It takes milliseconds
+where `mpc.programme.qp` takes microseconds, and is here to be read, and to check the other against:
+the same answer by another solver from another statement (`LinearMPC` docstring for the symbols).
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import cvxpy
+import numpy as np
+import numpy.typing as npt
+
+from models.basics.checks import SolverError
+from mpc.linear.condensed import WATCHED
+from mpc.linear.linear import LinearMPC
+
+cp: Any = cvxpy  # its stubs know too few of its functions
+
+__all__ = ["Oracle", "oracle"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Oracle:
+    """The programme with its parameters; `oracle` makes it.
+
+    Attributes
+    ----------
+    problem, moves
+        The CVXPY problem, and its variable v.
+    state, path, constants, end
+        Parameters: winch's state (nx,), hook's path (N + 1, 2), constants (2,), and the sea's state
+        at the end of the horizon (nh,).
+    low, high
+        Parameters: bounds on the moves, (nb,).
+    """
+
+    problem: Any
+    moves: Any
+    state: Any
+    path: Any
+    constants: Any
+    end: Any
+    low: Any
+    high: Any
+
+    def solve(self) -> FloatArray:
+        """Return the moves v, (nb,).
+
+        Raises
+        ------
+        SolverError
+            If the solver does not find the optimum.
+        """
+        # Clarabel's default tolerances are relative to a cost that spans many powers of ten; now
+        # and then it cannot meet tighter ones.
+        for gap in (1e-13, 1e-10):
+            tight = {"tol_gap_abs": gap, "tol_gap_rel": gap, "tol_feas": max(gap, 1e-11)}
+            try:
+                with warnings.catch_warnings():  # the status below says it too
+                    warnings.filterwarnings("ignore", "Solution may be inaccurate")
+                    self.problem.solve(solver=cp.CLARABEL, max_iter=200, **tight)
+            except cp.error.SolverError:
+                continue
+            break
+        if self.problem.status not in ("optimal", "optimal_inaccurate"):
+            raise SolverError(f"oracle: {self.problem.status}")
+        return np.asarray(self.moves.value)
+
+
+def oracle(controller: LinearMPC) -> Oracle:
+    """Return the programme of a controller, stated plainly.
+
+    Parameters
+    ----------
+    controller
+        The controller.
+    """
+    p, winch, weights = controller.programme, controller.model.winch, controller.regulator
+    N, nb, n = p.steps, len(p.blocks), winch.size
+    x0, constants = cp.Parameter(n), cp.Parameter(2)
+    path, end = cp.Parameter((N + 1, 2)), cp.Parameter(controller.model.sea.order)
+    low, high = cp.Parameter(nb), cp.Parameter(nb)
+
+    # Every state in its own size, so that the solver sees numbers of the size of one.
+    size = controller.model.scale[:n]
+    A, B = winch.A / size[:, None] * size, winch.B[:, 0] * p.unit / size
+    from_hook = winch.from_hook / size[:, None]
+    from_constants = winch.from_constants / size[:, None]
+    v: Any = cp.Variable(nb)
+    x: Any = cp.Variable((n, N + 1))
+    d = v[np.repeat(np.arange(nb), p.blocks)]
+    constraints = [x[:, 0] == cp.multiply(1.0 / size, x0), low <= v, v <= high]
+    for j in range(N):
+        moved = from_hook[:, :2] @ path[j] + from_hook[:, 2:] @ path[j + 1]
+        held = from_constants @ constants
+        constraints.append(x[:, j + 1] == A @ x[:, j] + B * d[j] + moved + held)
+    root = _root(weights.P * np.outer(size, size) / p.cost)
+    steady, nh = winch.steady / p.unit, controller.model.sea.order
+    cross = weights.N * size[:, None] / p.cost
+    cost: Any = cp.sum_squares((winch.payload * size) @ x[:, 1:N]) / p.cost
+    cost += weights.weight * p.unit**2 / p.cost * cp.sum_squares(d - steady @ constants)
+    cost += cp.sum_squares(root.T @ x[:, N])
+    cost += 2.0 * x[:, N] @ (cross[:, :nh] @ end + cross[:, nh:] @ constants)
+    price: Any = 0.0
+    for k, (j, kind) in enumerate(zip(p.at, p.kind, strict=True)):
+        name = WATCHED[kind]
+        if name == "tension":
+            value = (winch.tension * size) @ x[:, j] + winch.tension_from_hook @ path[j]
+        elif name == "command":
+            value = winch.back * ((winch.speed * size) @ x[:, j]) + d[j] * (p.unit / winch.gain)
+        else:
+            value = ((winch.speed if name == "speed" else winch.payload) * size) @ x[:, j]
+        lowest, highest = controller.soft_limits[name]
+        scale = controller.products.scale[k]
+        for beyond in (
+            (value - highest) if np.isfinite(highest) else None,
+            (lowest - value) if np.isfinite(lowest) else None,
+        ):
+            if beyond is not None:
+                s = cp.pos(beyond * scale)
+                price += controller.qp.linear * s + 0.5 * controller.qp.quadratic * cp.square(s)
+    problem = cp.Problem(cp.Minimize(cost + price), constraints)
+    return Oracle(
+        problem=problem,
+        moves=v,
+        state=x0,
+        path=path,
+        constants=constants,
+        end=end,
+        low=low,
+        high=high,
+    )
+
+
+def _root(P: FloatArray) -> FloatArray:
+    """Return M of P = M M', for a P that is positive semidefinite but for rounding."""
+    values, vectors = np.linalg.eigh(0.5 * (P + P.T))
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))

@@ -1,0 +1,561 @@
+"""`sh.compare`: common random numbers, processes, what is kept, and what it concludes."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+import signal
+
+import numpy as np
+import pytest
+from designs import thesis_design
+
+import stillhook as sh
+from models.sensing.control import Measurement
+from stillhook.comparison import work as compare_work
+from stillhook.comparison.cell import Cell, Prepared, Question
+from stillhook.comparison.comparison import Comparison
+from stillhook.comparison.figures import heights, worst_moment
+from stillhook.comparison.mismatch import Mismatch
+from stillhook.comparison.store import STORE
+from stillhook.controllers.contenders import CONTENDERS, DEFAULTS, contenders_of
+from stillhook.controllers.law import Law
+from stillhook.keeper.worker import Bench, Task
+from synth.controllers.linear_feedback import LinearFeedback
+
+CASE = sh.load_case("thesis-1975").replace({"sea.significant_height": 0.5})
+NOISY = CASE.replace({"sensors.mru": {"noise_floor": 0.02, "delay": 0.1}})
+FAST = {"seeds": 2, "duration": 30.0, "traces": False}
+
+
+class Listener:
+    """Holds the load, adds a wobble of its own, and remembers what it is shown."""
+
+    def __init__(self, case: sh.Case, name: str, sample_time: float, wobble: float) -> None:
+        self.name, self.sample_time, self.wobble = name, sample_time, wobble
+        inner = sh.ConstantTension(case)
+        self.rest = inner.step(Measurement.of({"rope.tension": case.static_tension}), 0.0)
+        self.heard: list[np.ndarray] = []
+
+    def reset(self) -> None:
+        self.heard = []
+
+    def step(self, measurement: Measurement, time: float) -> float:
+        self.heard.append(measurement.values.copy())
+        return self.rest + self.wobble * math.sin(time)
+
+
+def listener(case: sh.Case) -> Listener:
+    return Listener(case, "listener", 0.05, 0.0)
+
+
+def deadly(case: sh.Case) -> Listener:
+    os.kill(os.getpid(), signal.SIGKILL)
+    return listener(case)
+
+
+class Clumsy(Listener):
+    def step(self, measurement: Measurement, time: float) -> float:
+        if time > 5.0:
+            raise RuntimeError("stepped on the cable")
+        return super().step(measurement, time)
+
+
+def clumsy(case: sh.Case) -> Listener:
+    return Clumsy(case, "clumsy", 0.05, 0.0)
+
+
+def unmade(case: sh.Case) -> Listener:
+    raise KeyError("torque")
+
+
+def asked(case: sh.Case = CASE, **changes: object) -> Question:
+    given = {"duration": 30.0, "settle": 15.0, "mismatch": Mismatch.read(None), **changes}
+    return Question(case=case, **given)
+
+
+def numbers(found: Comparison) -> list[dict]:
+    """Return all cells without what a clock has measured."""
+    clean = []
+    for cell in found.cells:
+        content = {**cell.to_dict(), "wall": 0.0, "step": {}}
+        clean.append(json.dumps(content, sort_keys=True))
+    return clean
+
+
+# common random numbers
+
+
+def test_every_contender_meets_the_same_hook_motion_whatever_its_sample_time():
+    law = Law.of(thesis_design())
+    question = asked()
+    shown = {}
+    for name in ("none", "feed-forward", "thesis"):
+        prepared = Prepared(question, CONTENDERS[name], 0.5, law)
+        shown[name] = prepared.trace(3, 15.0)
+    own = Prepared(question, contenders_of([("listener", listener)])[0], 0.5, None).trace(3, 15.0)
+    mine, heave = np.round(own.time, 6), own.signals["hook.heave"]
+    assert mine.size == 601
+    assert np.ptp(heave) > 0.2
+    # Samples of 20 ms meet those of 50 ms every tenth of a second, samples of 10 ms all of them.
+    for name, count in (("none", 301), ("feed-forward", 301), ("thesis", 601)):
+        theirs = np.round(shown[name].time, 6)
+        at, here = np.isin(theirs, mine), np.isin(mine, theirs)
+        assert at.sum() == count
+        seen = shown[name].signals["hook.heave"][at]
+        # The brake's record grows out of rest by its own easing, the others' by the simulator's.
+        np.testing.assert_allclose(seen, heave[here], rtol=0.0, atol=3e-7)
+
+
+def test_contenders_with_one_sample_time_are_shown_the_same_noise_to_the_bit():
+    both = [Listener(NOISY, name, 0.05, wobble) for name, wobble in (("a", 0.0), ("b", 5.0))]
+    for each in both:
+        Prepared(asked(NOISY), contenders_of([each])[0], 0.5, None).run(7)
+    first, second = (np.array(each.heard) for each in both)
+    assert np.array_equal(first[:, 5:8], second[:, 5:8])
+    assert not np.allclose(first[:, 2], second[:, 2], atol=1e-3)
+    other = Listener(NOISY, "c", 0.05, 0.0)
+    Prepared(asked(NOISY), contenders_of([other])[0], 0.5, None).run(8)
+    assert not np.allclose(np.array(other.heard)[:, 5], first[:, 5], atol=1e-3)
+
+
+def test_a_run_is_that_of_simulate_with_the_same_seed():
+    found = sh.compare(CASE, ["feed-forward", "thesis"], jobs=1, **FAST)
+    for name in ("feed-forward", "thesis"):
+        named = "feedback" if name == "thesis" else name
+        runs = sh.simulate(CASE, named, seeds=2, duration=30.0, settle=15.0)
+        for cell, run in zip(found.of(name, 0.5), runs, strict=True):
+            assert cell.rms == run.statistics.value("tracking error rms")
+            assert cell.quantities["motor torque rms"] == run.statistics.value("motor torque rms")
+
+
+def test_runs_shared_by_processes_are_those_of_one_process_to_the_bit():
+    who = ["none", "feed-forward", ("listener", listener)]
+    alone = sh.compare(CASE, who, jobs=1, **FAST)
+    shared = sh.compare(CASE, who, jobs=2, **FAST)
+    assert alone.complete
+    assert len(alone.cells) == 6
+    assert numbers(alone) == numbers(shared)
+    assert all(cell.step for cell in shared.of("listener", 0.5))
+
+
+# what is kept
+
+
+def test_a_comparison_that_was_stopped_goes_on_and_ends_the_same(tmp_path, monkeypatch):
+    whole = sh.compare(CASE, ["none", "feed-forward"], jobs=1, **FAST)
+
+    def stop(what: str, done: int, total: int) -> None:
+        if done >= 2:
+            raise KeyboardInterrupt
+
+    first = sh.compare(CASE, ["none", "feed-forward"], jobs=1, out=tmp_path, progress=stop, **FAST)
+    assert not first.complete
+    assert len(first.cells) == 2
+    done: list[Task] = []
+    do = Bench.do
+    monkeypatch.setattr(Bench, "do", lambda self, task, p=None: done.append(task) or do(self, task))
+    then = sh.compare(CASE, ["none", "feed-forward"], jobs=1, out=tmp_path, **FAST)
+    assert [(task.name, task.seed) for task in done] == [("feed-forward", 0), ("feed-forward", 1)]
+    assert then.complete
+    assert numbers(then) == numbers(whole)
+    assert then.table.drop(columns=["step median"]).equals(
+        whole.table.drop(columns=["step median"])
+    )
+    done.clear()
+    more = sh.compare(CASE, ["none", "feed-forward"], jobs=1, out=tmp_path, **{**FAST, "seeds": 3})
+    assert [(task.name, task.seed) for task in done] == [("none", 2), ("feed-forward", 2)]
+    assert numbers(more)[:2] == numbers(whole)[:2]
+
+
+def test_a_line_that_a_crash_cut_short_is_made_again(tmp_path):
+    whole = sh.compare(CASE, ["none"], jobs=1, out=tmp_path, **FAST)
+    store = tmp_path / STORE
+    data = store.read_bytes()
+    assert data.count(b"\n") == 3
+    for cut in (1, 40, len(data.splitlines()[-1])):
+        store.write_bytes(data[:-cut])
+        again = sh.compare(CASE, ["none"], jobs=1, out=tmp_path, **FAST)
+        assert numbers(again) == numbers(whole)
+        assert store.read_bytes().count(b"\n") == 3
+
+
+def test_a_spoilt_or_foreign_store_is_refused(tmp_path):
+    sh.compare(CASE, ["none"], jobs=1, out=tmp_path, **FAST)
+    store = tmp_path / STORE
+    data = store.read_bytes()
+    at = data.index(b'"payload rms": ') + len(b'"payload rms": ') + 3
+    digit = b"1" if data[at : at + 1] != b"1" else b"2"
+    store.write_bytes(data[:at] + digit + data[at + 1 :])
+    with pytest.raises(sh.InputError, match=r"line 2 is not as it was written: the file is"):
+        sh.compare(CASE, ["none"], jobs=1, out=tmp_path, **FAST)
+    for foreign in (b"my notes\n", b'{"a": 1}\n', b"no end", b'{"crc": 1, "of": {}}\n'):
+        store.write_bytes(foreign)
+        with pytest.raises(sh.InputError, match=r"is not a|is not as it was written"):
+            sh.compare(CASE, ["none"], jobs=1, out=tmp_path, **FAST)
+        assert store.read_bytes() == foreign
+
+
+def test_a_store_that_answers_another_question_is_refused_and_told_apart(tmp_path):
+    sh.compare(CASE, ["none"], jobs=1, out=tmp_path, **FAST)
+    data = (tmp_path / STORE).read_bytes()
+    for changes, told in (
+        ({"duration": 40.0}, r"duration is 30.0, not 40.0"),
+        ({"mismatch": "delay=+50 ms"}, r"mismatch.delay is not given, not \+50 ms"),
+    ):
+        with pytest.raises(sh.InputError, match=told):
+            sh.compare(CASE, ["none"], jobs=1, out=tmp_path, **{**FAST, **changes})
+    heavier = CASE.replace({"payload.mass": 40000.0})
+    with pytest.raises(sh.InputError, match=r"holds another comparison: case.payload.mass is 36"):
+        sh.compare(heavier, ["none"], jobs=1, out=tmp_path, **FAST)
+    assert (tmp_path / STORE).read_bytes() == data
+
+
+def test_two_comparisons_do_not_write_into_one_store(tmp_path):
+    pytest.importorskip("fcntl")
+    said = []
+
+    def meddle(what: str, done: int, total: int) -> None:
+        if not said:
+            with pytest.raises(sh.InputError, match="another process writes this") as refused:
+                sh.compare(CASE, ["none"], jobs=1, out=tmp_path, **FAST)
+            said.append(refused.value)
+
+    assert sh.compare(CASE, ["none"], jobs=1, out=tmp_path, progress=meddle, **FAST).complete
+    assert len(said) == 1
+
+
+def test_another_contender_of_the_same_name_is_run_anew(tmp_path, monkeypatch):
+    first = Listener(CASE, "own", 0.05, 0.0)
+    sh.compare(CASE, [first], jobs=1, out=tmp_path, **FAST)
+    done = []
+    do = Bench.do
+    monkeypatch.setattr(Bench, "do", lambda self, task, p=None: done.append(task) or do(self, task))
+    sh.compare(CASE, [Listener(CASE, "own", 0.05, 5.0)], jobs=1, out=tmp_path, **FAST)
+    assert len(done) == 2
+
+
+# contenders that fail
+
+
+def test_a_process_that_dies_costs_its_own_runs_only_and_is_tried_twice(monkeypatch):
+    made = []
+    begin = compare_work.Pool.submit
+    monkeypatch.setattr(
+        compare_work.Pool, "submit", lambda self, task: made.append(task.name) or begin(self, task)
+    )
+    found = sh.compare(CASE, ["none", ("deadly", deadly)], jobs=2, **{**FAST, "seeds": 1})
+    assert found.complete
+    assert made.count("deadly") == 2
+    assert {cell.status for cell in found.of("none", 0.5)} == {"completed"}
+    for cell in found.of("deadly", 0.5):
+        assert (cell.status, cell.message) == ("died", "its process was ended by SIGKILL, twice")
+    row = found.table.set_index("contender").loc["deadly"]
+    assert (row["failed"], row["runs"]) == (1, 1)
+
+
+def test_a_contender_that_cannot_take_part_is_a_row_with_its_reason():
+    case = sh.load_case("subsea-crane")
+    found = sh.compare(
+        case, ["none", "thesis", ("unmade", unmade), ("clumsy", clumsy)], jobs=1, **FAST
+    )
+    height = case.sea.significant_height
+    assert found.refused["thesis", height] == "the case subsea-crane has no gains in use"
+    assert found.refused["unmade", height] == "KeyError: 'torque'"
+    notes = found.table.set_index("contender")["note"]
+    assert notes["clumsy"] == "RuntimeError: stepped on the cable"
+    assert found.lost("clumsy", height) == 2
+    assert "thesis did not take part: the case subsea-crane has no gains" in str(found)
+    assert list(found.table["runs"]) == [2, 0, 0, 2]
+
+
+def test_who_may_take_part_is_checked_at_once():
+    with pytest.raises(sh.InputError, match=r"no controller 'thesys'; there are: none, constant-t"):
+        sh.compare(CASE, ["thesys"])
+    with pytest.raises(sh.InputError, match="must have names that differ, got 'none' twice"):
+        sh.compare(CASE, ["none", "none"])
+    with pytest.raises(sh.InputError, match="at least one controller is wanted"):
+        sh.compare(CASE, [])
+    with pytest.raises(sh.InputError, match=r"must be a name, a design, .*; got float"):
+        sh.compare(CASE, [1.5])
+    with pytest.raises(sh.InputError, match="heights must be"):
+        sh.compare(CASE, ["none"], heights=[-1.0])
+    with pytest.raises(sh.InputError, match="design_at must be one of each, case"):
+        sh.compare(CASE, ["none"], design_at="never")
+    assert set(DEFAULTS) < set(CONTENDERS)
+    for each in CONTENDERS.values():
+        assert each.what
+        assert each.knows
+
+
+def test_a_design_that_is_given_is_the_same_law_as_its_gains():
+    found = sh.compare(CASE, ["thesis", ("mine", thesis_design())], jobs=1, **FAST)
+    for one, other in zip(found.of("thesis", 0.5), found.of("mine", 0.5), strict=True):
+        assert one.quantities == other.quantities
+
+
+def test_a_function_at_the_prompt_runs_here_and_is_never_taken_from_the_store(tmp_path):
+    seen = []
+
+    def made(case: sh.Case) -> Listener:
+        seen.append(case)
+        return listener(case)
+
+    for jobs in (1, 2):
+        found = sh.compare(
+            CASE, ["none", ("mine", made)], jobs=jobs, out=tmp_path, mismatch="payload=+30%", **FAST
+        )
+    assert found.complete
+    assert len(found.cells) == 4
+    assert [case.payload.mass for case in seen] == [CASE.payload.mass] * 2
+
+
+# laws and mismatch
+
+
+def test_a_law_survives_json_to_the_last_bit():
+    rng = np.random.default_rng(5)
+    values = {k: rng.standard_normal(s).tolist() for k, s in (("A", (2, 2)), ("B", (2, 1)))}
+    values |= {"C": rng.standard_normal((1, 2)).tolist(), "D": rng.standard_normal((1, 1)).tolist()}
+    values["A"] = (np.array(values["A"]) - 5.0 * np.eye(2)).tolist()
+    values |= {"measurements": ["payload.velocity"], "inputs": ["drive.command"]}
+    law = Law(kind="controller", values=values, ok=True)
+    again = Law(**json.loads(json.dumps(law.to_dict())))
+    assert again.digest == law.digest
+    for name in "ABCD":
+        assert np.array_equal(getattr(again.law, name), np.array(values[name]))
+    one, other = (LinearFeedback(CASE, each.law) for each in (law, again))
+    assert one.dynamic
+    assert str(one.recursion.function) == str(other.recursion.function)
+
+
+def test_a_mismatch_changes_the_plant_and_not_the_controller():
+    question = asked(mismatch=Mismatch.read("payload=+30%,E=-30%,delay=+50 ms,sea=+0.1 m"))
+    true, known = question.true(0.5), question.known(0.5)
+    assert known == CASE
+    assert true.payload.mass == pytest.approx(1.3 * CASE.payload.mass, rel=1e-12)
+    mass = true.payload.virtual_mass / CASE.payload.virtual_mass
+    assert mass == pytest.approx(1.3, rel=1e-12)
+    assert true.payload.submerged_weight == CASE.payload.submerged_weight
+    assert true.rope.stiffness == pytest.approx(0.7 * CASE.rope.stiffness, rel=1e-12)
+    assert true.sensors.telemetry.delay == pytest.approx(0.05)
+    assert true.sea.significant_height == pytest.approx(0.6)
+    # less than what hangs in the water cannot move: the water gives way
+    light = Mismatch.read("payload=-30%,weight=-20%").apply(CASE).payload
+    assert light.virtual_mass == pytest.approx(0.7 * CASE.payload.virtual_mass, rel=1e-12)
+    assert light.mass * 9.80665 >= light.submerged_weight
+    assert light.submerged_weight == pytest.approx(0.8 * CASE.payload.submerged_weight, rel=1e-12)
+    other = Mismatch.read("spectrum=jonswap, winch.motor.inertia=120").apply(CASE)
+    assert other.sea.spectral_peak_period == pytest.approx(CASE.sea.spectral_peak_period)
+    assert (other.sea.spectrum, other.winch.motor.inertia) == ("jonswap", 120.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("foo=1", "there is no 'foo'; there are payload, weight, stiffness"),
+        ("payload", r"must be NAME=VALUE, as in payload=\+30%"),
+        ("payload=1,payload=2", "payload is given twice"),
+        ("delay=-50 ms", r"telemetry.delay: must be a time in \[0, 60\] s"),
+        ("delay=+3 kg", "must be a time"),
+        ("rope.lumping=+3%", "is not a number in the case"),
+    ],
+)
+def test_a_mismatch_that_makes_no_sense_is_refused(text, told):
+    with pytest.raises(sh.InputError, match=told):
+        sh.compare(CASE, ["none"], mismatch=text, **FAST)
+
+
+def test_a_mismatch_is_felt():
+    plain = sh.compare(CASE, ["thesis"], jobs=1, **FAST)
+    off = sh.compare(CASE, ["thesis"], jobs=1, mismatch="delay=+50 ms", **FAST)
+    assert off.pooled("thesis", 0.5) > 1.2 * plain.pooled("thesis", 0.5)
+
+
+# what it concludes
+
+
+def fabricated(rms: dict[str, list[float]], lost: tuple[str, ...] = ()) -> Comparison:
+    who = contenders_of(list(rms))
+    cells = []
+    for name, values in rms.items():
+        for seed, value in enumerate(values):
+            told = {"tracking error rms": value, "tracking error largest": 3.0 * value}
+            if name in lost:
+                told["lost lock at"] = 12.0
+            cells.append(
+                Cell(
+                    contender=name,
+                    height=0.5,
+                    seed=seed,
+                    status="completed",
+                    quantities=told,
+                    worst=20.0,
+                )
+            )
+    return Comparison(
+        case=CASE,
+        contenders=who,
+        heights=(0.5,),
+        seeds=tuple(range(len(next(iter(rms.values()))))),
+        question=asked(),
+        cells=tuple(cells),
+    )
+
+
+def test_means_intervals_and_pooled_values_are_those_of_the_textbook():
+    values = [0.1, 0.3, 0.2, 0.25]
+    found = fabricated({"feed-forward": values, "clairvoyant": [0.05, 0.1, 0.1, 0.1]})
+    row = found.table.iloc[0]
+    half = 3.182446305284263 * np.std(values, ddof=1) / 2.0  # Student's t, 3 degrees, 97.5 %
+    assert row["payload rms"] == pytest.approx(np.mean(values), rel=1e-12)
+    assert row["payload rms low"] == pytest.approx(np.mean(values) - half, rel=1e-9)
+    assert row["pooled rms"] == pytest.approx(math.sqrt(0.2025 / 4.0), rel=1e-12)
+    assert row["of the floor"] == pytest.approx(0.2025 / 0.0325, rel=1e-12)
+    assert (row["worst seed"], row["worst seed rms"]) == (1, 0.3)
+
+
+def test_the_floor_is_compared_on_the_seeds_that_both_have():
+    found = fabricated({"feed-forward": [0.1, 0.3], "clairvoyant": [0.05, math.nan]})
+    assert found.table.iloc[0]["of the floor"] == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize(
+    ("predicted", "told", "overall"),
+    [
+        ([0.05, 0.11, 0.16, 0.19], "mpc (prediction) helps: 1.9 to 2.1 times less", "helps at H_s"),
+        (
+            [0.2, 0.45, 0.6, 0.81],
+            "mpc (prediction) does not help: 1.9 to 2.1 times more",
+            "does not",
+        ),
+        ([0.1, 0.22, 0.30, 0.40], "mpc (prediction) does not help: ", "does not help"),
+        (
+            [0.01, 0.9, 0.05, 1.9],
+            "helps cannot be told from 4 seeds: ",
+            "cannot be told from so few",
+        ),
+    ],
+)
+def test_where_prediction_helps_is_read_off_the_numbers(predicted, told, overall):
+    found = fabricated({"feed-forward": [0.1, 0.22, 0.31, 0.39], "mpc": predicted})
+    first, last = found.sentences[0], found.sentences[-1]
+    assert told in first
+    assert last.startswith("Prediction against the best linear law: it ")
+    assert overall in last
+
+
+def test_the_interval_of_a_ratio_is_that_of_paired_logarithms():
+    linear, predicted = np.array([0.1, 0.22, 0.31]), np.array([0.04, 0.1, 0.13])
+    found = fabricated({"feed-forward": linear.tolist(), "mpc": predicted.tolist()})
+    logs = np.log(linear / predicted)
+    half = 4.302652729749464 * logs.std(ddof=1) / math.sqrt(3.0)
+    low, high = np.exp(logs.mean() - half), np.exp(logs.mean() + half)
+    assert f"helps: {low:.1f} to {high:.1f} times less rms than feed-forward" in found.sentences[0]
+
+
+def test_a_single_seed_is_not_called_a_difference():
+    found = fabricated({"feed-forward": [0.2], "mpc": [0.1]})
+    assert "2.0 times less than feed-forward, in a single sea" in found.sentences[0]
+    assert "cannot be told from so few seeds" in found.sentences[-1]
+
+
+def test_who_loses_the_load_is_said():
+    found = fabricated({"none": [0.5, 0.5], "thesis": [1.0, 2.0]}, lost=("thesis",))
+    assert found.cliff("thesis") == 0.5
+    assert math.isnan(found.cliff("none"))
+    assert "though it loses the load in 2 of 2 runs" in found.sentences[0]
+    assert "3.2 times more than with the drum held" in found.sentences[0]
+
+
+def test_a_run_that_diverged_is_infinitely_bad():
+    cell = Cell(contender="none", height=0.5, seed=0, status="diverged")
+    assert cell.rms == math.inf
+    assert cell.lost
+
+
+def test_folder_and_figures_say_what_was_found(tmp_path):
+    found = sh.compare(
+        CASE,
+        ["none", "feed-forward", "thesis"],
+        seeds=2,
+        duration=30.0,
+        heights=[0.4, 3.0],
+        jobs=1,
+        out=tmp_path,
+    )
+    assert {trace.contender for trace in found.traces} == {"none", "feed-forward", "thesis"}
+    height, seed, moment = found.worst_moment
+    assert height == 3.0
+    best = found.best(3.0, ("linear",))
+    trace = next(t for t in found.traces if t.contender == best)
+    at = int(np.argmin(np.abs(trace.time - moment)))
+    worst = found.of(best, 3.0)[seed].quantities["tracking error largest"]
+    assert abs(trace.signals["payload.displacement"][at]) == pytest.approx(worst, rel=1e-9)
+    written = {path.name for path in found.save(tmp_path)}
+    figures = {f"{name}.{kind}" for name in ("heights", "worst") for kind in ("svg", "png")}
+    tables = {"case.yaml", "table.csv", "runs.csv", "traces.csv", "summary.json", "summary.md"}
+    assert written == figures | tables
+    content = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert [row["contender"] for row in content["table"]] == [
+        name for name in ("none", "feed-forward", "thesis") for _ in range(2)
+    ]
+    assert content["sentences"] == list(found.sentences)
+    assert len(content["runs"]) == 12
+    report = (tmp_path / "summary.md").read_text(encoding="utf-8")
+    for each in found.contenders:
+        assert each.what in report
+    axes = heights(found).axes[0]
+    assert axes.get_yscale() == "log"
+    lines = {line.get_label(): line for line in axes.lines}
+    shown = lines["feed-forward"].get_ydata()
+    assert shown[1] / shown[0] == pytest.approx(
+        found.pooled("feed-forward", 3.0) / found.pooled("feed-forward", 0.4)
+    )
+    assert "first loses the load" in lines
+    assert len(worst_moment(found).axes) == 4
+
+
+def test_without_runs_there_is_nothing_to_draw():
+    empty = dataclasses.replace(fabricated({"none": [0.1]}), cells=())
+    with pytest.raises(sh.InputError, match="no runs to draw"):
+        heights(empty)
+    with pytest.raises(sh.InputError, match="no traces to draw"):
+        worst_moment(empty)
+    assert empty.sentences == ()
+
+
+@pytest.mark.slow
+def test_no_controller_beats_the_floor_and_preview_beats_the_brake():
+    found = sh.compare(
+        CASE.replace({"sea.significant_height": 1.9}),
+        ["none", "feed-forward", "mpc-preview", "clairvoyant"],
+        seeds=2,
+        duration=120.0,
+        jobs=1,
+        traces=False,
+    )
+    floor = found.pooled("clairvoyant", 1.9)
+    for name in ("none", "feed-forward", "mpc-preview"):
+        assert found.pooled(name, 1.9) > floor
+    assert found.pooled("mpc-preview", 1.9) < 0.2 * found.pooled("none", 1.9)
+
+
+@pytest.mark.parametrize("name", ["study", "floor", "mismatch", "calm"])
+def test_a_table_of_the_documentation_is_that_of_the_study(name):
+    import sys
+    from pathlib import Path
+
+    root = Path(__file__).resolve().parents[3]
+    sys.path.insert(0, str(root / "benchmarks"))
+    try:
+        import comparison
+    finally:
+        sys.path.pop(0)
+    page = (root / "docs" / "compare.md").read_text(encoding="utf-8")
+    _, _, after = page.partition(f"<!-- {name}: begin -->\n")
+    assert after.partition(f"\n<!-- {name}: end -->")[0] == comparison.TABLES[name](
+        comparison.load()
+    )

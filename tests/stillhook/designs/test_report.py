@@ -1,0 +1,237 @@
+"""The report and the words in it: files whole, figures embedded, every number from the design."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+import xml.etree.ElementTree as ET
+
+import pytest
+from designs import infeasible_design, loopless_design, thesis_design, unstable_design
+
+import stillhook as sh
+from models import InputError, load_case
+from stillhook.designs.report import figures_of, summary_text
+from stillhook.text.summary import (
+    command_text,
+    effect,
+    facts,
+    gain_rows,
+    limit_rows,
+    margin_rows,
+    motion_rows,
+    required_rows,
+)
+
+FIGURES = ("payload_spectrum", "responses", "nyquist", "limits")
+ALL = {"case.yaml", "design.yaml", "summary.md"} | {
+    f"{name}.{kind}" for name in FIGURES for kind in ("svg", "png")
+}
+
+
+def names(folder) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report") / "deep" / "out"
+    written = sh.write_report(folder, design=thesis_design())
+    return folder, written
+
+
+def test_everything_is_written_and_listed(report):
+    folder, written = report
+    assert names(folder) == ALL
+    assert {path.name for path in written} == ALL
+    assert all(path.parent == folder for path in written)
+
+
+def test_the_parts_load_again(report):
+    folder, _ = report
+    assert sh.load_case(folder / "case.yaml") == thesis_design().case
+    assert sh.load_design(folder / "design.yaml").payload_rms == thesis_design().payload_rms
+    for name in FIGURES:
+        assert ET.parse(folder / f"{name}.svg").getroot().tag.endswith("svg")
+        assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_summary_embeds_the_figures_beside_it(report):
+    folder, _ = report
+    text = (folder / "summary.md").read_text(encoding="utf-8")
+    embedded = re.findall(r"!\[.+?\]\((.+?)\)", text)
+    assert embedded == [f"{name}.svg" for name in FIGURES]
+    assert all((folder / name).exists() for name in embedded)
+
+
+def test_summary_holds_the_figures_of_the_thesis():
+    text = summary_text(thesis_design())
+    for figure in ("11.7 mm", "5.99 m", "594 mm", "5.15", "11.3 deg", "25.7 ms", "x 0.0919"):
+        assert figure in text  # digest of the 1975 thesis
+    assert text.startswith("# thesis-1975\n\nThe 1975 thesis's winch in 2000 m")
+    assert "**Not ok**: stable; breaks max_sensitivity." in text
+    assert "| motor torque, peak | 43.7 kN m | ≤ 11.9 kN m | 368 % | reported |" in text
+
+
+def test_tables_of_the_summary_are_tables():
+    for table in re.findall(r"(?:^\|.*\n)+", summary_text(thesis_design()), re.MULTILINE):
+        columns = {len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}
+        assert len(columns) == 1
+
+
+@pytest.fixture
+def quick_pictures(monkeypatch):
+    monkeypatch.setattr("stillhook.text.style.picture", lambda figure, kind: kind.encode())
+
+
+@pytest.mark.usefixtures("quick_pictures")
+def test_an_unstable_design_takes_figures_of_an_earlier_run_away(tmp_path):
+    for name in ("limits.svg", "limits.png", "notes.txt"):
+        (tmp_path / name).touch()
+    written = sh.write_report(tmp_path, design=unstable_design())
+    assert names(tmp_path) == ALL - {"limits.svg", "limits.png"} | {"notes.txt"}
+    assert len(written) == len(ALL) - 2
+    text = (tmp_path / "summary.md").read_text(encoding="utf-8")
+    assert "No stable loop: the payload's motion has no standard deviation." in text
+    assert "limits.svg" not in text
+
+
+def test_figures_that_a_design_has():
+    assert figures_of(thesis_design()) == list(FIGURES)
+    assert figures_of(unstable_design()) == ["payload_spectrum", "responses", "nyquist"]
+    assert figures_of(loopless_design()) == ["payload_spectrum", "responses"]
+    assert "## Gains" not in summary_text(loopless_design())
+
+
+def test_an_infeasible_design_says_what_it_would_take():
+    text = summary_text(infeasible_design())
+    assert "| limit that breaks | is | needed in H_s 2.44 m |" in text
+    assert "| motor torque, peak | 11.9 kN m | 13.0 kN m |" in text
+    assert "All figures below are those in H_s 0.5 m." in text
+    assert "| sea | H_s 500 mm, T_S 8.10 s (asked for: H_s 2.44 m), bretschneider-1975 |" in text
+
+
+@pytest.mark.usefixtures("quick_pictures")
+def test_progress_is_told(tmp_path):
+    told = []
+    sh.write_report(tmp_path, design=loopless_design(), progress=lambda *step: told.append(step))
+    assert told == [("figures", done, 4) for done in range(4)]
+
+
+@pytest.mark.parametrize("below", ["", "more/"])
+def test_a_file_in_the_way_of_the_folder_is_named(below, tmp_path):
+    (tmp_path / "out").touch()
+    reason = "part of the path is a file" if below else "a file is there"
+    with pytest.raises(InputError, match=f"the output folder cannot be made: {reason}$"):
+        sh.write_report(f"{tmp_path}/out/{below}", design=thesis_design())
+
+
+@pytest.mark.usefixtures("quick_pictures")
+def test_a_full_disk_leaves_whole_files_only(tmp_path, monkeypatch):
+    folder = tmp_path / "out"
+    sh.write_report(folder, design=loopless_design())
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    (folder / "summary.md").write_text("old")
+    from pathlib import Path
+
+    write = Path.write_bytes
+
+    def full(path, data):
+        if "summary" in path.name:
+            write(path, data[: len(data) // 2])
+            raise OSError(28, "No space left on device")
+        return write(path, data)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(InputError, match=r"summary\.md: cannot be written: No space left on dev"):
+        sh.write_report(folder, design=loopless_design())
+    after = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert after == before | {"summary.md": b"old"}
+
+
+def test_motions_are_four_sigma_and_most_probable_maxima():
+    hook, before, after = motion_rows(thesis_design())
+    assert (hook.label, hook.rms, hook.significant) == ("hook", "594 mm", "2.38 m")
+    assert (before.rms, before.significant) == ("5.99 m", "24.0 m")
+    assert (after.rms, after.significant, after.largest) == ("11.7 mm", "46.9 mm", "44.8 mm")
+    assert len(motion_rows(unstable_design())) == 2
+
+
+def test_the_effect_is_said_whichever_way_it_goes():
+    design = thesis_design()
+    assert effect(design) == "compensation takes away 99.8 % of the motion (54.2 dB)"
+    worse = dataclasses.replace(design, payload_rms=1.1 * design.payload_rms_before)
+    text = "the payload moves 10.0 % more than with the drum held (-0.8 dB)"
+    assert effect(worse) == text
+    undamped = dataclasses.replace(design, payload_rms_before=math.inf)
+    assert effect(undamped) == "the payload moves 11.7 mm rms; with the drum held it resonates"
+
+
+def test_gains_carry_the_units_of_the_drive():
+    rows = gain_rows(thesis_design())
+    assert [(row.name, row.product, row.unit) for row in rows] == [
+        ("a", "10000", "V s2/m"),
+        ("a1", "20000", "V s/m"),
+        ("a2", "20000", "V/m"),
+    ]
+    assert command_text(thesis_design()).startswith("armature voltage [V] = -A (a P''")
+    crane = dataclasses.replace(thesis_design(), case=load_case("subsea-crane"))
+    assert [row.unit for row in gain_rows(crane)] == [
+        "rad/s per m/s2",
+        "rad/s per m/s",
+        "rad/s per m",
+    ]
+    torque = crane.case.replace({"winch.motor.speed_gain": 0})
+    assert gain_rows(dataclasses.replace(crane, case=torque))[2].unit == "N m per m"
+    assert command_text(crane).startswith("motor speed [rad/s] = ")
+
+
+def test_margins_in_words():
+    assert [row[:2] for row in margin_rows(thesis_design())] == [
+        ("sensitivity peak M_s", "5.15"),
+        ("gain may grow", "without bound"),
+        ("gain may fall", "x 0.0919"),
+        ("phase", "11.3 deg"),
+        ("further delay", "25.7 ms"),
+        ("disk margin", "0.198"),
+    ]
+    margins = thesis_design().margins
+    assert margins is not None
+    slow = dataclasses.replace(margins, gain=4.0, gain_down=0.0, phase=math.inf, delay=math.inf)
+    rows = margin_rows(dataclasses.replace(thesis_design(), margins=slow))
+    assert rows[1] == ("gain may grow", "x 4.00", "by 12.0 dB")
+    assert rows[2] == ("gain may fall", "to nothing", "")
+    assert rows[3] == ("phase, delay", "without bound", "|L| stays below 1")
+    assert margin_rows(unstable_design()) == []
+
+
+def test_limits_say_which_way_they_bind_and_what_they_cost():
+    design = thesis_design()
+    rows = {row.name: row for row in limit_rows(design)}
+    assert rows["max_sensitivity"].remark == "broken"
+    assert rows["motor.speed.peak"].remark == "reported"
+    assert rows["low_frequency"].label == "|P/Z| up to 0.01 rad/s"
+    assert [row.enforced for row in rows.values()] == [True] * 2 + [False] * 6
+    use = dataclasses.replace(design.limits["max_sensitivity"], use=1.0, value=2.0, price=4.16e-4)
+    least = dataclasses.replace(
+        use, name="rope.tension.least", value=50e3, bound=42e3, unit="N", use=0.9, price=1e-9
+    )
+    both = dataclasses.replace(design, limits={use.name: use, least.name: least})
+    dear, tension = limit_rows(both)
+    assert (dear.price, dear.remark) == ("0.42 mm", "0.42 mm")
+    assert (tension.label, tension.value, tension.bound, tension.price) == (
+        "rope tension, least",
+        "50.0 kN",
+        "≥ 42.0 kN",
+        "",  # a price of a nanometre is noise
+    )
+
+
+def test_facts_name_what_the_figures_rest_on():
+    rows = dict(facts(thesis_design()))
+    assert rows["rope"] == "one spring with all of the rope's mass at the payload"
+    assert rows["drag"] == "1.19 kN s/m, fixed by the case"
+    assert rows["check"].startswith("verified on")
+    assert "search" not in rows
+    assert required_rows(thesis_design()) == []

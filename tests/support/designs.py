@@ -1,0 +1,53 @@
+"""Designs that several test files look at, each made once per process."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+from models import load_case
+from synth import GainDesign, evaluate_gains
+from synth.design.tuning import LimitUse
+
+THESIS_GAINS = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
+
+
+@cache
+def thesis_design() -> GainDesign:
+    """The thesis's own gains on its own model: stable, M_s 5.15 against a limit of 2."""
+    return evaluate_gains(load_case("thesis-1975"), THESIS_GAINS)
+
+
+@cache
+def unstable_design() -> GainDesign:
+    """The same with the sign of the amplifier turned."""
+    return evaluate_gains(load_case("thesis-1975"), {**THESIS_GAINS, "A": -200.0})
+
+
+@cache
+def loopless_design() -> GainDesign:
+    """What a search that finds nothing stable hands over: no gains, no margins."""
+    status = "no stabilising gains were found"
+    gains = {"A": 200.0, "a": 0.0, "a1": 0.0, "a2": 0.0}
+    return replace(unstable_design(), gains=gains, status=status, verification=None)
+
+
+@cache
+def infeasible_design() -> GainDesign:
+    """A design for a calmer sea than asked for, with what the drive would have to be."""
+    calm = load_case("thesis-1975").replace({"sea.significant_height": 0.5})
+    design = evaluate_gains(calm, {"A": 200.0, "a": 21.908422, "a1": 12.003924, "a2": 68.339717})
+    limits = {
+        name: replace(use, enforced=True) if name.startswith("motor") else use
+        for name, use in design.limits.items()
+    }
+    torque: LimitUse = limits["motor.torque.peak"]
+    limits["motor.torque.peak"] = replace(torque, value=torque.bound, use=1.0)
+    return replace(
+        design,
+        case=load_case("thesis-1975"),
+        ok=False,
+        status="not feasible at H_s 2.44 m: motor.torque.peak breaks first",
+        limits=limits,
+        required={"motor.torque.peak": 13012.0},
+    )

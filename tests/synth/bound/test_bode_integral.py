@@ -1,0 +1,81 @@
+"""Bode's integral of loops in closed form, and the disk margin of a textbook loop."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from models.basics.checks import InputError
+from models.plant.linear import LinearPlant
+from models.sea.sea import SeaSpectrum
+from synth.bound.bode_integral import bode_estimate, bode_integral, least_sensitivity
+from synth.loop.assess import Assessment
+from synth.loop.controller import Controller
+from synth.loop.disturbance import disturbances
+from synth.loop.margins import loop_margins
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def test_bode_integral_of_a_stable_loop_is_zero() -> None:
+    # L = 2/(s+1)^2: ln|S| = ln|(s+1)^2/((s+1)^2 + 2)|
+    def log_sensitivity(omega: FloatArray) -> FloatArray:
+        s = 1j * omega
+        return np.asarray(np.log(np.abs((s + 1) ** 2 / ((s + 1) ** 2 + 2.0))))
+
+    poles = np.array([-1.0, -1.0, -1.0 + 1.41421j])
+    assert bode_integral(log_sensitivity, poles) == pytest.approx(0.0, abs=1e-4)
+
+    def unstable(omega: FloatArray) -> FloatArray:
+        # L = 6/((s-1)(s+3)): closed s^2 + 2 s + 3, one unstable pole at 1
+        s = 1j * omega
+        return np.asarray(np.log(np.abs((s - 1) * (s + 3) / (s**2 + 2 * s + 3))))
+
+    found = bode_integral(unstable, np.array([1.0, -3.0, -1.0 + 1.41421j]))
+    assert found == pytest.approx(np.pi, rel=1e-4)
+
+
+def test_least_sensitivity_trades_area_for_area() -> None:
+    # ln 2 over 9 rad/s above pays for 9 ln 2 over 1 rad/s below
+    assert least_sensitivity(2.0, 10.0, 1.0) == pytest.approx(2.0**-9)
+    assert least_sensitivity(2.0, 1.0, 2.0) == 1.0
+    with pytest.raises(InputError, match="max_sensitivity must be"):
+        least_sensitivity(0.5, 1.0, 1.0)
+
+
+def test_estimate_of_a_loop_is_one_line() -> None:
+    # A payload that a speed command moves, late: L = 1.2 e^{-0.2 s}/(s (1 + 0.2 s))
+    plant = LinearPlant(
+        A=[[0.0, 1.0], [0.0, -5.0]],
+        B=[[0.0], [5.0]],
+        E=[[0.0], [1.0]],
+        C=[[1.0, 0.0]],
+        Cz=[[1.0, 0.0]],
+        delays=(0.2,),
+        disturbances=("hook",),
+    )
+    sea = SeaSpectrum(kind="jonswap", significant_height=2.0, peak_period=9.0)
+    sources = disturbances({"hook": sea}, ("hook",))
+    view = Assessment(plant, Controller.static([[-1.2]], ("y1",), ("u1",)), sources)
+    assert view.stable
+    found = bode_estimate(view)
+    assert 0.0 < found.least < found.achieved < found.max_sensitivity
+    assert "\n" not in str(found)
+    assert "this loop's is" in str(found)
+    # More bandwidth, more to trade.
+    assert bode_estimate(view, available=50.0).least < bode_estimate(view, available=5.0).least
+
+
+def test_disk_margin_of_the_textbook_loop() -> None:
+    # Seiler, Packard and Gahinet, "An introduction to disk margins" (2020)
+    def loop(omega: FloatArray) -> npt.NDArray[np.complex128]:
+        s = 1j * omega
+        return np.asarray(25.0 / (s**3 + 10.0 * s**2 + 10.0 * s + 10.0))
+
+    grid = np.geomspace(1e-3, 1e3, 2000)
+    alpha = loop_margins(loop, grid, loop(grid)).disk
+    assert alpha == pytest.approx(0.458, abs=1e-3)
+    gain = (1.0 + alpha / 2.0) / (1.0 - alpha / 2.0)
+    assert 20.0 * np.log10(gain) == pytest.approx(4.05, abs=0.01)
+    assert np.degrees(2.0 * np.arctan(alpha / 2.0)) == pytest.approx(25.8, abs=0.1)

@@ -1,0 +1,519 @@
+"""Operability: limiting seas against single evaluations, closed forms, and sums by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from designs import THESIS_GAINS, thesis_design, unstable_design
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from models import Case, InputError, load_case
+from models.basics.metrics import peak_factor
+from models.basics.quadrature import Quadrature
+from models.hook.hook import HookMotion
+from models.plant.plant_data import PlantData
+from synth import GainDesign, evaluate_gains
+from synth.design.structure_design import StructureDesign
+from synth.loop.assess import Assessment
+from synth.operability import operability
+from synth.operability.asked import asked_of
+from synth.operability.capability import capability
+from synth.operability.columns import SeaColumn, sea_column
+from synth.operability.criteria import Criterion, Moments, case_criteria, payload_criteria
+from synth.operability.depths import rope_state
+from synth.operability.limiting import SeaStates, limiting_heights
+from synth.operability.recheck import evaluate_in
+from synth.question.question import pose, uncompensated
+
+pytestmark = pytest.mark.filterwarnings("ignore::models.basics.physics_warning.PhysicsWarning")
+
+T_S = 0.54**0.25 / 0.9  # significant over peak period of the 1975 spectrum
+MILD = {"A": 200.0, "a": 20.0, "a1": 12.0, "a2": 60.0}
+
+
+@cache
+def one_heading():
+    """The subsea crane with the heave of its hook as a table: no headings to choose from."""
+    omega = [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.4, 1.6]
+    heave = [1.0, 1.0, 1.0, 1.02, 1.05, 1.05, 0.98, 0.82, 0.62, 0.43, 0.28, 0.12, 0.05]
+    table = {"omega": omega, "amplitude": heave}
+    return load_case("subsea-crane").replace({"vessel.heave_rao": table})
+
+
+def dragged() -> GainDesign:
+    """The thesis's winch with drag that agrees with the motion, so not linear in H_s."""
+    changes = {"payload.drag": {"method": "stochastic"}, "limits.drive": "report"}
+    return evaluate_gains(load_case("thesis-1975").replace(changes), MILD)
+
+
+@cache
+def vessel_case() -> Case:
+    """The thesis's winch over the starboard side of a supply vessel."""
+    return load_case("thesis-1975").replace(
+        {
+            "vessel.raos": "osv-83m",
+            "vessel.hook": {"x": -25.0, "y": -15.0, "z": 20.0},
+            "vessel.heading": "150 deg",
+            "payload.drag": {"method": "stochastic"},
+        }
+    )
+
+
+def bisected(design: GainDesign, criterion: Criterion, low: float, high: float) -> float:
+    """The H_s at T_p = 11 s at which single evaluations change sides, by halving."""
+    limit = criterion.limit
+    assert limit is not None
+
+    def broken(height: float) -> bool:
+        sea = {"sea.significant_height": height, "sea.significant_period": T_S * 11.0}
+        value = limit.measure(evaluate_in(design, design.case.replace(sea)))
+        return value < limit.bound if limit.at_least else value > limit.bound
+
+    assert not broken(low)
+    assert broken(high)
+    while high / low > 1.0 + 1e-6:
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if broken(middle) else (middle, high)
+    return low
+
+
+def test_the_contour_is_where_single_evaluations_change_sides() -> None:
+    study = operability(thesis_design(), periods=[7.0, 11.0], payload_rms=0.05, payload_max="10 cm")
+    contour = study.depths[0].contours["loop"]
+    compared = 0
+    for criterion, heights in zip(contour.criteria, contour.heights[:, 0], strict=True):
+        if criterion.limit is not None and 0.0 < heights[1] < np.inf:
+            found = bisected(thesis_design(), criterion, 0.01, 30.0)
+            assert heights[1] == pytest.approx(found, rel=1e-6)
+            compared += 1
+    assert compared == 8
+
+
+@pytest.mark.parametrize("name", ["payload.rms", "motor.torque.peak"])
+def test_so_it_is_where_the_drag_changes_with_the_sea(name: str) -> None:
+    study = operability(dragged(), periods=[11.0], payload_rms=0.2)
+    contour = study.depths[0].contours["loop"]
+    at = [c.name for c in contour.criteria].index(name)
+    height = float(contour.heights[at, 0, 0])
+    found = bisected(dragged(), contour.criteria[at], 0.999 * height, 1.001 * height)
+    assert height == pytest.approx(found, rel=1e-6)
+
+
+def test_the_response_is_not_linear_in_the_height_where_the_drag_is_not() -> None:
+    asked = asked_of(dragged(), ())
+    states = SeaStates.of(asked.held, sea_column(asked.case, 7.0))
+    moments, C = states.look(np.array([0.5, 2.0]), np.array([0, 0]))
+    assert C[1] > 1.5 * C[0]
+    sigma = moments.sigma("payload.displacement")
+    assert sigma[1] < 3.0 * sigma[0]
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(0.0, 3e5), st.floats(0.4, 9.0))
+def test_responses_at_any_drag_are_those_of_the_plant_with_that_drag(C: float, w: float) -> None:
+    asked = asked_of(dragged(), ())
+    assert asked.loop is not None
+    omega = np.array([w])
+    base = asked.loop.responses(Quadrature(omega=omega, weights=np.ones(1)))
+    view = Assessment(
+        asked.loop.plant, asked.loop.controller, (), drag=asked.loop.drag, coefficient=C
+    )
+    for k, output in enumerate(base.outputs):
+        expected = abs(view.response(output, "hook.heave", omega)[0]) ** 2
+        assert base.gains(C)[k, 0, 0] == pytest.approx(expected, rel=1e-8)
+
+
+def test_the_held_drum_is_that_of_the_uncompensated_payload() -> None:
+    for case in (dragged().case, one_heading()):
+        study = operability(case, periods=[9.0], payload_rms=0.3)
+        height = float(study.dataset.height_limit_held.sel(limit="payload.rms").item())
+        key, period = ("sea.peak_period", 9.0)
+        if case.sea.significant_period is not None:
+            key, period = "sea.significant_period", 9.0 * T_S
+        sea = case.replace({key: period, "sea.significant_height": height})
+        hook = HookMotion.from_case(sea, warn=False)
+        assert uncompensated(sea, PlantData.from_case(sea), hook)[1] == pytest.approx(0.3, rel=1e-8)
+
+
+def test_the_tension_of_the_held_drum_carries_mass_and_drag_of_the_payload() -> None:
+    # One spring: what the rope pulls with is what the load's inertia and drag ask for.
+    asked = asked_of(thesis_design(), ())
+    omega = np.array([0.5, 0.94, 2.0])
+    base = asked.held.responses(Quadrature(omega=omega, weights=np.ones(3)))
+    data = asked.held.data
+    rows = dict(zip(base.outputs, base.zw[:, 0], strict=True))
+    mass = data.payload_mass + data.rope_mass
+    s = 1j * omega
+    pulled = (mass * s**2 + asked.held.reference * s) * rows["payload.displacement"]
+    assert rows["rope.tension"] == pytest.approx(pulled, rel=1e-9)
+
+
+def test_the_makers_lines_are_those_of_the_sheet() -> None:
+    # H = v T / pi and H = a T^2 / (2 pi^2), with no friction to speak of.
+    case = one_heading().replace({"winch.motor.viscous_friction": 0.0})
+    asked = asked_of(case, ())
+    T = np.array([5.0, 8.0, 14.0])
+    lines = capability(asked.perfect, asked.criteria["perfect"], T)
+    rows = {c.name: h for c, h in zip(lines.criteria, lines.heights, strict=True)}
+    r, n = case.drum_radius, case.winch.gearbox.ratio
+    v = case.winch.speed_limit * r / n
+    assert rows["motor.speed.peak"] == pytest.approx(v * T / math.pi, rel=1e-12)
+    static = asked.plant.static["motor.torque"]
+    a = (case.winch.drive.torque_peak - static) * r / (n * case.winch.inertia)
+    assert rows["motor.torque.peak"] == pytest.approx(a * T**2 / (2.0 * math.pi**2), rel=1e-12)
+    b = math.sqrt(2.0 * (case.winch.drive.torque_continuous**2 - static**2)) * r
+    b /= n * case.winch.inertia
+    continuous = rows["motor.torque.continuous"]
+    assert continuous == pytest.approx(b * T**2 / (2.0 * math.pi**2), rel=1e-12)
+    # At the line of the power, the peaks' product is the power.
+    A, w = 0.5 * rows["motor.power.peak"], 2.0 * math.pi / T
+    torque = static + case.winch.inertia * n / r * A * w**2
+    power = torque * n / r * A * w
+    assert power == pytest.approx(np.full(3, case.winch.power_limit), rel=1e-12)
+
+
+def test_a_perfect_winch_follows_the_hooks_own_speed() -> None:
+    case = one_heading()
+    study = operability(case, periods=[6.0, 12.0])
+    limit = study.dataset.height_limit_perfect.sel(limit="motor.speed.peak").values
+    for period, height in zip((6.0, 12.0), limit, strict=True):
+        sea = case.replace({"sea.peak_period": period, "sea.significant_height": float(height)})
+        speed = HookMotion.from_case(sea, warn=False).velocity
+        line = speed.rms * peak_factor(speed.zero_crossing_period, case.limits.exposure_time)
+        top = case.winch.speed_limit * case.drum_radius / case.winch.gearbox.ratio
+        assert line == pytest.approx(top, rel=1e-6)
+
+
+def test_with_fixed_drag_the_limit_grows_as_the_bound() -> None:
+    heights = [
+        float(operability(thesis_design(), periods=[8.0], payload_rms=b).dataset.height_limit[1, 0])
+        for b in (0.002, 0.004)
+    ]
+    assert heights[1] == pytest.approx(2.0 * heights[0], rel=1e-8)
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.floats(0.02, 1.0), st.floats(1.01, 3.0), st.floats(5.0, 14.0))
+def test_a_wider_bound_never_lowers_the_limit(bound: float, factor: float, period: float) -> None:
+    asked = asked_of(dragged(), ())
+    assert asked.loop is not None
+    states = SeaStates.of(asked.loop, sea_column(asked.case, period))
+    narrow, wide = (
+        payload_criteria(asked.case, rms=b, maximum=4.0 * b, speed=2.0 * b)
+        for b in (bound, factor * bound)
+    )
+    low = limiting_heights(states, narrow).heights
+    high = limiting_heights(states, wide).heights
+    assert np.all(high >= low)
+    assert np.all(high[np.isfinite(low) & (low > 0.0)] > low[np.isfinite(low) & (low > 0.0)])
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.floats(5.0, 14.0), st.floats(0.05, 8.0), st.floats(1.05, 4.0))
+def test_a_higher_sea_moves_everything_more(period: float, height: float, factor: float) -> None:
+    asked = asked_of(dragged(), ())
+    for system in asked.systems.values():
+        states = SeaStates.of(system, sea_column(asked.case, period))
+        both = np.array([height, factor * height])
+        moments, C = states.look(both, np.array([0, 0]))
+        for name in moments.m0:
+            assert moments.sigma(name)[1] > moments.sigma(name)[0]
+        assert np.all(np.isfinite(C))
+
+
+def test_significant_and_rms_are_one_limit_and_the_largest_another() -> None:
+    study = operability(
+        dragged(), periods=[8.0], payload_rms=0.1, payload_significant="400 mm", payload_max=0.5
+    )
+    limit = study.dataset.height_limit.squeeze()
+    assert float(limit.sel(limit="payload.rms")) == pytest.approx(
+        float(limit.sel(limit="payload.significant")), rel=1e-9
+    )
+    case = dragged().case.replace(
+        {
+            "sea.significant_height": float(limit.sel(limit="payload.max")),
+            "sea.significant_period": 8.0 * T_S,
+        }
+    )
+    view = evaluate_in(dragged(), case)
+    assert view.peak("payload.displacement", 10800.0) == pytest.approx(0.5, rel=1e-7)
+
+
+def test_arrays_of_moments_have_the_peaks_of_the_single_formula() -> None:
+    m0, m2 = np.array([4.0, 0.0, 1e-6]), np.array([1.0, 0.0, 1e-16])
+    found = Moments(m0={"x": m0}, m2={"x": m2}).peak("x", 10800.0)
+    assert found[0] == pytest.approx(2.0 * peak_factor(4.0 * math.pi, 10800.0), rel=1e-12)
+    assert found[1] == 0.0
+    assert found[2] == pytest.approx(1e-3)  # fewer than e^(1/2) crossings: one sigma
+
+
+def test_a_spectrum_that_cannot_be_scaled_is_built_anew_at_each_height() -> None:
+    asked = asked_of(dragged(), payload_criteria(dragged().case, rms=0.1))
+    assert asked.loop is not None
+    column = sea_column(asked.case, 9.0)
+    assert column.scalable
+    rebuilt: SeaColumn = replace(column, scalable=False)
+    criteria = asked.criteria["loop"]
+    found = [
+        limiting_heights(SeaStates.of(asked.loop, c), criteria, highest=6.0).heights
+        for c in (column, rebuilt)
+    ]
+    assert found[0] == pytest.approx(found[1], rel=1e-8)
+
+
+def test_torsethaugen_has_its_limits_at_the_shape_of_that_height() -> None:
+    case = one_heading().replace({"sea.spectrum": "torsethaugen"})
+    column = sea_column(case, 9.0)
+    assert not column.scalable
+    # So it is with a peak enhancement that follows the height, in steep seas only.
+    own_gamma = one_heading().replace({"sea.gamma": "auto"})
+    assert not sea_column(own_gamma, 9.0).scalable
+    assert sea_column(one_heading(), 9.0).scalable
+    assert 0.0 < column.floor < 0.3
+    study = operability(case, periods=[9.0], payload_rms=0.3, highest=8.0)
+    height = float(study.dataset.height_limit_held.sel(limit="payload.rms").item())
+    sea = case.replace({"sea.significant_height": height})
+    hook = HookMotion.from_case(sea, warn=False)
+    assert uncompensated(sea, PlantData.from_case(sea), hook)[1] == pytest.approx(0.3, rel=1e-7)
+
+
+def test_a_sea_without_a_period_has_one_limit_in_its_own_shape() -> None:
+    tree = one_heading().to_dict()
+    for sea in (
+        {"spectrum": "pierson-moskowitz", "significant_height": 2.5},
+        {"spectrum": "measured", "table": {"omega": [0.3, 0.6, 1.5], "density": [0.1, 1.2, 0.0]}},
+    ):
+        case = Case.from_dict({**tree, "sea": sea})
+        study = operability(case, payload_rms=0.3, highest=8.0)
+        height = float(study.dataset.height_held.item())
+        at = case.replace({"sea.significant_height": height})
+        hook = HookMotion.from_case(at, warn=False)
+        assert uncompensated(at, PlantData.from_case(at), hook)[1] == pytest.approx(0.3, rel=1e-7)
+        with pytest.raises(InputError, match="has no peak_period"):
+            operability(case, periods=[8.0])
+        with pytest.raises(InputError, match="cannot be set against a scatter diagram"):
+            operability(case, scatter="example")
+
+
+def test_each_heading_is_the_case_in_that_heading() -> None:
+    gains = evaluate_gains(vessel_case(), MILD)
+    angles = [math.radians(a) for a in (60.0, 180.0, 270.0)]
+    study = operability(gains, periods=[9.0], headings=angles, payload_rms=0.1)
+    assert study.dataset.height.dims == ("heading", "peak_period")
+    heights = study.dataset.height_limit.sel(limit="payload.rms").values[:, 0]
+    for angle, height in zip(angles, heights, strict=True):
+        sea = {
+            "vessel.heading": angle,
+            "sea.significant_height": float(height),
+            "sea.significant_period": 9.0 * T_S,
+        }
+        sigma = evaluate_in(gains, gains.case.replace(sea)).sigma("payload.displacement")
+        assert sigma == pytest.approx(0.1, rel=1e-7)
+
+
+def test_a_hook_on_the_centre_line_knows_no_port_or_starboard() -> None:
+    case = vessel_case().replace({"vessel.hook.y": 0.0})
+    angles = [math.radians(a) for a in (45.0, 120.0, 240.0, 315.0)]
+    study = operability(case, periods=[8.0], headings=angles, payload_rms=0.3)
+    height = study.dataset.height_held.values[:, 0]
+    assert height[0] == pytest.approx(height[3], rel=1e-6)
+    assert height[1] == pytest.approx(height[2], rel=1e-6)
+    off = operability(vessel_case(), periods=[8.0], headings=angles, payload_rms=0.3)
+    assert off.dataset.height_held.values[1, 0] < 0.95 * height[1]
+
+
+def test_a_rope_length_takes_its_layer_with_it() -> None:
+    case = one_heading()
+    study = operability(case, periods=[9.0], payload_rms=0.3, depths=[200.0, 1000.0, 1400.0])
+    layers = [at.rope.layer for at in study.depths]
+    assert layers == [5, 2, 1]
+    assert [at.rope.layers for at in study.depths] == [5, 5, 5]
+    lays = case.winch.drum.lays(case.rope.diameter)
+    assert [at.rope.radius for at in study.depths] == [lays[k - 1][1] for k in layers]
+    data = study.dataset
+    assert data.height_held.dims == ("rope_length", "peak_period")
+    alone = operability(case.replace({"rope.length": 1400.0}), periods=[9.0], payload_rms=0.3)
+    assert data.height_held.values[2] == pytest.approx(alone.dataset.height_held.values, rel=1e-10)
+    assert float(data.static_torque[2]) == pytest.approx(
+        case.replace({"rope.length": 1400.0}).static_torque_budget
+    )
+    # A radius that is given knows no layers.
+    assert rope_state(load_case("thesis-1975")).layer == 0
+
+
+def test_gains_stay_when_the_rope_gets_longer() -> None:
+    study = operability(dragged(), periods=[9.0], payload_rms=0.2, depths=[1500.0, 2500.0])
+    assert study.depths[0].max_sensitivity != pytest.approx(study.depths[1].max_sensitivity)
+    for at in study.depths:
+        height = float(at.contours["loop"].heights[1, 0, 0])
+        case = dragged().case.replace(
+            {
+                "rope.length": at.rope.length,
+                "sea.significant_height": height,
+                "sea.significant_period": 9.0 * T_S,
+            }
+        )
+        view = evaluate_in(dragged(), case)
+        assert view.sigma("payload.displacement") == pytest.approx(0.2, rel=1e-7)
+        drag = float(at.contours["loop"].drag[0, 0])
+        view = evaluate_in(dragged(), case, drag)
+        assert at.max_sensitivity == pytest.approx(view.margins.max_sensitivity, rel=1e-6)
+
+
+def test_an_unstable_loop_works_in_no_sea() -> None:
+    with pytest.raises(InputError, match="no stabilising gains"):
+        operability(unstable_design(), periods=[8.0])
+    asked = asked_of(dragged(), payload_criteria(dragged().case, rms=1.0))
+    assert asked.loop is not None
+    bad = pose(dragged().case).assess({**MILD, "A": -200.0}, 0.0).controller
+    loop = replace(asked.loop, controller=bad)
+    assert loop.stable_range == (np.inf, 0.0)
+    found = limiting_heights(
+        SeaStates.of(loop, sea_column(asked.case, 8.0)), asked.criteria["loop"]
+    )
+    assert np.all(found.heights == 0.0)
+
+
+def test_a_loop_that_needs_drag_to_be_stable_works_in_no_sea() -> None:
+    # Quadratic drag vanishes in small motion, so that such a loop swings by itself.
+    asked = asked_of(dragged(), ())
+    assert asked.loop is not None
+
+    class Edge(type(asked.loop)):  # type: ignore[misc]
+        def poles(self, coefficient: float) -> np.ndarray:
+            return np.array([complex(1.0 - coefficient / 5e4, 0.3)])
+
+    loop = Edge(**{name: getattr(asked.loop, name) for name in _fields(asked.loop)})
+    low, high = loop.stable_range
+    assert low == pytest.approx(5e4, rel=1e-9)
+    assert high == np.inf
+    assert loop.swings
+    assert not asked.loop.swings
+    found = limiting_heights(
+        SeaStates.of(loop, sea_column(asked.case, 8.0)), asked.criteria["loop"]
+    )
+    assert np.all(found.heights == 0.0)
+
+
+def test_a_loop_that_too_much_drag_destabilises_works_below_that() -> None:
+    asked = asked_of(dragged(), payload_criteria(dragged().case, rms=0.1))
+    assert asked.loop is not None
+
+    class Edge(type(asked.loop)):  # type: ignore[misc]
+        def poles(self, coefficient: float) -> np.ndarray:
+            return np.array([complex(coefficient / 4e3 - 1.0, 0.3)])
+
+    loop = Edge(**{name: getattr(asked.loop, name) for name in _fields(asked.loop)})
+    assert loop.stable_range == (0.0, pytest.approx(4e3, rel=1e-9))
+    column = sea_column(asked.case, 8.0)
+    for system in (loop, asked.loop):
+        found = limiting_heights(SeaStates.of(system, column), asked.criteria["loop"])
+        if system is loop:
+            edged = found
+    assert edged.heights[1] == pytest.approx(found.heights[1], rel=1e-8)
+    # Stability is lost where the drag of the motion reaches the edge, and not before.
+    height = float(edged.heights[0, 0])
+    assert height > float(edged.heights[1, 0])
+    states = SeaStates.of(asked.loop, column)
+    assert states.look(np.array([height]), np.array([0]))[1][0] == pytest.approx(4e3, rel=1e-6)
+
+
+def _fields(system: object) -> list[str]:
+    from dataclasses import fields
+
+    return [f.name for f in fields(system)]  # type: ignore[arg-type]
+
+
+def test_a_load_that_breaks_a_limit_at_rest_has_no_sea() -> None:
+    case = load_case("thesis-1975").replace(
+        {"winch.drive.torque_continuous": 4000.0, "winch.drive.torque_peak": 4900.0}
+    )
+    study = operability(evaluate_gains(case, THESIS_GAINS), periods=[8.0])
+    row = study.dataset.height_limit.squeeze()
+    assert float(row.sel(limit="motor.torque.peak")) == 0.0
+    assert float(study.dataset.height.squeeze()) == 0.0
+    assert not study.ok
+
+
+def test_every_limit_of_the_case_is_among_the_criteria_and_slack_always() -> None:
+    case = load_case("thesis-1975")
+    names = {c.name for c in case_criteria(case, pose(case).plant)}
+    assert {"motor.torque.peak", "motor.voltage.peak", "rope.tension.least"} <= names
+    slack = next(c for c in case_criteria(case, pose(case).plant) if c.name.endswith("least"))
+    assert slack.bound == 0.0
+
+
+@pytest.mark.slow
+def test_errors_of_the_reference_unit_grow_with_the_sea() -> None:
+    case = one_heading()
+    parameters = {
+        "payload.acceleration_gain": 0.971228,
+        "payload.velocity_gain": 1.61572,
+        "payload.position_gain": 2.85487,
+        "drum.position_gain": 0.679489,
+        "heave.gain": 0.929099,
+        "rolloff.corner": 19.6841,
+        "rolloff.damping": 0.97761,
+        "heave.lead": 0.0263462,
+        "heave.bandwidth": 7.56484,
+    }
+    design = StructureDesign(
+        case=case,
+        structure="combined",
+        ok=True,
+        status="given",
+        parameters=parameters,
+        units={},
+        payload_rms=0.021,
+        payload_rms_before=0.616,
+        hook_rms=0.46,
+        parts={},
+        margins=None,
+        limits={},
+        drag=670.0,
+        drag_before=7800.0,
+        masses=7,
+    )
+    # Above and below H_s = 4.3 m, where 5 % of the heave is as much as the floor of 5 cm.
+    for bound in (0.021, 0.06):
+        study = operability(design, periods=[9.0], payload_rms=bound)
+        limit = study.dataset.height_limit.squeeze()
+        height = float(limit.sel(limit="payload.rms"))
+        view = evaluate_in(design, case.replace({"sea.significant_height": height}))
+        assert view.sigma("payload.displacement") == pytest.approx(bound, rel=1e-6)
+    assert height > 4.5
+
+
+@pytest.mark.slow
+def test_gains_found_anew_never_do_worse_than_gains_within_the_same_margins() -> None:
+    case = load_case("thesis-1975").replace(
+        {"limits.drive": "enforce", "sea.significant_height": 0.5}
+    )
+    design = evaluate_gains(case, {"A": 200.0, "a": 21.908422, "a1": 12.003924, "a2": 68.339717})
+    study = operability(design, periods=[6.0, 8.0], payload_rms="60 mm", reoptimise=True)
+    fixed, anew = study.dataset.height.values, study.dataset.height_reoptimised.values
+    assert np.all(anew >= fixed * (1.0 - 1e-3))
+    assert anew[0] > 1.02 * fixed[0]  # gains of one sea are not those of another
+
+
+def test_what_cannot_be_asked_is_refused() -> None:
+    case = load_case("thesis-1975")
+    with pytest.raises(InputError, match="has no headings"):
+        operability(case, headings=[0.0, 1.0])
+    with pytest.raises(InputError, match="payload_rms"):
+        operability(case, payload_rms="50 kN")
+    with pytest.raises(InputError, match="payload_rms must be above 0"):
+        operability(case, payload_rms=0.0)
+    with pytest.raises(InputError, match="periods must be strictly ascending"):
+        operability(case, periods=[8.0, 7.0])
+    with pytest.raises(InputError, match="reoptimise is for"):
+        operability(case, reoptimise=True)
+    with pytest.raises(InputError, match="less than the 9000 m paid out"):
+        operability(one_heading(), periods=[8.0], depths=[9000.0])
+    with pytest.raises(InputError, match="highest must be in"):
+        operability(case, highest=80.0)

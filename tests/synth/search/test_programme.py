@@ -1,0 +1,312 @@
+"""The programme: derivatives, objective, guard, and whether its answers are optimal."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from loop_numbers import (
+    double_integrator,
+    integrator,
+    lyapunov_cost,
+    oscillator,
+    two_carts,
+    with_full_state,
+)
+
+from models.basics.quadrature import Quadrature
+from models.plant.linear import LinearPlant
+from synth import (
+    Continuous,
+    DelayMargin,
+    DragElement,
+    GainMargin,
+    GainMarginDown,
+    Limit,
+    LowFrequency,
+    LowOrder,
+    MaxSensitivity,
+    Peak,
+    Rms,
+    RollOff,
+    StaticGain,
+    White,
+)
+from synth.loop.assess import Assessment
+from synth.loop.disturbance import disturbances
+from synth.question.problem import Goal, Problem
+from synth.search.nodes import cost_nodes
+from synth.search.programme import Programme
+from synth.structures.structure import Structure
+
+OMEGA = np.geomspace(1e-3, 1e3, 60)
+LIMITS = (
+    MaxSensitivity(bound=1.7),
+    GainMargin(bound=3.0),
+    GainMarginDown(bound=0.3),
+    DelayMargin(bound=0.1),
+    RollOff(bound=0.2, above=8.0),
+    LowFrequency(output="x", disturbance="f", bound=0.3, below=0.1),
+    Rms(output="effort", bound=1.0),
+    Continuous(output="x", static=0.1, bound=1.0),
+    Peak(output="x", bound=2.0, duration=600.0),
+)
+
+
+def problem(
+    plant: LinearPlant,
+    structure: Structure,
+    limits: tuple[Limit, ...] = (),
+    minimise: dict[str, float] | None = None,
+    drag: DragElement | None = None,
+) -> Problem:
+    noises = {"f": White(1.0), "n": White(0.01), "w": White(1.0), "n1": White(0.01)}
+    known = {name: n for name, n in noises.items() if name in plant.independent_disturbances}
+    return Problem(
+        plant=plant,
+        law=structure.bind(plant),
+        disturbances=disturbances(known, plant.independent_disturbances),
+        minimise=minimise or {"x": 1.0, "effort": 0.1},
+        limits=limits,
+        drag=drag,
+    )
+
+
+def view(question: Problem, values, coefficient: float | None = None) -> Assessment:
+    return Assessment(
+        question.plant,
+        question.law.controller(list(values)),
+        question.disturbances,
+        drag=question.drag,
+        coefficient=coefficient,
+    )
+
+
+def programme(question: Problem, values, goal: Goal = Goal.COST, **options) -> Programme:
+    coefficient = None if question.drag is None else question.drag.reference
+    nodes = cost_nodes(question, [view(question, values, coefficient)])
+    return Programme(question, nodes, OMEGA, goal, reference=np.array(values), **options)
+
+
+MASS = problem(double_integrator(), LowOrder(2), LIMITS)
+MASS_VALUES = np.array([7.0, 24.0, -19.0, -25.0])
+
+
+def test_values_are_stable() -> None:
+    assert MASS.stable(MASS_VALUES)
+
+
+@pytest.mark.parametrize("goal", [Goal.COST, Goal.FEASIBLE, Goal.SEA])
+def test_first_derivatives_are_those_of_finite_differences(goal: Goal) -> None:
+    made = programme(MASS, MASS_VALUES, goal)
+    x0 = made.pack(MASS_VALUES, extra=0.2)
+    bounds = np.array([limit.bound for limit in MASS.limits])
+    x, p = ca.MX.sym("x", x0.size), ca.MX.sym("p", bounds.size)
+    cost, rows = made.evaluate(x, p)
+    both = ca.vertcat(cost, rows)
+    slopes = ca.Function("slopes", [x, p], [ca.jacobian(both, x), ca.jacobian(both, p)])
+    by_x, by_p = (np.array(found) for found in slopes(x0, bounds))
+
+    def values(x_at, p_at):
+        return np.concatenate([np.array(v).ravel() for v in made.evaluate(x_at, p_at)])
+
+    for analytic, at, move in (
+        (by_x, x0, lambda z: values(z, bounds)),
+        (by_p, bounds, lambda z: values(x0, z)),
+    ):
+        step = 1e-6 * np.maximum(np.abs(at), 1e-2)
+        for k in range(at.size):
+            h = np.zeros(at.size)
+            h[k] = step[k]
+            numeric = (move(at + h) - move(at - h)) / (2.0 * step[k])
+            scale = 1.0 + np.abs(numeric)
+            assert np.abs(analytic[:, k] - numeric).max() < 1e-5 * scale.max()
+            assert np.all(np.abs(analytic[:, k] - numeric) < 1e-3 * scale)
+
+
+def test_second_derivatives_are_those_of_finite_differences() -> None:
+    made = programme(MASS, MASS_VALUES)
+    x0 = made.pack(MASS_VALUES)
+    bounds = np.array([limit.bound for limit in MASS.limits])
+    x = ca.MX.sym("x", x0.size)
+    cost, _ = made.evaluate(x, bounds)
+    hessian, gradient = ca.hessian(cost, x)
+    slope = ca.Function("slope", [x], [gradient])
+    exact = np.array(ca.Function("hessian", [x], [hessian])(x0))
+    numeric = np.empty_like(exact)
+    for k in range(x0.size):
+        h = np.zeros(x0.size)
+        h[k] = 1e-5 * max(abs(x0[k]), 1.0)
+        numeric[:, k] = (np.array(slope(x0 + h)) - np.array(slope(x0 - h))).ravel() / (2.0 * h[k])
+    assert exact == pytest.approx(exact.T, rel=1e-9, abs=1e-12)
+    assert exact == pytest.approx(numeric, rel=1e-5, abs=1e-7 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize(
+    ("question", "values"),
+    [
+        (MASS, MASS_VALUES),
+        (problem(with_full_state(oscillator()), StaticGain()), [-1.0, -2.0]),
+        (problem(integrator(0.3), StaticGain()), [-2.0]),
+        (
+            problem(two_carts(), LowOrder(1), minimise={"x2": 1.0, "effort1": 0.1}),
+            [0.5, 0.3],
+        ),
+    ],
+    ids=["mass", "oscillator", "late integrator", "two carts"],
+)
+def test_objective_is_the_cost_that_the_assessment_finds(question: Problem, values) -> None:
+    made = programme(question, values)
+    log_cost, _ = made.violations(made.pack(values))
+    seen = view(question, values)
+    exact = np.sqrt(sum(w * seen.sigma(o) ** 2 for o, w in question.minimise.items()))
+    assert np.exp(log_cost) == pytest.approx(exact, rel=1e-7)
+    if not any(question.plant.delays):
+        noises = {d.name: White(np.pi * d.density(np.ones(1))[0]) for d in question.disturbances}
+        controller = question.law.controller(list(values))
+        other = lyapunov_cost(question.plant, controller, noises, question.minimise)
+        assert np.exp(log_cost) == pytest.approx(other, rel=1e-7)
+
+
+def test_rows_agree_with_measures_on_which_limits_are_kept() -> None:
+    made = programme(MASS, MASS_VALUES)
+    _, rows = made.violations(made.pack(MASS_VALUES))
+    seen = view(MASS, MASS_VALUES)
+    uses = {limit.name: limit.use(limit.measure(seen)) for limit in MASS.limits}
+    assert set(rows) == set(uses)
+    for name in ("max_sensitivity", "effort.rms", "x.continuous", "x.peak", "low_frequency"):
+        assert (rows[name] > 0.0) == (uses[name] > 1.0), name
+    # ... and some of each
+    assert {use > 1.0 for use in uses.values()} == {True, False}
+
+
+def test_sea_scales_the_disturbance() -> None:
+    made = programme(MASS, MASS_VALUES, Goal.SEA)
+    calm, _ = made.violations(made.pack(MASS_VALUES, extra=0.0))
+    rough, rows = made.violations(made.pack(MASS_VALUES, extra=np.log(2.0)))
+    assert rough - calm == pytest.approx(np.log(2.0), rel=1e-12)
+    seen = view(MASS, MASS_VALUES)
+    assert rows["effort.rms"] == pytest.approx((2.0 * seen.sigma("effort")) ** 2 - 1.0, rel=1e-6)
+
+
+def test_guard_refuses_what_is_unstable() -> None:
+    made = programme(MASS, MASS_VALUES)
+    for values, good in ((MASS_VALUES, True), (-MASS_VALUES, False), ([7, 24, 19, 25], False)):
+        assert MASS.stable(values) is good
+        found = float(made._guard(made.pack(values)))
+        assert found == 0.0 if good else np.isnan(found)
+    x = ca.MX.sym("x", 4)
+    flat = ca.Function("flat", [x], [ca.jacobian(made._guard(x), x)])(made.pack(MASS_VALUES))
+    assert not np.any(np.array(flat))
+
+
+def test_every_answer_is_stable_even_where_the_optimum_lies_at_the_edge() -> None:
+    # Without a price on the effort the best loop of an undamped mass is as fast as can be; with
+    # too few nodes the sum can be made small by loops that the nodes do not see.
+    question = problem(with_full_state(double_integrator()), StaticGain(), minimise={"x": 1.0})
+    made = Programme(
+        question,
+        Quadrature(omega=[0.5, 1.0, 2.0], weights=[0.5, 0.7, 1.0]),
+        OMEGA,
+        reference=np.array([-1.0, -1.0]),
+    )
+    for start in ([-1.0, -1.0], [-10.0, -0.5], [-0.1, -3.0]):
+        solved = made.solve(made.pack(start))
+        assert question.stable(solved.values)
+
+
+def test_answer_meets_the_optimality_conditions() -> None:
+    limits = (MaxSensitivity(bound=1.6), Rms(output="effort", bound=0.9))
+    question = problem(double_integrator(), LowOrder(2), limits)
+    made = programme(question, MASS_VALUES, tolerance=1e-9)
+    solved = made.solve(made.pack(MASS_VALUES))
+    assert solved.converged
+    at = made.pack(solved.values)
+    _, worst = made.violations(at)
+    assert max(worst.values()) < 1e-7
+    # The gradient of the cost is a combination of those of the rows at zero, with signs.
+    bounds = np.array([limit.bound for limit in limits])
+    x = ca.MX.sym("x", at.size)
+    cost, rows = made.evaluate(x, bounds)
+    found = ca.Function("slopes", [x], [ca.gradient(cost, x), ca.jacobian(rows, x), rows])(at)
+    gradient, jacobian, values = (np.array(f) for f in found)
+    active = jacobian[values.ravel() > -1e-5]
+    assert 1 <= len(active) <= 4
+    multipliers, *_ = np.linalg.lstsq(active.T, -gradient.ravel(), rcond=None)
+    residual = gradient.ravel() + active.T @ multipliers
+    assert np.abs(residual).max() < 1e-5 * np.abs(gradient).max()
+    assert np.all(multipliers > -1e-6)
+    # Prices are what these multipliers make of a change of the bounds: d log cost / d log bound.
+    p = ca.MX.sym("p", bounds.size)
+    by_bound = ca.Function("by_bound", [x, p], [ca.jacobian(made.evaluate(x, p)[1], p)])
+    moved = np.array(by_bound(at, bounds))[values.ravel() > -1e-5]
+    exact = np.abs(multipliers @ moved * bounds)
+    prices = [abs(solved.prices[limit.name]) for limit in limits]
+    assert prices == pytest.approx(exact, rel=1e-3, abs=1e-6)
+    assert max(prices) > 1e-3
+
+
+def test_unconstrained_answer_is_stationary_and_a_minimum() -> None:
+    question = problem(double_integrator(), LowOrder(2))
+    made = programme(question, MASS_VALUES, tolerance=1e-9)
+    solved = made.solve(made.pack(MASS_VALUES))
+    x = ca.MX.sym("x", 4)
+    cost, _ = made.evaluate(x, np.zeros(0))
+    hessian, gradient = ca.hessian(cost, x)
+    found = ca.Function("second", [x], [gradient, hessian])(made.pack(solved.values))
+    slope, curvature = (np.array(f) for f in found)
+    assert np.abs(slope).max() < 1e-7
+    assert np.linalg.eigvalsh(curvature).min() > 0.0
+
+
+def test_bounds_and_reach_keep_parameters_where_they_are_told() -> None:
+    structure = StaticGain(bounds={"K[u,m1]": (-1.5, 0.0)})
+    question = problem(with_full_state(double_integrator()), structure)
+    made = programme(question, [-1.0, -1.0])
+    solved = made.solve(made.pack([-1.0, -1.0]))
+    assert solved.values[0] == pytest.approx(-1.5, rel=1e-6)
+    near = made.solve(made.pack([-1.0, -1.0]), reach=0.1)
+    assert np.all(np.abs(near.values - [-1.0, -1.0]) <= 0.1 * (1.0 + 1e-6))
+
+
+def test_slow_real_pole_is_kept_away_from_zero() -> None:
+    # x'' = -x - 0.2 x' + u with integral action by a slow controller pole: the row is negative
+    # while all real poles are beyond the slow point, and positive with one in front of it.
+    question = problem(oscillator(1.0, 0.2), LowOrder(1))
+    pace = -question.slow_point
+    made = programme(question, [1.0, -0.1])
+    _, rows = made.evaluate(made.pack([1.0, -0.1]), np.zeros(0))
+    assert float(np.array(rows).ravel()[-1]) < 0.0
+    # A static gain of just under -1/|G(0)| leaves a real pole near zero.
+    static = problem(with_full_state(oscillator(1.0, 3.0)), StaticGain())
+    made = programme(static, [-0.5, 0.0])
+    for near_zero, sign in ((1.0 - 20.0 * pace, -1.0), (1.0 - 0.5 * pace, 1.0)):
+        values = [near_zero, 0.0]
+        assert static.stable(values)
+        poles = np.linalg.eigvals(static.law.closed_loop_matrix(static.plant, values))
+        assert np.sign(poles.real.max() - static.slow_point) == sign
+        _, rows = made.evaluate(made.pack(values), np.zeros(0))
+        assert np.sign(float(np.array(rows).ravel()[-1])) == sign
+
+
+def test_drag_balances_with_the_motion_at_the_answer() -> None:
+    plant = LinearPlant(
+        A=[[0.0, 1.0], [-4.0, -0.3]],
+        B=[[0.0], [1.0]],
+        E=[[0.0], [1.0]],
+        C=np.eye(2),
+        Cz=[[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]],
+        Dz=[[0.0], [0.0], [1.0]],
+        inputs=("u",),
+        disturbances=("f",),
+        outputs=("x", "v", "effort"),
+    )
+    drag = DragElement(quadratic=0.5, velocity="v", force="f", reference=0.3)
+    question = problem(plant, StaticGain(), drag=drag)
+    made = programme(question, [-1.0, -1.0])
+    solved = made.solve(made.pack([-1.0, -1.0], coefficient=0.3))
+    assert solved.converged
+    assert solved.coefficient is not None
+    seen = view(question, solved.values)  # solves the coefficient itself
+    assert solved.coefficient == pytest.approx(seen.coefficient, rel=1e-3)
+    assert seen.coefficient == pytest.approx(0.5 * np.sqrt(8.0 / np.pi) * seen.sigma("v"), rel=1e-8)

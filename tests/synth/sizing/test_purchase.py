@@ -1,0 +1,107 @@
+"""What is worth buying: prices against gains optimised again, the order, and what is for sale."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+import stillhook as sh
+from synth.sizing import purchase
+from synth.sizing.follow import Posed, begin_from, follow
+from synth.sizing.purchase import Worth
+from synth.sizing.purchase_items import limit_items, part_items
+from synth.structures.winch_structures import structure_named
+
+LATE = {"sensors.telemetry.delay": "50 ms"}
+HARD = {
+    "sea.significant_height": 1.0,
+    "limits.drive": "enforce",
+    "winch.drive.torque_peak": 13e3,  # so that the current alone binds, not both at once
+}
+
+
+@pytest.fixture(scope="module")
+def late() -> Worth:
+    return sh.worth(sh.load_case("thesis-1975").replace(LATE), starts=8)
+
+
+def test_prices_are_what_optimising_again_gives_where_the_optimum_is_smooth(late: Worth) -> None:
+    case = sh.load_case("thesis-1975").replace(HARD)
+    design = sh.optimise_structure(case, "payload-feedback", starts=2)
+    posed = Posed.of(case, "payload-feedback", design.masses)
+    problem = posed.problem((*posed.loop, *posed.drive))
+    here = follow(problem, [begin_from(problem, design)])
+    assert here is not None
+    items = [
+        *limit_items(problem.limits),
+        *part_items(case, design.posed.structure.measurements, posed),
+    ]
+    step = 0.01
+    for name in ("gear ratio", "motor, all of it", "motor.current.peak"):
+        item = next(item for item in items if item.name == name)
+        price = purchase._price(design, here, item)
+        logs = []
+        for way in (-1.0, 1.0):
+            again = purchase._again(design, here, item, math.exp(way * step), here)
+            assert again is not None
+            logs.append(math.log(again.payload_rms))
+        # Central: what is left is the third derivative, and answers that are good to 1e-4.
+        assert abs(price) > 0.1, name
+        assert (logs[1] - logs[0]) / (2.0 * step) == pytest.approx(price, rel=0.01, abs=5e-3), name
+    # A few per cent are what the curve bends over a step of 5 %.
+    assert late.first is not None
+    assert late.first.elasticity == pytest.approx(late.first.price, rel=0.03)
+
+
+def test_the_first_thing_to_buy_is_the_delay_and_no_margin(late: Worth) -> None:
+    assert late.ok
+    assert late.first is not None
+    assert late.first.item.name == "telemetry delay"
+    assert late.rows[0].item.kind == "margin"  # larger, but not for sale
+    assert "buy first: telemetry delay" in late.status
+    gains = [row.gain for row in late.rows]
+    assert gains == sorted(gains, reverse=True)
+    assert late.to_csv().count("\n") == len(late.rows) + 1
+
+
+def test_twice_as_good_is_the_optimum_of_that_case(late: Worth) -> None:
+    half = sh.load_case("thesis-1975").replace({"sensors.telemetry.delay": "25 ms"})
+    design = sh.optimise_structure(half, "payload-feedback", starts=8)
+    assert late.first is not None
+    assert late.first.twice_rms == pytest.approx(design.payload_rms, rel=1e-3)
+    # 10 ms less: near the slope, with what the curve bends
+    ten = sh.load_case("thesis-1975").replace({"sensors.telemetry.delay": "40 ms"})
+    less = sh.optimise_structure(ten, "payload-feedback", starts=8).payload_rms
+    assert late.first.per_step == pytest.approx(less - late.payload_rms, rel=0.1)
+
+
+def test_what_is_for_sale_is_what_the_structure_hears() -> None:
+    case = sh.load_case("subsea-crane")
+    names = {}
+    for name in ("payload-feedback", "feed-forward", "constant-tension"):
+        posed = Posed.of(case, name)
+        heard = structure_named(name, case).measurements
+        names[name] = {item.name for item in part_items(case, heard, posed)}
+    assert "telemetry delay" in names["payload-feedback"]
+    assert "MRU error" not in names["payload-feedback"]
+    assert {"MRU error", "MRU delay"} <= names["feed-forward"]
+    assert "telemetry delay" not in names["feed-forward"]
+    assert "load cell noise" in names["constant-tension"]
+    assert all("gear ratio" in found for found in names.values())
+    assert all("motor, all of it" in found for found in names.values())
+
+
+def test_a_drive_that_is_too_small_is_said_before_anything_is_priced() -> None:
+    small = {"limits.drive": "enforce", "winch.drive.torque_peak": "5.95 kN m"}
+    result = sh.worth(sh.load_case("thesis-1975").replace(small), starts=1)
+    assert not result.ok
+    assert result.rows == ()
+    assert "drive" in result.status
+
+
+def test_nothing_that_is_sold_is_worth_it_where_only_margins_bind(late: Worth) -> None:
+    kept = tuple(row for row in late.rows if not row.item.sold)
+    assert replace(late, rows=kept).first is None
+    assert all(math.isfinite(row.gain) for row in late.rows)

@@ -1,0 +1,94 @@
+"""Filter sections: response, denominator and state space say the same, in numbers and symbols."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from synth.loop.phasor import Phasor
+from synth.structures.blocks import Integral, LeadLag, LeadTime, Notch, RollOff, Section, series
+
+SECTIONS: dict[str, Section] = {
+    "roll-off": RollOff(name="f", corner=(0.5, 50.0)),
+    "lead-lag": LeadLag(name="f", zero=(0.1, 30.0), pole=(0.1, 60.0)),
+    "notch": Notch(name="f", frequency=(1.0, 20.0)),
+    "integral": Integral(name="f", corner=(0.01, 1.0)),
+    "lead time": LeadTime(name="f"),
+}
+OMEGA = np.geomspace(0.03, 300.0, 9)
+
+
+def values_of(section: Section, share: float) -> list[float]:
+    points = np.full((1, len(section.parameters)), share)
+    return [float(v) for v in section.guess(points)[0]]
+
+
+@pytest.mark.parametrize("name", SECTIONS)
+@given(share=st.floats(0.02, 0.98))
+@settings(max_examples=20, deadline=None)
+def test_state_space_has_the_response(name: str, share: float) -> None:
+    section = SECTIONS[name]
+    values = values_of(section, share)
+    A, B, C, D = section.matrices(values)
+    s = 1j * OMEGA
+    found = [(C @ np.linalg.solve(p * np.eye(len(A)) - A, B) + D)[0, 0] for p in s]
+    assert np.asarray(section.response(values, s)) == pytest.approx(np.array(found), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", SECTIONS)
+@given(share=st.floats(0.02, 0.98))
+@settings(max_examples=20, deadline=None)
+def test_characteristic_is_that_of_the_state_matrix(name: str, share: float) -> None:
+    section = SECTIONS[name]
+    values = values_of(section, share)
+    A = section.matrices(values)[0]
+    s = 1j * OMEGA
+    found = [np.linalg.det(p * np.eye(len(A)) - A) for p in s]
+    assert np.asarray(section.characteristic(values, s)) == pytest.approx(np.array(found))
+
+
+@pytest.mark.parametrize("name", SECTIONS)
+def test_symbols_and_numbers_agree(name: str) -> None:
+    section = SECTIONS[name]
+    values = values_of(section, 0.4)
+    x = ca.MX.sym("x", len(values))
+    response = section.response([x[k] for k in range(len(values))], Phasor(0.0, ca.DM(OMEGA)))
+    function = ca.Function("f", [x], [response.re, response.im])
+    re, im = (np.array(part).ravel() for part in function(values))
+    assert re + 1j * im == pytest.approx(np.asarray(section.response(values, 1j * OMEGA)))
+
+
+def test_textbook_values() -> None:
+    at_corner = RollOff(name="f", corner=(1.0, 10.0)).response([4.0, 0.5], np.array([4.0j]))
+    assert at_corner == pytest.approx([-1.0j])  # 1/(2 i z)
+    at_notch = Notch(name="f", frequency=(1.0, 10.0)).response([7.0, 0.3, 0.1], np.array([7.0j]))
+    assert at_notch == pytest.approx([0.1])
+    lead = LeadTime(name="f").response([0.2, 1e6], np.array([0.5j]))
+    assert lead == pytest.approx([1.0 + 0.1j], rel=1e-5)
+    integral = Integral(name="f", corner=(0.01, 1.0)).response([0.2], np.array([0.2j]))
+    assert integral == pytest.approx([1.0 - 1.0j])
+    lag = LeadLag(name="f", zero=(0.1, 9.0), pole=(0.1, 9.0)).response([1.0, 5.0], np.array([1e9j]))
+    assert lag == pytest.approx([5.0], rel=1e-6)
+
+
+@pytest.mark.parametrize("name", SECTIONS)
+def test_guesses_lie_within_the_bounds(name: str) -> None:
+    section = SECTIONS[name]
+    for share in (0.0, 0.5, 1.0):
+        for value, parameter in zip(values_of(section, share), section.parameters, strict=True):
+            assert parameter.low * (1 - 1e-12) <= value <= parameter.high * (1 + 1e-12)
+            assert 0.0 < parameter.scale <= parameter.high
+    assert all(p.name.startswith("f.") for p in section.parameters)
+
+
+def test_series_is_the_product() -> None:
+    first, then = SECTIONS["notch"], SECTIONS["integral"]
+    one, two = values_of(first, 0.3), values_of(then, 0.6)
+    A, B, C, D = series(first.matrices(one), then.matrices(two))
+    s = 1j * OMEGA
+    found = [(C @ np.linalg.solve(p * np.eye(len(A)) - A, B) + D)[0, 0] for p in s]
+    wanted = np.asarray(first.response(one, s)) * np.asarray(then.response(two, s))
+    assert wanted == pytest.approx(np.array(found), rel=1e-12)

@@ -1,0 +1,303 @@
+"""Structures of a winch: what they do by hand-written laws, and what their designs promise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.stats import qmc
+
+from models import Case, load_case
+from models.basics.checks import InputError
+from models.plant.drive import DriveLimits
+from models.simulation.simulate import run_simulation
+from models.simulation.simulation import prepare
+from synth import optimise_gains
+from synth.controllers.linear_feedback import LinearFeedback
+from synth.design.structure_design import StructureDesign
+from synth.design.structure_search import optimise_structure
+from synth.loop.controller import closed_loop_matrix
+from synth.loop.phasor import Phasor
+from synth.question.structure_question import pose_structure
+from synth.search.starts import candidates
+from synth.structures.winch_structures import structure_named, structure_names
+from synth.verify.verification import Check
+
+OMEGA = np.geomspace(0.05, 30.0, 11)
+DIAGRAMS = [name for name in structure_names() if not name.startswith("low-order")]
+
+# What `optimise_structure` finds for these, rounded.
+CRANE = {
+    "payload.acceleration_gain": 0.991,
+    "payload.velocity_gain": 1.807,
+    "payload.position_gain": 3.45,
+    "drum.position_gain": 0.824,
+    "heave.gain": 0.953,
+    "rolloff.corner": 21.65,
+    "rolloff.damping": 0.977,
+    "heave.lead": 0.0186,
+    "heave.bandwidth": 10.8,
+}
+
+
+@pytest.fixture(scope="module")
+def crane() -> Case:
+    return load_case("subsea-crane")
+
+
+@pytest.fixture(scope="module")
+def spring() -> Case:
+    return load_case("thesis-1975").replace({"sensors.telemetry.delay": 0.05})
+
+
+@pytest.fixture(scope="module")
+def followed(spring: Case) -> StructureDesign:
+    late = {"sensors.mru": {"noise_floor": 0.0, "noise_fraction": 0.02, "delay": 0.03}}
+    return optimise_structure(spring.replace(late), "feed-forward", starts=2)
+
+
+def values_of(case: Case, name: str) -> list[float]:
+    law = pose_structure(case, name).law
+    points = qmc.Sobol(law.dimensions, seed=3).random_base2(3)
+    posed = pose_structure(case, name)
+    yu = posed.plant.response(OMEGA).yu
+    return [float(v) for v in law.draw(points, OMEGA, yu)[5]]
+
+
+@pytest.mark.parametrize("name", DIAGRAMS)
+@pytest.mark.parametrize("bundled", ["subsea-crane", "thesis-1975"])
+def test_response_state_space_and_symbols_say_the_same(name: str, bundled: str) -> None:
+    case = load_case(bundled)
+    law = pose_structure(case, name).law
+    values = values_of(case, name)
+    numbers = law.response(values, 1j * OMEGA)[0]
+    row = np.array([np.broadcast_to(entry, OMEGA.shape) for entry in numbers]).T
+    state = law.controller(values).response_at(1j * OMEGA)[:, 0]
+    size = np.abs(state).max(axis=0)
+    assert np.abs(row - state).max(axis=0) == pytest.approx(np.zeros(size.size), abs=1e-9) or (
+        np.all(np.abs(row - state) <= 1e-9 * size)
+    )
+    x = ca.MX.sym("x", len(values))
+    symbols = [x[k] for k in range(len(values))]
+    s = Phasor(0.0, ca.DM(OMEGA))
+    for entry, wanted in zip(law.response(symbols, s)[0], row.T, strict=True):
+        parts = [entry.re, entry.im] if isinstance(entry, Phasor) else [entry, 0.0]
+        ones = ca.DM.ones(OMEGA.size)
+        found = ca.Function("f", [x], [part * ones for part in parts])(values)
+        re, im = (np.array(part).ravel() for part in found)
+        assert re + 1j * im == pytest.approx(wanted, rel=1e-9, abs=1e-12)
+    A = law.controller(values).A
+    wanted_characteristic = [np.linalg.det(p * np.eye(len(A)) - A) for p in 1j * OMEGA]
+    found_characteristic = np.broadcast_to(law.characteristic(values, 1j * OMEGA), OMEGA.shape)
+    assert found_characteristic == pytest.approx(np.array(wanted_characteristic), rel=1e-8)
+
+
+def test_combined_is_the_law_of_the_page(crane: Case) -> None:
+    law = pose_structure(crane, "combined").law
+    motor = structure_named("combined", crane).motor  # type: ignore[union-attr]
+    s = 1j * OMEGA
+    p = CRANE
+    n, w, z = motor.per_rope_speed, p["rolloff.corner"], p["rolloff.damping"]
+    low = w**2 / (s**2 + 2 * z * w * s + w**2)
+    lead = (1 + p["heave.lead"] * s) / (1 + s / p["heave.bandwidth"]) * p["heave.gain"]
+    wanted = {
+        "payload.acceleration": -n * p["payload.acceleration_gain"] * low,
+        "payload.velocity": -n * p["payload.velocity_gain"] * low,
+        "payload.displacement": -n * p["payload.position_gain"] * low,
+        "mru.heave": -n * p["drum.position_gain"] * lead,
+        "mru.heave_rate": -n * lead,
+        "drum.haul": -n * p["drum.position_gain"] * np.ones(s.size),
+    }
+    controller = law.controller([p[name.name] for name in law.parameters])
+    found = controller.response_at(s)[:, 0]
+    assert set(controller.measurements) == set(wanted)
+    for k, name in enumerate(controller.measurements):
+        assert found[:, k] == pytest.approx(wanted[name], rel=1e-9), name
+
+
+def test_a_torque_drive_gets_a_speed_gain_and_the_steady_command(spring: Case) -> None:
+    structure = structure_named("feed-forward", spring)
+    law = pose_structure(spring, "feed-forward").law
+    found = dict(zip((p.name for p in law.parameters), values_of(spring, "feed-forward"), strict=1))
+    found |= {"heave.lead": 0.0, "heave.bandwidth": 100.0, "heave.gain": 1.0}
+    controller = law.controller([found[p.name] for p in law.parameters])
+    slow = controller.response_at([1e-9j])[0, 0].real
+    at = dict(zip(controller.measurements, slow, strict=True))
+    motor, k = structure.motor, found["drum.speed_gain"]  # type: ignore[union-attr]
+    # A drum that moves as asked leaves the command at what a steady speed costs.
+    steady = at["motor.speed"] * motor.per_rope_speed * 1.0 + at["mru.heave_rate"] * -1.0
+    assert steady == pytest.approx(motor.per_rope_speed * motor.feed)
+    assert at["drum.haul"] == pytest.approx(-k * motor.per_rope_speed * found["drum.position_gain"])
+
+
+@pytest.mark.parametrize("name", ["combined", "feed-forward", "drum-feedback", "constant-tension"])
+def test_guard_sees_every_unstable_pole_of_the_loop(name: str, crane: Case) -> None:
+    posed = pose_structure(crane, name)
+    plant = posed.plant.without_delays(4)
+    law = posed.law
+    yu = posed.plant.response(OMEGA).yu
+    verdicts = set()
+    for values in law.draw(qmc.Sobol(law.dimensions, seed=5).random_base2(5), OMEGA, yu):
+        row = [float(v) for v in values]
+        guard = np.linalg.eigvals(law.closed_loop_matrix(plant, row)).real.max()
+        whole = np.linalg.eigvals(closed_loop_matrix(plant, law.controller(row))).real.max()
+        assert (guard < 0.0) == (whole < 0.0)
+        verdicts.add(bool(guard < 0.0))
+    assert True in verdicts
+
+
+@pytest.mark.parametrize("name", DIAGRAMS)
+def test_candidates_keep_their_bounds_and_some_are_stable(name: str, crane: Case) -> None:
+    posed = pose_structure(crane, name)
+    problem = posed.problem(posed.limits)
+    points = candidates(problem, 32, 0)
+    for parameter, column in zip(posed.law.parameters, points.T, strict=True):
+        assert np.all(column >= parameter.low), parameter.name
+        assert np.all(column <= parameter.high), parameter.name
+    assert any(problem.stable(row) for row in points)
+
+
+def test_unknown_structure_is_refused(crane: Case) -> None:
+    with pytest.raises(InputError, match="combined"):
+        structure_named("combind", crane)
+    assert structure_named("low-order-3", crane).name == "low-order-3"
+    with pytest.raises(InputError):
+        structure_named("low-order-0", crane)
+
+
+def test_without_the_payload_slow_motion_is_reported_only(crane: Case) -> None:
+    forward, both = (pose_structure(crane, name) for name in ("feed-forward", "combined"))
+    assert "low_frequency" in {limit.name for limit in forward.reported}
+    assert "low_frequency" in {limit.name for limit in both.limits}
+    assert set(forward.spectra) == {"hook.heave", "mru.error"}
+    noises = {f"payload.{name}_noise" for name in ("acceleration", "velocity", "displacement")}
+    assert set(pose_structure(crane, "payload-feedback").spectra) == {"hook.heave", *noises}
+    assert set(pose_structure(crane, "constant-tension").spectra) == {
+        "hook.heave",
+        "rope.tension_noise",
+    }
+
+
+def test_payload_feedback_is_what_optimise_gains_finds(spring: Case) -> None:
+    design = optimise_structure(spring, "payload-feedback", starts=4)
+    gains = optimise_gains(spring, starts=4)
+    assert design.ok
+    assert gains.ok
+    assert design.payload_rms == pytest.approx(gains.payload_rms, rel=1e-4)
+    assert design.parts == {"hook.heave": pytest.approx(design.payload_rms, rel=1e-6)}
+    assert design.binding
+    assert "V" in design.units["a"]
+
+
+def test_a_roll_off_only_helps(spring: Case) -> None:
+    plain, filtered = (
+        optimise_structure(spring, name, starts=4).payload_rms
+        for name in ("payload-feedback", "payload-feedback-rolloff")
+    )
+    assert filtered <= 1.02 * plain  # the widest corner is late by 0.8 ms and more
+
+
+def test_feed_forward_design_is_verified_and_its_parts_add_up(followed: StructureDesign) -> None:
+    assert followed.ok, followed.status
+    assert followed.verification is not None
+    assert followed.verification.ok
+    assert set(followed.parts) == {"hook.heave", "mru.error"}
+    total = math.sqrt(sum(rms**2 for rms in followed.parts.values()))
+    assert total == pytest.approx(followed.payload_rms, rel=1e-6)
+    assert followed.payload_rms < 0.2 * followed.payload_rms_before
+    assert followed.controller.measurements[:2] == ("mru.heave", "mru.heave_rate")
+
+
+def test_more_noise_costs_gain(followed: StructureDesign) -> None:
+    noisy = followed.case.replace({"sensors.mru.noise_fraction": 0.5})
+    design = optimise_structure(noisy, "feed-forward", starts=2)
+    assert design.payload_rms > followed.payload_rms
+    assert design.parameters["heave.gain"] < followed.parameters["heave.gain"]
+
+
+@pytest.mark.parametrize(
+    ("field", "change"),
+    [
+        ("payload_rms", lambda d: 0.99 * d.payload_rms),
+        ("drag", lambda d: 1.01 * d.drag),
+        ("parts", lambda d: {**d.parts, "mru.error": 0.0}),
+        ("hook_rms", lambda d: 1.01 * d.hook_rms),
+        ("parameters", lambda d: {**d.parameters, "heave.gain": 0.9}),
+    ],
+)
+def test_a_false_claim_is_found(field: str, change: object, followed: StructureDesign) -> None:
+    false = replace(followed, **{field: change(followed)})  # type: ignore[operator]
+    assert not false.verify().ok
+
+
+def test_an_unstable_design_is_found(crane: Case) -> None:
+    posed = pose_structure(crane, "combined")
+    wild = {**CRANE, "payload.position_gain": 60.0}
+    design = StructureDesign(
+        case=crane,
+        structure="combined",
+        ok=True,
+        status="optimal",
+        parameters=wild,
+        units={},
+        payload_rms=0.02,
+        payload_rms_before=0.6,
+        hook_rms=0.46,
+        parts={},
+        margins=None,
+        limits={},
+        drag=posed.question.drag_before,
+        drag_before=posed.question.drag_before,
+        masses=posed.question.masses,
+    )
+    checked = design.verify()
+    assert not checked.ok
+    assert not _named(checked.checks, "winding number").ok
+
+
+def _named(checks: tuple[Check, ...], name: str) -> Check:
+    return next(check for check in checks if check.name == name)
+
+
+def test_simulated_combined_structure_has_the_predicted_rms(crane: Case) -> None:
+    posed = pose_structure(crane, "combined")
+    controller = posed.law.controller([CRANE[p.name] for p in posed.law.parameters])
+    drag, omega = 3000.0, np.geomspace(1e-3, 60.0, 30_001)
+    T = 0.01
+    # The loop with the hold of the samples in it, by this test's own formulas.
+    plant = pose_plant(crane, drag)
+    blocks = plant.response(omega)
+    late = 1j * omega * T
+    law = controller.response_at(1j * omega)[:, 0] * (-np.expm1(-late) / late)[:, None]
+    closed = 1.0 - np.einsum("kj,kj->k", law, blocks.yu[:, :, 0])
+    row = blocks.outputs.index("payload.displacement")
+    variance = 0.0
+    for name, density in posed.spectra.items():
+        column = blocks.disturbances.index(name)
+        heard = np.einsum("kj,kj->k", law, blocks.yw[:, :, column])
+        response = blocks.zw[:, row, column] + blocks.zu[:, row, 0] * heard / closed
+        values = density(omega) if callable(density) else density.density(omega)
+        variance += float(np.trapezoid(np.abs(response) ** 2 * values, omega))
+    feedback = LinearFeedback(crane, controller, sample_time=T)
+    linear = {
+        "payload.quadratic_drag": 0.0,
+        "payload.linear_drag": drag,
+        "winch.gear_switching": 0.0,
+    }
+    simulation = prepare(crane, feedback, limits=DriveLimits(), parameters=linear)
+    runs = [run_simulation(simulation, seed=s, duration=1260.0, settle=60.0) for s in range(6)]
+    found = [r.statistics["payload.displacement"].standard_deviation ** 2 for r in runs]
+    error = np.std(found, ddof=1) / math.sqrt(len(found))
+    assert abs(np.mean(found) - variance) < 3.0 * error
+    assert error < 0.05 * variance  # or the test says little
+
+
+def pose_plant(case: Case, drag: float) -> object:
+    from models.sensing.plant import sensed_plant
+
+    return sensed_plant(case, drag=drag).select(
+        measurements=structure_named("combined", case).measurements
+    )

@@ -1,0 +1,204 @@
+"""Loops by the thousand: their poles, peaks and nodes against one loop at a time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from designs import thesis_design
+
+from models import load_case
+from models.plant.plant import build_plant
+from models.plant.rope import lump_rope
+from models.spread import LogNormal, Normal, Spread
+from synth import evaluate_gains
+from synth.loop.controller import closed_loop_poles
+from synth.question.question import pose
+from synth.structures.structure import PayloadFeedback
+from synth.sweeps.calming import calming_drag
+from synth.sweeps.chain import ChainLoops
+from synth.sweeps.frequency import FrequencyEngine
+from synth.sweeps.kernel import hurwitz
+from synth.sweeps.numbers import numbers_of
+from synth.sweeps.sweep_nodes import sweep_nodes
+from synth.sweeps.winding_count import count_unstable, peak_sensitivity
+from synth.verify.recompute import LawMatrices
+from synth.verify.winding import count_unstable as wind_one
+
+FloatArray = npt.NDArray[np.float64]
+
+GAINS_ON_ROPE = {"A": 1.0, "a": 16.0, "a1": 44.0, "a2": 6.4}
+SPRING = Spread(
+    {
+        "payload.mass": "20 %",
+        "stiffness": "30 %",
+        "winch.motor.inertia": "10 %",
+        "payload.drag.coefficient": LogNormal(sigma=0.3),
+        "gains.a": "50 %",
+        "gains.a1": "60 %",
+        "gains.a2": "80 %",
+    }
+)
+
+
+def closed_poles(engine: FrequencyEngine, row: FloatArray) -> npt.NDArray[np.complex128]:
+    """Poles of a loop without delay, from the state space; its drag is given."""
+    case = engine.spread.case_at(row)
+    plant = build_plant(case, engine.design.masses).linearise(drag=case.payload.fixed_drag or 0.0)
+    own = engine.spread.gains(row)
+    law = PayloadFeedback().bind(plant).controller([own[name] for name in ("a", "a1", "a2")])
+    return closed_loop_poles(plant, law)
+
+
+def chains(masses: int, count: int, seed: int, delay: float) -> tuple[FrequencyEngine, ChainLoops]:
+    """Loops of random gains of either sign around the crane's rope, lightly damped."""
+    case = load_case("subsea-crane").replace(
+        {
+            "rope.masses": masses,
+            "rope.damping_ratio": 0.003,
+            "payload.drag": {"method": "given", "coefficient": 3000.0},
+            "sensors.telemetry.delay": delay,
+        }
+    )
+    wide = {
+        f"gains.{name}": Normal(0.0, size) for name, size in (("a", 25), ("a1", 60), ("a2", 40))
+    }
+    design = replace(evaluate_gains(case, GAINS_ON_ROPE), verification=None)
+    engine = FrequencyEngine(design, Spread({**wide, "payload.mass": "40 %", "depth": "-0 %"}))
+    rows = engine.spread.sample(count, seed=seed)
+    numbers, _ = numbers_of(case, engine.spread, rows)
+    gains = np.stack(
+        [rows[:, engine.spread.paths.index(f"gains.{g}")] for g in ("a", "a1", "a2")], 1
+    )
+    return engine, ChainLoops(numbers, gains, numbers.fixed_drag, lumps=lump_rope(masses))
+
+
+@pytest.mark.parametrize("degree", range(1, 10))
+def test_rouths_array_knows_stable_polynomials(degree: int) -> None:
+    rng = np.random.default_rng(degree)
+    # Roots on both sides, over four decades of size: half of the polynomials are stable.
+    count = 3000
+    columns = np.empty((count, degree + 1))
+    stable = np.empty(count, dtype=bool)
+    for k in range(count):
+        sizes = 10.0 ** rng.uniform(-2.0, 2.0, degree)
+        chance = 0.5 ** (1.0 / degree)
+        roots: list[complex] = []
+        while len(roots) < degree:
+            left = -1.0 if rng.uniform() < chance else 1.0
+            size = sizes[len(roots)]
+            if degree - len(roots) > 1 and rng.uniform() < 0.6:
+                turn = rng.uniform(0.02, 1.55)
+                root = size * complex(left * np.sin(turn), np.cos(turn))
+                roots += [root, root.conjugate()]
+            else:
+                roots.append(left * size)
+        columns[k] = rng.uniform(-3.0, 3.0) * np.poly(roots)[::-1].real
+        stable[k] = all(root.real < 0.0 for root in roots)
+    found = hurwitz([np.ascontiguousarray(c) for c in columns.T])
+    np.testing.assert_array_equal(found, stable)
+    assert 0.1 < stable.mean() < 0.9
+
+
+@pytest.mark.parametrize("masses", [1, 3, 10])
+def test_winding_number_counts_the_eigenvalues(masses: int) -> None:
+    engine, loops = chains(masses, 60, seed=masses, delay=0.0)
+    rows = engine.spread.sample(60, seed=masses)
+    counts = count_unstable(loops)
+    expected = [int((closed_poles(engine, row).real > 0.0).sum()) for row in rows]
+    assert counts.tolist() == expected
+    assert 5 < sum(n == 0 for n in expected) < 55
+
+
+def test_winding_number_with_delay_is_that_of_one_loop_followed_alone() -> None:
+    engine, loops = chains(8, 10, seed=5, delay=0.25)
+    rows = engine.spread.sample(10, seed=5)
+    counts = count_unstable(loops)
+    expected = []
+    for row in rows:
+        question = pose(engine.spread.case_at(row), engine.design.masses)
+        view = question.assess({"A": 1.0, **engine.spread.gains(row)})
+        law = LawMatrices.of(view.controller, view.plant)
+
+        def difference(s: npt.NDArray[np.complex128], view=view, law=law):  # type: ignore[no-untyped-def]
+            through = law(s) @ view.plant.response_at(s).yu
+            return 1.0 - through[:, 0, 0]
+
+        poles = view.plant.poles()
+        poles = np.where(np.abs(poles) < 1e-9, 0.0, poles)
+        expected.append(
+            wind_one(difference, poles=poles, marks=view.poles, per_decade=200).unstable
+        )
+    assert counts.tolist() == expected
+    assert len(set(expected)) > 1
+
+
+def test_peak_sensitivity_is_that_of_a_dense_search() -> None:
+    engine, loops = chains(6, 40, seed=2, delay=0.03)
+    rows = engine.spread.sample(40, seed=2)
+    peaks = peak_sensitivity(loops)
+    for k, row in enumerate(rows[:12]):
+        poles = closed_poles(engine, row)  # without the delay: near enough to look around
+        omega = np.geomspace(1e-3, 1e3, 60_001)
+        near = [abs(p.imag) + abs(p.real) * np.linspace(-6.0, 6.0, 4001) for p in poles]
+        omega = np.concatenate([omega, *near])
+        omega = omega[omega > 0.0]
+        closed, free = loops.responses(np.array([k]), np.asarray(1j * omega))
+        sizes = np.abs(closed / free)[0]
+        centre = float(omega[np.argmin(sizes)])
+        width = 1e-2 * centre
+        for _ in range(12):
+            fine = centre + width * np.linspace(-1.0, 1.0, 201)
+            closed, free = loops.responses(np.array([k]), np.asarray(1j * fine))
+            sizes = np.abs(closed / free)[0]
+            centre, width = float(fine[np.argmin(sizes)]), 0.1 * width
+        assert peaks[k] == pytest.approx(1.0 / sizes.min(), rel=1e-9)
+
+
+def test_spring_and_chain_agree_where_both_are_possible() -> None:
+    engine = FrequencyEngine(thesis_design(), SPRING)
+    rows = engine.spread.sample(500, seed=3)
+    found = engine.evaluate(rows)
+    numbers, _ = numbers_of(engine.case, engine.spread, rows)
+    at = [engine.spread.paths.index(f"gains.{g}") for g in ("a", "a1", "a2")]
+    loops = ChainLoops(
+        numbers, 200.0 * rows[:, at], numbers.fixed_drag, lumps=lump_rope(1, "thesis")
+    )
+    stable = found["stable"].astype(bool)
+    np.testing.assert_array_equal(count_unstable(loops) == 0, stable)
+    chosen = np.flatnonzero(stable)
+    np.testing.assert_allclose(
+        peak_sensitivity(loops, chosen), found["max_sensitivity"][chosen], rtol=1e-8
+    )
+
+
+def test_drag_from_which_a_loop_is_stable_is_where_the_axis_is_crossed() -> None:
+    engine, loops = chains(4, 12, seed=9, delay=0.05)
+    del engine
+    edge = calming_drag(loops)
+    rows = np.flatnonzero((edge > 0.0) & np.isfinite(edge))
+    assert rows.size > 3
+    never = np.flatnonzero(np.isinf(edge))
+    assert never.size > 0
+    assert np.all(count_unstable(loops.with_drag(np.array([1e12])), never) == 1)
+    edge = np.where(np.isinf(edge), 0.0, edge)
+    calm = np.setdiff1d(np.arange(12), [*rows, *never])
+    above = count_unstable(loops.with_drag(edge * 1.0001), rows)
+    below = count_unstable(loops.with_drag(edge * 0.9999), rows)
+    assert np.all(above == 0)
+    assert np.all(below > 0)
+    assert np.all(count_unstable(loops.with_drag(np.zeros(1)), calm) == 0)
+
+
+def test_gauss_kronrod_pairs_are_exact_to_their_degree() -> None:
+    for splits, degree, rough in (([], 22, 13), ([1.02, 1.05], 10, 5)):
+        # Polynomials in ln omega on one panel: weights hold the omega of d omega.
+        nodes = sweep_nodes(1.0, 1.05 if splits else 2.0, splits)
+        t = np.log(nodes.omega)
+        top = float(np.log(1.05 if splits else 2.0))
+        for rule, most in zip(nodes.weights, (degree, rough), strict=True):
+            for power in range(most + 1):
+                found = float((rule / nodes.omega) @ (t / top) ** power)
+                assert found == pytest.approx(top / (power + 1.0), rel=1e-13)
