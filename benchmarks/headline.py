@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 import stillhook as sh
-from synth.question.question import pose
+from synth.question import pose
 
 ROOT = Path(__file__).resolve().parents[1]
 CSV = ROOT / "docs" / "data" / "headline.csv"

@@ -14,10 +14,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import stillhook as sh
-from models.hook.hook import HookMotion
-from models.hook.hook_survey import hook_motion
-from models.vessel.hook_operator import case_raos
-from models.vessel.readers.files import read_raos
+from models.hook import HookMotion, hook_motion
+from models.vessel import case_raos
+from models.vessel.readers import read_raos
 
 IMAGE = Path(__file__).resolve().parents[1] / "docs" / "images" / "hook-motion.svg"
 VESSEL = {
@@ -35,8 +34,8 @@ def case(**changes: object) -> sh.Case:
 
 def picture() -> None:
     """Write the figure."""
-    from stillhook.seas.hook_plot import motion_figure
-    from stillhook.text.style import picture as drawn
+    from stillhook.seas import motion_figure
+    from stillhook.text import picture as drawn
 
     IMAGE.write_bytes(drawn(motion_figure(hook_motion(case())), "svg"))
     print(f"written: {IMAGE}")

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 import stillhook as sh
-from models.basics.intervals import Interval, mean_interval
-from models.sensing.control import Controller
+from models.basics import Interval, mean_interval
+from models.sensing import Controller
 from synth.controllers.feed_forward import lead_of
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -312,7 +312,7 @@ to before it is disengaged, ten seconds later.
 
 def figure(kind: str = "svg", seed: int = 0) -> bytes:
     """Return the figure of the page as a file of a kind, `svg` or `png`."""
-    from stillhook.text.style import AFTER, BEFORE, DRUM, REFERENCE, new_figure, picture, styled
+    from stillhook.text import AFTER, BEFORE, DRUM, REFERENCE, new_figure, picture, styled
 
     shown = {"feedback": AFTER, "feed-forward": DRUM, "lowered without compensation": BEFORE}
     with styled():

@@ -14,9 +14,8 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from mpc.linear.condensed import WATCHED, path_of_sea
-from mpc.linear.linear import LinearMPC
-from mpc.nonlinear.nonlinear import NonlinearMPC
+from mpc.linear import WATCHED, LinearMPC, path_of_sea
+from mpc.nonlinear import NonlinearMPC
 
 __all__ = ["Horizon"]
 

@@ -31,7 +31,7 @@ import numpy as np
 import numpy.typing as npt
 from mpc_horizon import Horizon
 
-from mpc.linear.condensed import WATCHED
+from mpc.linear import WATCHED
 
 __all__ = ["Peer", "acados_peer", "do_mpc_peer", "ipopt_peer"]
 

@@ -15,13 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from models import Case, load_case
-from models.sensing.control import Measurement
-from models.simulation.simulate import run_simulation
-from models.simulation.simulation import prepare
-from mpc.linear.linear import LinearMPC
-from mpc.programme.qp import SoftQP
-from mpc.winch.doubts import Doubts
-from mpc.winch.weights import Weights
+from models.sensing import Measurement
+from models.simulation import prepare, run_simulation
+from mpc.linear import LinearMPC
+from mpc.programme import SoftQP
+from mpc.winch import Doubts, Weights
 
 __all__ = [
     "HEIGHTS",

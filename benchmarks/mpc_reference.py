@@ -17,7 +17,7 @@ from mpc_questions import Recording
 from mpc_statements import Programme, slack_statement
 from scipy.sparse.linalg import splu
 
-from models.basics.checks import SolverError
+from models.basics import SolverError
 
 __all__ = ["piqp_answer", "piqp_solver", "reference", "tight_answers"]
 

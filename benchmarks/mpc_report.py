@@ -232,7 +232,7 @@ def table_of(found: Sequence[Timing]) -> str:
 
 def solver_figure(solvers: Sequence[Timing], sea: str, moves: int) -> str:
     """Return a figure of the solvers on one recording, as SVG."""
-    from stillhook.text.style import AFTER, BEFORE, REFERENCE, new_figure, picture, styled
+    from stillhook.text import AFTER, BEFORE, REFERENCE, new_figure, picture, styled
 
     chosen = [one for one in solvers if one.sea == sea and one.moves == moves]
     chosen = sorted((one for one in chosen if one.median == one.median), key=lambda a: -a.median)

@@ -49,10 +49,9 @@ from mpc_solvers import SOLVERS, version_of
 from mpc_turns import Replay, Task, measure, nothing, timed
 from mpc_wrappers import cvxpy_oracle
 
-from models.simulation.simulate import run_simulation
-from models.simulation.simulation import prepare
-from mpc.linear.linear import LinearMPC
-from mpc.nonlinear.nonlinear import NonlinearMPC
+from models.simulation import prepare, run_simulation
+from mpc.linear import LinearMPC
+from mpc.nonlinear import NonlinearMPC
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -19,8 +19,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from mpc_questions import Recording
 
-from mpc.linear.condensed import WATCHED, path_of_sea
-from mpc.linear.linear import LinearMPC
+from mpc.linear import WATCHED, LinearMPC, path_of_sea
 
 __all__ = [
     "Programme",

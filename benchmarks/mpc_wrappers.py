@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from mpc_questions import Recording
 from mpc_statements import Programme, one_sided, slack_statement, stated
 
-from mpc.linear.condensed import path_of_sea
+from mpc.linear import path_of_sea
 
 __all__ = ["casadi_any", "cvxpy_oracle", "qpsolvers_any"]
 

@@ -23,10 +23,15 @@ def main() -> None:
     import numpy as np
 
     import stillhook as sh
-    from models.basics.physics_warning import PhysicsWarning
-    from stillhook.seas.operability_plot import capability_figure, contour_figure, depth_figure
-    from stillhook.seas.operability_site_plot import heading_figure, scatter_figure
-    from stillhook.text.style import picture
+    from models.basics import PhysicsWarning
+    from stillhook.seas import (
+        capability_figure,
+        contour_figure,
+        depth_figure,
+        heading_figure,
+        scatter_figure,
+    )
+    from stillhook.text import picture
     from synth.operability import operability
 
     warnings.simplefilter("ignore", PhysicsWarning)

@@ -17,14 +17,13 @@ from pathlib import Path
 
 import numpy as np
 
-from models.basics.files import write_text_atomically
-from models.vessel.hull.lines import ShipLines
-from models.vessel.hull.vessel import HullVessel, vessel_from_hull
-from models.vessel.raos import MODES, VesselRaos
+from models.basics import write_text_atomically
+from models.vessel import MODES, VesselRaos
+from models.vessel.hull import HullVessel, ShipLines, vessel_from_hull
+from models.vessel.readers import read_raos
 from models.vessel.readers.csv_file import csv_text
-from models.vessel.readers.files import read_raos
-from stillhook.seas.hull_plot import hull_figure
-from stillhook.text.style import picture
+from stillhook.seas import hull_figure
+from stillhook.text import picture
 
 ROOT = Path(__file__).parents[1]
 PLACE = ROOT / "models" / "vessel" / "data" / "osv-83m.csv"

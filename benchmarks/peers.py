@@ -22,16 +22,12 @@ import numpy as np
 import numpy.typing as npt
 import scipy.optimize
 
-from models.basics.quadrature import Quadrature, spectral_nodes
-from models.hook.hook import HookMotion
-from models.plant.linear import LinearPlant
-from synth.limits.limits import Limit
-from synth.limits.margin_limits import LowFrequency, MaxSensitivity
-from synth.loop.assess import Assessment
-from synth.loop.controller import Controller
-from synth.loop.disturbance import disturbances
-from synth.loop.element import DragElement
-from synth.structures.structure import PayloadFeedback
+from models.basics import Quadrature, spectral_nodes
+from models.hook import HookMotion
+from models.plant import LinearPlant
+from synth.limits import Limit, LowFrequency, MaxSensitivity
+from synth.loop import Assessment, Controller, DragElement, disturbances
+from synth.structures import PayloadFeedback
 
 if TYPE_CHECKING:
     import control

@@ -31,16 +31,13 @@ import numpy as np
 import numpy.typing as npt
 
 from models import PhysicsWarning, load_case
-from models.basics.threads import one_thread
-from synth.loop.controller import closed_loop_poles
-from synth.loop.element import with_drag
-from synth.question.problem import Problem
-from synth.question.question import pose
-from synth.search.multistart import briskest, coarse_programme, start_coefficient
-from synth.search.programme import Solved
+from models.basics import one_thread
+from synth.loop import closed_loop_poles, with_drag
+from synth.question import Problem, pose
+from synth.search import Solved, briskest, coarse_programme
+from synth.search.begin import start_coefficient
 from synth.search.starts import crossover_grid
-from synth.verify.recheck import winding_of_plant
-from synth.verify.recompute import LawMatrices
+from synth.verify import LawMatrices, winding_of_plant
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -178,7 +175,7 @@ def write(rows: Sequence[Row], path: Path = CSV) -> None:
 
 def figure(rows: Sequence[Row], kind: str = "svg") -> bytes:
     """Return the sorted final costs of each question as a picture."""
-    from stillhook.text.style import AFTER, BEFORE, new_figure, picture, styled, typeset
+    from stillhook.text import AFTER, BEFORE, new_figure, picture, styled, typeset
 
     names = list(dict.fromkeys(row.question for row in rows))
     with styled():

@@ -28,8 +28,9 @@ from pathlib import Path
 
 import numpy as np
 
-from models.basics.physics_warning import PhysicsWarning
-from models.vessel import MODES, VesselRaos, read_raos, write_raos
+from models.basics import PhysicsWarning
+from models.vessel import MODES, VesselRaos
+from models.vessel.readers import read_raos, write_raos
 
 LIMIT = 1.0  # s
 
@@ -110,8 +111,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         fast = reading(["osv-83m", *own, *given.files], given.repeats)
     using(vessel, given.repeats)
     if given.picture:
-        from stillhook.seas.rao_plot import rao_figure
-        from stillhook.text.style import picture
+        from stillhook.seas import rao_figure
+        from stillhook.text import picture
 
         place = Path(given.picture)
         place.write_bytes(picture(rao_figure(vessel), place.suffix.removeprefix(".")))

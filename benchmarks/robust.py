@@ -25,18 +25,17 @@ from pathlib import Path
 import numpy as np
 
 from models import load_case
-from models.basics.physics_warning import PhysicsWarning
-from models.basics.threads import one_thread
-from synth.bound.beside import bound_beside
-from synth.design.structure_search import optimise_structure
-from synth.question.family_problem import FamilyProblem
-from synth.robust.family import Family
+from models.basics import PhysicsWarning, one_thread
+from synth.bound import bound_beside
+from synth.design import optimise_structure
+from synth.question import FamilyProblem
+from synth.robust import Family, optimise_robust
 from synth.robust.family_plants import FamilyPlants
-from synth.robust.robust import optimise_robust
 from synth.robust.worst_case import draw_check
-from synth.search.family_search import begin_points, coarse_programme, search_family
-from synth.sizing.pareto import pareto_front
-from synth.structures.winch_structures import structure_names
+from synth.search import search_family
+from synth.search.family_search import begin_points, coarse_programme
+from synth.sizing import pareto_front
+from synth.structures import structure_names
 
 DATA = Path(__file__).resolve().parents[1] / "docs" / "data"
 SEAS = ((1.5, 7.0), (2.4, 8.5), (3.5, 10.0))

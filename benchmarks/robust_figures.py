@@ -31,7 +31,7 @@ def read(name: str) -> list[dict[str, str]]:
 
 def pareto(kind: str = "svg") -> bytes:
     """Return the fronts as a picture."""
-    from stillhook.text.style import AFTER, BEFORE, new_figure, picture, styled, typeset
+    from stillhook.text import AFTER, BEFORE, new_figure, picture, styled, typeset
 
     rows = read("pareto.csv")
     names = list(dict.fromkeys(row["against"] for row in rows))
@@ -59,7 +59,7 @@ def pareto(kind: str = "svg") -> bytes:
 
 def robust(kind: str = "svg") -> bytes:
     """Return each scenario with the drum held, with gains for all and with gains of its own."""
-    from stillhook.text.style import AFTER, BEFORE, REFERENCE, new_figure, picture, styled
+    from stillhook.text import AFTER, BEFORE, REFERENCE, new_figure, picture, styled
 
     rows = read("robust.csv")
     by_objective = {
@@ -104,7 +104,7 @@ def robust(kind: str = "svg") -> bytes:
 
 def structure_bounds(kind: str = "svg") -> bytes:
     """Return the structures beside their bounds as a picture."""
-    from stillhook.text.style import AFTER, REFERENCE, new_figure, picture, styled
+    from stillhook.text import AFTER, REFERENCE, new_figure, picture, styled
 
     rows = sorted(read("structure_bounds.csv"), key=lambda r: float(r["on_the_bound_s_terms"]))
     with styled():

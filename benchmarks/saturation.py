@@ -23,8 +23,8 @@ from pathlib import Path
 import numpy as np
 
 import stillhook as sh
-from models.basics.intervals import FallTime, Share, fall_time, share
-from models.plant.drive import DriveLimits
+from models.basics import FallTime, Share, fall_time, share
+from models.plant import DriveLimits
 
 ROOT = Path(__file__).resolve().parents[1]
 CSV = ROOT / "docs" / "data" / "saturation.csv"

@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from models.sea.sea import SeaSpectrum
-from models.sea.spreading import Spreading
-from stillhook.text.style import AFTER, BEFORE, DRUM, HOOK, REFERENCE, new_figure, picture, styled
-from stillhook.text.style import typeset as math_text
+from models.sea import SeaSpectrum, Spreading
+from stillhook.text import AFTER, BEFORE, DRUM, HOOK, REFERENCE, new_figure, picture, styled
+from stillhook.text import typeset as math_text
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 HEIGHT, PERIOD = 2.5, 10.0

@@ -39,15 +39,12 @@ from simulation_report import REST, Comparison, Memory, Speed, missed, report, w
 from synthesis import markdown, plain
 
 from models import load_case
-from models.hook.hook import HookMotion
-from models.run.run import Run
-from models.run.statistics import Accumulator
-from models.sensing.control import Measurement
-from models.simulation.kernel import Kernel
+from models.hook import HookMotion
+from models.run import Accumulator, Run
+from models.sensing import Measurement
+from models.simulation import Kernel, Simulation, prepare, run_simulation
 from models.simulation.rows import RowMaker
-from models.simulation.simulate import run_simulation
-from models.simulation.simulation import Simulation, prepare
-from synth.controllers.linear_feedback import LinearFeedback
+from synth.controllers import LinearFeedback
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -26,10 +26,10 @@ import numpy as np
 import numpy.typing as npt
 import scipy.integrate
 
-from models.plant.drive import DriveLimits
-from models.plant.plant import Plant, build_plant
-from models.sensing.control import MEASURED, Measurement, recursion_of
-from models.simulation.simulation import Simulation
+from models.plant import DriveLimits, Plant, build_plant
+from models.sensing import Measurement, recursion_of
+from models.sensing.control import MEASURED
+from models.simulation import Simulation
 
 __all__ = ["Answer", "Peer"]
 

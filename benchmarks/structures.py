@@ -28,8 +28,7 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 from models import Case, PhysicsWarning, load_case
-from synth.design.structure_design import StructureDesign
-from synth.design.structure_search import optimise_structure
+from synth.design import StructureDesign, optimise_structure
 
 DELAYS = (0.1, 0.05, 0.025, 0.0)
 LENGTHS = (2000.0, 1000.0, 300.0, 100.0)

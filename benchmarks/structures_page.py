@@ -82,7 +82,7 @@ def _order(structure: str) -> tuple[bool, str]:
 
 def figure(rows: Rows, kind: str = "svg") -> bytes:
     """Return payload rms over the delay, a panel for each rope, as a picture."""
-    from stillhook.text.style import REFERENCE, new_figure, picture, styled
+    from stillhook.text import REFERENCE, new_figure, picture, styled
 
     with styled():
         sheet = new_figure(9.6, 6.0)

@@ -37,13 +37,13 @@ import numpy as np
 import numpy.typing as npt
 
 from models import load_case
-from models.basics.physics_warning import PhysicsWarning
-from models.basics.quadrature import Quadrature, spectral_nodes
-from models.hook.hook import HookMotion
+from models.basics import PhysicsWarning, Quadrature, spectral_nodes
+from models.hook import HookMotion
 from models.spread import LogNormal, Normal, Spread, Uniform
 from synth import GainDesign, evaluate_gains
-from synth.question.question import pose
-from synth.sweeps.frequency import FrequencyEngine, frequency_chunks
+from synth.question import pose
+from synth.sweeps import FrequencyEngine
+from synth.sweeps.frequency import frequency_chunks
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -296,9 +296,11 @@ def write(rows: list[Row], figures: dict[str, float]) -> None:
 
 def draw() -> None:
     """Draw the figures of docs/sweeps.md."""
-    from stillhook.sweeps.figures import cumulative_share, nyquist_cloud, scatter_matrix, violins
-    from stillhook.text.style import picture
-    from synth.sweeps.frequency import frequency_sweep
+    from stillhook.sweeps.cloud_figure import nyquist_cloud
+    from stillhook.sweeps.figures import cumulative_share, violins
+    from stillhook.sweeps.scatter_figure import scatter_matrix
+    from stillhook.text import picture
+    from synth.sweeps import frequency_sweep
 
     design = evaluate_gains(load_case("thesis-1975"), THESIS)
     wide = Spread({**SPRING.distributions, **{f"gains.{n}": "30 %" for n in ("a", "a1", "a2")}})

@@ -35,15 +35,14 @@ from typing import Any
 from synthesis import machine, markdown, plain, write_into
 
 import stillhook as sh
-from models.case.case import Case
+from models.case import Case
 from models.spread import Spread
+from stillhook.sweeps import sweep, usual_spread
 from stillhook.sweeps.header import Draw
 from stillhook.sweeps.pilots import pilot_of
-from stillhook.sweeps.sweeping import sweep
 from stillhook.sweeps.time_cases import CaseResult, CaseTask, TimeBench, TimeQuestion
 from stillhook.sweeps.time_metrics import METRICS
 from stillhook.sweeps.time_sweep import run_sweep
-from stillhook.sweeps.usual import usual_spread
 
 ROOT = Path(__file__).parents[1]
 DATA, PAGE = ROOT / "docs" / "data" / "sweep_workers.csv", ROOT / "docs" / "scaling.md"

@@ -32,7 +32,7 @@ from peers import HOOK, PAYLOAD, Answer, Exact, PythonControlLoop, SampledLoop, 
 
 from models import load_case
 from synth import LowFrequency, MaxSensitivity, Tuning, tune
-from synth.question.question import pose
+from synth.question import pose
 
 FloatArray = npt.NDArray[np.float64]
 

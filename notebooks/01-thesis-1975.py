@@ -41,10 +41,10 @@ from time_response import Sine, Step, time_response
 
 import stillhook as sh
 from models import HookMotion, PlantData, build_plant, fixed_top_modes
-from models.basics.quadrature import spectral_nodes
-from stillhook.text.style import AFTER, BEFORE, DRUM, HOOK, REFERENCE
-from synth.loop.controller import Controller, closed_loop_poles
-from synth.question.question import locked_response, pose
+from models.basics import spectral_nodes
+from stillhook.text import AFTER, BEFORE, DRUM, HOOK, REFERENCE
+from synth.loop import Controller, closed_loop_poles
+from synth.question import locked_response, pose
 
 sys.path.insert(0, str(Path.cwd().parent / "benchmarks"))
 import headline

@@ -38,17 +38,16 @@ from IPython.display import Markdown
 
 import stillhook as sh
 from models import HookMotion, build_plant
-from models.basics.quadrature import spectral_nodes
-from models.plant.drive import DriveLimits
-from models.simulation.simulate import run_simulation
-from models.simulation.simulation import prepare
-from stillhook.text.style import AFTER, BEFORE, DRUM, HOOK, REFERENCE
-from synth.loop.controller import closed_loop_poles
-from synth.question.question import pose
+from models.basics import spectral_nodes
+from models.plant import DriveLimits
+from models.simulation import prepare, run_simulation
+from stillhook.text import AFTER, BEFORE, DRUM, HOOK, REFERENCE
+from synth.loop import closed_loop_poles
+from synth.question import pose
 from synth.saturation.describing import bias_for, gaussian_response, sine_response
 from synth.saturation.limit_cycles import limit_cycles
 from synth.saturation.torque_loop import TorqueLoop
-from synth.structures.sampling import sampled_loop
+from synth.structures import sampled_loop
 
 sys.path.insert(0, str(Path.cwd().parent / "benchmarks"))
 import saturation

@@ -37,14 +37,13 @@ import numpy as np
 from IPython.display import Markdown
 
 import stillhook as sh
-from models.operation.excitation import SpectrumMotion
-from models.simulation.simulation import EASE
-from mpc.forecast.autoregressive import AdaptiveAR
-from mpc.forecast.preview import PerfectPreview
+from models.operation import SpectrumMotion
+from models.simulation import EASE
+from mpc.forecast import AdaptiveAR, PerfectPreview
 from mpc.forecast.sea_predictor import SeaPredictor
-from mpc.linear.condensed import path_of_sea
-from stillhook.text.style import AFTER, BEFORE, DRUM, HOOK, REFERENCE
-from synth.question.structure_question import pose_structure
+from mpc.linear import path_of_sea
+from stillhook.text import AFTER, BEFORE, DRUM, HOOK, REFERENCE
+from synth.question import pose_structure
 
 # %matplotlib inline
 plt.rcParams.update(

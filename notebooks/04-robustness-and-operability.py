@@ -28,8 +28,8 @@ from IPython.display import Markdown
 
 import stillhook as sh
 from models.spread import Normal, Spread, Uniform
-from stillhook.seas.operability_plot import contour_figure
-from stillhook.text.style import AFTER, BEFORE
+from stillhook.seas import contour_figure
+from stillhook.text import AFTER, BEFORE
 
 # %matplotlib inline
 case = sh.load_case("thesis-1975")

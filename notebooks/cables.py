@@ -20,13 +20,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.basics.checks import InputError
-from models.case.case import Case
-from models.hook.hook import HookMotion
-from models.plant.plant_data import PlantData
-from models.plant.rope import fixed_top_modes
-from synth.loop.margins import refine_minima
-from synth.question.question import locked_response, uncompensated
+from models.basics import InputError
+from models.case import Case
+from models.hook import HookMotion
+from models.plant import PlantData, fixed_top_modes
+from synth.loop import refine_minima
+from synth.question import locked_response, uncompensated
 
 __all__ = ["Cable", "CableStudy", "cable_study"]
 

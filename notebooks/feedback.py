@@ -19,9 +19,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.basics.signals import pick
-from models.plant.linear import LinearPlant
+from models.basics import InputError, pick
+from models.plant import LinearPlant
 
 __all__ = ["Feedback", "with_feedback"]
 

@@ -16,9 +16,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from models.basics.checks import check_range, read_only
-from models.basics.signals import pick
-from models.plant.linear import LinearPlant
+from models.basics import check_range, pick, read_only
+from models.plant import LinearPlant
 
 __all__ = ["Sine", "Step", "TimeResponse", "time_response"]
 

@@ -12,8 +12,6 @@ from __future__ import annotations
 import importlib.util
 from pathlib import Path
 
-__all__ = ["check_siblings"]
-
 SIBLINGS = ("models", "synth", "mpc")
 
 

@@ -22,8 +22,6 @@ from importlib import import_module
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-__all__ = ["build_parser", "main"]
-
 OK, NOT_OK, BAD_INPUT, OUR_FAULT, INTERRUPTED = 0, 1, 2, 3, 130
 
 _CASE = "a bundled case (see `stillhook cases`) or a case file (.yaml, .json, .toml)"
@@ -43,18 +41,22 @@ to begin with:
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
-    from . import __version__
-    from .commands.design.robust_arguments import add_pareto_arguments, add_robust_arguments
-    from .commands.design.size_arguments import add_size_arguments, add_worth_arguments
-    from .commands.design_argument import add_design_arguments
-    from .commands.run.simulate_arguments import add_simulate_arguments
-    from .commands.study.compare_arguments import add_compare_arguments
-    from .commands.study.operability_arguments import add_operability_arguments
-    from .commands.study.sensitivity_arguments import add_sensitivity_arguments
-    from .commands.study.sweep_arguments import add_sweep_arguments
-    from .commands.world.motion_arguments import add_motion_arguments
-    from .commands.world.sea_arguments import add_sea_arguments
-    from .commands.world.vessel_arguments import add_vessel_arguments
+    from ._version import __version__
+    from .commands import add_design_arguments
+    from .commands.design import (
+        add_pareto_arguments,
+        add_robust_arguments,
+        add_size_arguments,
+        add_worth_arguments,
+    )
+    from .commands.run import add_simulate_arguments
+    from .commands.study import (
+        add_compare_arguments,
+        add_operability_arguments,
+        add_sensitivity_arguments,
+        add_sweep_arguments,
+    )
+    from .commands.world import add_motion_arguments, add_sea_arguments, add_vessel_arguments
 
     raw = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(
@@ -318,7 +320,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def _failed(error: Exception) -> int:
     """Write one sentence (or one for each error in a file), and return the exit status."""
-    from models.basics.checks import InputError, StillhookError
+    from models.basics import InputError, StillhookError
 
     if isinstance(error, InputError):
         print(error, file=sys.stderr)

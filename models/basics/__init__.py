@@ -1,1 +1,72 @@
 """Foundations that every room stands on: errors, files, signals, units, quadrature, intervals."""
+
+from typing import TYPE_CHECKING
+
+from .lazy import lazy_face
+
+if TYPE_CHECKING:
+    from .arrays import BoolArray as BoolArray
+    from .arrays import ComplexArray as ComplexArray
+    from .arrays import FloatArray as FloatArray
+    from .checks import InputError as InputError
+    from .checks import SolverError as SolverError
+    from .checks import StillhookError as StillhookError
+    from .checks import SynthesisError as SynthesisError
+    from .checks import check_ascending as check_ascending
+    from .checks import check_finite as check_finite
+    from .checks import check_range as check_range
+    from .checks import read_only as read_only
+    from .dispersion import wave_number as wave_number
+    from .draws import MRU_ERROR as MRU_ERROR
+    from .draws import SENSOR_NOISE as SENSOR_NOISE
+    from .draws import TELEMETRY as TELEMETRY
+    from .draws import check_seed as check_seed
+    from .draws import draw as draw
+    from .files import reason as reason
+    from .files import replace_atomically as replace_atomically
+    from .files import write_text_atomically as write_text_atomically
+    from .hdf5_check import check_hdf5 as check_hdf5
+    from .intervals import FallTime as FallTime
+    from .intervals import Interval as Interval
+    from .intervals import Share as Share
+    from .intervals import fall_time as fall_time
+    from .intervals import mean_interval as mean_interval
+    from .intervals import share as share
+    from .metrics import THREE_HOURS as THREE_HOURS
+    from .metrics import SpectrumStatistics as SpectrumStatistics
+    from .metrics import most_probable_maximum as most_probable_maximum
+    from .metrics import peak_factor as peak_factor
+    from .metrics import spectrum_statistics as spectrum_statistics
+    from .metrics import zero_crossing_period as zero_crossing_period
+    from .panels import FrequencyAxis as FrequencyAxis
+    from .panels import cut_panels as cut_panels
+    from .panels import longest_panel as longest_panel
+    from .physics_warning import PhysicsWarning as PhysicsWarning
+    from .quadrature import Quadrature as Quadrature
+    from .quadrature import SpectralDensity as SpectralDensity
+    from .quadrature import adaptive_nodes as adaptive_nodes
+    from .quadrature import spectral_nodes as spectral_nodes
+    from .riccati import balanced_truncation as balanced_truncation
+    from .riccati import solve_lyapunov as solve_lyapunov
+    from .riccati import solve_riccati as solve_riccati
+    from .signals import pick as pick
+    from .signals import signal_delays as signal_delays
+    from .signals import signal_names as signal_names
+    from .signals import signal_rates as signal_rates
+    from .tables import DRAG_COEFFICIENTS as DRAG_COEFFICIENTS
+    from .tables import DRUM_LAYERS as DRUM_LAYERS
+    from .tables import GRAVITY as GRAVITY
+    from .tables import SEA_WATER_DENSITY as SEA_WATER_DENSITY
+    from .tables import STEEL_DENSITY as STEEL_DENSITY
+    from .tables import prism_added_mass as prism_added_mass
+    from .text import GZIP as GZIP
+    from .text import read_bytes as read_bytes
+    from .text import read_text as read_text
+    from .threads import one_thread as one_thread
+    from .units import KINDS as KINDS
+    from .units import parse_quantity as parse_quantity
+    from .units import read_quantity as read_quantity
+    from .units import units_of as units_of
+    from .white import White as White
+else:
+    __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -15,18 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-__all__ = [
-    "InputError",
-    "SolverError",
-    "StillhookError",
-    "SynthesisError",
-    "check_ascending",
-    "check_finite",
-    "check_range",
-    "read_only",
-]
-
-FloatArray = npt.NDArray[np.float64]
+from .arrays import FloatArray
 
 
 class StillhookError(Exception):

@@ -11,11 +11,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from .arrays import FloatArray
 from .tables import GRAVITY
-
-__all__ = ["wave_number"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def wave_number(omega: npt.ArrayLike, depth: float = math.inf) -> FloatArray:

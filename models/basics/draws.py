@@ -11,13 +11,10 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from .arrays import FloatArray
 from .checks import InputError
 
-__all__ = ["MRU_ERROR", "SENSOR_NOISE", "TELEMETRY", "check_seed", "draw"]
-
-FloatArray = npt.NDArray[np.float64]
 Law = Literal["normal", "uniform"]
 
 SENSOR_NOISE, TELEMETRY, MRU_ERROR = 1, 2, 3  # purposes: second entry of the seed

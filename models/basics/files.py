@@ -9,8 +9,6 @@ from pathlib import Path
 
 from .checks import InputError
 
-__all__ = ["reason", "replace_atomically", "write_text_atomically"]
-
 
 def replace_atomically(path: str | Path, write: Callable[[Path], object]) -> Path:
     """Let `write` write a file under a temporary name beside it, then rename.

@@ -13,8 +13,6 @@ from pathlib import Path
 
 from .checks import InputError
 
-__all__ = ["HDF5", "check_hdf5"]
-
 HDF5 = b"\x89HDF\r\n\x1a\n"
 """How an HDF5 file begins."""
 

@@ -15,11 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from .arrays import FloatArray
 from .checks import InputError, check_finite, check_range, read_only
-
-__all__ = ["FallTime", "Interval", "Share", "fall_time", "mean_interval", "share"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,20 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from .arrays import FloatArray
 from .checks import check_range
 from .quadrature import Quadrature
 
-__all__ = [
-    "THREE_HOURS",
-    "SpectrumStatistics",
-    "moments",
-    "most_probable_maximum",
-    "peak_factor",
-    "spectrum_statistics",
-    "zero_crossing_period",
-]
-
-FloatArray = npt.NDArray[np.float64]
 Density = Callable[[FloatArray], npt.ArrayLike]
 
 THREE_HOURS = 10800.0

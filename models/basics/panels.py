@@ -13,13 +13,9 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from .arrays import FloatArray
 from .checks import InputError, check_range
-
-__all__ = ["FrequencyAxis", "cut_panels", "distance", "longest_panel"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class FrequencyAxis:

@@ -7,8 +7,6 @@ may import it at no cost and a user can filter on it.
 
 from __future__ import annotations
 
-__all__ = ["PhysicsWarning"]
-
 
 class PhysicsWarning(UserWarning):
     """The input is allowed but physically implausible, or a result leans on an assumption."""

@@ -29,12 +29,9 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from .arrays import FloatArray
 from .checks import InputError, SolverError, check_finite, check_range, read_only
 from .panels import FrequencyAxis, cut_panels, distance, longest_panel
-
-__all__ = ["Quadrature", "SpectralDensity", "adaptive_nodes", "spectral_nodes"]
-
-FloatArray = npt.NDArray[np.float64]
 
 # Rules that the adaptive scheme tries on a panel before it cuts the panel in two.
 # Shorter ones (3, 5) were tried: across an unannounced kink two of them can agree by accident.

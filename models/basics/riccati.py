@@ -15,14 +15,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
+from .arrays import FloatArray
 from .checks import SolverError
-
-__all__ = ["Riccati", "balanced_truncation", "solve_lyapunov", "solve_riccati"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _REFINEMENTS = 3
 _SOLVED = 1e-13  # relative change of X below which a refinement is the last one

@@ -7,8 +7,6 @@ from types import MappingProxyType
 
 from .checks import InputError, check_range
 
-__all__ = ["pick", "signal_delays", "signal_names", "signal_rates"]
-
 
 def pick(owner: str, kind: str, names: Sequence[str], wanted: Sequence[str]) -> list[int]:
     """Return the positions of the `wanted` names.

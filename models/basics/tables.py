@@ -15,16 +15,6 @@ import numpy as np
 
 from .checks import check_range
 
-__all__ = [
-    "ADDED_MASS_PRISM",
-    "DRAG_COEFFICIENTS",
-    "DRUM_LAYERS",
-    "GRAVITY",
-    "SEA_WATER_DENSITY",
-    "STEEL_DENSITY",
-    "prism_added_mass",
-]
-
 GRAVITY = 9.80665
 """Standard gravity [m/s2]."""
 

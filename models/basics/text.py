@@ -9,8 +9,6 @@ from pathlib import Path
 from .checks import InputError
 from .files import reason
 
-__all__ = ["GZIP", "read_bytes", "read_text"]
-
 _LARGEST = 500_000_000  # bytes: what still fits in memory several times over
 GZIP = b"\x1f\x8b"
 """How a file that is packed with gzip begins."""

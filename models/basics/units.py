@@ -17,8 +17,6 @@ from dataclasses import dataclass
 
 from .checks import InputError
 
-__all__ = ["KINDS", "Kind", "parse_quantity", "read_quantity", "units_of"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Kind:

@@ -10,11 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from .arrays import FloatArray
 from .checks import check_range
-
-__all__ = ["White"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

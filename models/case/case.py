@@ -17,21 +17,23 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
-from ..basics.checks import InputError
-from ..basics.physics_warning import PhysicsWarning
-from ..casefile.data_file import FOLDER
-from ..casefile.messages import Path, describe, line_of, message_line
-from ..casefile.paths import plain, replaced
-from ..casefile.section import Section, problems
-from ..casefile.yaml_lines import yaml_text
-from ..rig.limits import GainBounds, Gains, Limits
-from ..rig.rig import Payload, Rope
-from ..rig.sensors import Sensors
-from ..rig.winch import Winch
-from .environment import Sea, Vessel
+from ..basics import InputError, PhysicsWarning
+from ..casefile import (
+    FOLDER,
+    Path,
+    Section,
+    describe,
+    line_of,
+    message_line,
+    plain,
+    problems,
+    replaced,
+    yaml_text,
+)
+from ..rig import GainBounds, Gains, Limits, Payload, Rope, Sensors, Winch
+from ..sea import Sea
+from ..vessel import Vessel
 from .plausibility import contradictions, remarks
-
-__all__ = ["Case", "PhysicsWarning"]
 
 
 class Case(Section):

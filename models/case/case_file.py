@@ -14,14 +14,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ..basics.checks import InputError
-from ..casefile.messages import Path as FieldPath
-from ..casefile.messages import message_line
-from ..casefile.toml import toml_lines
-from ..casefile.yaml_lines import read_yaml
+from ..basics import InputError
+from ..casefile import Path as FieldPath
+from ..casefile import message_line, read_yaml, toml_lines
 from .case import Case
-
-__all__ = ["bundled_cases", "case_schema", "load_case", "template_text"]
 
 _TEMPLATE = "template"
 

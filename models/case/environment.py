@@ -5,8 +5,3 @@ the hook in `models.hook.hook`.
 """
 
 from __future__ import annotations
-
-from ..sea.sea_section import Sea, SeaPart
-from ..vessel.vessel_section import HeaveRAO, Vessel
-
-__all__ = ["HeaveRAO", "Sea", "SeaPart", "Vessel"]

@@ -9,13 +9,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ..basics.checks import InputError
-from ..rig.winch import DCMotor
+from ..basics import InputError
+from ..rig import DCMotor
 
 if TYPE_CHECKING:
     from .case import Case
-
-__all__ = ["contradictions", "remarks"]
 
 Finding = tuple[str, str]
 

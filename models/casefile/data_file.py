@@ -18,8 +18,6 @@ from pydantic_core import CoreSchema, core_schema
 
 from .quantity import custom_error
 
-__all__ = ["FOLDER", "DataFile"]
-
 FOLDER = "folder"
 """Key of the case file's folder in pydantic's validation context."""
 

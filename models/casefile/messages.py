@@ -16,8 +16,6 @@ from pydantic import ValidationError
 from .quantity import Quantity
 from .section import Section
 
-__all__ = ["describe", "discriminator", "message_line", "path_text", "sections_of", "suggestion"]
-
 Path = tuple[str | int, ...]
 
 

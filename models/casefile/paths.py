@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..basics.checks import InputError
+from ..basics import InputError
 from .messages import discriminator, path_text, sections_of, suggestion
 from .section import Section
-
-__all__ = ["plain", "replaced"]
 
 
 def plain(value: Any) -> Any:

@@ -16,10 +16,8 @@ from typing import Any
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from ..basics.checks import InputError, _range_text
-from ..basics.units import KINDS, read_quantity, units_of
-
-__all__ = ["Quantity", "custom_error"]
+from ..basics import KINDS, InputError, read_quantity, units_of
+from ..basics.checks import _range_text
 
 
 def custom_error(message: str, **context: Any) -> PydanticCustomError:

@@ -12,10 +12,8 @@ from typing import Any, ClassVar
 from pydantic import BaseModel, ConfigDict, PrivateAttr, ValidationError
 from pydantic_core import PydanticCustomError
 
-from ..basics.checks import InputError
+from ..basics import InputError
 from .quantity import custom_error
-
-__all__ = ["Section", "problems"]
 
 
 class Section(BaseModel):

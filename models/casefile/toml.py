@@ -10,8 +10,6 @@ from __future__ import annotations
 import re
 import tomllib
 
-__all__ = ["toml_lines"]
-
 Path = tuple[str | int, ...]
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")

@@ -16,10 +16,8 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
-from ..basics.checks import InputError
+from ..basics import InputError
 from .messages import message_line
-
-__all__ = ["read_yaml", "yaml_text"]
 
 Path = tuple[str | int, ...]
 

@@ -29,18 +29,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_finite, read_only
-from ..basics.dispersion import wave_number
-from ..basics.tables import GRAVITY
-from ..vessel.hook_operator import case_raos, hook_operators
-from ..vessel.vessel import HeaveRao
+from ..basics import GRAVITY, FloatArray, InputError, check_finite, read_only, wave_number
+from ..vessel import HeaveRao, case_raos, hook_operators
 
 if TYPE_CHECKING:
-    from ..case.case import Case
+    from ..case import Case
 
-__all__ = ["Encounter", "MetSpectrum", "speed_along"]
-
-FloatArray = npt.NDArray[np.float64]
 
 # Spacing of the waves whose energy is mapped, and of the curve through E, relative to frequency.
 _FINE, _COARSE = 0.0015, 0.006

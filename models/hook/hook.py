@@ -24,21 +24,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_range, read_only
-from ..basics.metrics import SpectrumStatistics, spectrum_statistics
-from ..basics.physics_warning import PhysicsWarning
-from ..basics.quadrature import Quadrature, adaptive_nodes
-from ..sea.sea import SeaSpectrum
-from ..vessel.hook_operator import speed_remark
-from ..vessel.vessel import HeaveRao, OutsideShare
+from ..basics import (
+    FloatArray,
+    InputError,
+    PhysicsWarning,
+    Quadrature,
+    SpectrumStatistics,
+    adaptive_nodes,
+    check_range,
+    read_only,
+    spectrum_statistics,
+)
+from ..sea import SeaSpectrum
+from ..vessel import HeaveRao, OutsideShare, speed_remark
 from .encounter import Encounter, MetSpectrum
 
 if TYPE_CHECKING:
-    from ..case.case import Case
+    from ..case import Case
 
-__all__ = ["HookMotion", "HookRecord"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _MOTIONS = ("displacement", "velocity", "acceleration")
 

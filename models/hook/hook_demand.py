@@ -23,18 +23,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from ..basics.checks import check_range
-from ..basics.metrics import THREE_HOURS, peak_factor, zero_crossing_period
+from ..basics import THREE_HOURS, FloatArray, check_range, peak_factor, zero_crossing_period
 from .hook import HookMotion
 
 if TYPE_CHECKING:
-    from ..case.case import Case
+    from ..case import Case
 
-__all__ = ["ORDERS", "HookDemand", "MotionFigures", "fractile_factor"]
-
-FloatArray = npt.NDArray[np.float64]
 
 ORDERS = np.arange(7.0)[:, np.newaxis]
 """Orders of the displacement's moments that the figures of all three motions are made of (7, 1)."""

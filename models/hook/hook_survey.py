@@ -17,25 +17,25 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from ..basics.checks import InputError, check_finite, check_range, read_only
-from ..basics.physics_warning import PhysicsWarning
-from ..basics.quadrature import spectral_nodes
-from ..sea.sea import SeaSpectrum
-from ..vessel.crane import Point, across
-from ..vessel.hook_operator import case_raos, equivalent, heave_operators, sea_directions
-from ..vessel.vessel import HeaveRao
+from ..basics import (
+    BoolArray,
+    FloatArray,
+    InputError,
+    PhysicsWarning,
+    check_finite,
+    check_range,
+    read_only,
+    spectral_nodes,
+)
+from ..sea import SeaSpectrum
+from ..vessel import HeaveRao, Point, across, case_raos, equivalent, heave_operators, sea_directions
 from .encounter import Encounter, speed_along
 from .hook_demand import ORDERS, HookDemand, MotionFigures, fractile_factor
 
 if TYPE_CHECKING:
-    from ..case.case import Case
+    from ..case import Case
 
-__all__ = ["HookSurvey", "hook_motion"]
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 HEADINGS = tuple(float(b) for b in range(0, 360, 15))
 PEAK_PERIODS = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0)

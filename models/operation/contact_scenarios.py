@@ -12,12 +12,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..basics.checks import InputError
-from ..basics.tables import GRAVITY
-from ..case.case import Case
-from ..casefile.quantity import Quantity
-from ..plant.surroundings import Deck, Seabed, SplashZone, Surroundings
-from ..sea.sea import SeaSpectrum
+from ..basics import GRAVITY, InputError
+from ..case import Case
+from ..casefile import Quantity
+from ..plant import Deck, Seabed, SplashZone, Surroundings
+from ..sea import SeaSpectrum
 from .excitation import MotionSource
 from .options import (
     Choice,
@@ -40,8 +39,6 @@ from .options import (
 )
 from .schedule import Profile
 from .second_bodies import boat_motion, surface_motion
-
-__all__ = ["CONTACT_SCENARIOS"]
 
 
 def _landing(case: Case, values: Values) -> dict[str, Any]:

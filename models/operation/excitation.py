@@ -21,32 +21,15 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-from ..basics.checks import InputError, check_range
-from ..basics.draws import check_seed
-from ..hook.hook import HookMotion
+from ..basics import FloatArray, InputError, check_range, check_seed
+from ..hook import HookMotion
 from .hermite import MotionBlock, interpolated
 from .long_record import LongRecord, seed_for
 
 if TYPE_CHECKING:
-    from ..case.case import Case
+    from ..case import Case
 
-__all__ = [
-    "HOOK",
-    "SECOND_BODY",
-    "SURFACE",
-    "Motion",
-    "MotionBlock",
-    "MotionSource",
-    "SineMotion",
-    "SpectrumMotion",
-    "StillMotion",
-    "interpolated",
-    "seed_for",
-]
-
-FloatArray = npt.NDArray[np.float64]
 
 HOOK = None
 """Purpose of a random motion that is drawn with the run's own seed."""

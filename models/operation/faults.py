@@ -16,13 +16,11 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
-from ..basics.checks import InputError, check_range
-from ..case.case import Case
-from ..casefile.messages import suggestion
-from ..plant.drive import DriveLimits
+from ..basics import InputError, check_range
+from ..case import Case
+from ..casefile import suggestion
+from ..plant import DriveLimits
 from .scenario import Scenario
-
-__all__ = ["FAULTS", "PREFIX", "FaultField", "fault_of", "with_faults"]
 
 PREFIX = "fault."
 """What the path of a fault begins with."""

@@ -11,11 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
-__all__ = ["MotionBlock", "Nodes", "interpolated"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import FloatArray
 
 Nodes = Callable[[int, int], FloatArray]
 """Gives displacement, velocity and acceleration (count, 3) of `count` nodes from one on."""

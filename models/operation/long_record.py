@@ -16,11 +16,8 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from ..hook.hook import HookMotion
-
-__all__ = ["LongRecord", "seed_for"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import FloatArray
+from ..hook import HookMotion
 
 _PIECE, _FADE = 3600.0, 600.0  # [s]
 _LONGEST_ALONE = 11400.0  # [s]

@@ -14,32 +14,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from ..basics.checks import InputError
-from ..basics.tables import GRAVITY
-from ..case.case import Case
-from ..casefile.quantity import Quantity
+from ..basics import GRAVITY, InputError
+from ..case import Case
+from ..casefile import Quantity
 from .schedule import Move, Profile
-
-__all__ = [
-    "Choice",
-    "Option",
-    "Recipe",
-    "Values",
-    "acceleration_option",
-    "begin",
-    "duration_after",
-    "length_option",
-    "lifting_speed",
-    "lowering_speed",
-    "move",
-    "payload_height",
-    "payload_side",
-    "rope_left",
-    "speed_option",
-    "time_option",
-    "wave_height",
-    "weight_in_air",
-]
 
 Values: TypeAlias = Mapping[str, Any]
 """Values of a scenario's options by name, in SI."""

@@ -31,15 +31,17 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_finite, check_range, read_only
-from ..basics.physics_warning import PhysicsWarning
-from ..basics.units import parse_quantity
+from ..basics import (
+    FloatArray,
+    InputError,
+    PhysicsWarning,
+    check_finite,
+    check_range,
+    parse_quantity,
+    read_only,
+)
 from .excitation import Motion
 from .hermite import interpolated
-
-__all__ = ["RecordMotion", "even_step", "read_columns"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _FEWEST = 8  # samples: what a spline of fifth degree needs to be one
 _UNEVEN = 0.05  # of the mean step that a sample may be early or late

@@ -19,19 +19,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_range
-from ..plant.surroundings import Surroundings
-from ..sensing.mru import Bias, check_biases
-from ..sensing.telemetry import Late, check_late
+from ..basics import FloatArray, InputError, check_range
+from ..plant import Surroundings
+from ..sensing import Bias, Late, check_biases, check_late
 from .schedule import Period, Profile, Schedule, check_periods, events
 
 if TYPE_CHECKING:
-    from ..case.case import Case
+    from ..case import Case
     from .excitation import MotionSource
-
-__all__ = ["Scenario"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def _nothing() -> Mapping[str, object]:

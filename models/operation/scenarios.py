@@ -12,16 +12,14 @@ import difflib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from ..basics.checks import InputError
+from ..basics import InputError
 from .contact_scenarios import CONTACT_SCENARIOS
 from .options import Choice, Option, Recipe
 from .scenario import Scenario
 from .station_scenarios import STATION_SCENARIOS
 
 if TYPE_CHECKING:
-    from ..case.case import Case
-
-__all__ = ["scenario_named", "scenario_names", "scenario_options"]
+    from ..case import Case
 
 _RECIPES: Mapping[str, Recipe] = {**STATION_SCENARIOS, **CONTACT_SCENARIOS}
 

@@ -19,14 +19,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_range
+from ..basics import FloatArray, InputError, check_range
 
 if TYPE_CHECKING:
     from .scenario import Scenario
 
-__all__ = ["Move", "Period", "Profile", "Schedule", "ScheduleBlock", "check_periods", "events"]
-
-FloatArray = npt.NDArray[np.float64]
 
 Period = tuple[float, float]
 """Start (included) and end (not included) of a period of time [s]."""

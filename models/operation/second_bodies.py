@@ -12,17 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..basics.tables import GRAVITY
-from ..hook.encounter import Encounter
-from ..hook.hook import HookMotion
-from ..sea.sea import SeaSpectrum
-from ..vessel.vessel import HeaveRao
+from ..basics import GRAVITY
+from ..hook import Encounter, HookMotion
+from ..sea import SeaSpectrum
+from ..vessel import HeaveRao
 from .excitation import HOOK, SECOND_BODY, SpectrumMotion
 
 if TYPE_CHECKING:
-    from ..case.case import Case
-
-__all__ = ["boat_motion", "surface_motion"]
+    from ..case import Case
 
 
 def boat_motion(case: Case, cut_off: float = 0.9) -> SpectrumMotion:

@@ -26,14 +26,9 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_finite
-from ..basics.physics_warning import PhysicsWarning
+from ..basics import FloatArray, InputError, PhysicsWarning, check_finite
 from .excitation import Motion
 from .record_file import RecordMotion, read_columns
-
-__all__ = ["SixDofMotion", "tip_heave"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _KINDS = {
     "time": "time",

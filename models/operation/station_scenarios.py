@@ -10,8 +10,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from ..case.case import Case
-from ..casefile.quantity import Quantity
+from ..case import Case
+from ..casefile import Quantity
 from .options import (
     Choice,
     Option,
@@ -28,8 +28,6 @@ from .options import (
     time_option,
 )
 from .schedule import Profile
-
-__all__ = ["STATION_SCENARIOS"]
 
 _AFTER = 240.0  # [s] in which a failure's consequences are seen
 

@@ -14,11 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from ..basics.checks import read_only
-
-__all__ = ["DiscretePlant", "zero_order_hold"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import FloatArray, read_only
 
 
 def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:

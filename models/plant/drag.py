@@ -15,15 +15,7 @@ from collections.abc import Callable
 from scipy.optimize import brentq
 from scipy.special import erf
 
-from ..basics.checks import SolverError, check_range
-
-__all__ = [
-    "consistent_drag",
-    "energy_equivalent",
-    "gaussian_gain",
-    "gaussian_mean",
-    "stochastic_equivalent",
-]
+from ..basics import SolverError, check_range
 
 _OWNER = "drag"
 

@@ -25,13 +25,11 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 
-from ..basics.checks import check_range
+from ..basics import check_range
 
 if TYPE_CHECKING:
-    from ..case.case import Case
+    from ..case import Case
     from .plant_data import PlantData
-
-__all__ = ["DriveLimits", "MotorEquations", "motor_equations"]
 
 SPEED_BAND = 0.02  # of the highest speed, over which the driving torque closes [-]
 

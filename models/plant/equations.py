@@ -27,20 +27,9 @@ if TYPE_CHECKING:
     from .rope import RopeLumps
     from .surroundings import Surroundings
 
-__all__ = [
-    "DISTURBANCES",
-    "INPUTS",
-    "MEASUREMENTS",
-    "RATES",
-    "Equations",
-    "build_equations",
-    "displacement_names",
-    "parameter_values",
-]
-
 INPUTS = ("drive.command",)
 DISTURBANCES = ("hook.heave", "hook.heave_rate", "payload.force", "drive.set_point")
-MEASUREMENTS = ("payload.acceleration", "payload.velocity", "payload.displacement")
+MEASUREMENTS: tuple[str, ...] = ("payload.acceleration", "payload.velocity", "payload.displacement")
 RATES = {"hook.heave_rate": "hook.heave"}
 MOTION = ("displacement", "velocity", "acceleration")  # of whatever else moves: deck, surface
 

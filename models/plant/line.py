@@ -23,15 +23,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_finite, check_range
+from ..basics import ComplexArray, InputError, check_finite, check_range
 from .equations import DISTURBANCES, INPUTS, MEASUREMENTS, RATES
 from .plant_data import PlantData, as_plant_data
-from .response import ComplexArray, PlantResponse
+from .response import PlantResponse
 
 if TYPE_CHECKING:
-    from ..case.case import Case
-
-__all__ = ["line_response", "line_response_at", "rope_transfers"]
+    from ..case import Case
 
 _OWNER = "line response"
 

@@ -22,18 +22,25 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from ..basics.checks import InputError, check_finite, check_range, read_only
-from ..basics.signals import pick, signal_delays, signal_names, signal_rates
+from ..basics import (
+    ComplexArray,
+    FloatArray,
+    InputError,
+    check_finite,
+    check_range,
+    pick,
+    read_only,
+    signal_delays,
+    signal_names,
+    signal_rates,
+)
 from .discrete import DiscretePlant, zero_order_hold
 from .pade import pade_bank
-from .response import ComplexArray, PlantResponse, state_space_response
+from .response import PlantResponse, state_space_response
 
 if TYPE_CHECKING:
     import control
 
-__all__ = ["LinearPlant", "PlantResponse"]
-
-FloatArray = npt.NDArray[np.float64]
 _OWNER = "linear plant"
 
 

@@ -10,13 +10,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from ..basics.checks import check_range
-
-__all__ = ["pade_bank", "pade_state_space"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import FloatArray, check_range
 
 
 def pade_state_space(

@@ -15,12 +15,10 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 
-from ..basics.checks import check_range
+from ..basics import check_range
 
 if TYPE_CHECKING:
-    from ..case.case import Case
-
-__all__ = ["DrumTravel"]
+    from ..case import Case
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,24 +24,19 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 
-from ..basics.checks import SolverError, check_range, read_only
-from ..basics.signals import pick
+from ..basics import FloatArray, SolverError, check_range, pick, read_only
 from .equations import INPUTS, MEASUREMENTS, RATES, build_equations, displacement_names
 from .linear import LinearPlant
 from .plant_data import PlantData, as_plant_data
 from .rope import RopeLumps, lump_rope
 
 if TYPE_CHECKING:
-    from ..case.case import Case
+    from ..case import Case
     from .drive import DriveLimits
     from .payout import DrumTravel
     from .surroundings import Surroundings
 
-__all__ = ["MEAN_LOSSES", "OperatingPoint", "Plant", "build_plant"]
-
-FloatArray = npt.NDArray[np.float64]
 
 #: Parameters of a load that truly hangs at rest, neither hauled nor lowered: the gear has the mean
 #: of its two losses.  It is where a simulation starts and what a controller's command begins from;

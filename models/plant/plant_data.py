@@ -11,13 +11,11 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..basics.checks import InputError, check_range
+from ..basics import InputError, check_range
 from .rope import MAX_MASSES, damping_time, masses_for_bandwidth
 
 if TYPE_CHECKING:
-    from ..case.case import Case
-
-__all__ = ["PlantData", "as_plant_data"]
+    from ..case import Case
 
 # Without a design there is no crossover yet.  A loop through a rope and a motor seldom
 # crosses above 8 rad/s; five times that is what `masses: auto` holds until told better.

@@ -15,16 +15,11 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from ..basics.checks import InputError, check_finite
-from ..basics.signals import pick
+from ..basics import ComplexArray, FloatArray, InputError, check_finite, pick
 
 if TYPE_CHECKING:
     from .linear import LinearPlant
 
-__all__ = ["ComplexArray", "PlantResponse", "state_space_response"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 _OWNER = "linear plant"
 _CHUNK = 512  # points solved at a time: keeps the stacked (n, k, columns) states in the cache
 

@@ -13,27 +13,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 from scipy.optimize import brentq
 
-from ..basics.checks import InputError, check_range, read_only
+from ..basics import FloatArray, InputError, check_range, read_only
 
 if TYPE_CHECKING:
     from .plant_data import PlantData
 
-__all__ = [
-    "MAX_MASSES",
-    "MODE_TOLERANCE",
-    "RopeLumps",
-    "damping_time",
-    "fixed_top_modes",
-    "lump_rope",
-    "lumped_modes",
-    "masses_for_bandwidth",
-]
-
-FloatArray = npt.NDArray[np.float64]
 MAX_MASSES = 40  # more states cost more in every eigenvalue than they add to any design
 MODE_TOLERANCE = 0.05  # a mode is "in the model" if its frequency is met this well [-]
 

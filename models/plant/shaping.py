@@ -24,12 +24,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
-from ..basics.checks import InputError, SolverError, check_range, read_only
-
-__all__ = ["ShapingFilter", "fit_shaping_filter"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
+from ..basics import ComplexArray, FloatArray, InputError, SolverError, check_range, read_only
 
 _NODES = 240
 _TAIL_WEIGHT = 0.03  # of the tail's logarithm against the amplitude

@@ -33,17 +33,7 @@ from dataclasses import dataclass, fields
 
 import casadi as ca
 
-from ..basics.checks import InputError, check_range
-from ..basics.tables import GRAVITY, SEA_WATER_DENSITY
-
-__all__ = [
-    "Deck",
-    "MotionSymbols",
-    "Seabed",
-    "SplashZone",
-    "SurroundingForces",
-    "Surroundings",
-]
+from ..basics import GRAVITY, SEA_WATER_DENSITY, InputError, check_range
 
 MotionSymbols = tuple[ca.SX, ca.SX, ca.SX]
 """Displacement, velocity and acceleration of a second body or of the surface."""

@@ -14,12 +14,8 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..basics.checks import InputError
-from ..basics.tables import DRUM_LAYERS
-from ..casefile.quantity import Quantity, custom_error
-from ..casefile.section import Section, problems
-
-__all__ = ["Drum", "DrumGeometry", "DrumLayer"]
+from ..basics import DRUM_LAYERS, InputError
+from ..casefile import Quantity, Section, custom_error, problems
 
 
 class DrumLayer(Section):

@@ -6,10 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import model_validator
 
-from ..casefile.quantity import Quantity
-from ..casefile.section import Section, problems
-
-__all__ = ["GainBounds", "Gains", "Limits", "LowFrequencyLimit"]
+from ..casefile import Quantity, Section, problems
 
 _Length = Annotated[float, Quantity("length", -12000.0, 12000.0)]
 

@@ -12,25 +12,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from ..basics.tables import (
-    DRAG_COEFFICIENTS,
-    GRAVITY,
-    SEA_WATER_DENSITY,
-    STEEL_DENSITY,
-    prism_added_mass,
-)
-from ..casefile.quantity import Quantity
-from ..casefile.section import Section, problems
-
-__all__ = [
-    "Drag",
-    "EnergyDrag",
-    "GivenDrag",
-    "Payload",
-    "Prism",
-    "Rope",
-    "StochasticDrag",
-]
+from ..basics import DRAG_COEFFICIENTS, GRAVITY, SEA_WATER_DENSITY, STEEL_DENSITY, prism_added_mass
+from ..casefile import Quantity, Section, problems
 
 
 class Rope(Section):

@@ -10,10 +10,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from ..casefile.quantity import Quantity
-from ..casefile.section import Section
-
-__all__ = ["MRU", "Encoder", "LoadCell", "PayloadSensor", "Sensors", "Telemetry"]
+from ..casefile import Quantity, Section
 
 _BANDWIDTH_LOW, _BANDWIDTH_HIGH = 0.1, 1e5
 

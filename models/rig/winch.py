@@ -13,11 +13,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from ..casefile.quantity import Quantity
-from ..casefile.section import Section, problems
+from ..casefile import Quantity, Section, problems
 from .drum import Drum
-
-__all__ = ["ACMotor", "Brake", "DCMotor", "Drive", "Gearbox", "Motor", "Winch"]
 
 
 class Gearbox(Section):

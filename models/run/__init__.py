@@ -1,1 +1,23 @@
 """One run in time: its series, statistics, extremes and files."""
+
+from typing import TYPE_CHECKING
+
+from ..basics.lazy import lazy_face
+
+if TYPE_CHECKING:
+    from .extremes import FEWEST_MAXIMA as FEWEST_MAXIMA
+    from .extremes import ExtremeEstimate as ExtremeEstimate
+    from .extremes import extreme_over_seeds as extreme_over_seeds
+    from .files import attributes as attributes
+    from .files import to_csv as to_csv
+    from .files import to_netcdf as to_netcdf
+    from .files import to_parquet as to_parquet
+    from .metrics import Summary as Summary
+    from .run import Event as Event
+    from .run import Run as Run
+    from .run import Timings as Timings
+    from .statistics import Accumulator as Accumulator
+    from .summary import ERROR as ERROR
+    from .summary import Quantity as Quantity
+else:
+    __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

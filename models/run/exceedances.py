@@ -21,11 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import check_range
-
-__all__ = ["Exceedances", "cluster_maxima"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import FloatArray, check_range
 
 # The maximum-likelihood estimate of the shape is regular above -1/2 only (Smith 1985), and above 1
 # the excess has no mean: no motion nor force of a winch is like that.

@@ -27,22 +27,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_finite, check_range
-from ..basics.metrics import THREE_HOURS, peak_factor
+from ..basics import THREE_HOURS, FloatArray, InputError, check_finite, check_range, peak_factor
 from .exceedances import Exceedances, cluster_maxima
 from .gumbel import gumbel_errors, gumbel_fit
 from .run import Run
 from .summary import SignalStatistics, Statistics
-
-__all__ = [
-    "ExtremeEstimate",
-    "cluster_maxima",
-    "extreme_over_seeds",
-    "gumbel_maximum",
-    "pareto_maximum",
-]
-
-FloatArray = npt.NDArray[np.float64]
 
 FEWEST_MAXIMA = 8
 """Fewer block maxima than this say nothing about a law of two parameters."""

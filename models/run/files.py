@@ -24,24 +24,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..basics.checks import InputError
-from ..basics.files import reason, replace_atomically
+from ..basics import InputError, reason, replace_atomically
 
 if TYPE_CHECKING:
     import xarray
 
     from .run import Run
-
-__all__ = [
-    "attributes",
-    "read_csv",
-    "read_netcdf",
-    "read_parquet",
-    "to_csv",
-    "to_netcdf",
-    "to_parquet",
-    "to_xarray",
-]
 
 # Rows turned into text at a time: a day's run must not be held as text.
 _ROWS_AT_ONCE = 4096

@@ -14,9 +14,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["gumbel_errors", "gumbel_fit"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import FloatArray
 
 
 def gumbel_fit(maxima: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:

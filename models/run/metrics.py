@@ -14,12 +14,18 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..basics.checks import InputError, check_range
-from ..basics.intervals import FallTime, Interval, Share, fall_time, mean_interval, share
+from ..basics import (
+    FallTime,
+    InputError,
+    Interval,
+    Share,
+    check_range,
+    fall_time,
+    mean_interval,
+    share,
+)
 from .run import Run
 from .summary import Statistics, unknown
-
-__all__ = ["Summary"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

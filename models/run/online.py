@@ -16,9 +16,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["BlockExtremes", "Cycles", "FirstTime", "Flow", "Moments", "Slack", "Touchdown"]
+from ..basics import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 SmallArray: TypeAlias = npt.NDArray[np.float32]
 
 

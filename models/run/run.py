@@ -17,17 +17,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError
+from ..basics import FloatArray, InputError
 from .summary import Statistics, unknown
 
 if TYPE_CHECKING:
     import xarray
 
-    from ..case.case import Case
+    from ..case import Case
 
-__all__ = ["Event", "Run", "Timings"]
-
-FloatArray = npt.NDArray[np.float64]
 
 # Events printed with a run: the first few say what went wrong.
 _EVENTS_SHOWN = 6

@@ -22,13 +22,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_range
+from ..basics import FloatArray, InputError, check_range
 from .online import BlockExtremes, Cycles, FirstTime, Flow, Moments, Slack, Touchdown
 from .summary import ERROR, Blocks, SignalStatistics, Statistics, quantities_of
-
-__all__ = ["ERROR", "Accumulator", "SignalStatistics", "Statistics"]
-
-FloatArray = npt.NDArray[np.float64]
 
 # Samples worked off at once: few enough to stay in the cache, many enough for numpy.
 _STRETCH = 4096

@@ -16,12 +16,8 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, read_only
+from ..basics import FloatArray, InputError, read_only
 from .online import Cycles, FirstTime, Flow, Slack, Touchdown
-
-__all__ = ["ERROR", "Blocks", "Quantity", "SignalStatistics", "Statistics", "quantities_of"]
-
-FloatArray = npt.NDArray[np.float64]
 
 ERROR = "payload.error"
 """Name of the tracking error, payload.displacement less reference.displacement."""

@@ -2,3 +2,19 @@
 
 `models.sea.sea.SeaSpectrum` is the sea of a case; the rooms here hold what it is made of.
 """
+
+from typing import TYPE_CHECKING
+
+from ..basics.lazy import lazy_face
+
+if TYPE_CHECKING:
+    from .records import SeaRecords as SeaRecords
+    from .records import read_seas as read_seas
+    from .scatter import Scatter as Scatter
+    from .scatter import read_scatter as read_scatter
+    from .sea import SeaSpectrum as SeaSpectrum
+    from .sea_section import Sea as Sea
+    from .sea_section import SeaPart as SeaPart
+    from .spreading import Spreading as Spreading
+else:
+    __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..basics.checks import InputError
-from ..basics.text import read_bytes
+from ..basics import InputError, read_bytes
 from .ndbc import is_ndbc, read_ndbc
 from .records import RawRecords
-
-__all__ = ["FORMATS", "guess_format", "read_raw"]
 
 FORMATS: dict[str, str] = {
     "ndbc": "NDBC text",

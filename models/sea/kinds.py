@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..basics.checks import InputError, check_range
-
-__all__ = ["FIELDS", "SPECTRA", "STANDARD_SPECTRA", "check_fields", "takes"]
+from ..basics import InputError, check_range
 
 STANDARD_SPECTRA = (
     "bretschneider-1975", "bretschneider", "pierson-moskowitz", "jonswap", "tma", "torsethaugen",

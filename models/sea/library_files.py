@@ -18,15 +18,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError
-from ..basics.hdf5_check import check_hdf5
-from ..basics.text import GZIP, read_bytes
+from ..basics import GZIP, FloatArray, InputError, check_hdf5, read_bytes
 from .formats import FORMATS
 from .records import RawRecords
-
-__all__ = ["read_with_library"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _READERS: dict[str, tuple[str, dict[str, Any]]] = {
     "spotter": ("spotter", {"dd": None}),  # its own directions are moments, not a second axis

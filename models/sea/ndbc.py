@@ -27,12 +27,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..basics.checks import InputError
-from ..basics.text import read_text
+from ..basics import InputError, read_text
 from .quality import Rejection
 from .records import RawRecords
-
-__all__ = ["is_ndbc", "read_ndbc"]
 
 _CODES = (999.0, 9999.0)
 _WHOLE_ROW = 99.0

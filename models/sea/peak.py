@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-__all__ = ["highest_of"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import FloatArray
 
 
 def highest_of(density: Callable[[FloatArray], FloatArray], peaks: Sequence[float]) -> float:

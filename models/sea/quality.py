@@ -15,9 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["HIGHEST_SEA", "QualityControl", "Rejection", "sift"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import FloatArray
 
 HIGHEST_SEA = 30.0
 """H_s above which a record is rejected [m]; the highest on record is 19 m."""

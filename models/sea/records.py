@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_range
+from ..basics import FloatArray, InputError, check_range
 from .quality import QualityControl, Rejection, sift
 from .scatter import Scatter
 from .table import MOST_ROWS
@@ -26,9 +26,6 @@ from .table import MOST_ROWS
 if TYPE_CHECKING:
     from .sea import SeaSpectrum
 
-__all__ = ["RawRecords", "SeaRecords", "read_seas"]
-
-FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.datetime64]
 
 

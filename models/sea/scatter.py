@@ -16,11 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_finite, check_range, read_only
-
-__all__ = ["Scatter", "read_scatter", "zero_crossing_ratio"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import FloatArray, InputError, check_finite, check_range, read_only
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

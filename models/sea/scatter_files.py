@@ -13,13 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..basics.checks import InputError
-from ..basics.files import write_text_atomically
-from ..basics.text import read_text
-from ..basics.units import KINDS
+from ..basics import KINDS, InputError, read_text, write_text_atomically
 from .scatter import Scatter, zero_crossing_ratio
-
-__all__ = ["scatter_from_csv", "write_scatter"]
 
 _NAMES = {
     "significant_height": ("significantheight", "significantwaveheight", "hs", "hm0", "swh"),

@@ -29,11 +29,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_range
-from ..basics.metrics import SpectrumStatistics, spectrum_statistics
-from ..basics.quadrature import Quadrature, adaptive_nodes
+from ..basics import (
+    FloatArray,
+    InputError,
+    Quadrature,
+    SpectrumStatistics,
+    adaptive_nodes,
+    check_range,
+    spectrum_statistics,
+)
 from . import shapes
-from .kinds import SPECTRA, STANDARD_SPECTRA, check_fields
+from .kinds import SPECTRA, check_fields
 from .peak import highest_of
 from .spreading import Spreading
 from .table import SpectrumTable
@@ -41,11 +47,8 @@ from .table import SpectrumTable
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..case.case import Case
+    from ..case import Case
 
-__all__ = ["HIGHEST_FREQUENCY", "SPECTRA", "STANDARD_SPECTRA", "SeaSpectrum"]
-
-FloatArray = npt.NDArray[np.float64]
 
 HIGHEST_FREQUENCY = 60.0
 """Where integrals over a sea end [rad/s]: a resonant loop still answers to the tail at 10 rad/s."""

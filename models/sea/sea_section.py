@@ -15,19 +15,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from ..basics.checks import InputError
-from ..basics.tables import GRAVITY
-from ..casefile.data_file import DataFile
-from ..casefile.quantity import Quantity
-from ..casefile.section import Section, problems
+from ..basics import GRAVITY, InputError
+from ..casefile import DataFile, Quantity, Section, problems
 from .kinds import FIELDS
 from .shapes import fully_developed_period, jonswap_gamma
 from .wind import fully_arisen
 
 if TYPE_CHECKING:
     from .sea import SeaSpectrum
-
-__all__ = ["Sea", "SeaPart", "SeaSpreading", "SeaTable"]
 
 _BY_WIND = ("bretschneider-1975", "bretschneider", "pierson-moskowitz")
 _MEASURED = ("table", "file", "record", "beyond")

@@ -19,21 +19,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ..basics.dispersion import wave_number
-from ..basics.tables import GRAVITY
-
-__all__ = [
-    "depth_function",
-    "fully_developed_period",
-    "gaussian_density",
-    "jonswap_gamma",
-    "library_density",
-    "thesis_density",
-]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import GRAVITY, FloatArray, wave_number
 
 _PHILLIPS = 0.0081  # alpha of Pierson and Moskowitz
 

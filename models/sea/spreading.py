@@ -28,11 +28,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import gammaln, roots_gegenbauer
 
-from ..basics.checks import InputError, check_range
-
-__all__ = ["SPREADINGS", "Spreading"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import FloatArray, InputError, check_range
 
 SPREADINGS = ("cos-2s", "cos-n")
 """The spreading laws by their names in a case file."""

@@ -14,13 +14,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from ..basics.checks import InputError, check_ascending, check_finite
-
-__all__ = ["BEYOND", "MOST_ROWS", "SpectrumTable"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import FloatArray, InputError, check_ascending, check_finite
 
 BEYOND = ("decay", "zero")
 """What a measured spectrum may be above its last row: falling with omega^-5, or zero."""

@@ -15,9 +15,7 @@ import math
 
 import numpy as np
 
-from ..basics.checks import InputError
-
-__all__ = ["WIND_TABLE", "fully_arisen"]
+from ..basics import InputError
 
 _FOOT = 0.3048
 _KNOT = 1852.0 / 3600.0

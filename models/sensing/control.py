@@ -17,22 +17,8 @@ from typing import Protocol, runtime_checkable
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 
-from ..basics.checks import InputError, check_finite, read_only
-from ..basics.signals import pick
-
-__all__ = [
-    "MEASURED",
-    "MEASURED_UNITS",
-    "Controller",
-    "Measurement",
-    "Recursion",
-    "holds_brake",
-    "recursion_of",
-]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import FloatArray, InputError, check_finite, pick, read_only
 
 MEASURED_UNITS: Mapping[str, str] = MappingProxyType(
     {

@@ -15,10 +15,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["from_mode", "integrate_to", "low_pass_pole", "mode_recursion", "noise_root", "to_mode"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
+from ..basics import ComplexArray, FloatArray
 
 
 def low_pass_pole(corner: float) -> complex:

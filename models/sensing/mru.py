@@ -19,16 +19,21 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_finite, check_range, read_only
-from ..basics.draws import MRU_ERROR, check_seed, draw
-from ..rig.sensors import MRU
+from ..basics import (
+    MRU_ERROR,
+    ComplexArray,
+    FloatArray,
+    InputError,
+    check_finite,
+    check_range,
+    check_seed,
+    draw,
+    read_only,
+)
+from ..rig import MRU
 from .lowpass import from_mode, integrate_to, low_pass_pole, mode_recursion, noise_root, to_mode
 from .telemetry import Interval, check_intervals, during
 
-__all__ = ["Bias", "MruBlock", "MruModel", "MruState", "check_biases"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 Bias = tuple[float, float, float, float]
 
 _SETTLED = 0.01  # share of the filter's transient that is left after the settling time

@@ -18,18 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from ..basics.checks import check_range
-from ..basics.white import White
-from ..case.case import Case
-from ..hook.hook import HookMotion
-from ..plant.equations import MEASUREMENTS
-from ..plant.linear import LinearPlant
-from ..plant.plant import build_plant
-from ..plant.plant_data import PlantData
-from ..rig.sensors import Sensors
+from ..basics import White, check_range
+from ..case import Case
+from ..hook import HookMotion
+from ..plant import MEASUREMENTS, LinearPlant, PlantData, build_plant
+from ..rig import Sensors
 from .mru import MruModel
-
-__all__ = ["MEASURED", "NOISES", "sensed_plant", "sensed_spectra", "with_sensors"]
 
 #: What is measured, in the order of the plant's measurements.
 MEASURED = (

@@ -22,20 +22,24 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_finite, check_range
-from ..basics.draws import SENSOR_NOISE, check_seed, draw
-from ..basics.signals import pick
-from ..rig.sensors import Encoder, LoadCell, PayloadSensor, Telemetry
+from ..basics import (
+    SENSOR_NOISE,
+    FloatArray,
+    InputError,
+    check_finite,
+    check_range,
+    check_seed,
+    draw,
+    pick,
+)
+from ..rig import Encoder, LoadCell, PayloadSensor, Telemetry
 from .control import MEASURED
 from .mru import MruBlock
 from .telemetry import Late, TelemetryBlock, TelemetrySchedule
 
 if TYPE_CHECKING:
-    from ..case.case import Case
+    from ..case import Case
 
-__all__ = ["NOISE", "RAW", "SensorModel"]
-
-FloatArray = npt.NDArray[np.float64]
 
 #: What the sensors take from the plant, by name; the payload's signals behind its filters.
 RAW = (

@@ -19,22 +19,18 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_range, read_only
-from ..basics.draws import TELEMETRY, check_seed, draw
-from ..rig.sensors import Telemetry
+from ..basics import (
+    TELEMETRY,
+    BoolArray,
+    FloatArray,
+    InputError,
+    check_range,
+    check_seed,
+    draw,
+    read_only,
+)
+from ..rig import Telemetry
 
-__all__ = [
-    "Interval",
-    "Late",
-    "TelemetryBlock",
-    "TelemetrySchedule",
-    "check_intervals",
-    "check_late",
-    "during",
-]
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]
 Interval = tuple[float, float]
 Late = tuple[float, float, float]

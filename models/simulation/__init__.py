@@ -1,1 +1,15 @@
 """Simulation in time: the closed loop as one recursion, compiled and run."""
+
+from typing import TYPE_CHECKING
+
+from ..basics.lazy import lazy_face
+
+if TYPE_CHECKING:
+    from .compiler import cache_folder as cache_folder
+    from .kernel import Kernel as Kernel
+    from .simulate import run_simulation as run_simulation
+    from .simulation import EASE as EASE
+    from .simulation import Simulation as Simulation
+    from .simulation import prepare as prepare
+else:
+    __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

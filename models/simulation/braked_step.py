@@ -16,10 +16,8 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from ..plant.plant import Plant
+from ..plant import Plant
 from .integrate import hermite_midpoint, rk4_step
-
-__all__ = ["braked_step", "disturbances"]
 
 Ends = Sequence[tuple[ca.SX, ca.SX, ca.SX]]
 """Displacement, velocity and acceleration of every motion at one moment, the hook's first."""

@@ -23,22 +23,17 @@ from typing import TYPE_CHECKING, cast
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 
-from ..plant.equations import MOTION
-from ..plant.plant import Plant
-from ..sensing.control import Recursion
-from ..sensing.sensing import SensorModel
+from ..basics import FloatArray
+from ..plant import MOTION, Plant
+from ..sensing import Recursion, SensorModel
 from .braked_step import braked_step, disturbances
 from .integrate import StepChoice
 from .rows import FLAGS
 
 if TYPE_CHECKING:
-    from ..case.case import Case
+    from ..case import Case
 
-__all__ = ["HOOK", "ClosedLoop", "build_closed_loop"]
-
-FloatArray = npt.NDArray[np.float64]
 
 HOOK = "hook"
 _SATURATED = 1e-9  # relative difference of asked and applied command that is no rounding [-]

@@ -25,9 +25,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..basics.checks import SolverError
-
-__all__ = ["Compiler", "cache_folder", "find_compiler", "load_library"]
+from ..basics import SolverError
 
 # No fast-math and no fused multiply-add: the compiled recursion must give the same numbers as
 # CasADi's virtual machine.  Hidden symbols cannot clash with those of another library.

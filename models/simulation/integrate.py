@@ -18,9 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from ..basics.checks import InputError, check_finite, check_range
-
-__all__ = ["StepChoice", "choose_step", "hermite_midpoint", "rk4_stability_limit", "rk4_step"]
+from ..basics import InputError, check_finite, check_range
 
 # casadi.SX, casadi.MX, an array or a float: the formulas are the same.
 Value: TypeAlias = Any

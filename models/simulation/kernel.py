@@ -21,12 +21,8 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import override
 
-from ..basics.checks import InputError, SolverError
+from ..basics import FloatArray, InputError, SolverError
 from .compiler import find_compiler, load_library
-
-__all__ = ["Kernel"]
-
-FloatArray = npt.NDArray[np.float64]
 
 # Python sees an interrupt only between blocks; even slow recursions take a block in a second.
 BLOCK = 8192  # rows handed to the compiled loop at once

@@ -14,17 +14,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from ..operation.excitation import Motion, MotionBlock
-from ..operation.schedule import Schedule
-from ..sensing.mru import MruModel, MruState
-from ..sensing.sensing import NOISE, SensorModel
-from ..sensing.telemetry import TelemetrySchedule
-
-__all__ = ["FLAGS", "RowMaker"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import FloatArray
+from ..operation import Motion, MotionBlock, Schedule
+from ..sensing import NOISE, MruModel, MruState, SensorModel, TelemetrySchedule
 
 FLAGS = ("engaged", "brake")
 """The last columns: share of the controller's command that reaches the drive, brake closed."""

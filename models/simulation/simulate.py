@@ -21,26 +21,19 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from ..basics.checks import check_range
-from ..basics.draws import check_seed
-from ..run.run import Event, Run, Timings
-from ..run.statistics import Accumulator
-from ..sensing.control import holds_brake
+from ..basics import FloatArray, check_range, check_seed
+from ..run import Accumulator, Event, Run, Timings
+from ..sensing import holds_brake
 from .simulation import Simulation, prepare
 from .steppers import stepper_for
 
 if TYPE_CHECKING:
-    from ..case.case import Case
-    from ..operation.excitation import MotionSource
-    from ..operation.scenario import Scenario
-    from ..plant.drive import DriveLimits
-    from ..sensing.control import Controller
+    from ..case import Case
+    from ..operation import MotionSource, Scenario
+    from ..plant import DriveLimits
+    from ..sensing import Controller
 
-__all__ = ["run_simulation", "simulate"]
-
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[float], None]
 
 CHUNK = 8192  # samples between two looks at trips, Ctrl-C and progress

@@ -14,31 +14,34 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from ..basics.checks import InputError, check_range
-from ..case.case import Case
-from ..operation.excitation import MotionSource, SpectrumMotion
-from ..operation.scenario import Scenario
-from ..operation.schedule import Schedule
-from ..plant.drive import SPEED_BAND, DriveLimits
-from ..plant.equations import displacement_names
-from ..plant.payout import DrumTravel
-from ..plant.plant import MEAN_LOSSES, OperatingPoint, Plant, build_plant
-from ..plant.surroundings import Surroundings
-from ..sensing.control import Controller, holds_brake, recursion_of
-from ..sensing.mru import MruModel
-from ..sensing.sensing import SensorModel
-from ..sensing.telemetry import TelemetrySchedule
+from ..basics import FloatArray, InputError, check_range
+from ..case import Case
+from ..operation import MotionSource, Scenario, Schedule, SpectrumMotion
+from ..plant import (
+    MEAN_LOSSES,
+    SPEED_BAND,
+    DriveLimits,
+    DrumTravel,
+    OperatingPoint,
+    Plant,
+    Surroundings,
+    build_plant,
+    displacement_names,
+)
+from ..sensing import (
+    Controller,
+    MruModel,
+    SensorModel,
+    TelemetrySchedule,
+    holds_brake,
+    recursion_of,
+)
 from .closed_loop import HOOK, ClosedLoop, build_closed_loop
 from .integrate import StepChoice, choose_step
 from .kernel import Kernel
 from .rows import RowMaker
 from .trips import TripLimit, trip_limits
-
-__all__ = ["EASE", "Simulation", "prepare"]
-
-FloatArray = npt.NDArray[np.float64]
 
 EASE = 30.0  # in which the hook's motion grows where the controller is engaged from the start [s]
 _CLOSING_TIME = 0.3  # of a brake that the case says nothing about [s]
@@ -202,9 +205,7 @@ def prepare(
         If there is no static operating point, or C was demanded and there is no compiler.
     """
     if not isinstance(scenario, Scenario):
-        from ..operation.scenarios import (
-            scenario_named,  # the library of them is only needed by name
-        )
+        from ..operation import scenario_named  # the library of them is only needed by name
 
         scenario = scenario_named(scenario or "hold", case)
     case = scenario.case_for(case)

@@ -15,19 +15,15 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-from ..basics.checks import SolverError, check_range
-from ..run.run import Event
-from ..sensing.control import Measurement
+from ..basics import FloatArray, SolverError, check_range
+from ..run import Event
+from ..sensing import Measurement
 from .trips import Trip, TripLimit, find_trip
 
 if TYPE_CHECKING:
     from .simulation import Simulation
 
-__all__ = ["Stepper", "stepper_for"]
-
-FloatArray = npt.NDArray[np.float64]
 
 Ran = tuple[FloatArray, FloatArray, Trip | None]
 

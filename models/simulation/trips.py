@@ -13,14 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from ..case.case import Case
-from ..run.run import Event
-
-__all__ = ["Trip", "TripLimit", "find_trip", "trip_limits"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import FloatArray
+from ..case import Case
+from ..run import Event
 
 # Hoists have a switch at 1.1 to 1.25 times their highest speed: a drive at the limit of its power
 # cannot hold a load that runs away.

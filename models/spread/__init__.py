@@ -6,19 +6,21 @@ A row depends on its own index and the seed alone (a Latin hypercube: on the num
 well), so that a sweep gives the same numbers in chunks of any size, on any engine, in any order.
 """
 
-from __future__ import annotations
+from typing import TYPE_CHECKING
 
-from .distributions import Distribution, LogNormal, Normal, Samples, Triangular, Uniform
-from .sampling import METHODS
-from .spread import Spread
+from ..basics.lazy import lazy_face
 
-__all__ = [
-    "METHODS",
-    "Distribution",
-    "LogNormal",
-    "Normal",
-    "Samples",
-    "Spread",
-    "Triangular",
-    "Uniform",
-]
+if TYPE_CHECKING:
+    from .distribution import Distribution as Distribution
+    from .distributions import LogNormal as LogNormal
+    from .distributions import Normal as Normal
+    from .distributions import Samples as Samples
+    from .distributions import Triangular as Triangular
+    from .distributions import Uniform as Uniform
+    from .fields import ALIASES as ALIASES
+    from .fields import DRAG as DRAG
+    from .fields import GAINS as GAINS
+    from .sampling import METHODS as METHODS
+    from .spread import Spread as Spread
+else:
+    __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

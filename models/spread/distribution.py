@@ -8,24 +8,8 @@ from collections.abc import Callable
 from dataclasses import fields
 from typing import Any, ClassVar, TypeVar
 
-import numpy as np
-import numpy.typing as npt
+from ..basics import FloatArray, InputError
 
-from ..basics.checks import InputError
-
-__all__ = [
-    "NOMINAL",
-    "TAIL",
-    "Distribution",
-    "Read",
-    "Value",
-    "cuts_of",
-    "ends_of",
-    "narrowed",
-    "number",
-]
-
-FloatArray = npt.NDArray[np.float64]
 Value = float | str
 Read = Callable[[Value], float]
 D = TypeVar("D", bound="Distribution")

@@ -14,11 +14,10 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import ndtr, ndtri
 from typing_extensions import override
 
-from ..basics.checks import InputError, check_finite, check_range
+from ..basics import FloatArray, InputError, check_finite, check_range
 from .distribution import (
     NOMINAL,
     TAIL,
@@ -30,10 +29,6 @@ from .distribution import (
     narrowed,
     number,
 )
-
-__all__ = ["KINDS", "Distribution", "LogNormal", "Normal", "Samples", "Triangular", "Uniform"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..basics.checks import InputError
-from ..basics.units import KINDS
-from ..case.case import Case
-from ..casefile.messages import suggestion
-from ..casefile.quantity import Quantity
-from ..operation.faults import PREFIX as FAULTS
-from ..operation.faults import fault_of
-
-__all__ = ["ALIASES", "DRAG", "FAULTS", "GAINS", "Field", "field_of"]
+from ..basics import KINDS, InputError
+from ..case import Case
+from ..casefile import Quantity, suggestion
+from ..operation import PREFIX as FAULTS
+from ..operation import fault_of
 
 #: Short names of what is most often varied.
 ALIASES: Mapping[str, str] = {

@@ -6,17 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ..basics.checks import InputError
-from ..basics.units import parse_quantity
+from ..basics import FloatArray, InputError, parse_quantity
 from .distribution import Distribution, Value
 from .distributions import Samples, Uniform
 from .fields import Field
 
-__all__ = ["at_ends", "copula_factor", "distribution_of", "resolved", "words"]
-
-FloatArray = npt.NDArray[np.float64]
 Pairs = Mapping[tuple[str, str], float]
 
 
@@ -102,4 +97,5 @@ def words(kind: str, values: Any) -> str:
 
 
 def short(value: Any) -> str:
+    """Return a value as a sentence shows it: six digits at the most."""
     return f"{value:.6g}" if isinstance(value, int | float) else str(value)

@@ -11,14 +11,9 @@ import itertools
 import warnings
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import ndtr, ndtri
 
-from ..basics.checks import InputError, check_range
-
-__all__ = ["METHODS", "correlated", "counted", "unit_points"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..basics import FloatArray, InputError, check_range
 
 METHODS = ("sobol", "lhs", "random", "grid", "corners", "given")
 """Ways to choose samples, by their names."""

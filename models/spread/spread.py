@@ -18,18 +18,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_range
-from ..basics.physics_warning import PhysicsWarning
-from ..case.case import Case
+from ..basics import FloatArray, InputError, PhysicsWarning, check_range
+from ..case import Case
+from ..operation import PREFIX as FAULTS
 from .distributions import Samples
-from .fields import ALIASES, DRAG, FAULTS, GAINS, Field, field_of
+from .fields import ALIASES, DRAG, GAINS, Field, field_of
 from .reading import at_ends, copula_factor, distribution_of, resolved, words
 from .sampling import correlated, counted, unit_points
 from .spread_file import read_spread, spread_text
 
-__all__ = ["Spread"]
-
-FloatArray = npt.NDArray[np.float64]
 Pairs = Mapping[tuple[str, str], float]
 
 

@@ -16,12 +16,10 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from ..basics.checks import InputError
-from ..casefile.messages import line_of, message_line, suggestion
-from ..casefile.yaml_lines import read_yaml, yaml_text
-from .distributions import KINDS, Distribution, Samples, Uniform
-
-__all__ = ["read_spread", "spread_text"]
+from ..basics import InputError
+from ..casefile import line_of, message_line, read_yaml, suggestion, yaml_text
+from .distribution import Distribution
+from .distributions import KINDS, Samples, Uniform
 
 Lines = dict[tuple[str | int, ...], int]
 Pairs = dict[tuple[str, str], float]

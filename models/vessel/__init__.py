@@ -7,17 +7,35 @@ to know another one: z up; x forward, y to port; angles by the right hand rule; 
 e^{+i omega t}; headings are where the waves travel towards, 0 following, 180 deg head sea.
 """
 
-from __future__ import annotations
+from typing import TYPE_CHECKING
 
-from .raos import MODES, VesselRaos
+from ..basics.lazy import lazy_face
 
-__all__ = ["MODES", "VesselRaos", "bundled_vessels", "read_raos", "write_raos"]
-
-
-def __getattr__(name: str) -> object:
-    # The readers are imported when one is asked for: a case without a vessel file needs none.
-    if name in {"bundled_vessels", "read_raos", "write_raos"}:
-        from .readers import files
-
-        return getattr(files, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+if TYPE_CHECKING:
+    from .assemble import finished as finished
+    from .assemble import grid as grid
+    from .assemble import numbers as numbers
+    from .assemble import read_bytes as read_bytes
+    from .assemble import text_of as text_of
+    from .convention import CHOICES as CHOICES
+    from .convention import Convention as Convention
+    from .convention import one_of as one_of
+    from .crane import Point as Point
+    from .crane import across as across
+    from .crane import place_text as place_text
+    from .crane import side_of as side_of
+    from .hook_operator import case_raos as case_raos
+    from .hook_operator import equivalent as equivalent
+    from .hook_operator import heave_operators as heave_operators
+    from .hook_operator import hook_operators as hook_operators
+    from .hook_operator import sea_directions as sea_directions
+    from .hook_operator import speed_remark as speed_remark
+    from .raos import MODES as MODES
+    from .raos import VesselRaos as VesselRaos
+    from .symmetry import SYMMETRIES as SYMMETRIES
+    from .vessel import HeaveRao as HeaveRao
+    from .vessel import OutsideShare as OutsideShare
+    from .vessel_section import HeaveRAO as HeaveRAO
+    from .vessel_section import Vessel as Vessel
+else:
+    __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

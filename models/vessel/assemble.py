@@ -14,15 +14,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError
-from ..basics.files import reason
+from ..basics import ComplexArray, FloatArray, InputError, reason
 from .raos import VesselRaos
 from .symmetry import completed, looks_symmetric
-
-__all__ = ["finished", "grid", "numbers", "read_bytes", "text_of"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 LARGEST = 200_000_000
 """Largest file that is read [bytes]; RAO files are under one megabyte."""

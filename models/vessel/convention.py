@@ -24,12 +24,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError
-
-__all__ = ["CHOICES", "Convention"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
+from ..basics import ComplexArray, FloatArray, InputError
 
 CHOICES: dict[str, tuple[str, ...]] = {
     "waves": ("frequency (rad/s)", "frequency (Hz)", "period (s)"),

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ..basics.checks import check_finite
-
-__all__ = ["Point", "across", "crane_tip", "place_text", "side_of"]
+from ..basics import check_finite
 
 Point = tuple[float, float, float]
 

@@ -17,27 +17,15 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from ..basics.checks import InputError
-from ..sea.spreading import Spreading
+from ..basics import ComplexArray, FloatArray, InputError
+from ..sea import Spreading
 from .crane import Point
 from .raos import VesselRaos
 
 if TYPE_CHECKING:
-    from ..case.case import Case
+    from ..case import Case
 
-__all__ = [
-    "case_raos",
-    "equivalent",
-    "heave_operators",
-    "hook_operators",
-    "sea_directions",
-    "speed_remark",
-]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _ALIKE = 3.0
 """Difference of speeds that hardly matters to the motions [m/s]: a Froude number of 0.1 on 80 m."""
@@ -184,7 +172,7 @@ def equivalent(operators: ComplexArray, weights: FloatArray) -> tuple[FloatArray
 @lru_cache(maxsize=16)
 def _read(name: str, modified: int, size: int) -> VesselRaos:
     del modified, size  # they only tell whether the file is the one that was read before
-    from .readers.files import read_raos
+    from .readers import read_raos
 
     return read_raos(name)
 
@@ -207,7 +195,7 @@ def _spreading(case: Case) -> Spreading | None:
 def _read_at(name: str, modified: int, size: int, speed: float) -> VesselRaos | None:
     """Return the operators of a speed; None if the file does not have them."""
     del modified, size
-    from .readers.files import read_raos
+    from .readers import read_raos
 
     try:
         return read_raos(name, speed=speed)

@@ -11,12 +11,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_range
-
-__all__ = ["WIDEST_GAP", "between_headings", "between_rows"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
+from ..basics import ComplexArray, FloatArray, InputError, check_range
 
 WIDEST_GAP = math.pi / 2.0
 """Widest gap between two headings of a table that is filled by interpolation [rad]."""

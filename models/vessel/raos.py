@@ -22,17 +22,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_ascending, check_finite, check_range, read_only
-from ..basics.dispersion import wave_number
+from ..basics import (
+    ComplexArray,
+    FloatArray,
+    InputError,
+    check_ascending,
+    check_finite,
+    check_range,
+    read_only,
+    wave_number,
+)
 from .rao_table import between_headings, between_rows
 
 if TYPE_CHECKING:
     from waveresponse import RAO
 
-__all__ = ["MODES", "VesselRaos"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 MODES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 """The six motions, in the order of the last axis of every table."""
@@ -284,7 +288,7 @@ class VesselRaos:
 
     def to_waveresponse(self) -> dict[str, RAO]:
         """Return the six motions as :class:`waveresponse.RAO` objects, named by :data:`MODES`."""
-        from .readers.waveresponse_bridge import to_waveresponse
+        from .readers import to_waveresponse
 
         return to_waveresponse(self)
 
@@ -309,7 +313,7 @@ class VesselRaos:
         InputError
             If a motion is unknown, or two of them have different frequencies or headings.
         """
-        from .readers.waveresponse_bridge import from_waveresponse
+        from .readers import from_waveresponse
 
         return from_waveresponse(raos, name=name, depth=depth)
 

@@ -12,15 +12,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from ..basics.checks import InputError
+from ..basics import ComplexArray, FloatArray, InputError
 from .raos import VesselRaos
-
-__all__ = ["SYMMETRIES", "completed", "looks_symmetric"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 SYMMETRIES = ("none", "xz plane", "yz plane", "xz and yz planes", "circular")
 """What a vessel may be symmetric about."""

@@ -23,16 +23,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..basics.checks import InputError, check_ascending, check_finite, read_only
-from ..basics.quadrature import SpectralDensity, adaptive_nodes
+from ..basics import (
+    ComplexArray,
+    FloatArray,
+    InputError,
+    SpectralDensity,
+    adaptive_nodes,
+    check_ascending,
+    check_finite,
+    read_only,
+)
 
 if TYPE_CHECKING:
-    from ..case.case import Case
+    from ..case import Case
 
-__all__ = ["BELOW", "BEYOND", "HeaveRao", "OutsideShare"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 BELOW = ("unity", "hold", "zero")
 """What the RAO may be below its table: linear to 1 at zero frequency, its first value, or 0."""

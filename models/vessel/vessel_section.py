@@ -16,17 +16,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from ..basics.checks import InputError, check_ascending
-from ..casefile.data_file import DataFile
-from ..casefile.quantity import Quantity
-from ..casefile.section import Section, problems
+from ..basics import InputError, check_ascending
+from ..casefile import DataFile, Quantity, Section, problems
 from .crane import Point, crane_tip
-
-__all__ = ["Crane", "Current", "HeaveRAO", "Hook", "Vessel"]
 
 
 def _bundled() -> Collection[str]:
-    from .readers.files import bundled_vessels  # here, as most cases have no file
+    from .readers import bundled_vessels  # here, as most cases have no file
 
     return tuple(name for name, _ in bundled_vessels())
 

@@ -17,16 +17,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.basics.files import reason, replace_atomically
+from models.basics import FloatArray, InputError, reason, replace_atomically
 
 from .problem import RecordSolution
-
-__all__ = ["distrust", "fingerprint", "store_solution", "stored_solution"]
-
-FloatArray = npt.NDArray[np.float64]
 
 FORMAT = 1  # of the entries; to be raised whenever the programme's meaning changes
 _ARRAYS = ("start", "inputs", "window_prices", "tension_prices")

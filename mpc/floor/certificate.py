@@ -26,13 +26,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
+
+from models.basics import FloatArray
 
 from .problem import RHO, RHO_START, RecordProblem, RecordSolution
-
-__all__ = ["Certificate", "certify", "rollout"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _START = 10.0  # [m, m/s] no first state deviates by more, or by more than twice the answer's
 

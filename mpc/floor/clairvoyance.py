@@ -25,12 +25,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, check_range
-from models.plant.drag import stochastic_equivalent
-from models.plant.drive import DriveLimits
-from models.plant.plant_data import PlantData
+from models.basics import FloatArray, InputError, check_range
+from models.plant import DriveLimits, PlantData, stochastic_equivalent
 
 from .cache import distrust, fingerprint, store_solution, stored_solution
 from .certificate import certify, rollout
@@ -41,12 +38,9 @@ from .qp import solve_record
 from .solvers import SOLVERS
 
 if TYPE_CHECKING:
-    from models.case.case import Case
-    from models.operation.excitation import Motion
+    from models.case import Case
+    from models.operation import Motion
 
-__all__ = ["Clairvoyant", "Start", "clairvoyant"]
-
-FloatArray = npt.NDArray[np.float64]
 _Pose = Callable[[float], RecordProblem]
 
 _OWNER = "clairvoyant"

@@ -15,9 +15,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import read_only
+from models.basics import FloatArray, read_only
 
 from .certificate import Certificate, certify, rollout
 from .plant import Hold
@@ -25,12 +24,9 @@ from .problem import RecordProblem, RecordSolution
 from .verification import RecordVerification, verify_record
 
 if TYPE_CHECKING:
-    from models.case.case import Case
-    from models.plant.drive import DriveLimits
+    from models.case import Case
+    from models.plant import DriveLimits
 
-__all__ = ["Clairvoyant", "Start", "floor_of"]
-
-FloatArray = npt.NDArray[np.float64]
 Start = Literal["free", "hook"]
 
 _AT_LIMIT = 1e-3  # closer to a limit than this share of it counts as at the limit

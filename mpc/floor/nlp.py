@@ -24,20 +24,14 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, SolverError, check_range, read_only
-from models.plant.plant import MEAN_LOSSES, Plant, build_plant
-from models.plant.plant_data import PlantData
-from models.sensing.control import Measurement
+from models.basics import FloatArray, InputError, SolverError, check_range, read_only
+from models.plant import MEAN_LOSSES, Plant, PlantData, build_plant
+from models.sensing import Measurement
 
 from .certificate import rollout
-from .clairvoyance import Clairvoyant
+from .floor import Clairvoyant
 from .problem import RHO, RHO_START
-
-__all__ = ["Refinement", "Replay", "refine"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _OWNER = "record refinement"
 _REACH = 0.25  # of the fastest pole times a Runge-Kutta step

@@ -30,20 +30,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
-from models.basics.checks import InputError, read_only
-from models.plant.drive import SPEED_BAND, DriveLimits
-from models.plant.plant import MEAN_LOSSES, Plant, build_plant
+from models.basics import FloatArray, InputError, read_only
+from models.plant import MEAN_LOSSES, SPEED_BAND, DriveLimits, Plant, build_plant
 
 if TYPE_CHECKING:
-    from models.case.case import Case
-    from models.plant.linear import LinearPlant
+    from models.case import Case
+    from models.plant import LinearPlant
 
-__all__ = ["HOLDS", "Hold", "RecordPlant", "record_plant"]
-
-FloatArray = npt.NDArray[np.float64]
 Hold = Literal["line", "command"]
 HOLDS: tuple[Hold, ...] = ("line", "command")
 

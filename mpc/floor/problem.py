@@ -11,13 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
+
+from models.basics import FloatArray
 
 from .plant import RecordPlant
-
-__all__ = ["RHO", "RHO_START", "RecordProblem", "RecordSolution"]
-
-FloatArray = npt.NDArray[np.float64]
 
 RHO = 1e-8  # of inputs in peak torques [m2]
 RHO_START = 1e-6  # of the first state: its fast rope modes do next to nothing

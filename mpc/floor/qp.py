@@ -29,15 +29,11 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from models.basics.checks import InputError
+from models.basics import FloatArray, InputError
 
 from .plant import RecordPlant
 from .problem import RHO, RHO_START, RecordProblem, RecordSolution
 from .solvers import SOLVERS, solve_programme
-
-__all__ = ["solve_record"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _OWNER = "clairvoyant"
 _LONGEST_BLOCK = 16  # samples

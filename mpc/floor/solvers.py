@@ -11,14 +11,9 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
-from models.basics.checks import InputError, SolverError
-
-__all__ = ["SOLVERS", "SparseProgramme", "solve_programme"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import FloatArray, InputError, SolverError
 
 SOLVERS = ("piqp", "clarabel")
 _OWNER = "clairvoyant"

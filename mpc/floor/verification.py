@@ -13,19 +13,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 
-from models.plant.plant import build_plant
+from models.basics import FloatArray
+from models.plant import build_plant
 
 from .problem import RecordProblem, RecordSolution
 
 if TYPE_CHECKING:
-    from models.case.case import Case
+    from models.case import Case
 
-__all__ = ["RecordVerification", "verify_record"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _REACH = 0.1  # of the plant's fastest pole times the step
 _PAYLOAD, _LIMITS = 1e-5, 1e-5  # allowed [m], and share of a limit [-]

@@ -26,14 +26,10 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import check_range, read_only
+from models.basics import FloatArray, check_range, read_only
 
 from .forecast import Forecast, hermite_weights, leads_of, usable
 from .regression import KnotRegression
-
-__all__ = ["AdaptiveAR"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _TRAIN_EVERY = 0.2  # [s] between two regressions
 _FADING = 1.0  # [s] in which a forecast fades before there is a model

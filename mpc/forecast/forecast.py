@@ -14,13 +14,8 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, check_range, read_only
-
-__all__ = ["Forecast", "Predictor", "hermite_weights", "leads_of", "usable"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import FloatArray, InputError, check_range, read_only
 
 _MOST_LEADS = 100_000
 

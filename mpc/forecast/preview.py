@@ -10,18 +10,14 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError
+from models.basics import FloatArray, InputError
 
 from .forecast import Forecast, leads_of
 
 if TYPE_CHECKING:
-    from models.operation.excitation import Motion
+    from models.operation import Motion
 
-__all__ = ["PerfectPreview"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _CHUNK = 4096  # samples read at once: a day at 1 ms would be 86 million rows
 

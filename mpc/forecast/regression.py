@@ -25,11 +25,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import lapack
 
-from models.basics.checks import read_only
+from models.basics import FloatArray, read_only
 
-__all__ = ["KnotRegression", "smoother"]
-
-FloatArray = npt.NDArray[np.float64]
 IndexArray = npt.NDArray[np.int64]
 
 _RECENT = (0.1, 0.2, 0.35, 0.5)  # spacings ago: what averages the noise of the newest sample

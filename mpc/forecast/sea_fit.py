@@ -20,15 +20,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import least_squares
 
-from models.basics.checks import InputError, SolverError
-from models.plant.shaping import ShapingFilter, fit_shaping_filter
-
-__all__ = ["ORDERS", "fit_for_forecast"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import FloatArray, InputError, SolverError
+from models.plant import ShapingFilter, fit_shaping_filter
 
 ORDERS = (4, 6, 8, 10, 12)
 """Orders that can be asked for; up to 8 the fit is that of `models.plant.shaping`."""

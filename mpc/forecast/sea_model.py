@@ -13,19 +13,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
-from models.basics.checks import read_only
-from models.hook.hook import HookMotion
-from models.plant.shaping import ShapingFilter
-from models.sensing.lowpass import noise_root
-from models.sensing.mru import MruModel
-
-__all__ = ["SeenHook", "seen_hook", "true_variances"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
+from models.basics import FloatArray, read_only
+from models.hook import HookMotion
+from models.plant import ShapingFilter
+from models.sensing import MruModel, noise_root
 
 _PANEL = 0.25  # [rad/s], of the quadrature over the true spectrum
 _BUTTERWORTH = math.sqrt(2.0)

@@ -20,23 +20,19 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
-from models.basics.checks import SolverError, check_range, read_only
-from models.hook.hook import HookMotion
-from models.sensing.mru import MruModel
+from models.basics import FloatArray, SolverError, check_range, read_only
+from models.hook import HookMotion
+from models.sensing import MruModel
 
 from .forecast import Forecast, leads_of, usable
 from .sea_fit import fit_for_forecast
 from .sea_model import SeenHook, seen_hook, true_variances
 
 if TYPE_CHECKING:
-    from models.case.case import Case
+    from models.case import Case
 
-__all__ = ["SeaPredictor"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _SETTLED = 0.02  # excess of a variance over the steady one, of the motion's, that no longer counts
 _CHECK_EVERY = 10  # samples between two looks whether it has settled

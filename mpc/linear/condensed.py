@@ -30,14 +30,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError, check_range, read_only
+from models.basics import FloatArray, InputError, check_range, read_only
 
-from ..winch.prediction import PredictionModel
-from ..winch.regulation import Regulator
+from ..winch import PredictionModel, Regulator
 
-__all__ = ["WATCHED", "Condensed", "condense", "default_blocking", "path_of_sea", "sea_at_end"]
-
-FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 _OWNER = "predictive control"

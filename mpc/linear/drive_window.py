@@ -12,16 +12,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-from models.case.case import Case
-from models.plant.drive import DriveLimits
+from models.basics import FloatArray
+from models.case import Case
+from models.plant import DriveLimits
 
-from ..winch.sampled import SampledWinch
-
-__all__ = ["DriveWindow", "TorqueBudget"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..winch import SampledWinch
 
 _EDGE = 1e-7  # of a move that is at its bound
 _MOST = 0.2  # of the peak: half of what the torque may fall by over a sample

@@ -10,11 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-__all__ = ["Fallback"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import FloatArray
 
 
 class Fallback:

@@ -15,36 +15,35 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, check_range
-from models.case.case import Case
-from models.plant.drive import SPEED_BAND, DriveLimits
+from models.basics import FloatArray, InputError, check_range
+from models.case import Case
+from models.plant import SPEED_BAND, DriveLimits
+from models.sensing import Measurement
 from models.sensing.control import MEASURED as HEARD
-from models.sensing.control import Measurement
 
-from ..forecast.autoregressive import AdaptiveAR
-from ..forecast.preview import PerfectPreview
-from ..programme.qp import SoftQP, Solved, kkt_residual
-from ..winch.doubts import doubted
-from ..winch.estimator import Estimator
-from ..winch.planning import plan_model
-from ..winch.prediction import PredictionModel, prediction_model
-from ..winch.regulation import regulator
-from ..winch.weights import Weights, tune_weights
+from ..forecast import AdaptiveAR, PerfectPreview
+from ..programme import SoftQP, Solved, kkt_residual
+from ..winch import (
+    Estimator,
+    PredictionModel,
+    Weights,
+    doubted,
+    plan_model,
+    prediction_model,
+    regulator,
+    tune_weights,
+)
 from .condensed import condense, default_blocking
 from .drive_window import DriveWindow, TorqueBudget
 from .fallback import Fallback
 from .products import Products
 
 if TYPE_CHECKING:
-    from models.operation.excitation import Motion
+    from models.operation import Motion
 
-    from ..forecast.forecast import Predictor
+    from ..forecast import Predictor
 
-__all__ = ["LinearMPC"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _OWNER = "predictive control"
 _QUADRATIC, _LINEAR = 1e4, 1e2  # price of a soft row, over its scale, in units of the cost

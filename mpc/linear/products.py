@@ -13,19 +13,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import read_only
+from models.basics import FloatArray, read_only
 
-from ..winch.prediction import PredictionModel
+from ..winch import PredictionModel
 from .condensed import WATCHED, Condensed, path_of_sea, sea_at_end
 
 if TYPE_CHECKING:
-    from ..forecast.forecast import Forecast
+    from ..forecast import Forecast
 
-__all__ = ["Products"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _NONE = np.zeros(0)
 _WIDE = 1e20  # no limit, for the solver

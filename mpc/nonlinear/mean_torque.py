@@ -17,15 +17,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import read_only
+from models.basics import FloatArray, read_only
 
-from ..winch.sampled import SampledWinch
-
-__all__ = ["Drift", "mean_torque", "start_torque"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..winch import SampledWinch
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -16,33 +16,27 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import numpy.typing as npt
 from typing_extensions import override
 
-from models.basics.checks import SolverError, check_range
-from models.case.case import Case
-from models.plant.drive import DriveLimits
+from models.basics import FloatArray, SolverError, check_range
+from models.case import Case
+from models.plant import DriveLimits
+from models.sensing import Measurement
 from models.sensing.control import MEASURED as HEARD
-from models.sensing.control import Measurement
 
-from ..linear.condensed import condense, path_of_sea
-from ..linear.linear import LinearMPC
-from ..linear.products import Products
-from ..programme.qp import SoftQP
-from ..winch.weights import Weights
+from ..linear import LinearMPC, Products, condense, path_of_sea
+from ..programme import SoftQP
+from ..winch import Weights
 from .mean_torque import start_torque
 from .responses import with_drift
 from .shooting import Known, Prepared, Shooting
 from .stage import make_stage
 
 if TYPE_CHECKING:
-    from models.plant.payout import DrumTravel
+    from models.plant import DrumTravel
 
-    from ..forecast.forecast import Predictor
+    from ..forecast import Predictor
 
-__all__ = ["NonlinearMPC"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _OWNER = "nonlinear predictive control"
 _UNIT, _TORQUE = HEARD.index("mru.valid"), HEARD.index("motor.torque")

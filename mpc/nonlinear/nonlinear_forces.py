@@ -13,19 +13,15 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 
-from models.plant.equations import displacement_names
-from models.plant.plant import build_plant
+from models.basics import FloatArray
+from models.plant import build_plant, displacement_names
 
-from ..winch.sampled import SampledWinch
+from ..winch import SampledWinch
 
 if TYPE_CHECKING:
-    from models.plant.payout import DrumTravel
+    from models.plant import DrumTravel
 
-__all__ = ["Argument", "ForceLaw", "force_law"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _SMOOTH = 0.002  # eps of a tension, over that at rest
 _TURN = 2.0  # motor speed over which gear's losses and friction change sides [rad/s]

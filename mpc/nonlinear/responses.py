@@ -10,15 +10,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from ..linear.condensed import WATCHED, Condensed
-from ..winch.prediction import PredictionModel
+from models.basics import FloatArray
+
+from ..linear import WATCHED, Condensed
+from ..winch import PredictionModel
 from .stage import Stage
-
-__all__ = ["forced_response", "linear_response", "with_drift"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def with_drift(p: Condensed, stage: Stage) -> Condensed:

@@ -35,18 +35,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg.blas import dtrsm
 
-from models.basics.checks import read_only
+from models.basics import FloatArray, read_only
 
-from ..linear.condensed import Condensed, path_of_sea, sea_at_end
-from ..linear.products import Products
-from ..winch.prediction import PredictionModel
-from ..winch.regulation import Regulator
+from ..linear import Condensed, Products, path_of_sea, sea_at_end
+from ..winch import PredictionModel, Regulator
 from .responses import forced_response, linear_response
 from .stage import Stage
 
-__all__ = ["Known", "Prepared", "Shooting"]
-
-FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 _FAINT = 1e-5  # slope of a slack spring's force below which it counts as held

@@ -27,23 +27,19 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
-from models.basics.checks import InputError, SolverError, check_range, read_only
-from models.plant.discrete import zero_order_hold
-from models.simulation.kernel import Kernel
+from models.basics import FloatArray, InputError, SolverError, check_range, read_only
+from models.plant import zero_order_hold
+from models.simulation import Kernel
 
-from ..winch.sampled import SampledWinch
+from ..winch import SampledWinch
 from .mean_torque import Drift, mean_torque
 from .nonlinear_forces import ForceLaw, force_law
 
 if TYPE_CHECKING:
-    from models.plant.payout import DrumTravel
+    from models.plant import DrumTravel
 
-__all__ = ["Stage", "make_stage"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _OWNER = "nonlinear predictive control"
 _NEWTON = 50  # iterations for the forces of one sample

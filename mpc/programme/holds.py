@@ -9,12 +9,9 @@ TAC 23, 1978).
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
-__all__ = ["hermite_hold", "noisy_hold", "root_of"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import FloatArray
 
 
 def hermite_hold(A: FloatArray, E: FloatArray, dt: float) -> FloatArray:

@@ -21,13 +21,8 @@ from typing import Any
 
 import daqp
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import SolverError
-
-__all__ = ["SoftQP", "Solved", "kkt_residual"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import FloatArray, SolverError
 
 _SOFT = 8  # DAQP's bit of a soft row
 

@@ -1,1 +1,21 @@
 """The winch as predictive control sees it: model, estimator, weights."""
+
+from typing import TYPE_CHECKING
+
+from models.basics.lazy import lazy_face
+
+if TYPE_CHECKING:
+    from .doubts import Doubts as Doubts
+    from .doubts import doubted as doubted
+    from .estimator import Estimator as Estimator
+    from .planning import plan_model as plan_model
+    from .prediction import PredictionModel as PredictionModel
+    from .prediction import prediction_model as prediction_model
+    from .regulation import Regulator as Regulator
+    from .regulation import regulator as regulator
+    from .sampled import SampledWinch as SampledWinch
+    from .weights import Weights as Weights
+    from .weights import tune_weights as tune_weights
+    from .weights import watched as watched
+else:
+    __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

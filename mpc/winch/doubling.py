@@ -12,13 +12,8 @@ equation is the filter's, transposed.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import SolverError
-
-__all__ = ["lyapunov", "riccati"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import FloatArray, SolverError
 
 _STEPS = 60
 _MENDED = 4

@@ -13,19 +13,14 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import check_range
-from models.plant.equations import MEASUREMENTS
-from models.sensing.plant import MEASURED
-from models.sensing.sensing import SensorModel
+from models.basics import FloatArray, check_range
+from models.plant import MEASUREMENTS
+from models.sensing import MEASURED, SensorModel
 
 if TYPE_CHECKING:
     from .prediction import PredictionModel
 
-__all__ = ["AT_FIRST", "Doubts", "constant_scales", "doubted"]
-
-FloatArray = npt.NDArray[np.float64]
 
 # How far the constants wander in so many seconds, over `constant_scales`.
 _DRIFT, _DRIFT_TIME = (0.02, 0.02, 2e-4, 0.005), 1000.0

@@ -17,19 +17,14 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import read_only
-from models.plant.equations import MEASUREMENTS
+from models.basics import FloatArray, read_only
+from models.plant import MEASUREMENTS
+from models.sensing import MEASURED, Measurement
 from models.sensing.control import MEASURED as HEARD
-from models.sensing.control import Measurement
-from models.sensing.plant import MEASURED
 
 from .doubling import riccati
 from .doubts import AT_FIRST, constant_scales
 from .prediction import PredictionModel
-
-__all__ = ["Estimator", "kalman_covariance", "kalman_gain"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _AT = np.array([HEARD.index(name) for name in MEASURED])
 _AGE, _FRESH = HEARD.index("payload.age"), HEARD.index("payload.valid")

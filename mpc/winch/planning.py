@@ -21,8 +21,6 @@ import numpy as np
 
 from .prediction import PredictionModel, prediction_model
 
-__all__ = ["plan_model"]
-
 
 def plan_model(model: PredictionModel, stiffness: float) -> PredictionModel:
     """Return the model of the same world on a rope of another stiffness.

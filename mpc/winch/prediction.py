@@ -28,24 +28,17 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
-from models.basics.checks import SolverError, read_only
-from models.case.case import Case
-from models.hook.hook import HookMotion
-from models.plant.equations import MEASUREMENTS
-from models.plant.shaping import ShapingFilter, fit_shaping_filter
-from models.sensing.mru import MruModel
-from models.sensing.plant import MEASURED
+from models.basics import FloatArray, SolverError, read_only
+from models.case import Case
+from models.hook import HookMotion
+from models.plant import MEASUREMENTS, ShapingFilter, fit_shaping_filter
+from models.sensing import MEASURED, MruModel
 
-from ..programme.holds import noisy_hold, root_of
+from ..programme import noisy_hold, root_of
 from .doubts import Doubts, doubted
 from .sampled import SampledWinch, sampled_winch
-
-__all__ = ["CONSTANTS", "LATE", "PredictionModel", "prediction_model", "sea_filter"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _OWNER = "prediction model"
 CONSTANTS = (

@@ -25,17 +25,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
-from models.basics.checks import SolverError, check_range, read_only
+from models.basics import FloatArray, SolverError, check_range, read_only
 
 from .doubling import riccati
 from .prediction import PredictionModel
-
-__all__ = ["Regulator", "regulator"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

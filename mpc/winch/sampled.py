@@ -26,22 +26,21 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import check_range, read_only
-from models.case.case import Case
-from models.plant.discrete import zero_order_hold
-from models.plant.equations import MEASUREMENTS
-from models.plant.linear import LinearPlant
-from models.plant.plant import MEAN_LOSSES, Plant, build_plant
-from models.plant.plant_data import PlantData
-from models.sensing.plant import sensed_plant
+from models.basics import FloatArray, check_range, read_only
+from models.case import Case
+from models.plant import (
+    MEAN_LOSSES,
+    MEASUREMENTS,
+    LinearPlant,
+    Plant,
+    PlantData,
+    build_plant,
+    zero_order_hold,
+)
+from models.sensing import sensed_plant
 
-from ..programme.holds import hermite_hold
-
-__all__ = ["SampledWinch", "sampled_winch"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..programme import hermite_hold
 
 _OWNER = "predictive control"
 

@@ -18,17 +18,12 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import read_only
+from models.basics import ComplexArray, FloatArray, read_only
 
 from .doubling import lyapunov
 from .estimator import kalman_covariance, kalman_gain
 from .prediction import PredictionModel
 from .regulation import Regulator
-
-__all__ = ["Unsaturated"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _NODES = 160
 _LOWEST = 1e-3  # [rad/s]

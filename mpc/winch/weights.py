@@ -23,22 +23,17 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
-from models.basics.checks import SolverError, check_range
-from models.case.case import Case
+from models.basics import FloatArray, SolverError, check_range
+from models.case import Case
 
 from .doubts import Doubts, doubted
 from .planning import plan_model
 from .prediction import PredictionModel, prediction_model
 from .regulation import regulator
 from .unsaturated import Unsaturated
-
-__all__ = ["OFF", "STIFFER", "Weights", "tune_weights", "watched"]
-
-FloatArray = npt.NDArray[np.float64]
 
 #: Plants that the controller has to get along with, as factors on the plant's numbers.
 OFF: tuple[Mapping[str, float], ...] = (

@@ -1,1 +1,15 @@
 """The commands of the command line, one module each, with `run(arguments) -> exit status`."""
+
+from typing import TYPE_CHECKING
+
+from models.basics.lazy import lazy_face
+
+if TYPE_CHECKING:
+    from .design_argument import add_design_arguments as add_design_arguments
+    from .design_argument import given_design as given_design
+    from .given import case_words as case_words
+    from .given import gains_text as gains_text
+    from .given import given_case as given_case
+    from .given import parse_gains as parse_gains
+else:
+    __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -8,10 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from models import Case
-    from synth.design.design import GainDesign
-    from synth.design.structure_design import StructureDesign
-
-__all__ = ["add_design_arguments", "given_design"]
+    from synth.design import GainDesign, StructureDesign
 
 
 def add_design_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,7 +32,7 @@ def given_design(case: Case, arguments: argparse.Namespace) -> GainDesign | Stru
         If both are given or neither, or the file holds no design.
     """
     # Here, as the parser imports this file and has to be quick.
-    from models.basics.checks import InputError
+    from models.basics import InputError
     from synth import evaluate_gains
 
     from .given import parse_gains
@@ -43,8 +40,7 @@ def given_design(case: Case, arguments: argparse.Namespace) -> GainDesign | Stru
     if arguments.design is not None:
         if arguments.gains is not None:
             raise InputError(f"{arguments.command}: give --design or --gains, not both")
-        from ..designs.design_file import load_design
-        from ..designs.structure_file import load_structure
+        from ..designs import load_design, load_structure
 
         try:
             structure = load_structure(arguments.design)

@@ -10,13 +10,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from models import Case, load_case
-from models.basics.checks import InputError
-from models.basics.physics_warning import PhysicsWarning
-from models.casefile.yaml_lines import read_yaml
+from models.basics import InputError, PhysicsWarning
+from models.casefile import read_yaml
 
-from ..text.terminal import told_once
-
-__all__ = ["case_words", "gains_text", "given_case", "parse_gains"]
+from ..text import told_once
 
 _NAMES = ("A", "a", "a1", "a2")
 
@@ -32,7 +29,7 @@ def given_case(arguments: argparse.Namespace) -> Case:
     InputError
         If the case is wrong, or a change is.
     """
-    from models.hook.hook import HookMotion
+    from models.hook import HookMotion
 
     with told_once():
         case = load_case(arguments.case)

@@ -17,25 +17,17 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.case.case import Case
-from models.operation.excitation import Motion, SpectrumMotion
-from models.run.run import Run
-from models.run.summary import ERROR
-from models.sensing.control import holds_brake
-from models.simulation.simulation import EASE
+from models.basics import FloatArray, InputError
+from models.case import Case
+from models.operation import Motion, SpectrumMotion
+from models.run import ERROR, Run
+from models.sensing import holds_brake
+from models.simulation import EASE
 
-from ..controllers.contenders import Contender
-from ..controllers.law import Law
-from ..runs.runs import TRIPS
-from ..runs.series import Progress, Series
+from ..controllers import Contender, Law
+from ..runs import TRIPS, Progress, Series
 from .mismatch import Mismatch
-
-__all__ = ["TRACED", "WINDOW", "Cell", "CommonSea", "Prepared", "Question", "Trace"]
-
-FloatArray = npt.NDArray[np.float64]
 
 TRACED = (
     "hook.heave",

@@ -20,14 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from models.basics.intervals import Interval, mean_interval
-from models.case.case import Case
+from models.basics import Interval, mean_interval
+from models.case import Case
 
-from ..controllers.contenders import Contender
-from ..controllers.law import Law
+from ..controllers import Contender, Law
 from .cell import Cell, Question, Trace
-
-__all__ = ["COLUMNS", "Comparison"]
 
 COLUMNS: Mapping[str, str] = {
     "payload rms": "m",

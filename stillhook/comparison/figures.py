@@ -11,20 +11,32 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics.checks import InputError
+from models.basics import InputError
 
-from ..text.quantities import count, duration, number, quantity, scale
-from ..text.style import AFTER, BEFORE, BROKEN, DRUM, HOOK, REFERENCE, new_figure, styled, typeset
+from ..text import (
+    AFTER,
+    BEFORE,
+    BROKEN,
+    DRUM,
+    HOOK,
+    REFERENCE,
+    count,
+    duration,
+    new_figure,
+    number,
+    quantity,
+    scale,
+    styled,
+    typeset,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..controllers.contenders import Contender
+    from ..controllers import Contender
     from .cell import Trace
     from .comparison import Comparison
-
-__all__ = ["heights", "worst_moment"]
 
 _COLOURS = {
     "none": HOOK,

@@ -11,21 +11,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, StillhookError
-from models.operation.excitation import SpectrumMotion
-from models.simulation.simulation import EASE
+from models.basics import FloatArray, InputError, StillhookError
+from models.operation import SpectrumMotion
+from models.simulation import EASE
 
-from ..controllers.contenders import Contender
-from ..controllers.law import Law
-from ..controllers.makers import late
-from ..runs.series import Progress
+from ..controllers import Contender, Law, late
+from ..runs import Progress
 from .cell import WINDOW, Cell, CommonSea, Prepared, Question, Trace
-
-__all__ = ["Floor", "prepare"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _SAMPLE = 0.05  # of the demand, which may bend in any way from one to the next [s]
 

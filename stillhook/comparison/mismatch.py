@@ -14,13 +14,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from models.basics.checks import InputError
-from models.basics.tables import GRAVITY
-from models.basics.units import parse_quantity
-from models.case.case import Case
-from models.casefile.yaml_lines import read_yaml
-
-__all__ = ["SHORT", "Mismatch"]
+from models.basics import GRAVITY, InputError, parse_quantity
+from models.case import Case
+from models.casefile import read_yaml
 
 SHORT: Mapping[str, str] = {
     "payload": "mass of the payload, by a share the water that moves with it too; not its weight",
@@ -179,7 +175,7 @@ def _present(path: str, case: Case) -> float:
 
 def _kind_of(path: str) -> str:
     """Return the kind of quantity that a path holds, as `models.basics.units` names it."""
-    from models.casefile.quantity import Quantity
+    from models.casefile import Quantity
 
     section: Any = Case
     *parents, last = path.split(".")

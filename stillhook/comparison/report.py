@@ -16,14 +16,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from models.basics.checks import InputError
+from models.basics import InputError
 
-from ..text.folder import OutputFolder
+from ..text import OutputFolder
 from .comparison import COLUMNS, Comparison
 from .store import question_of
 from .words import HEADINGS, LEGEND, headline_of, left_out, rows_at
-
-__all__ = ["summary_of", "write_comparison"]
 
 _FORMAT = 1
 _FIGURES = {
@@ -101,7 +99,7 @@ def summary_of(found: Comparison) -> dict[str, Any]:
 
 
 def _draw(place: OutputFolder, found: Comparison, written: list[Path]) -> list[str]:
-    from ..text.style import picture
+    from ..text import picture
     from .figures import heights, worst_moment
 
     drawn = []

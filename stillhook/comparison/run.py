@@ -16,21 +16,19 @@ import time as clock
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from models.basics.checks import InputError, check_range
-from models.case.case import Case
-from models.casefile.quantity import Quantity
-from models.simulation.simulation import EASE
+from models.basics import InputError, check_range
+from models.case import Case
+from models.casefile import Quantity
+from models.simulation import EASE
 
-from ..controllers.contenders import contenders_of
-from ..keeper.pool import Pool
+from ..controllers import contenders_of
+from ..keeper import Pool
 from ..runs.simulation import _seeds_of
 from .cell import Question
 from .comparison import Comparison
 from .mismatch import Mismatch
 from .store import STORE, Store
 from .work import Progress, Work
-
-__all__ = ["compare"]
 
 
 def compare(
@@ -139,7 +137,7 @@ def compare(
     with contextlib.ExitStack() as stack:
         store = None
         if out is not None:
-            from ..text.folder import OutputFolder
+            from ..text import OutputFolder
 
             store = stack.enter_context(Store(OutputFolder.prepare(out).path / STORE, question))
         work = Work(

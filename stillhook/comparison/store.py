@@ -20,14 +20,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
 
-from models.basics.checks import InputError
+from models.basics import InputError
 
-from ..controllers.contenders import Contender
-from ..controllers.law import Law
-from ..keeper.kept_lines import difference, lock, put
+from ..controllers import Contender, Law
+from ..keeper import difference, lock, put
 from .cell import Cell, Question
-
-__all__ = ["STORE", "Store", "code_digest"]
 
 STORE = "cells.jsonl"
 """Name of the file in the folder of a comparison."""
@@ -50,7 +47,7 @@ def code_digest(packages: tuple[str, ...]) -> str:
 
 def question_of(question: Question) -> dict[str, Any]:
     """Return what a store has to answer, as plain data."""
-    from .. import __version__
+    from .._version import __version__
 
     return {
         "stillhook_comparison": _FORMAT,

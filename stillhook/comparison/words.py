@@ -13,22 +13,12 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from models.basics.intervals import mean_interval
+from models.basics import mean_interval
 
-from ..text.quantities import count, duration, number, quantity, scale
+from ..text import count, duration, number, quantity, scale
 
 if TYPE_CHECKING:
     from .comparison import Comparison
-
-__all__ = [
-    "HEADINGS",
-    "LEGEND",
-    "headline_of",
-    "left_out",
-    "plain_table",
-    "rows_at",
-    "sentences_of",
-]
 
 HEADINGS = ("", "rms", "95 % interval", "largest", "sat.", "lost", "/ floor")
 LEGEND = (

@@ -12,15 +12,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ..controllers.contenders import Contender
-from ..controllers.law import Law
-from ..keeper.pool import Died, Pool
-from ..keeper.worker import Bench, Refused, Task
+from ..controllers import Contender, Law
+from ..keeper import Bench, Died, Pool, Refused, Task
 from .cell import Cell, Question, Trace
 from .comparison import Comparison
 from .store import Store
-
-__all__ = ["Progress", "Work"]
 
 Progress = Callable[[str, int, int], None]
 

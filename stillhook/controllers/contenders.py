@@ -18,13 +18,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from models.basics.checks import InputError
-from models.basics.signals import pick
-from models.case.case import Case
-from models.sensing.control import Controller
-from synth.design.design import GainDesign
-from synth.design.structure_design import StructureDesign
-from synth.design.tuning import Tuning
+from models.basics import InputError, pick
+from models.case import Case
+from models.sensing import Controller
+from synth.design import GainDesign, StructureDesign, Tuning
 
 from .law import Law
 from .makers import (
@@ -38,8 +35,6 @@ from .makers import (
     nonlinear_mpc,
     thesis,
 )
-
-__all__ = ["CONTENDERS", "DEFAULTS", "GROUPS", "Contender", "contenders_of"]
 
 Make = Callable[[Case, Law | None], Controller]
 

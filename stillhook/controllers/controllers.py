@@ -12,16 +12,12 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from models.basics.checks import InputError
-from models.basics.signals import pick
-from models.case.case import Case
-from models.sensing.control import Controller
+from models.basics import InputError, pick
+from models.case import Case
+from models.sensing import Controller
 
 if TYPE_CHECKING:
-    from synth.design.design import GainDesign
-    from synth.design.tuning import Tuning
-
-__all__ = ["PREDICTIVE", "controller_by_name", "known_controllers"]
+    from synth.design import GainDesign, Tuning
 
 #: Predictive controllers and what each is, in a line.
 PREDICTIVE: Mapping[str, str] = MappingProxyType(
@@ -36,7 +32,7 @@ PREDICTIVE: Mapping[str, str] = MappingProxyType(
 
 def known_controllers() -> tuple[str, ...]:
     """Return the names of all controllers."""
-    from synth.controllers.controllers import CONTROLLERS
+    from synth.controllers import CONTROLLERS
 
     return (*CONTROLLERS, *PREDICTIVE)
 
@@ -71,17 +67,17 @@ def controller_by_name(
     """
     pick("controllers", "controller", known_controllers(), (name,))
     if name not in PREDICTIVE:
-        from synth.controllers.controllers import controller_named
+        from synth.controllers import controller_named
 
         return controller_named(name, case, design=design, gains=gains, sample_time=sample_time)
     if gains is not None:
         raise InputError(f"{name}: gains are for feedback; predictive control has none")
     T = 0.05 if sample_time is None else sample_time
     if name == "nonlinear-mpc":
-        from mpc.nonlinear.nonlinear import NonlinearMPC
+        from mpc.nonlinear import NonlinearMPC
 
         return NonlinearMPC(case, sample_time=T)
-    from mpc.linear.linear import LinearMPC
+    from mpc.linear import LinearMPC
 
     if name == "mpc":
         return LinearMPC(case, sample_time=T)

@@ -17,13 +17,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from models.case.case import Case
-from synth.design.design import GainDesign
-from synth.design.structure_design import StructureDesign
-from synth.design.tuning import Tuning
-from synth.loop.controller import Controller
-
-__all__ = ["EAGER", "HALF", "Law", "design_law"]
+from models.case import Case
+from synth.design import GainDesign, StructureDesign, Tuning
+from synth.loop import Controller
 
 EAGER = "-eager"
 """Ending of the designs that ignore the drive's limits."""
@@ -149,9 +145,9 @@ def _design(
     needs: str, case: Case, starts: int, progress: Progress | None
 ) -> GainDesign | StructureDesign:
     if needs == "gains":
-        from synth.design.optimise import optimise_gains
+        from synth.design import optimise_gains
 
         return optimise_gains(case, starts=starts, progress=progress)
-    from synth.design.structure_search import optimise_structure
+    from synth.design import optimise_structure
 
     return optimise_structure(case, needs, starts=starts, progress=progress)

@@ -12,26 +12,12 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
-from models.basics.checks import InputError
-from models.case.case import Case
-from models.sensing.control import Controller
-from synth.controllers.controllers import controller_named
-from synth.controllers.linear_feedback import LinearFeedback
+from models.basics import InputError
+from models.case import Case
+from models.sensing import Controller
+from synth.controllers import LinearFeedback, controller_named
 
 from .law import EAGER, Law
-
-__all__ = [
-    "PROTOCOL",
-    "as_it_is",
-    "from_factory",
-    "given",
-    "late",
-    "linear",
-    "linear_mpc",
-    "named",
-    "nonlinear_mpc",
-    "thesis",
-]
 
 PROTOCOL = ("name", "sample_time", "reset", "step")
 """What a controller has."""

@@ -18,15 +18,11 @@ from typing import Any, Union, get_args, get_origin
 
 import numpy as np
 
-from models.basics.checks import InputError
-from models.basics.files import write_text_atomically
-from models.case.case import Case
-from models.casefile.messages import line_of, message_line, suggestion
-from models.casefile.yaml_lines import read_yaml, yaml_text
-from synth.design.design import GainDesign
-from synth.verify.verify import Verification
-
-__all__ = ["FORMAT", "load_design", "save_design"]
+from models.basics import InputError, write_text_atomically
+from models.case import Case
+from models.casefile import line_of, message_line, read_yaml, suggestion, yaml_text
+from synth.design import GainDesign
+from synth.verify import Verification
 
 FORMAT = 1
 """Version of the file's format."""
@@ -62,7 +58,7 @@ def save_design(design: GainDesign, path: str | Path) -> Path:
 
 def design_text(design: GainDesign) -> str:
     """Return a design as the YAML text that `load_design` reads."""
-    from .. import __version__
+    from .._version import __version__
 
     content = {_KEY: FORMAT, _WRITER: f"stillhook {__version__}", **_encoded(design)}
     # The case comes last: it is the longest, and the one part that is not an answer.

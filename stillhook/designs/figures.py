@@ -11,38 +11,39 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError
-from synth.design.design import GainDesign
+from models.basics import FloatArray, InputError
+from synth.design import GainDesign
 
-from ..text.motion import DRUM as DRUM_HAUL
-from ..text.motion import HOOK as HOOK_HEAVE
-from ..text.motion import PAYLOAD, MotionView, highest
-from ..text.quantities import decibels, number, quantity
-from ..text.style import (
+from ..text import (
     AFTER,
     BEFORE,
     BROKEN,
     DRUM,
     HOOK,
+    PAYLOAD,
     REFERENCE,
+    LimitRow,
+    MotionView,
     annotate,
+    decibels,
     headline,
+    highest,
+    limit_rows,
     new_figure,
+    number,
+    quantity,
     styled,
     typeset,
 )
-from ..text.summary import LimitRow, limit_rows
+from ..text.motion import DRUM as DRUM_HAUL
+from ..text.motion import HOOK as HOOK_HEAVE
 from .nyquist_plot import nyquist
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["FIGURES", "limits", "nyquist", "payload_spectrum", "responses"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _WEIGHT = 0.999  # share of a variance that a spectrum's axis has to hold
 _PERIODS = (20.0, 12.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5)  # marks on an axis [s]

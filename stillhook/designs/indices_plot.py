@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from synth.sensitivity.global_indices import SobolIndices
+from synth.sensitivity import SobolIndices
 
-from ..text.style import AFTER, HOOK, new_figure, styled, typeset
+from ..text import AFTER, HOOK, new_figure, styled, typeset
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = ["NAMES", "indices_figure"]
 
 NAMES = {
     "payload_rms": "rms of the payload",

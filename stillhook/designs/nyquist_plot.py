@@ -14,21 +14,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError
-from synth.design.design import GainDesign
+from models.basics import ComplexArray, FloatArray, InputError
+from synth.design import GainDesign
 
-from ..text.quantities import number
-from ..text.style import AFTER, BROKEN, REFERENCE, annotate, headline, new_figure, styled
-from ..text.summary import has_gains
+from ..text import (
+    AFTER,
+    BROKEN,
+    REFERENCE,
+    annotate,
+    has_gains,
+    headline,
+    new_figure,
+    number,
+    styled,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["nyquist"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 LoopGain = Callable[[FloatArray], ComplexArray]
 
 _HALF = 2.0  # half the window's width, in the unit of L

@@ -6,15 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from synth.sizing.pareto import ParetoFront
+from synth.sizing import ParetoFront
 
-from ..text.quantities import number, quantity, scale
-from ..text.style import AFTER, HOOK, annotate, new_figure, styled, typeset
+from ..text import AFTER, HOOK, annotate, new_figure, number, quantity, scale, styled, typeset
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = ["AXES", "finding", "pareto_figure", "value_text"]
 
 #: What the other axis is called, by the name of the front.
 AXES = {

@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from synth.design.design import GainDesign
+from synth.design import GainDesign
 
-from ..text.folder import OutputFolder
-from ..text.quantities import duration, percent
-from ..text.summary import (
+from ..text import (
     LimitRow,
+    OutputFolder,
     command_text,
+    duration,
     effect,
     facts,
     gain_rows,
@@ -24,11 +24,10 @@ from ..text.summary import (
     limit_rows,
     margin_rows,
     motion_rows,
+    percent,
     required_rows,
 )
 from .design_file import design_text
-
-__all__ = ["summary_text", "write_report"]
 
 _CAPTIONS = {
     "payload_spectrum": "Spectra of the hook and of the payload",
@@ -75,7 +74,7 @@ def write_report(
     InputError
         If the folder cannot be made or a file cannot be written.
     """
-    from ..text.style import picture
+    from ..text import picture
     from .figures import FIGURES
 
     target = OutputFolder.prepare(folder)

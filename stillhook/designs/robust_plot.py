@@ -6,16 +6,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from synth.robust.robust import RobustDesign
-from synth.robust.schedule import GainSchedule
+from synth.robust import GainSchedule, RobustDesign
 
-from ..text.quantities import quantity, scale
-from ..text.style import AFTER, BEFORE, DRUM, HOOK, REFERENCE, new_figure, styled, typeset
+from ..text import (
+    AFTER,
+    BEFORE,
+    DRUM,
+    HOOK,
+    REFERENCE,
+    new_figure,
+    quantity,
+    scale,
+    styled,
+    typeset,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = ["robust_figure", "schedule_figure"]
 
 _SHOWN = 24  # scenarios
 

@@ -5,16 +5,24 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from synth.sizing.purchase import Worth, WorthRow
-from synth.sizing.sizing import Sizing
+from synth.sizing import Sizing, Worth, WorthRow
 
-from ..text.quantities import quantity, scale
-from ..text.style import AFTER, BEFORE, DRUM, HOOK, REFERENCE, annotate, new_figure, styled, typeset
+from ..text import (
+    AFTER,
+    BEFORE,
+    DRUM,
+    HOOK,
+    REFERENCE,
+    annotate,
+    new_figure,
+    quantity,
+    scale,
+    styled,
+    typeset,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = ["size_figure", "step_text", "value_text", "worth_figure"]
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "X")
 _ROWS = 14  # of the bar figure

@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from models.basics.checks import InputError
-from models.basics.files import write_text_atomically
-from models.casefile.messages import line_of, message_line
-from models.casefile.yaml_lines import read_yaml, yaml_text
-from synth.design.structure_design import StructureDesign
+from models.basics import InputError, write_text_atomically
+from models.casefile import line_of, message_line, read_yaml, yaml_text
+from synth.design import StructureDesign
 
 from .design_file import _encoded, _Reader, _text
-
-__all__ = ["load_structure", "save_structure", "structure_text"]
 
 FORMAT = 1
 """Version of the file's format."""
@@ -42,7 +38,7 @@ def save_structure(design: StructureDesign, path: str | Path) -> Path:
 
 def structure_text(design: StructureDesign) -> str:
     """Return a design as the YAML text that `load_structure` reads."""
-    from .. import __version__
+    from .._version import __version__
 
     content = {_KEY: FORMAT, _WRITER: f"stillhook {__version__}", **_encoded(design)}
     content["case"] = content.pop("case")

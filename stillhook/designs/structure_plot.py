@@ -10,20 +10,27 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from models.basics.checks import InputError
+from models.basics import InputError
 
-from ..text.bound_text import bound_figures
-from ..text.quantities import quantity
-from ..text.style import AFTER, BEFORE, DRUM, HOOK, REFERENCE, new_figure, styled, typeset
+from ..text import (
+    AFTER,
+    BEFORE,
+    DRUM,
+    HOOK,
+    REFERENCE,
+    bound_figures,
+    new_figure,
+    quantity,
+    styled,
+    typeset,
+)
 from .structure_table import SHARES, share_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from synth.design.structure_design import StructureDesign
-
-__all__ = ["structures"]
+    from synth.design import StructureDesign
 
 _COLOURS = {"sea": AFTER, "MRU": "#e69f00", "noise": "#cc79a7"}
 _MARKS: Mapping[str, Mapping[str, Any]] = {

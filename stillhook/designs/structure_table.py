@@ -10,13 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..text.bound_text import bound_cell, bounds_note
-from ..text.quantities import number, percent, quantity
+from ..text import bound_cell, bounds_note, number, percent, quantity
 
 if TYPE_CHECKING:
-    from synth.design.structure_design import StructureDesign
-
-__all__ = ["HEADINGS", "SHARES", "StructureRow", "markdown", "share_of", "structure_rows"]
+    from synth.design import StructureDesign
 
 HEADINGS = (
     "structure",

@@ -8,13 +8,10 @@ import numpy as np
 
 from synth.sensitivity import Sensitivity
 
-from ..text.quantities import quantity
-from ..text.style import AFTER, BEFORE, new_figure, styled, typeset
+from ..text import AFTER, BEFORE, new_figure, quantity, styled, typeset
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = ["finding", "tornado_figure"]
 
 _BARS = 16
 _SMALL = 0.01  # elasticity below which nobody looks

@@ -13,8 +13,6 @@ from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 
-__all__ = ["code_digest", "versions"]
-
 _CODE = (
     "models/**/*.py",
     "synth/**/*.py",
@@ -40,7 +38,7 @@ def code_digest() -> str:
 
 def versions() -> dict[str, str]:
     """Return the versions of Stillhook, Python and the libraries that make the numbers."""
-    from .. import __version__
+    from .._version import __version__
 
     found = {"stillhook": __version__, "code": code_digest()}
     found |= {name: version(name) for name in _NUMERICAL}

@@ -14,11 +14,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
 
-from models.basics.checks import InputError
+from models.basics import InputError
 
 from .kept_lines import lock, put
-
-__all__ = ["Journal"]
 
 
 class Journal:

@@ -11,9 +11,7 @@ import zlib
 from pathlib import Path
 from typing import BinaryIO
 
-from models.basics.checks import InputError
-
-__all__ = ["difference", "lock", "put"]
+from models.basics import InputError
 
 
 def lock(file: BinaryIO, place: Path, what: str) -> None:

@@ -25,8 +25,6 @@ from typing import Any
 
 from .worker import Task, receive, send
 
-__all__ = ["Died", "Pool"]
-
 _START = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
     "from stillhook.keeper.worker import serve; serve()"

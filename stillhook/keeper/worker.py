@@ -18,8 +18,6 @@ import warnings
 from dataclasses import dataclass, field
 from typing import IO, Any
 
-__all__ = ["Bench", "Refused", "Task", "receive", "send", "serve"]
-
 _LENGTH = struct.Struct(">Q")
 
 
@@ -82,11 +80,10 @@ class Bench:
 
     def do(self, task: Task, progress: Any = None) -> Any:
         """Return the answer to a task: a `Law`, a `Cell`, a `Trace`, or `Refused`."""
-        from models.basics.checks import StillhookError
-        from models.basics.physics_warning import PhysicsWarning
+        from models.basics import PhysicsWarning, StillhookError
 
-        from ..comparison.floor import prepare
-        from ..controllers.law import Law, design_law
+        from ..comparison import prepare
+        from ..controllers import Law, design_law
 
         with warnings.catch_warnings():  # told once, where the case was read
             warnings.simplefilter("ignore", PhysicsWarning)

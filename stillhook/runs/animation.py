@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from models.operation.scenario import Scenario
-from models.run.run import Run
+from models.operation import Scenario
+from models.run import Run
 
-from ..text.quantities import number
-from ..text.style import AFTER, HOOK, REFERENCE, styled
+from ..text import AFTER, HOOK, REFERENCE, number, styled
 from .strip import Scene, draw_station, height_axis
 from .window import Window, moves, whole_of, window_of
 
@@ -23,8 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from matplotlib.artist import Artist
-
-__all__ = ["animation"]
 
 _FEWEST, _MOST = 120, 300  # frames
 _RATE = 12.0  # frames per second

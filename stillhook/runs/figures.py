@@ -11,14 +11,24 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.basics.metrics import peak_factor
-from models.run.summary import ERROR
+from models.basics import FloatArray, InputError, peak_factor
+from models.run import ERROR
 
-from ..text.quantities import decibels, duration, quantity, scale
-from ..text.style import AFTER, BEFORE, DRUM, HOOK, REFERENCE, new_figure, styled, typeset
+from ..text import (
+    AFTER,
+    BEFORE,
+    DRUM,
+    HOOK,
+    REFERENCE,
+    decibels,
+    duration,
+    new_figure,
+    quantity,
+    scale,
+    styled,
+    typeset,
+)
 from .runs import Runs
 from .strip import strip
 from .table import main_quantity
@@ -28,9 +38,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["comparison", "exceedance", "figures_of", "strip", "traces"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _COLOURS = {"none": BEFORE, "feedback": AFTER, "constant-tension": "#cc79a7"}
 _OTHERS = (DRUM, "#56b4e9", "#e69f00", HOOK)

@@ -11,13 +11,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from models.run.extremes import ExtremeEstimate
-from models.run.files import attributes
-from models.run.run import Run
+from models.run import ExtremeEstimate, Run, attributes
 
 from .runs import Runs
-
-__all__ = ["FORMAT", "summary_of", "summary_text"]
 
 FORMAT = 1
 """Version of the format."""

@@ -17,18 +17,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from models.basics.checks import InputError
-from models.case.case import Case
-from models.run.files import to_csv, to_netcdf, to_parquet
-from models.run.run import Run
+from models.basics import InputError
+from models.case import Case
+from models.run import Run, to_csv, to_netcdf, to_parquet
 
-from ..text.folder import OutputFolder, folder_name
+from ..text import OutputFolder, folder_name
 from .json import summary_of, summary_text
 from .runs import Runs
 from .table import TableRow, rows_of
 from .words import headline_of
-
-__all__ = ["FORMATS", "RunFolder", "TraceFormat", "write_runs"]
 
 TraceFormat = Literal["csv", "parquet", "netcdf", "none"]
 FORMATS: Mapping[str, tuple[str, Callable[[Run, Path], Path]]] = {
@@ -144,7 +141,7 @@ class RunFolder:
 
     def _draw(self, compared: Sequence[Runs], tell: Callable[[str, float], None]) -> list[str]:
         """Write the figures; return their paths from the folder, without suffix."""
-        from ..text.style import picture
+        from ..text import picture
         from .figures import comparison, exceedance, figures_of
 
         wanted: list[tuple[OutputFolder, str, Callable[[], Any]]] = []

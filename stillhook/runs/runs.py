@@ -18,15 +18,10 @@ from typing import Literal, overload
 
 import numpy as np
 
-from models.basics.checks import InputError
-from models.case.case import Case
-from models.operation.scenario import Scenario
-from models.run.extremes import ExtremeEstimate, extreme_over_seeds
-from models.run.metrics import Summary
-from models.run.run import Run
-from models.run.summary import ERROR
-
-__all__ = ["EXTREMES", "TRIPS", "Runs", "keep_worst", "stays"]
+from models.basics import InputError
+from models.case import Case
+from models.operation import Scenario
+from models.run import ERROR, ExtremeEstimate, Run, Summary, extreme_over_seeds
 
 EXTREMES: Mapping[str, tuple[str, bool]] = {
     "payload up": (ERROR, False),

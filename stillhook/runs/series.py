@@ -15,30 +15,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics.checks import InputError
-from models.case.case import Case
-from models.casefile.quantity import Quantity as Range
-from models.operation.excitation import SpectrumMotion
-from models.operation.scenario import Scenario
-from models.operation.scenarios import scenario_named
-from models.run.run import Run
-from models.run.summary import Quantity
-from models.sensing.control import Controller, holds_brake
-from models.simulation.simulate import run_simulation
-from models.simulation.simulation import Simulation, prepare
-from synth.controllers.linear_feedback import LinearFeedback
-from synth.design.design import GainDesign
-from synth.design.tuning import Tuning
+from models.basics import InputError
+from models.case import Case
+from models.casefile import Quantity as Range
+from models.operation import Scenario, SpectrumMotion, scenario_named
+from models.run import Quantity, Run
+from models.sensing import Controller, holds_brake
+from models.simulation import Simulation, prepare, run_simulation
+from synth.controllers import LinearFeedback
+from synth.design import GainDesign, Tuning
 
-from ..controllers.controllers import controller_by_name
+from ..controllers import controller_by_name
 from .runs import Runs, stays
 from .window import error_of
 
 if TYPE_CHECKING:
-    from models.operation.excitation import MotionSource
-    from models.plant.drive import DriveLimits
-
-__all__ = ["Progress", "Series", "controller_of"]
+    from models.operation import MotionSource
+    from models.plant import DriveLimits
 
 Progress = Callable[[float], None]
 

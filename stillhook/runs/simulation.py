@@ -11,24 +11,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Literal
 
-from models.basics.checks import InputError, check_range
-from models.basics.draws import check_seed
-from models.basics.threads import one_thread
-from models.case.case import Case
-from models.operation.scenario import Scenario
-from models.run.run import Run
-from models.sensing.control import Controller
-from synth.design.design import GainDesign
-from synth.design.tuning import Tuning
+from models.basics import InputError, check_range, check_seed, one_thread
+from models.case import Case
+from models.operation import Scenario
+from models.run import Run
+from models.sensing import Controller
+from synth.design import GainDesign, Tuning
 
 from .runs import Runs, keep_worst
 from .series import Progress, Series
 
 if TYPE_CHECKING:
-    from models.operation.excitation import MotionSource
-    from models.plant.drive import DriveLimits
-
-__all__ = ["simulate"]
+    from models.operation import MotionSource
+    from models.plant import DriveLimits
 
 
 def simulate(

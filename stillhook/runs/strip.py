@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.operation.scenario import Scenario
-from models.run.run import Run
+from models.basics import FloatArray, InputError
+from models.operation import Scenario
+from models.run import Run
 
-from ..text.quantities import quantity
-from ..text.style import AFTER, BROKEN, DRUM, HOOK, REFERENCE, new_figure, styled, typeset
+from ..text import AFTER, BROKEN, DRUM, HOOK, REFERENCE, new_figure, quantity, styled, typeset
 from .window import Window, moves, whole_of, window_of
 
 if TYPE_CHECKING:
@@ -28,9 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.transforms import Affine2DBase, Transform
 
-__all__ = ["Scene", "draw_station", "height_axis", "strip"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _SHOTS = 8
 _WAVES = 2.2  # periods of the hook's motion that a strip of a payload at rest shows

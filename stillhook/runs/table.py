@@ -12,14 +12,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from models.basics.intervals import Interval, Share, share
-from models.case.case import Case
-from models.run.extremes import ExtremeEstimate
+from models.basics import Interval, Share, share
+from models.case import Case
+from models.run import ExtremeEstimate
 
-from ..text.quantities import duration, number, quantity, scale
+from ..text import duration, number, quantity, scale
 from .runs import Runs
-
-__all__ = ["Figure", "TableRow", "main_quantity", "rows_of"]
 
 _KWH = 3.6e6  # [J]
 _UNITS = {"rad/s": "rpm"}  # motors are rated in rpm
@@ -195,7 +193,7 @@ def _quantities(compared: Sequence[Runs], group: str, wanted: Sequence[_Wanted])
 
 def _against_none(compared: Sequence[Runs]) -> list[TableRow]:
     """Return what is left of the payload's motion with the brake on, where that was simulated."""
-    from models.run.metrics import Summary
+    from models.run import Summary
 
     held = next((runs for runs in compared if runs.controller == "none"), None)
     if held is None or len(compared) < 2 or not held.stays:

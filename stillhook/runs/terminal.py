@@ -11,12 +11,9 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Literal
 
-from models.run.extremes import FEWEST_MAXIMA
-from models.run.run import Run
-from models.run.summary import ERROR
+from models.run import ERROR, FEWEST_MAXIMA, Run
 
-from ..text.quantities import count, duration, number, quantity
-from ..text.terminal import console
+from ..text import console, count, duration, number, quantity
 from .runs import Runs
 from .table import TableRow, rows_of
 from .words import headline_of, speed_of
@@ -24,8 +21,6 @@ from .words import headline_of, speed_of
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
-
-__all__ = ["Ticker", "run_progress", "show_comparison", "show_events", "show_runs"]
 
 Ticker = Callable[[str, float], None]
 """Takes what is being done, and how much of the whole is done [s of simulated time]."""

@@ -14,21 +14,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.run.run import Event, Run
-from models.run.summary import ERROR
+from models.basics import FloatArray, InputError
+from models.run import ERROR, Event, Run
 
-from ..text.quantities import duration, percent, quantity, scale
-from ..text.style import AFTER, BROKEN, DRUM, HOOK, REFERENCE, new_figure, styled, typeset
+from ..text import (
+    AFTER,
+    BROKEN,
+    DRUM,
+    HOOK,
+    REFERENCE,
+    duration,
+    new_figure,
+    percent,
+    quantity,
+    scale,
+    styled,
+    typeset,
+)
 from .window import Window, envelope, error_of, moves, runs_of_true, window_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["traces"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _BINS = 500  # over the width of the whole run
 _SMALL = 0.25  # of the hook's motion: a payload that moves less has a scale of its own

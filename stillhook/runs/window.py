@@ -10,24 +10,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from models.run.run import Run
+from models.basics import BoolArray, FloatArray
+from models.run import Run
 
 from .runs import TRIPS
-
-__all__ = [
-    "Window",
-    "envelope",
-    "error_of",
-    "moves",
-    "runs_of_true",
-    "whole_of",
-    "window_of",
-]
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 LENGTH = 60.0  # of a window [s]
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 
-from ..text.quantities import count, duration, number
+from ..text import count, duration, number
 from .runs import Runs
 from .table import main_quantity, rows_of
-
-__all__ = ["headline_of", "outcome", "speed_of", "tree"]
 
 
 def headline_of(runs: Runs) -> str:

@@ -6,16 +6,25 @@ import math
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
-import numpy.typing as npt
 
-from models.hook.hook import HookMotion
-from models.hook.hook_demand import HookDemand
-from models.hook.hook_survey import HookSurvey
-from models.vessel.crane import side_of
+from models.basics import FloatArray
+from models.hook import HookDemand, HookMotion, HookSurvey
+from models.vessel import side_of
 
-from ..text.hook_words import heading_words, sea_words, vessel_words
-from ..text.quantities import quantity
-from ..text.style import AFTER, BEFORE, DRUM, HOOK, REFERENCE, new_figure, styled, typeset
+from ..text import (
+    AFTER,
+    BEFORE,
+    DRUM,
+    HOOK,
+    REFERENCE,
+    heading_words,
+    new_figure,
+    quantity,
+    sea_words,
+    styled,
+    typeset,
+    vessel_words,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,9 +32,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.projections.polar import PolarAxes
 
-__all__ = ["motion_figure", "spectra_figure"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _MOTIONS = (
     ("displacement", "m", "m$^2$ s/rad"),

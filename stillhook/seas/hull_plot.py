@@ -6,16 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..text.style import AFTER, BEFORE, DRUM, REFERENCE, new_figure, styled, typeset
+from ..text import AFTER, BEFORE, DRUM, REFERENCE, new_figure, styled, typeset
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from models.vessel.hull.hull import FloatArray
-    from models.vessel.hull.vessel import HullVessel
-
-__all__ = ["hull_figure"]
+    from models.basics import FloatArray
+    from models.vessel.hull import HullVessel
 
 
 def hull_figure(vessel: HullVessel) -> Figure:

@@ -6,36 +6,18 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.tables import GRAVITY
-from synth.operability.criteria import Criterion
-from synth.operability.result import AtDepth, Operability
+from models.basics import GRAVITY, FloatArray
+from synth.operability import AtDepth, Criterion, Operability
 
-from ..text.quantities import quantity
-from ..text.style import REFERENCE, typeset
+from ..text import REFERENCE, quantity, typeset
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from synth.operability.contour import Contour
+    from synth.operability import Contour
 
-__all__ = [
-    "SHADE",
-    "draw_steepest",
-    "headline",
-    "limit_text",
-    "line_of",
-    "own_heading",
-    "pale",
-    "periods_axis",
-    "shade",
-    "steepest",
-    "top_of",
-]
-
-FloatArray = npt.NDArray[np.float64]
 
 # Colour and dashes of each limit: the same in every figure.
 _LINES: dict[str, tuple[str, Any]] = {

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from synth.operability.result import AtDepth, Operability
+from synth.operability import AtDepth, Operability
 
-from ..text.style import AFTER, BEFORE, REFERENCE, new_figure, styled
+from ..text import AFTER, BEFORE, REFERENCE, new_figure, styled
 from .operability_axes import (
     SHADE,
     draw_steepest,
@@ -30,8 +30,6 @@ from .operability_axes import (
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = ["capability_figure", "contour_figure", "depth_figure"]
 
 
 def contour_figure(study: Operability, at: AtDepth | None = None) -> Figure:

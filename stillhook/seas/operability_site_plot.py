@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from synth.operability.result import AtDepth, Operability
+from models.basics import FloatArray
+from synth.operability import AtDepth, Operability
 
-from ..text.style import AFTER, BEFORE, DRUM, HOOK, new_figure, styled
+from ..text import AFTER, BEFORE, DRUM, HOOK, new_figure, styled
 from .operability_axes import (
     draw_steepest,
     headline,
@@ -25,10 +26,6 @@ from .operability_axes import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["heading_figure", "scatter_figure"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def heading_figure(study: Operability, at: AtDepth | None = None) -> Figure:

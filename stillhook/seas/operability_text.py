@@ -9,19 +9,16 @@ import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from synth.operability.result import AtDepth, Operability
+from synth.operability import AtDepth, Operability
 
-from ..text.quantities import percent
-from ..text.terminal import _put, _table, pairs
+from ..text import pairs, percent
+from ..text.terminal import _put, _table
 
 if TYPE_CHECKING:
     import xarray as xr
     from rich.console import Console
 
-    from synth.operability.contour import Contour
-    from synth.operability.recheck import ContourCheck
-
-__all__ = ["netcdf", "show_operability", "workable_csv"]
+    from synth.operability import Contour, ContourCheck
 
 _MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
 _WHO = {"held": "drum held", "loop": "design", "reoptimised": "anew", "perfect": "perfect"}

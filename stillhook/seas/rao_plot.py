@@ -9,13 +9,11 @@ import numpy as np
 
 from models.vessel import MODES, VesselRaos
 
-from ..text.style import AFTER, BEFORE, DRUM, HOOK, REFERENCE, new_figure, styled
+from ..text import AFTER, BEFORE, DRUM, HOOK, REFERENCE, new_figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["rao_figure"]
 
 _HEADINGS = (0.0, 45.0, 90.0, 135.0, 180.0)
 _COLOURS = (AFTER, "#56b4e9", DRUM, BEFORE, REFERENCE)

@@ -7,16 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..text.quantities import percent, quantity
-from ..text.style import AFTER, BEFORE, HOOK, annotate, new_figure, styled, typeset
+from ..text import AFTER, BEFORE, HOOK, annotate, new_figure, percent, quantity, styled, typeset
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from models.sea.scatter import Scatter
-    from models.sea.sea import SeaSpectrum
-
-__all__ = ["scatter_figure", "spectrum_figure"]
+    from models.sea import Scatter, SeaSpectrum
 
 _MOST_CELLS = 350  # beyond, the numbers in the cells would not be legible
 
@@ -81,7 +77,7 @@ def spectrum_figure(sea: SeaSpectrum, *, name: str) -> Figure:
     name
         What it is, for the line under the title.
     """
-    from models.sea.sea import SeaSpectrum as Spectrum
+    from models.sea import SeaSpectrum as Spectrum
 
     peak, height = sea.peak_frequency, sea.significant_height
     period = 2.0 * math.pi / peak

@@ -4,3 +4,27 @@ What is varied stands in `models.spread`, the vectorised frequency-domain engine
 `synth.sweeps`; here are what runs thousands of time-domain cases, keeps them on disk, and shows
 what came of it.
 """
+
+from typing import TYPE_CHECKING
+
+from models.basics.lazy import lazy_face
+
+if TYPE_CHECKING:
+    from .export import write_result as write_result
+    from .figures import sweep_figures as sweep_figures
+    from .header import ATTRIBUTE as ATTRIBUTE
+    from .header import question_from as question_from
+    from .header import read_header as read_header
+    from .store import RESULT as RESULT
+    from .sweeping import resume_sweep as resume_sweep
+    from .sweeping import spread_of as spread_of
+    from .sweeping import sweep as sweep
+    from .time_metrics import STATUS as STATUS
+    from .usual import fault_spread as fault_spread
+    from .usual import usual_spread as usual_spread
+    from .words import SweepSummary as SweepSummary
+    from .words import case_at as case_at
+    from .words import varied_paths as varied_paths
+    from .words import worst_cases as worst_cases
+else:
+    __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

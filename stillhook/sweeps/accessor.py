@@ -18,11 +18,9 @@ from .export import table_of, write_result
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped]
 
-    from models.case.case import Case
+    from models.case import Case
 
     from .words import SweepSummary
-
-__all__ = ["SweepAccessor"]
 
 
 @xr.register_dataset_accessor("sweep")  # type: ignore[no-untyped-call]

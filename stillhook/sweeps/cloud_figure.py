@@ -6,18 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..text.quantities import number
-from ..text.style import AFTER, BROKEN, HOOK, REFERENCE, new_figure, styled
+from ..text import AFTER, BROKEN, HOOK, REFERENCE, new_figure, number, styled
 from .figure_parts import numbers_in, shown, stable_of, title
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from synth.design.design import GainDesign
-    from synth.design.structure_design import StructureDesign
-
-__all__ = ["nyquist_cloud"]
+    from synth.design import GainDesign, StructureDesign
 
 _CURVES = 150
 _BAND = (0.02, 200.0, 5000)  # ends [rad/s] and points: circles of light rope modes look round
@@ -34,8 +30,7 @@ def nyquist_cloud(result: xr.Dataset, design: GainDesign | StructureDesign) -> F
     design
         The design.
     """
-    from synth.sweeps.dataset import spread_of
-    from synth.sweeps.frequency import FrequencyEngine
+    from synth.sweeps import FrequencyEngine, spread_of
 
     engine = FrequencyEngine(design, spread_of(result), metrics=[])
     at = shown(stable_of(result), _CURVES)

@@ -21,14 +21,11 @@ from typing import Any
 
 from typing_extensions import override
 
-from models.basics.checks import InputError, SolverError, check_range
+from models.basics import InputError, SolverError, check_range
 
-from ..keeper.digest import code_digest
-from ..keeper.pool import Died
+from ..keeper import Died, code_digest
 from .engines import RETRIES, Answers, Engine, Todo, died
 from .time_cases import CaseResult, CaseTask, TimeBench, TimeQuestion
-
-__all__ = ["Cluster", "do_case"]
 
 _POLL = 0.2  # between two looks at Ctrl-C [s]
 _AHEAD = 3  # cases under way for each thread of the cluster

@@ -18,12 +18,10 @@ from collections.abc import Generator, Iterator
 
 from typing_extensions import override
 
-from models.basics.checks import InputError, check_range
+from models.basics import InputError, check_range
 
-from ..keeper.pool import Died, Pool
+from ..keeper import Died, Pool
 from .time_cases import CaseResult, CaseTask, TimeQuestion
-
-__all__ = ["RETRIES", "Answers", "Engine", "Processes", "Serial", "Todo", "died", "engine_of"]
 
 Answers = Generator[tuple[CaseTask, CaseResult] | None, None, None]
 

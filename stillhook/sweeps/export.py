@@ -9,15 +9,11 @@ import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from models.basics.checks import InputError
-from models.basics.files import replace_atomically
-from models.basics.signals import pick
+from models.basics import InputError, pick, replace_atomically
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped]
     import xarray as xr
-
-__all__ = ["check_writable", "table_of", "write_result"]
 
 ENDINGS = (".csv", ".parquet", ".nc", ".zarr")
 

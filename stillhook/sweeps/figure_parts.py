@@ -7,26 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..text.quantities import scale
-from ..text.style import typeset
+from models.basics import FloatArray
+
+from ..text import scale, typeset
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "OWN",
-    "numbers_in",
-    "shown",
-    "stable_of",
-    "thinned",
-    "title",
-    "unit_of",
-    "words_of",
-]
-
-FloatArray = npt.NDArray[np.float64]
 
 OWN = ("case", "seed")  # coordinates that are not varied
 _PLAIN = ("mass", "length", "coefficient", "radius", "inertia", "ratio", "efficiency", "bandwidth")

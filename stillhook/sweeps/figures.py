@@ -11,13 +11,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.basics.intervals import share
+from models.basics import FloatArray, InputError, share
 
-from ..text.quantities import number, quantity
-from ..text.style import AFTER, BROKEN, HOOK, REFERENCE, new_figure, styled, typeset
+from ..text import AFTER, BROKEN, HOOK, REFERENCE, new_figure, number, quantity, styled, typeset
 from .cloud_figure import nyquist_cloud
 from .figure_parts import numbers_in, stable_of, thinned, title, unit_of, words_of
 from .scatter_figure import scatter_matrix
@@ -27,12 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from synth.design.design import GainDesign
-    from synth.design.structure_design import StructureDesign
+    from synth.design import GainDesign, StructureDesign
 
-__all__ = ["cumulative_share", "nyquist_cloud", "scatter_matrix", "sweep_figures", "violins"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _MEASURES = ("payload_rms", "torque_rms", "speed_rms", "max_sensitivity")
 
@@ -201,9 +194,7 @@ def _nominal(
     """Return the nominal case's own numbers, as the sweep computes them."""
     if design is None or result.attrs.get("mode") != "frequency":
         return {}
-    from synth.sweeps.dataset import spread_of
-    from synth.sweeps.frequency import FrequencyEngine
-    from synth.sweeps.metrics import METRICS
+    from synth.sweeps import METRICS, FrequencyEngine, spread_of
 
     engine = FrequencyEngine(design, spread_of(result), metrics=[n for n in names if n in METRICS])
     row = np.array([[engine.spread.nominal[path] for path in engine.spread.paths]])

@@ -16,24 +16,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from models.basics.checks import InputError
-from models.case.case import Case
+from models.basics import InputError
+from models.case import Case
 from models.spread import Spread
 
-from ..keeper.digest import versions
-from ..keeper.kept_lines import difference
+from ..keeper import difference, versions
 from .pilots import pilot_from
 from .time_cases import TimeQuestion
-
-__all__ = [
-    "ATTRIBUTE",
-    "FORMAT",
-    "Draw",
-    "differences",
-    "header_of",
-    "question_from",
-    "read_header",
-]
 
 ATTRIBUTE = "stillhook_sweep"
 """Name of the attribute."""

@@ -19,16 +19,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.basics.files import replace_atomically
+from models.basics import InputError, replace_atomically
 
 from .header import ATTRIBUTE, FORMAT, differences
 from .time_metrics import STATUS
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["NetcdfStore"]
 
 _SUM = "stillhook_check_sum"
 _OFTEN = 30.0  # between two writes [s]

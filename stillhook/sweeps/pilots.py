@@ -14,20 +14,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from models.basics.checks import InputError
-from models.basics.signals import pick
-from models.case.case import Case
-from models.sensing.control import Controller
-from synth.design.design import GainDesign
-from synth.design.structure_design import StructureDesign
-from synth.design.tuning import Tuning
+from models.basics import InputError, pick
+from models.case import Case
+from models.sensing import Controller
+from synth.design import GainDesign, StructureDesign, Tuning
 
-from ..controllers.contenders import contenders_of
-from ..controllers.controllers import controller_by_name, known_controllers
-from ..controllers.law import Law, design_law
-from ..controllers.makers import given
-
-__all__ = ["Pilot", "pilot_from", "pilot_of"]
+from ..controllers import (
+    Law,
+    contenders_of,
+    controller_by_name,
+    design_law,
+    given,
+    known_controllers,
+)
 
 Make = Callable[[Case, Law | None], Controller]
 

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.basics.intervals import share
+from models.basics import FloatArray, InputError, share
 
-from ..text.style import AFTER, BROKEN, new_figure, styled, typeset
+from ..text import AFTER, BROKEN, new_figure, styled, typeset
 from .figure_parts import OWN, numbers_in, shown, stable_of, thinned, unit_of, words_of
 
 if TYPE_CHECKING:
@@ -19,9 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["scatter_matrix"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _POINTS = 1500
 _COLUMNS = 6

@@ -26,19 +26,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError
+from models.basics import BoolArray, InputError
 
-from ..keeper.journal import Journal
-from ..text.folder import OutputFolder
+from ..keeper import Journal
+from ..text import OutputFolder
 from .header import ATTRIBUTE, differences, read_header
 from .time_metrics import STATUS
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["JOURNAL", "RESULT", "Store", "piece_of"]
-
-BoolArray = npt.NDArray[np.bool_]
 
 RESULT, JOURNAL = "result.zarr", "journal.jsonl"
 _IDENTITY = "stillhook_store"

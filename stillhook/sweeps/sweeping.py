@@ -13,22 +13,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from models.basics.checks import InputError, check_range
-from models.basics.draws import check_seed
-from models.basics.signals import pick
-from models.case.case import Case
-from models.casefile.quantity import Quantity
+from models.basics import InputError, check_range, check_seed, pick
+from models.case import Case
+from models.casefile import Quantity
 from models.spread import METHODS, Spread
-from synth.design.design import GainDesign
-from synth.design.structure_design import StructureDesign
+from synth.design import GainDesign, StructureDesign
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from .engines import Engine
     from .time_sweep import Progress
-
-__all__ = ["case_of", "resume_sweep", "spread_of", "sweep"]
 
 SAMPLES = {"frequency": 10_000, "time": 256}
 """Cases of a sweep unless told otherwise, by its mode."""
@@ -268,7 +263,7 @@ def _in_frequency(
     """Return the sweep of the linear loop."""
     from dataclasses import replace
 
-    from synth.sweeps.frequency import frequency_sweep
+    from synth.sweeps import frequency_sweep
 
     from .export import check_writable, write_result
 

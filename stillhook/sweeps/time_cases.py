@@ -18,22 +18,17 @@ from typing import Any
 
 import numpy as np
 
-from models.basics.checks import StillhookError
-from models.basics.physics_warning import PhysicsWarning
-from models.basics.threads import one_thread
-from models.case.case import Case
-from models.operation.faults import with_faults
-from models.operation.scenarios import scenario_named
-from models.run.run import Run
-from models.sensing.control import Controller
+from models.basics import PhysicsWarning, StillhookError, one_thread
+from models.case import Case
+from models.operation import scenario_named, with_faults
+from models.run import Run
+from models.sensing import Controller
 
-from ..keeper.worker import Task
-from ..runs.series import Progress, Series
+from ..keeper import Task
+from ..runs import Progress, Series
 from .pilots import Pilot
 from .time_metrics import numbers_of, status_of
 from .trim import Shift, shift_between, static_of, trimmed
-
-__all__ = ["CaseResult", "CaseTask", "TimeBench", "TimeQuestion", "seed_of"]
 
 _PURPOSE = 7  # second entry of the seeds of cases; those of a run's own draws are others
 

@@ -12,13 +12,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from models.basics.signals import pick
-from models.run.run import Run
+from models.basics import pick
+from models.run import Run
 
-from ..runs.runs import TRIPS
-from ..runs.window import error_of
-
-__all__ = ["METRICS", "STATUS", "Metric", "names_of", "numbers_of", "status_of"]
+from ..runs import TRIPS, error_of
 
 STATUS: Mapping[str, int] = MappingProxyType(
     {

@@ -17,9 +17,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.operation.faults import FAULTS, PREFIX
-from models.operation.scenarios import scenario_named
+from models.basics import BoolArray, FloatArray, InputError
+from models.operation import FAULTS, PREFIX, scenario_named
 from models.spread import Spread
 
 from .engines import Engine, engine_of
@@ -30,10 +29,6 @@ from .time_metrics import METRICS, STATUS
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Keeper", "Progress", "row_of", "run_sweep", "tasks_of", "template_of"]
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 Progress = Callable[[str, int, int], None]
 
 _TOLD = 20  # reasons of failed cases that a result tells

@@ -16,19 +16,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from models.case.case import Case
-from models.plant.plant import MEAN_LOSSES, build_plant
-from models.sensing.control import (
-    MEASURED,
-    Controller,
-    Measurement,
-    Recursion,
-    holds_brake,
-    recursion_of,
-)
-from synth.structures.recursive import RecursiveController
-
-__all__ = ["Shift", "shift_between", "static_of", "trimmed"]
+from models.case import Case
+from models.plant import MEAN_LOSSES, build_plant
+from models.sensing import Controller, Measurement, Recursion, holds_brake, recursion_of
+from models.sensing.control import MEASURED
+from synth.structures import RecursiveController
 
 _SHIFTED = ("drive.applied", "rope.tension", "motor.torque")
 

@@ -11,11 +11,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from models.basics.signals import pick
-from models.case.case import Case
+from models.basics import pick
+from models.case import Case
 from models.spread import Distribution, Spread, Uniform
-
-__all__ = ["FAULT_SPREADS", "fault_spread", "usual_spread"]
 
 _LATER = 0.02  # how much later the telemetry may be [s]
 

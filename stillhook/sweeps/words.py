@@ -17,11 +17,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics.checks import InputError, check_range
-from models.basics.intervals import Share, share
-from models.basics.physics_warning import PhysicsWarning
-from models.basics.signals import pick
-from models.case.case import Case
+from models.basics import InputError, PhysicsWarning, Share, check_range, pick, share
+from models.case import Case
 from models.spread import Samples, Spread
 
 from .header import ATTRIBUTE
@@ -29,8 +26,6 @@ from .time_metrics import STATUS
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["QUANTILES", "SweepSummary", "case_at", "varied_paths", "worst_cases"]
 
 QUANTILES = (0.05, 0.5, 0.95)
 """Shares of the stable cases that are below what is told."""
@@ -191,7 +186,7 @@ def case_at(result: xr.Dataset, number: int, nominal: Case) -> Case:
         last = int(result["case"].to_numpy().max())
         raise InputError(f"sweep: case must be one of 0 to {last}, got {number}")
     if result.attrs.get("mode") == "frequency":
-        from synth.sweeps.dataset import case_of
+        from synth.sweeps import case_of
 
         return case_of(result, number)
     values = {p: float(result[p].to_numpy()[there[0]]) for p in varied_paths(result)}

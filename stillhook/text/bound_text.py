@@ -11,18 +11,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from models.basics.checks import StillhookError
-from synth.bound.beside import DesignBound, exact_sensors
+from models.basics import StillhookError
+from synth.bound import DesignBound, exact_sensors
 
 from .quantities import number, quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from synth.design.design import GainDesign
-    from synth.design.structure_design import StructureDesign
-
-__all__ = ["bound_cell", "bound_figures", "bound_sentence", "bounds_note"]
+    from synth.design import GainDesign, StructureDesign
 
 _CLEAR = 3.0  # from so many times the bound on it is told as a multiple
 

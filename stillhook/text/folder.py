@@ -12,9 +12,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from models.basics.checks import InputError
-
-__all__ = ["OutputFolder", "folder_name"]
+from models.basics import InputError
 
 
 @dataclass(frozen=True)

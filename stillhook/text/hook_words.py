@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from models.vessel.crane import place_text
+from models.vessel import place_text
 
 from .quantities import quantity
 
 if TYPE_CHECKING:
     from models import Case
-
-__all__ = ["heading_text", "heading_words", "sea_words", "vessel_words"]
 
 
 def heading_words(heading: float) -> str:

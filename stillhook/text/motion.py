@@ -14,19 +14,18 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.metrics import most_probable_maximum, zero_crossing_period
-from models.basics.quadrature import adaptive_nodes
-from models.case.case import Case
-from models.hook.hook import HookMotion
-from synth.design.design import GainDesign
-from synth.question.question import locked_response
-
-__all__ = ["Motion", "MotionView", "highest", "hook_of"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
+from models.basics import (
+    ComplexArray,
+    FloatArray,
+    adaptive_nodes,
+    most_probable_maximum,
+    zero_crossing_period,
+)
+from models.case import Case
+from models.hook import HookMotion
+from synth.design import GainDesign
+from synth.question import locked_response
 
 PAYLOAD = "payload.displacement"
 DRUM = "drum.haul"

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["count", "decibels", "duration", "number", "percent", "quantity", "scale"]
-
 # The largest factor that leaves a figure of at least one is taken; the last entry otherwise.
 _SCALES: dict[str, tuple[tuple[float, str], ...]] = {
     "m": ((1.0, "m"), (1e-3, "mm")),

@@ -18,22 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from synth.design.design import GainDesign
-
-__all__ = [
-    "AFTER",
-    "BEFORE",
-    "BROKEN",
-    "DRUM",
-    "HOOK",
-    "REFERENCE",
-    "annotate",
-    "headline",
-    "new_figure",
-    "picture",
-    "styled",
-    "typeset",
-]
+    from synth.design import GainDesign
 
 HOOK = "#7f7f7f"
 BEFORE = "#d55e00"

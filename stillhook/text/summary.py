@@ -11,31 +11,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from models.rig.winch import DCMotor
-from synth.design.design import GainDesign
-from synth.design.tuning import LimitUse
+from models.rig import DCMotor
+from synth.design import GainDesign, LimitUse
 
 from .bound_text import bound_sentence
 from .motion import MotionView
 from .quantities import decibels, number, percent, quantity, scale
-
-__all__ = [
-    "AT_LEAST",
-    "GainRow",
-    "LimitRow",
-    "MotionRow",
-    "command_text",
-    "effect",
-    "facts",
-    "gain_rows",
-    "has_gains",
-    "label_of",
-    "limit_rows",
-    "margin_rows",
-    "motion_rows",
-    "required_rows",
-    "sea_text",
-]
 
 _LABELS = {
     "max_sensitivity": "sensitivity peak M_s",

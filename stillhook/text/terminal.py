@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from models.basics.physics_warning import PhysicsWarning
+from models.basics import PhysicsWarning
 
 from .quantities import duration, percent
 from .summary import (
@@ -35,9 +35,7 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
-    from synth.design.design import GainDesign
-
-__all__ = ["Progress", "commands", "console", "pairs", "progress", "show_design", "told_once"]
+    from synth.design import GainDesign
 
 Progress = Callable[[str, int, int], None]
 

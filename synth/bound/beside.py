@@ -19,28 +19,22 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.threads import one_thread
-from models.case.case import Case
-from models.hook.hook import HookMotion
-from models.plant.linear import LinearPlant
-from models.sensing.plant import MEASURED, sensed_plant, sensed_spectra
+from models.basics import White, one_thread
+from models.case import Case
+from models.hook import HookMotion
+from models.plant import LinearPlant
+from models.sensing import MEASURED, sensed_plant, sensed_spectra
 
-from ..limits.limits import Limit
-from ..loop.controller import Controller, closed_loop_poles
-from ..loop.disturbance import White, disturbances
-from ..question.question import PAYLOAD
-from ..verify.recompute import LawMatrices, Loop, moments
+from ..limits import Limit
+from ..loop import Controller, closed_loop_poles, disturbances
+from ..question import PAYLOAD
+from ..verify import LawMatrices, Loop, moments
 from .bound import Bound, lqg_bound
 from .case import command_limit, faint_noise, rms_limits
 from .check import banded
 from .shaped import with_input_outputs
 from .spectral_factor import SpectralFactor, spectral_factor
-
-__all__ = ["DesignBound", "bound_beside", "exact_sensors"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _FAINT = 1e-3  # noise of an exact sensor, see `bound_case.bound_for`
 _LONGER = 2.0  # T_z of any signal over that of the hook, at most

@@ -23,14 +23,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import check_range
-from models.basics.quadrature import adaptive_nodes
+from models.basics import FloatArray, adaptive_nodes, check_range
 
-from ..loop.assess import Assessment
-
-__all__ = ["BodeEstimate", "bode_estimate", "bode_integral", "least_sensitivity"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..loop import Assessment
 
 _GONE = 0.1  # loop gain below which nothing is left to trade
 _QUANTILES = (0.05, 0.95)  # of the variance, between which a sea has its band

@@ -18,17 +18,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, check_range
-from models.basics.signals import pick
-from models.basics.threads import one_thread
-from models.plant.linear import LinearPlant
-from models.plant.shaping import ShapingFilter
+from models.basics import FloatArray, InputError, White, check_range, one_thread, pick
+from models.plant import LinearPlant, ShapingFilter
 
-from ..loop.controller import Controller
-from ..loop.disturbance import Disturbance, White, disturbances
-from ..structures.lqg import reduced
+from ..loop import Controller, Disturbance, disturbances
+from ..structures import reduced
 from .dual import Dual, DualPoint
 from .nodes import refitted, truth_of
 from .shaped import shaped, with_input_outputs
@@ -36,11 +31,8 @@ from .spectral_factor import SpectralFactor, spectral_factor
 from .truth import ClosedLoop
 
 if TYPE_CHECKING:
-    from ..verify.verification import Verification
+    from ..verify import Verification
 
-__all__ = ["Bound", "lqg_bound"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _ENOUGH = 1e-3  # of the bound's variance: less need not be won by fitting again
 _BROKEN = 1.01  # a limit that is exceeded by more, at the highest multipliers, cannot be kept

@@ -16,20 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from models.basics.checks import InputError, check_range
-from models.case.case import Case
-from models.hook.hook import HookMotion
-from models.plant.linear import LinearPlant
-from models.plant.plant_data import PlantData
-from models.sensing.plant import sensed_plant, sensed_spectra
+from models.basics import InputError, White, check_range
+from models.case import Case
+from models.hook import HookMotion
+from models.plant import LinearPlant, PlantData
+from models.sensing import sensed_plant, sensed_spectra
 
-from ..limits.limits import Limit
-from ..limits.signal_limits import Continuous, Least, Peak, Rms
-from ..loop.disturbance import White
-from ..question.question import PAYLOAD, pose
+from ..limits import Continuous, Least, Limit, Peak, Rms
+from ..question import PAYLOAD, pose
 from .bound import Bound, lqg_bound
-
-__all__ = ["bound_for", "command_limit", "faint_noise", "rms_limits"]
 
 _LONGER = 2.0  # T_z of any signal over that of the hook, at most
 _SAMPLE = 0.01  # of the faint noise [s]

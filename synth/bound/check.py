@@ -11,26 +11,28 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import SynthesisError
-from models.basics.threads import one_thread
+from models.basics import ComplexArray, FloatArray, SynthesisError, one_thread
 
-from ..loop.controller import Controller, closed_loop_poles
-from ..verify.integrals import panels
-from ..verify.recompute import LawMatrices, Loop, Source, lyapunov_variances, moments
-from ..verify.verification import Verification, agreement, bounded
+from ..loop import Controller, closed_loop_poles
+from ..verify import (
+    LawMatrices,
+    Loop,
+    Source,
+    Verification,
+    agreement,
+    bounded,
+    lyapunov_variances,
+    moments,
+    panels,
+)
 from .truth import optimal_response
 
 if TYPE_CHECKING:
-    from ..loop.disturbance import Disturbance
+    from ..loop import Disturbance
     from .bound import Bound
     from .dual import DualPoint
 
-__all__ = ["banded", "verify_bound", "weighted_rms"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _PADE = 5  # of the delays, where another controller's stability is looked at
 _TIME = 1e-3  # cost by a Lyapunov equation, in which much cancels

@@ -20,18 +20,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize
 
-from models.basics.checks import InputError, SolverError
-from models.basics.riccati import solve_lyapunov, solve_riccati
-from models.plant.linear import LinearPlant
+from models.basics import FloatArray, InputError, SolverError, solve_lyapunov, solve_riccati
+from models.plant import LinearPlant
 
-from ..structures.lqg import Estimator, Regulator, weighing
-
-__all__ = ["Dual", "DualPoint"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..structures import Estimator, Regulator, weighing
 
 _LEAST = 1e-6  # of a multiplier, as a price: lambda b^2 over the cost
 _MOST = 1e6

@@ -5,20 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
-from models.plant.linear import LinearPlant
-from models.plant.shaping import ShapingFilter
+from models.basics import ComplexArray, FloatArray
+from models.plant import LinearPlant, ShapingFilter
 
-from ..loop.disturbance import Disturbance
+from ..loop import Disturbance
 from .dual import Dual, DualPoint
 from .spectral_factor import SpectralFactor
 from .truth import Truth, frequencies, optimal_response
-
-__all__ = ["densities", "refitted", "truth_of"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _LOYAL, _FAINT = 0.3, 1e-5  # weight of a spectrum's own fit, and its floor over the peak
 

@@ -11,15 +11,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.plant.linear import LinearPlant
-from models.plant.shaping import ShapingFilter
-
-__all__ = ["shaped", "with_input_outputs"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import InputError
+from models.plant import LinearPlant, ShapingFilter
 
 
 def with_input_outputs(plant: LinearPlant, names: Sequence[str]) -> LinearPlant:

@@ -22,17 +22,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import least_squares
 
-from models.basics.checks import InputError, SolverError, check_range
-from models.plant.shaping import ShapingFilter
+from models.basics import FloatArray, InputError, SolverError, check_range
+from models.plant import ShapingFilter
 
-from ..loop.disturbance import Disturbance
-
-__all__ = ["SpectralFactor", "fit_spectral_factor", "spectral_factor"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..loop import Disturbance
 
 _NODES = 300
 _TAIL_WEIGHT = 0.02  # of the logarithm against the amplitude

@@ -30,17 +30,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.plant.linear import LinearPlant
-from models.plant.response import PlantResponse
+from models.basics import ComplexArray, FloatArray
+from models.plant import LinearPlant, PlantResponse
 
-from ..loop.disturbance import Disturbance
-from ..structures.lqg import Estimator, Regulator
-from ..verify.integrals import panels
-
-__all__ = ["ClosedLoop", "Truth", "frequencies", "optimal_response"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
+from ..loop import Disturbance
+from ..structures import Estimator, Regulator
+from ..verify import panels
 
 _ORDER = 12  # Gauss-Legendre nodes a panel
 _TAIL = 8  # panels of 1/omega above all features

@@ -21,28 +21,37 @@ from typing import TYPE_CHECKING, Any
 
 import cvxpy
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, SolverError, SynthesisError, check_range
-from models.basics.riccati import balanced_truncation, solve_lyapunov
-from models.basics.threads import one_thread
+from models.basics import (
+    ComplexArray,
+    FloatArray,
+    InputError,
+    SolverError,
+    SynthesisError,
+    balanced_truncation,
+    check_range,
+    one_thread,
+    solve_lyapunov,
+)
 
-from ..loop.assess import Assessment
-from ..loop.controller import Controller, closed_loop_poles
-from ..verify.recompute import LawMatrices, closed_matrices, lyapunov_variances
-from ..verify.verification import Check, Verification, agreement, bounded
+from ..loop import Assessment, Controller, closed_loop_poles
+from ..verify import (
+    Check,
+    LawMatrices,
+    Verification,
+    agreement,
+    bounded,
+    closed_matrices,
+    lyapunov_variances,
+)
 from .bound import Bound
 from .nodes import densities
 from .truth import frequencies
 from .youla_parts import AffineLoop, basis, compressed, laguerre, realised
 
 if TYPE_CHECKING:
-    from ..loop.margins import Margins
+    from ..loop import Margins
 
-__all__ = ["YoulaDesign", "youla_design"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 cp: Any = cvxpy  # its functions come through a star import that mypy does not follow
 

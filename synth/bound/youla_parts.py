@@ -12,20 +12,15 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import block_diag
 
-from models.plant.linear import LinearPlant
+from models.basics import ComplexArray, FloatArray
+from models.plant import LinearPlant
 
-from ..loop.controller import Controller
+from ..loop import Controller
 
 if TYPE_CHECKING:
     from .bound import Bound
-
-__all__ = ["AffineLoop", "basis", "compressed", "laguerre", "realised"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 
 def laguerre(a: float, count: int, channels: int) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -10,11 +10,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from models.case.case import Case
+from models.case import Case
 
-from ..structures.recursive import RecursiveController
-
-__all__ = ["BrakeOn"]
+from ..structures import RecursiveController
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, init=False)

@@ -30,15 +30,18 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from models.basics.checks import SynthesisError, check_range
-from models.case.case import Case
-from models.plant.plant import Plant, build_plant
+from models.basics import SynthesisError, check_range
+from models.case import Case
+from models.plant import Plant, build_plant
 
-from ..structures.drum_speed import DrumSpeedLoop
-from ..structures.recursive import RecursiveController, Signals, make_recursion
-from ..structures.sampling import SampledLoop, sampled_loop
-
-__all__ = ["ConstantTension"]
+from ..structures import (
+    DrumSpeedLoop,
+    RecursiveController,
+    SampledLoop,
+    Signals,
+    make_recursion,
+    sampled_loop,
+)
 
 _OWNER = "constant tension"
 _DEAD_BAND = 0.02  # of the set-point: what friction of sheaves and drum hides at the least [-]

@@ -9,19 +9,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from models.basics.checks import InputError
-from models.basics.signals import pick
-from models.case.case import Case
+from models.basics import InputError, pick
+from models.case import Case
 
-from ..design.design import GainDesign
-from ..design.tuning import Tuning
-from ..structures.recursive import RecursiveController
+from ..design import GainDesign, Tuning
+from ..structures import RecursiveController
 from .brake_on import BrakeOn
 from .constant_tension import ConstantTension
 from .feed_forward import VelocityFeedForward
 from .linear_feedback import LinearFeedback
-
-__all__ = ["CONTROLLERS", "Wanted", "controller_named"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -40,21 +40,13 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import SynthesisError, check_range
-from models.case.case import Case
-from models.hook.hook import HookMotion
-from models.plant.discrete import zero_order_hold
-from models.plant.plant import build_plant
+from models.basics import FloatArray, SynthesisError, check_range
+from models.case import Case
+from models.hook import HookMotion
+from models.plant import build_plant, zero_order_hold
 
-from ..structures.drum_speed import DrumSpeedLoop
-from ..structures.recursive import RecursiveController, Signals
-from ..structures.sampling import sampled_loop
-
-__all__ = ["VelocityFeedForward", "lead_of"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..structures import DrumSpeedLoop, RecursiveController, Signals, sampled_loop
 
 _OWNER = "feed-forward"
 LEAD_BANDWIDTH = 8.0  # of the acceleration: well above the waves, below the MRU's noise [rad/s]

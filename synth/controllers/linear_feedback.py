@@ -37,25 +37,27 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, check_range
-from models.basics.signals import pick
-from models.case.case import Case
-from models.plant.plant import MEAN_LOSSES, build_plant
+from models.basics import InputError, check_range, pick
+from models.case import Case
+from models.plant import MEAN_LOSSES, build_plant
 
-from ..design.design import GainDesign
-from ..loop.controller import Controller
-from ..structures.drum_speed import SteadyMotion
-from ..structures.recursive import RecursiveController, Signals, checked_sample_time
-from ..structures.sampled_controller import Matrices, low_pass_matrices, sampled, tracking_gain
+from ..design import GainDesign
+from ..loop import Controller
+from ..structures import (
+    Matrices,
+    RecursiveController,
+    Signals,
+    SteadyMotion,
+    checked_sample_time,
+    low_pass_matrices,
+    sampled,
+    tracking_gain,
+)
 
 if TYPE_CHECKING:
-    from ..design.tuning import Tuning
+    from ..design import Tuning
 
-__all__ = ["LinearFeedback"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _OWNER = "linear feedback"
 PAYLOAD = ("payload.acceleration", "payload.velocity", "payload.displacement")

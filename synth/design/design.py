@@ -13,24 +13,19 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.case.case import Case
-from models.plant.equations import MEASUREMENTS
+from models.basics import InputError
+from models.case import Case
+from models.plant import MEASUREMENTS
 
-from ..loop.assess import Assessment
-from ..loop.margins import Margins
-from ..search.multistart import Start
+from ..loop import Assessment, Margins
+from ..search import Start
 from .tuning import LimitUse
 
 if TYPE_CHECKING:
-    from ..bound.beside import DesignBound
-    from ..verify.verify import Verification
+    from ..bound import DesignBound
+    from ..verify import Verification
 
-__all__ = ["GainDesign"]
-
-FloatArray = npt.NDArray[np.float64]
 PAYLOAD = "payload.displacement"
 HOOK = "hook.heave"
 
@@ -120,7 +115,7 @@ class GainDesign:
     @cached_property
     def assessment(self) -> Assessment:
         """The closed loop in numbers: spectra, responses, margins, poles."""
-        from ..question.question import assess_gains
+        from ..question import assess_gains
 
         return assess_gains(self.sea_case, self.gains, masses=self.masses, drag=self.drag)
 
@@ -140,8 +135,8 @@ class GainDesign:
         SolverError
             If there is no bound.
         """
-        from ..bound.beside import bound_beside
-        from ..question.question import pose
+        from ..bound import bound_beside
+        from ..question import pose
 
         if self.margins is None:
             raise InputError("bound: the loop must be stable")
@@ -157,7 +152,7 @@ class GainDesign:
 
     def verify(self) -> Verification:
         """Check everything that is claimed by code that the optimiser did not use."""
-        from ..verify.verify import verify_design
+        from ..verify import verify_design
 
         return verify_design(self)
 

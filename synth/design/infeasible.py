@@ -11,17 +11,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from ..question.question import Question
-from ..search.multistart import briskest, coarse_programme
-from ..search.polishing import polish, view_of
-from ..search.programme import Goal, Problem, Solved
+from models.basics import FloatArray
+
+from ..question import Goal, Problem, Question
+from ..search import Solved, briskest, coarse_programme, polish, view_of
 from .tuning import Tuning
-
-__all__ = ["Shortfall", "shortfall"]
-
-FloatArray = npt.NDArray[np.float64]
 
 Progress = Callable[[str, int, int], None]
 

@@ -14,18 +14,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.basics.checks import InputError, check_range
-from models.basics.threads import one_thread
-from models.case.case import Case
+from models.basics import InputError, check_range, one_thread
+from models.case import Case
 
-from ..loop.assess import Assessment
-from ..question.question import Question, pose, with_masses
-from ..search.multistart import resume, search
+from ..loop import Assessment
+from ..question import Question, pose, with_masses
+from ..search import resume, search
 from .design import PAYLOAD, GainDesign
 from .infeasible import Shortfall, shortfall
 from .tuning import LimitUse, Tuning, limit_uses, tuning_of
-
-__all__ = ["evaluate_gains", "optimise_gains"]
 
 Progress = Callable[[str, int, int], None]
 
@@ -297,7 +294,7 @@ def _masses_wanted(question: Question, tuning: Tuning) -> int:
 
 def _masses_for(question: Question, view: Assessment) -> int:
     """Return the rope masses that the loop's crossover asks for, where the case leaves it open."""
-    from models.plant.rope import masses_for_bandwidth
+    from models.plant import masses_for_bandwidth
 
     if question.data.masses is not None or not view.margins.crossovers.size:
         return question.masses

@@ -14,22 +14,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics.checks import InputError
-from models.case.case import Case
+from models.basics import InputError
+from models.case import Case
 
-from ..loop.controller import Controller
-from ..loop.margins import Margins
-from ..question.question import HOOK
-from ..question.structure_question import StructureQuestion, pose_structure
-from ..search.multistart import Found
-from ..verify.structure_check import verify_structure
+from ..loop import Controller, Margins
+from ..question import HOOK, StructureQuestion, pose_structure
+from ..search import Found
+from ..verify import verify_structure
 from .tuning import LimitUse, Tuning
 
 if TYPE_CHECKING:
-    from ..bound.beside import DesignBound
-    from ..verify.verification import Verification
-
-__all__ = ["StructureDesign"]
+    from ..bound import DesignBound
+    from ..verify import Verification
 
 _SOURCES = {HOOK: "the sea", "mru.error": "the reference unit"}
 
@@ -122,7 +118,7 @@ class StructureDesign:
         SolverError
             If there is no bound.
         """
-        from ..bound.beside import bound_beside
+        from ..bound import bound_beside
 
         if self.margins is None or not self.parameters:
             raise InputError("bound: the loop must be stable")

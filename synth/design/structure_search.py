@@ -11,22 +11,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from models.basics.checks import check_range
-from models.basics.threads import one_thread
-from models.case.case import Case
-from models.plant.rope import MAX_MASSES
+from models.basics import check_range, one_thread
+from models.case import Case
+from models.plant import MAX_MASSES
 
-from ..limits.limits import Limit
-from ..loop.assess import Assessment
-from ..question.problem import Problem
-from ..question.question import PAYLOAD
-from ..question.structure_question import StructureQuestion, pose_structure
-from ..search.multistart import Progress, begin_points, briskest, least_violation, search
+from ..limits import Limit
+from ..loop import Assessment
+from ..question import PAYLOAD, Problem, StructureQuestion, pose_structure
+from ..search import Progress, begin_points, briskest, least_violation, search
 from .structure_design import StructureDesign
 from .structure_starts import nested_starts, no_worse, starts_from
 from .tuning import LimitUse, Tuning, limit_uses, tuning_of
-
-__all__ = ["optimise_structure"]
 
 _HARDLY = 1e-2  # largest row of a limit that a search may still mend
 _ROUNDS = 3  # of a search that did not arrive

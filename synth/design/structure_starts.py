@@ -16,19 +16,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..loop.assess import Assessment
-from ..question.problem import Problem
-from ..question.structure_question import StructureQuestion, pose_structure
-from ..search.multistart import Found, Progress, search
-from ..search.polishing import KEPT, polish
-from ..search.programme import Solved
-from ..structures.structure import Law
-from ..structures.winch_diagram import TRANSPARENT
-from ..structures.winch_law import WinchLaw
-from ..structures.winch_structures import LowOrderFeedback
+from ..loop import Assessment
+from ..question import Problem, StructureQuestion, pose_structure
+from ..search import KEPT, Found, Progress, Solved, polish, search
+from ..structures import TRANSPARENT, Law, LowOrderFeedback, WinchLaw
 from .tuning import Tuning, tuning_of
-
-__all__ = ["as_values", "nested_starts", "no_worse", "starts_from"]
 
 _FEW = 4  # starts of a structure within another
 _BETTER = 1e-6  # of the log cost that counts as better

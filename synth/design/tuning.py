@@ -14,25 +14,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from models.basics.checks import InputError, check_range
-from models.basics.threads import one_thread
-from models.plant.linear import LinearPlant
+from models.basics import InputError, check_range, one_thread
+from models.plant import LinearPlant
 
-from ..limits.limits import Limit
-from ..loop.assess import Assessment
-from ..loop.controller import Controller
-from ..loop.disturbance import disturbances
-from ..loop.element import DragElement
-from ..loop.margins import Margins
-from ..search.multistart import Found, Progress, Start, search
-from ..search.polishing import KEPT
-from ..search.programme import Problem
-from ..structures.structure import Structure
+from ..limits import Limit
+from ..loop import Assessment, Controller, DragElement, Margins, disturbances
+from ..question import Problem
+from ..search import KEPT, Found, Progress, Start, search
+from ..structures import Structure
 
 if TYPE_CHECKING:
-    from ..verify.verify import Verification
-
-__all__ = ["LimitUse", "Tuning", "limit_uses", "tune", "tuning_of"]
+    from ..verify import Verification
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +111,7 @@ class Tuning:
         -------
         synth.verify.verify.Verification
         """
-        from ..verify.verify import verify_tuning
+        from ..verify import verify_tuning
 
         return verify_tuning(self)
 

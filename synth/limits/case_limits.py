@@ -6,11 +6,9 @@ import math
 
 import numpy as np
 
-from models.basics.checks import InputError
-from models.case.case import Case
-from models.plant.linear import LinearPlant
-from models.plant.plant_data import PlantData
-from models.plant.rope import fixed_top_modes, lump_rope, lumped_modes
+from models.basics import InputError
+from models.case import Case
+from models.plant import LinearPlant, PlantData, fixed_top_modes, lump_rope, lumped_modes
 
 from .limits import Limit
 from .margin_limits import (
@@ -22,8 +20,6 @@ from .margin_limits import (
     RollOff,
 )
 from .signal_limits import Continuous, Least, Peak, Power
-
-__all__ = ["drive_limits", "loop_limits", "modelled_bandwidth"]
 
 PAYLOAD = "payload.displacement"
 HOOK = "hook.heave"

@@ -16,15 +16,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
+
+from models.basics import FloatArray
 
 if TYPE_CHECKING:
-    from ..loop.assess import Assessment
+    from ..loop import Assessment
     from .symbols import Symbols
-
-__all__ = ["Limit"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,28 +7,17 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 from typing_extensions import override
 
-from models.basics.checks import check_range
+from models.basics import FloatArray, check_range
 
-from ..loop.phasor import Phasor
+from ..loop import Phasor
 from .limits import Limit
 
 if TYPE_CHECKING:
-    from ..loop.assess import Assessment
+    from ..loop import Assessment
     from .symbols import Symbols
 
-__all__ = [
-    "DelayMargin",
-    "GainMargin",
-    "GainMarginDown",
-    "LowFrequency",
-    "MaxSensitivity",
-    "RollOff",
-]
-
-FloatArray = npt.NDArray[np.float64]
 _RATIO = 1.4  # of the ends of one disc's diameter, where few discs do
 _MOST_DISCS = 12
 _FAR = 1e3  # a loop gain beyond which a gain margin of zero asks for nothing

@@ -13,15 +13,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from typing_extensions import override
 
-from models.basics.checks import check_range
+from models.basics import check_range
 
 from .limits import Limit
 
 if TYPE_CHECKING:
-    from ..loop.assess import Assessment
+    from ..loop import Assessment
     from .symbols import Symbols
-
-__all__ = ["Continuous", "Least", "Peak", "Power", "Rms"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,24 +8,19 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.quadrature import Quadrature
+from models.basics import FloatArray, Quadrature
 
-from ..loop.loop import (
+from ..loop import (
     Blocks,
+    Phasor,
     close_scalar,
     closed_loop,
     determinant,
     numeric_blocks,
     return_differences,
 )
-from ..loop.phasor import Phasor
-from ..question.problem import Goal, Problem
-
-__all__ = ["Symbols"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..question import Goal, Problem
 
 
 class Symbols:

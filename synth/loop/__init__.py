@@ -1,1 +1,29 @@
 """The loop: responses, margins and what is measured on them."""
+
+from typing import TYPE_CHECKING
+
+from models.basics.lazy import lazy_face
+
+if TYPE_CHECKING:
+    from .assess import Assessment as Assessment
+    from .assess import frequency_grid as frequency_grid
+    from .assess import integration_band as integration_band
+    from .controller import Controller as Controller
+    from .controller import closed_loop_matrix as closed_loop_matrix
+    from .controller import closed_loop_poles as closed_loop_poles
+    from .disturbance import Disturbance as Disturbance
+    from .disturbance import disturbances as disturbances
+    from .element import DragElement as DragElement
+    from .element import with_drag as with_drag
+    from .loop import Blocks as Blocks
+    from .loop import close_scalar as close_scalar
+    from .loop import closed_loop as closed_loop
+    from .loop import determinant as determinant
+    from .loop import numeric_blocks as numeric_blocks
+    from .loop import return_differences as return_differences
+    from .margins import Margins as Margins
+    from .margins import loop_margins as loop_margins
+    from .margins import refine_minima as refine_minima
+    from .phasor import Phasor as Phasor
+else:
+    __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

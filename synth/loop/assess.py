@@ -11,24 +11,22 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import SolverError
-from models.basics.metrics import peak_factor
-from models.basics.quadrature import Quadrature, adaptive_nodes
-from models.plant.drag import consistent_drag
-from models.plant.linear import LinearPlant
+from models.basics import (
+    ComplexArray,
+    FloatArray,
+    Quadrature,
+    SolverError,
+    adaptive_nodes,
+    peak_factor,
+)
+from models.plant import LinearPlant, consistent_drag
 
 from .controller import Controller, closed_loop_poles
 from .disturbance import Disturbance
 from .element import DragElement, with_drag
 from .loop import closed_loop, numeric_blocks, return_differences
 from .margins import Margins, loop_margins, refine_minima, worst_margins
-
-__all__ = ["Assessment"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _RTOL = 1e-8  # of every variance
 _PADE = 6  # order of the delay models that the poles are those of

@@ -14,16 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError, check_finite, read_only
-from models.plant.linear import LinearPlant
+from models.basics import ComplexArray, FloatArray, InputError, check_finite, read_only
+from models.plant import LinearPlant
 
 if TYPE_CHECKING:
     import control
-
-__all__ = ["Controller", "closed_loop_matrix", "closed_loop_poles"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

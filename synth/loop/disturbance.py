@@ -12,14 +12,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, check_ascending, check_finite
-from models.basics.white import White
-
-__all__ = ["Disturbance", "White", "disturbances"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import FloatArray, InputError, White, check_ascending, check_finite
 
 
 @dataclass(frozen=True, kw_only=True)

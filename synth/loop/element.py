@@ -13,11 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.basics.checks import InputError, check_range
-from models.basics.signals import pick
-from models.plant.linear import LinearPlant
-
-__all__ = ["DragElement", "with_drag"]
+from models.basics import InputError, check_range, pick
+from models.plant import LinearPlant
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,18 +28,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from models.plant.response import PlantResponse
+from models.plant import PlantResponse
 
 from .phasor import constant
-
-__all__ = [
-    "Blocks",
-    "close_scalar",
-    "closed_loop",
-    "determinant",
-    "numeric_blocks",
-    "return_differences",
-]
 
 Complex = Any
 Matrix = list[list[Complex]]

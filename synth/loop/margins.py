@@ -11,12 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-__all__ = ["Margins", "loop_margins", "refine_minima"]
+from models.basics import ComplexArray, FloatArray
 
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 LoopGain = Callable[[FloatArray], ComplexArray]
 
 _INSIDE = np.arange(1.0, 9.0) / 9.0

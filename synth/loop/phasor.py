@@ -14,8 +14,6 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Phasor", "constant", "squared_magnitude"]
-
 # What both kinds of number share; NumPy and CasADi have no common static type.
 Complex = Any
 

@@ -7,6 +7,16 @@ at, `responses` their responses with the drag as a variable, `columns` the seas 
 `limiting` the search for the limiting H_s, `contour` the answer over period and heading.
 """
 
-from .study import operability
+from typing import TYPE_CHECKING
 
-__all__ = ["operability"]
+from models.basics.lazy import lazy_face
+
+if TYPE_CHECKING:
+    from .contour import Contour as Contour
+    from .criteria import Criterion as Criterion
+    from .recheck import ContourCheck as ContourCheck
+    from .result import AtDepth as AtDepth
+    from .result import Operability as Operability
+    from .study import operability as operability
+else:
+    __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

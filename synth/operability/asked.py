@@ -7,27 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.basics.physics_warning import PhysicsWarning
-from models.case.case import Case
-from models.plant.linear import LinearPlant
-from models.plant.plant_data import PlantData
+from models.basics import InputError, PhysicsWarning
+from models.case import Case
+from models.plant import LinearPlant, PlantData
 
-from ..design.design import GainDesign
-from ..design.structure_design import StructureDesign
-from ..loop.controller import Controller
-from ..loop.disturbance import Disturbance
-from ..loop.element import DragElement
-from ..question.question import HOOK, PAYLOAD, pose
-from ..question.structure_question import pose_structure
+from ..design import GainDesign, StructureDesign
+from ..loop import Controller, Disturbance, DragElement
+from ..question import HOOK, PAYLOAD, pose, pose_structure
 from .criteria import STABILITY, Criterion, case_criteria, outputs_of
 from .systems import VELOCITY, HeldSystem, LoopSystem, PerfectSystem, System
 
-__all__ = ["Asked", "Design", "asked_of"]
-
-FloatArray = npt.NDArray[np.float64]
 Design = GainDesign | StructureDesign
 
 _HELD = {PAYLOAD, VELOCITY, "rope.tension"}

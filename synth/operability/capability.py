@@ -22,16 +22,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import read_only
-from models.basics.quadrature import Quadrature
+from models.basics import FloatArray, Quadrature, read_only
 
-from ..limits.signal_limits import Continuous, Peak, Power
+from ..limits import Continuous, Peak, Power
 from .criteria import Criterion
 from .systems import PerfectSystem
-
-__all__ = ["Capability", "capability"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -13,20 +13,20 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.basics.physics_warning import PhysicsWarning
-from models.basics.quadrature import Quadrature, adaptive_nodes
-from models.case.case import Case
-from models.hook.hook import HookMotion
+from models.basics import (
+    ComplexArray,
+    FloatArray,
+    InputError,
+    PhysicsWarning,
+    Quadrature,
+    adaptive_nodes,
+)
+from models.case import Case
+from models.hook import HookMotion
 
-from ..loop.assess import integration_band
-from ..loop.disturbance import Disturbance, disturbances
-from ..question.question import HOOK
-from .systems import ComplexArray, System
-
-__all__ = ["SeaColumn", "has_headings", "has_period", "own_period", "sea_column"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..loop import Disturbance, disturbances, integration_band
+from ..question import HOOK
+from .systems import System
 
 _RTOL = 1e-8  # of every variance, as in `synth.loop.assess`
 _SAME = 1e-9  # relative, of densities that scale with H_s^2

@@ -10,16 +10,12 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError, read_only
+from models.basics import FloatArray, InputError, read_only
 
 from .columns import SeaColumn
 from .criteria import Criterion
 from .limiting import HIGHEST, SeaStates, limiting_heights
 from .systems import System
-
-__all__ = ["Contour", "contour_of", "over_headings"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _FULL_CIRCLE_GAP = math.radians(90.0)  # between headings that still stand for a full circle
 _ROUND = 1e-9

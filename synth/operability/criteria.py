@@ -13,18 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError, check_range
-from models.basics.units import parse_quantity
-from models.case.case import Case
-from models.plant.linear import LinearPlant
+from models.basics import FloatArray, InputError, check_range, parse_quantity
+from models.case import Case
+from models.plant import LinearPlant
 
-from ..limits.case_limits import PAYLOAD, drive_limits
-from ..limits.limits import Limit
-from ..limits.signal_limits import Continuous, Least, Peak, Rms
-
-__all__ = ["STABILITY", "Criterion", "Moments", "case_criteria", "payload_criteria"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..limits import PAYLOAD, Continuous, Least, Limit, Peak, Rms, drive_limits
 
 _BROKEN = 10.0  # excess of what is broken beyond measure
 _LABELS = {

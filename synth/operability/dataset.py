@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from .contour import Contour
 
-__all__ = ["dataset_of", "table_text"]
-
 _SUFFIX = {"loop": "", "held": "_held", "perfect": "_perfect", "reoptimised": "_reoptimised"}
 
 

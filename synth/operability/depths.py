@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from models.case.case import Case
-
-__all__ = ["RopeState", "rope_state"]
+from models.case import Case
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,9 +13,7 @@ import math
 import numpy as np
 from scipy.special import ndtr
 
-from models.sea.scatter import Scatter
-
-__all__ = ["EXAMPLE", "example_scatter"]
+from models.sea import Scatter
 
 EXAMPLE = "example"
 """The name by which the command line knows the diagram."""

@@ -16,16 +16,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import elementwise
 
-from models.basics.checks import SolverError, read_only
+from models.basics import FloatArray, SolverError, read_only
 
 from .columns import SeaColumn
 from .criteria import Criterion, Moments
 from .responses import DragResponses
 from .systems import System
 
-__all__ = ["ColumnLimits", "SeaStates", "limiting_heights"]
-
-FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
 
 LOWEST, HIGHEST = 0.01, 30.0  # H_s that are looked at [m]

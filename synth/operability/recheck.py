@@ -16,21 +16,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics.physics_warning import PhysicsWarning
-from models.case.case import Case
-from models.plant.plant_data import PlantData
+from models.basics import PhysicsWarning
+from models.case import Case
+from models.plant import PlantData
 
-from ..design.design import GainDesign
-from ..loop.assess import Assessment
-from ..question.question import pose
-from ..question.structure_question import pose_structure
+from ..design import GainDesign
+from ..loop import Assessment
+from ..question import pose, pose_structure
 
 if TYPE_CHECKING:
     from .asked import Design
     from .columns import SeaColumn
     from .contour import Contour
-
-__all__ = ["ContourCheck", "evaluate_in", "recheck"]
 
 _TOLERANCE = 1e-6
 

@@ -14,23 +14,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.basics.checks import SolverError
-from models.basics.physics_warning import PhysicsWarning
-from models.basics.threads import one_thread
-from models.case.case import Case
+from models.basics import PhysicsWarning, SolverError, one_thread
+from models.case import Case
 
-from ..design.design import GainDesign
-from ..design.infeasible import shortfall
-from ..design.tuning import tuning_of
-from ..limits.limits import Limit
-from ..question.question import Question, pose
-from ..search.multistart import search
+from ..design import GainDesign, shortfall, tuning_of
+from ..limits import Limit
+from ..question import Question, pose
+from ..search import search
 from .asked import Asked
 from .columns import SeaColumn
 from .contour import Contour
 from .limiting import HIGHEST, SeaStates, limiting_heights
-
-__all__ = ["reoptimised_contour"]
 
 _STARTS = 3  # of each search, besides the design's own gains
 

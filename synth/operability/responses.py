@@ -22,15 +22,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import read_only
-from models.basics.quadrature import Quadrature
-
-__all__ = ["DragResponses"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
+from models.basics import ComplexArray, FloatArray, Quadrature, read_only
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -9,11 +9,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.case.case import Case
-from models.sea.scatter import Scatter
+from models.basics import FloatArray, InputError
+from models.case import Case
+from models.sea import Scatter
 
 from .capability import Capability
 from .columns import SeaColumn
@@ -29,9 +28,6 @@ if TYPE_CHECKING:
 
     from .asked import Design
 
-__all__ = ["STAGES", "AtDepth", "Operability"]
-
-FloatArray = npt.NDArray[np.float64]
 
 STAGES: Mapping[str, str] = {
     "loop": "with the design",

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["HIGHEST_TENTH", "RULES", "Rule"]
-
 HIGHEST_TENTH = 1.27
 """H_1/10 over H_s [-]."""
 

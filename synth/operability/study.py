@@ -14,16 +14,20 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, check_ascending, check_range
-from models.basics.physics_warning import PhysicsWarning
-from models.basics.threads import one_thread
-from models.case.case import Case
-from models.sea.scatter import Scatter, read_scatter
+from models.basics import (
+    FloatArray,
+    InputError,
+    PhysicsWarning,
+    check_ascending,
+    check_range,
+    one_thread,
+)
+from models.case import Case
+from models.sea import Scatter, read_scatter
 
-from ..design.design import GainDesign
-from ..loop.assess import Assessment
+from ..design import GainDesign
+from ..loop import Assessment
 from .asked import Asked, Design, asked_of
 from .capability import capability
 from .columns import SeaColumn, has_headings, has_period, sea_column
@@ -36,9 +40,6 @@ from .reoptimise import reoptimised_contour
 from .result import AtDepth, Operability
 from .workable import workable
 
-__all__ = ["default_headings", "default_periods", "operability"]
-
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 _PERIODS = (4.0, 18.0, 15)  # first, last and number of the default periods

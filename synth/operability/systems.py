@@ -15,28 +15,15 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 from typing_extensions import override
 
-from models.basics.quadrature import Quadrature
-from models.plant.line import rope_transfers
-from models.plant.linear import LinearPlant
-from models.plant.plant_data import PlantData
-from models.plant.rope import fixed_top_modes
-from models.rig.sensors import MRU
+from models.basics import ComplexArray, FloatArray, Quadrature
+from models.plant import LinearPlant, PlantData, fixed_top_modes, rope_transfers
+from models.rig import MRU
 
-from ..loop.assess import Assessment
-from ..loop.controller import Controller
-from ..loop.disturbance import Disturbance
-from ..loop.element import DragElement
-from ..loop.loop import closed_loop, numeric_blocks
-from ..question.question import HOOK, PAYLOAD
+from ..loop import Assessment, Controller, Disturbance, DragElement, closed_loop, numeric_blocks
+from ..question import HOOK, PAYLOAD
 from .responses import DragResponses
-
-__all__ = ["HeldSystem", "LoopSystem", "PerfectSystem", "System"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 VELOCITY, FORCE = "payload.velocity", "payload.force"
 _COEFFICIENTS = np.concatenate([[0.0], np.geomspace(1e-6, 1e2, 33)])  # over the slope [m/s]

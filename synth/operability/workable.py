@@ -16,14 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.sea.scatter import Scatter
+from models.basics import FloatArray
+from models.sea import Scatter
 
 from .contour import Contour, over_headings
 from .rules import RULES, Rule
-
-__all__ = ["Workable", "class_width", "rule_shares", "workable"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _MOST_CLASSES = 80  # of H_s: more are measured heights
 

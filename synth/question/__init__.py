@@ -1,1 +1,26 @@
 """The question of synthesis: plant, hook, noise and limits of a case, prepared."""
+
+from typing import TYPE_CHECKING
+
+from models.basics.lazy import lazy_face
+
+if TYPE_CHECKING:
+    from .family_problem import FamilyProblem as FamilyProblem
+    from .family_problem import Objective as Objective
+    from .family_problem import Scenario as Scenario
+    from .problem import Goal as Goal
+    from .problem import Problem as Problem
+    from .problem import Values as Values
+    from .question import HOOK as HOOK
+    from .question import PAYLOAD as PAYLOAD
+    from .question import Question as Question
+    from .question import assess_gains as assess_gains
+    from .question import locked_response as locked_response
+    from .question import pose as pose
+    from .question import uncompensated as uncompensated
+    from .question import with_masses as with_masses
+    from .structure_question import SampledNoise as SampledNoise
+    from .structure_question import StructureQuestion as StructureQuestion
+    from .structure_question import pose_structure as pose_structure
+else:
+    __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -16,16 +16,11 @@ from enum import Enum
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, check_range
+from models.basics import FloatArray, InputError, check_range
 
-from ..structures.structure import Parameter
+from ..structures import Parameter
 from .problem import Problem, Values
-
-__all__ = ["FamilyProblem", "Objective", "Scenario"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class Objective(Enum):

@@ -8,18 +8,14 @@ from enum import Enum
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from models.plant.linear import LinearPlant
+from models.basics import FloatArray
+from models.plant import LinearPlant
 
-from ..limits.limits import Limit
-from ..loop.disturbance import Disturbance
-from ..loop.element import DragElement, with_drag
-from ..structures.structure import Law
+from ..limits import Limit
+from ..loop import Disturbance, DragElement, with_drag
+from ..structures import Law
 
-__all__ = ["Goal", "Problem", "Values"]
-
-FloatArray = npt.NDArray[np.float64]
 Values = Sequence[float] | FloatArray
 
 PADE = 5  # order of the delay model that the stability guard sees

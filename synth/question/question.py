@@ -14,31 +14,23 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.quadrature import adaptive_nodes
-from models.case.case import Case
-from models.hook.hook import HookMotion
-from models.plant.drag import consistent_drag
-from models.plant.line import rope_transfers
-from models.plant.linear import LinearPlant
-from models.plant.plant import build_plant
-from models.plant.plant_data import PlantData
-from models.plant.rope import fixed_top_modes
+from models.basics import ComplexArray, FloatArray, adaptive_nodes
+from models.case import Case
+from models.hook import HookMotion
+from models.plant import (
+    LinearPlant,
+    PlantData,
+    build_plant,
+    consistent_drag,
+    fixed_top_modes,
+    rope_transfers,
+)
 
-from ..limits.case_limits import drive_limits, loop_limits, modelled_bandwidth
-from ..limits.limits import Limit
-from ..limits.margin_limits import RollOff
-from ..loop.assess import Assessment
-from ..loop.disturbance import disturbances
-from ..loop.element import DragElement
-from ..structures.structure import PayloadFeedback
+from ..limits import Limit, RollOff, drive_limits, loop_limits, modelled_bandwidth
+from ..loop import Assessment, DragElement, disturbances
+from ..structures import PayloadFeedback
 from .problem import Problem
-
-__all__ = ["Question", "assess_gains", "locked_response", "pose"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 PAYLOAD = "payload.displacement"
 HOOK = "hook.heave"

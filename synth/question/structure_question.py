@@ -15,20 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from models.case.case import Case
-from models.plant.linear import LinearPlant
-from models.sensing.plant import SAMPLE_TIME, sensed_plant, sensed_spectra
+from models.basics import White
+from models.case import Case
+from models.plant import LinearPlant
+from models.sensing import SAMPLE_TIME, sensed_plant, sensed_spectra
 
-from ..limits.case_limits import drive_limits
-from ..limits.limits import Limit
-from ..limits.margin_limits import LowFrequency
-from ..loop.disturbance import White, disturbances
-from ..structures.structure import Law
-from ..structures.winch_structures import LowOrderFeedback, WinchStructure, structure_named
+from ..limits import Limit, LowFrequency, drive_limits
+from ..loop import disturbances
+from ..structures import Law, LowOrderFeedback, WinchStructure, structure_named
 from .problem import Problem
 from .question import HOOK, PAYLOAD, Question, pose, with_masses
-
-__all__ = ["StructureQuestion", "pose_structure"]
 
 _LATE = 0.2  # delay beyond which the guard's model of it needs a higher order [s]
 _HIGH_ORDER = 12

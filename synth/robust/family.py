@@ -16,18 +16,13 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.case.case import Case
-from models.spread.fields import ALIASES
+from models.basics import FloatArray, InputError
+from models.case import Case
+from models.spread import ALIASES
 
 from .sea_states import SeaState as SeaState
 from .sea_states import read_scatter as read_scatter
-
-__all__ = ["Axis", "Choice", "Family", "Member", "SeaState", "read_scatter"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _MOST_CORNERS = 4096
 

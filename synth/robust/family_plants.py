@@ -13,22 +13,15 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.quadrature import Quadrature, spectral_nodes
-from models.plant.linear import LinearPlant
+from models.basics import FloatArray, Quadrature, spectral_nodes
+from models.plant import LinearPlant
 
-from ..loop.disturbance import Disturbance, disturbances
-from ..question.family_problem import Scenario
-from ..question.problem import Problem
-from ..question.question import HOOK, PAYLOAD, Question, pose
-from ..structures.structure import Law, Structure
+from ..loop import Disturbance, disturbances
+from ..question import HOOK, PAYLOAD, Problem, Question, Scenario, pose
+from ..structures import Law, Structure
 from .family import Family, Member
 from .plant_stack import PlantStack, numbers_of, stacked_members
-
-__all__ = ["PAYLOAD_FEEDBACK", "FamilyPlants"]
-
-FloatArray = npt.NDArray[np.float64]
 
 PAYLOAD_FEEDBACK = "payload-feedback"
 
@@ -71,7 +64,7 @@ class FamilyPlants:
             return self.nominal.structure.bind(self.nominal.plant)
         structure = self.structure
         if isinstance(structure, str):
-            from ..structures.winch_structures import structure_named
+            from ..structures import structure_named
 
             bound: Structure = structure_named(structure, self.nominal.case)
         else:
@@ -124,7 +117,7 @@ class FamilyPlants:
         masses = self.masses or self.most_masses
         if not self._sensed:
             return stacked_members(self.family, members, masses)
-        from models.sensing.plant import sensed_plant
+        from models.sensing import sensed_plant
 
         case = self.family.case
         fixed = case.payload.fixed_drag
@@ -170,7 +163,7 @@ class FamilyPlants:
         if key not in self._plants:
             self._plants[key] = question.plant
             if self._sensed:
-                from models.sensing.plant import sensed_plant
+                from models.sensing import sensed_plant
 
                 self._plants[key] = sensed_plant(
                     question.case, masses=question.masses, drag=question.drag_before
@@ -181,6 +174,6 @@ class FamilyPlants:
         question = self.question(member)
         if not self._sensed:
             return {HOOK: question.hook}
-        from models.sensing.plant import sensed_spectra
+        from models.sensing import sensed_spectra
 
         return dict(sensed_spectra(question.case, question.hook))

@@ -8,12 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from models.basics.checks import InputError, check_range, read_only
-from models.case.case import Case
-
-__all__ = ["KEPT_BETWEEN", "LENGTH", "GainSchedule", "SchedulePoint", "blend_of"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import FloatArray, InputError, check_range, read_only
+from models.case import Case
 
 LENGTH = "rope.length"
 KEPT_BETWEEN = 1e-3  # relative excess over a limit that counts as kept between the nodes
@@ -107,7 +103,7 @@ class GainSchedule:
 
     def to_yaml(self) -> str:
         """Return the schedule as YAML; `from_yaml` reads it again."""
-        from models.casefile.yaml_lines import yaml_text
+        from models.casefile import yaml_text
 
         rows = [[float(v) for v in row] for row in self.gains]
         return yaml_text(
@@ -131,7 +127,7 @@ class GainSchedule:
         InputError
             If the text is not a schedule.
         """
-        from models.casefile.yaml_lines import read_yaml
+        from models.casefile import read_yaml
 
         data, _ = read_yaml(text, source)
         try:

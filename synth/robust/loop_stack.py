@@ -16,17 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.metrics import peak_factor
-from models.basics.quadrature import Quadrature
+from models.basics import ComplexArray, FloatArray, Quadrature, peak_factor
 
-from ..loop.controller import Controller
-from ..verify.recompute import LawMatrices
+from ..loop import Controller
+from ..verify import LawMatrices
 from .plant_stack import PlantStack
-
-__all__ = ["LoopStack", "StackView", "consistent_stack"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _CHUNK = 400  # loops whose responses are evaluated at once
 _ZOOM = np.array([-1.0, -0.6, -0.3, -0.1, 0.1, 0.3, 0.6, 1.0])

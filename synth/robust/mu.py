@@ -18,24 +18,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from models.basics.checks import InputError, check_range
-from models.basics.threads import one_thread
+from models.basics import InputError, check_range, one_thread
 
-from ..loop.controller import Controller, closed_loop_poles
-from ..loop.margins import Margins
-from ..structures.structure import Law
-from ..verify.recheck import winding_of_plant
-from ..verify.recompute import LawMatrices
+from ..loop import Controller, Margins, closed_loop_poles
+from ..structures import Law
+from ..verify import LawMatrices, winding_of_plant
 from .mu_doubts import Doubt, doubts_of
 from .mu_plant import UncertainLoop, uncertain_loop
 from .mu_search import critical_point, furthest, grid_of, proved_bound
 from .perturbation import GainRadius, gain_radius
 
 if TYPE_CHECKING:
-    from ..design.design import GainDesign
-    from ..design.structure_design import StructureDesign
-
-__all__ = ["Robustness", "robustness"]
+    from ..design import GainDesign, StructureDesign
 
 Progress = Callable[[str, int, int], None]
 
@@ -248,8 +242,8 @@ def robustness(
 
 def _parts(design: GainDesign | StructureDesign) -> tuple[Controller, Law, Sequence[float]]:
     """Return controller, law and parameters of a design."""
-    from ..design.structure_design import StructureDesign
-    from ..question.question import pose
+    from ..design import StructureDesign
+    from ..question import pose
 
     if isinstance(design, StructureDesign):
         law = design.posed.law

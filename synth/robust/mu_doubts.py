@@ -12,17 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from models.basics.checks import InputError, check_range
-from models.basics.physics_warning import PhysicsWarning
-from models.case.case import Case
-from models.plant.linear import LinearPlant
-from models.plant.plant_data import PlantData
-from models.sensing.plant import sensed_plant
-from models.spread.fields import ALIASES
+from models.basics import InputError, PhysicsWarning, check_range
+from models.case import Case
+from models.plant import LinearPlant, PlantData
+from models.sensing import sensed_plant
+from models.spread import ALIASES
 
 from .family import Axis, Family, Member
-
-__all__ = ["DELAYS", "Doubt", "doubts_of", "plant_of"]
 
 #: Paths of delays, and the measurements that they make late.
 DELAYS: Mapping[str, str] = {"sensors.telemetry.delay": "payload.", "sensors.mru.delay": "mru."}

@@ -26,19 +26,14 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from models.basics.checks import InputError
-from models.case.case import Case
-from models.plant.linear import LinearPlant
+from models.basics import ComplexArray, FloatArray, InputError
+from models.case import Case
+from models.plant import LinearPlant
 
-from ..loop.controller import Controller
-from ..verify.recompute import LawMatrices
+from ..loop import Controller
+from ..verify import LawMatrices
 from .mu_doubts import DELAYS, Doubt, plant_of
 from .mu_structured_value import Block
-
-__all__ = ["UncertainLoop", "uncertain_loop"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _RANK = 1e-9  # singular values below this share of the largest do not count
 _SAMPLES = 4  # plants that the LFT is compared with

@@ -17,18 +17,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize, root
 
-from ..loop.assess import frequency_grid
-from ..loop.controller import closed_loop_poles
+from models.basics import FloatArray
+
+from ..loop import closed_loop_poles, frequency_grid
 from .mu_plant import UncertainLoop
 from .mu_structured_value import mu_upper
-
-__all__ = ["Critical", "critical_point", "furthest", "grid_of", "proved_bound"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _PADE = 6
 _THIN = 4  # of the grid's nodes, one in so many to begin with

@@ -27,12 +27,7 @@ import numpy.typing as npt
 import scipy.linalg
 from scipy.optimize import minimize
 
-from models.basics.checks import InputError, check_range
-
-__all__ = ["Block", "Scaling", "mu_upper"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
+from models.basics import ComplexArray, FloatArray, InputError, check_range
 
 _SHARPER = (10.0, 40.0, 160.0, 640.0)  # of the smoothed largest eigenvalue, in turn
 _STEPS = 150  # of each

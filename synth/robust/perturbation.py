@@ -23,20 +23,12 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.plant.linear import LinearPlant
+from models.basics import ComplexArray, FloatArray, InputError
+from models.plant import LinearPlant
 
-from ..loop.assess import frequency_grid
-from ..loop.controller import closed_loop_poles
-from ..loop.margins import refine_minima
-from ..structures.structure import Law
-
-__all__ = ["GainRadius", "gain_radius"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
+from ..loop import closed_loop_poles, frequency_grid, refine_minima
+from ..structures import Law
 
 _AFFINE = 1e-9  # relative size of what would not be affine
 _PADE = 6

@@ -17,18 +17,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from models.case.case import Case
-from models.plant.equations import parameter_values
-from models.plant.linear import LinearPlant
-from models.plant.pade import pade_bank
-from models.plant.plant import build_plant
-from models.plant.plant_data import PlantData
+from models.basics import FloatArray
+from models.case import Case
+from models.plant import LinearPlant, PlantData, build_plant, pade_bank, parameter_values
 
 from .family import Family, Member
-
-__all__ = ["PlantStack", "stacked_members"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _PADE = 6
 _SHORTEST = 1e-4  # of a delay that has a Pade model [s]

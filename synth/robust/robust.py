@@ -14,18 +14,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, check_range
-from models.basics.threads import one_thread
-from models.case.case import Case
-from models.plant.rope import masses_for_bandwidth
+from models.basics import FloatArray, InputError, check_range, one_thread
+from models.case import Case
+from models.plant import masses_for_bandwidth
 
-from ..question.family_problem import FamilyProblem, Objective, Scenario
-from ..search.family_search import FamilyFound, search_family
-from ..search.multistart import search
-from ..search.polishing import KEPT
-from ..structures.structure import Structure
+from ..question import FamilyProblem, Objective, Scenario
+from ..search import KEPT, FamilyFound, search, search_family
+from ..structures import Structure
 from .family import Family, Member
 from .family_plants import PAYLOAD_FEEDBACK, FamilyPlants
 from .robust_answer import answer_of
@@ -33,9 +29,6 @@ from .robust_result import RobustDesign as RobustDesign
 from .robust_result import ScenarioResult as ScenarioResult
 from .worst_case import worst_members
 
-__all__ = ["RobustDesign", "ScenarioResult", "optimise_robust", "tune_family"]
-
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 _MOST_FIRST = 64  # members that a design begins with at most

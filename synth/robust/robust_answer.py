@@ -7,21 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.basics.checks import InputError
-from models.case.case import Case
+from models.basics import InputError
+from models.case import Case
 
-from ..design.tuning import limit_uses, tuning_of
-from ..question.family_problem import FamilyProblem, Objective
-from ..search.family_search import FamilyFound
-from ..search.multistart import Found
-from ..search.polishing import KEPT
+from ..design import limit_uses, tuning_of
+from ..question import FamilyProblem, Objective
+from ..search import KEPT, FamilyFound, Found
 from .family import Family, Member
 from .family_plants import FamilyPlants
 from .perturbation import gain_radius
 from .robust_result import RobustDesign, ScenarioResult
 from .worst_case import DrawCheck, draw_check
-
-__all__ = ["answer_of"]
 
 Progress = Callable[[str, int, int], None]
 

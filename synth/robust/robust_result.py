@@ -6,22 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.case.case import Case
+from models.basics import InputError
+from models.case import Case
 
-from ..design.tuning import LimitUse
-from ..loop.controller import Controller
-from ..question.family_problem import Objective
+from ..design import LimitUse
+from ..loop import Controller
+from ..question import Objective
 from .family import Family, Member
 from .family_plants import PAYLOAD_FEEDBACK, FamilyPlants
 from .perturbation import GainRadius
 from .worst_case import DrawCheck
-
-__all__ = ["RobustDesign", "ScenarioResult"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

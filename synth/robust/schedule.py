@@ -18,17 +18,13 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, check_range
-from models.basics.threads import one_thread
-from models.case.case import Case
+from models.basics import FloatArray, InputError, check_range, one_thread
+from models.case import Case
 
-from ..design.tuning import tuning_of
-from ..question.family_problem import FamilyProblem, Objective, Scenario
-from ..search.family_search import FamilyFound, search_family
-from ..search.multistart import Found, search
-from ..search.polishing import KEPT
+from ..design import tuning_of
+from ..question import FamilyProblem, Objective, Scenario
+from ..search import KEPT, FamilyFound, Found, search, search_family
 from .family import Family, Member
 from .family_plants import FamilyPlants
 from .gain_schedule import LENGTH
@@ -37,9 +33,6 @@ from .gain_schedule import SchedulePoint as SchedulePoint
 from .gain_schedule import blend_of as blend_of
 from .worst_case import exact_figures
 
-__all__ = ["GainSchedule", "SchedulePoint", "blend_of", "schedule_gains"]
-
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 _STARTS = 6
@@ -281,7 +274,7 @@ class _Work:
 
     def _verified(self, nodes: Sequence[int], gains: FloatArray, index: int) -> bool:
         """Return whether other code confirms the loop at one length."""
-        from ..search.polishing import view_of
+        from ..search import view_of
 
         scenario: Scenario = self.plants.scenario(self.members[index])
         own = self.own[index]

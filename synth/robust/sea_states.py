@@ -6,10 +6,8 @@ import csv
 from dataclasses import dataclass
 from pathlib import Path
 
-from models.basics.checks import InputError, check_range
-from models.case.case import Case
-
-__all__ = ["SeaState", "read_scatter"]
+from models.basics import InputError, check_range
+from models.case import Case
 
 
 @dataclass(frozen=True, kw_only=True)

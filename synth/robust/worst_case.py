@@ -14,25 +14,18 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import qmc
 
-from models.basics.checks import InputError, read_only
-from models.basics.intervals import share
+from models.basics import FloatArray, InputError, read_only, share
 
-from ..limits.limits import Limit
-from ..limits.margin_limits import MaxSensitivity
-from ..loop.assess import Assessment
-from ..question.family_problem import Objective
-from ..question.question import PAYLOAD
+from ..limits import Limit, MaxSensitivity
+from ..loop import Assessment
+from ..question import PAYLOAD, Objective
 from .family import Member
 from .family_plants import FamilyPlants
 from .loop_stack import StackView, consistent_stack
 from .plant_stack import PlantStack
 
-__all__ = ["DrawCheck", "Figures", "draw_check", "exact_figures", "figures_of", "worst_members"]
-
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 _SAMPLES = 256  # Sobol points of a search for the worst

@@ -21,9 +21,7 @@ from collections.abc import Callable
 from scipy.optimize import brentq
 from scipy.special import ndtr
 
-from models.basics.checks import check_range
-
-__all__ = ["bias_for", "gaussian_response", "sine_response"]
+from models.basics import check_range
 
 _OWNER = "describing function"
 

@@ -21,20 +21,14 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import brentq, root
 
-from models.basics.checks import check_range
-from models.plant.drag import energy_equivalent
+from models.basics import ComplexArray, FloatArray, check_range
+from models.plant import energy_equivalent
 
-from ..loop.margins import loop_margins
+from ..loop import loop_margins
 from .describing import bias_for, sine_response
 from .torque_loop import TorqueLoop
-
-__all__ = ["LimitCycle", "clipped_harmonics", "limit_cycles"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _POINTS = 512  # of a cycle
 _RESIDUAL = 1e-8

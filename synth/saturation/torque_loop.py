@@ -24,19 +24,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError, check_range
-from models.case.case import Case
-from models.plant.linear import LinearPlant
-from models.plant.plant import build_plant
+from models.basics import ComplexArray, FloatArray, InputError, check_range
+from models.case import Case
+from models.plant import LinearPlant, build_plant
 
-from ..loop.assess import frequency_grid
-from ..loop.controller import Controller, closed_loop_poles
-from ..loop.margins import Margins, loop_margins
-
-__all__ = ["TorqueLoop"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
+from ..loop import Controller, Margins, closed_loop_poles, frequency_grid, loop_margins
 
 _OWNER = "torque loop"
 

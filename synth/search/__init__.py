@@ -1,1 +1,30 @@
 """The search for parameters: starts, programmes, polishing, following."""
+
+from typing import TYPE_CHECKING
+
+from models.basics.lazy import lazy_face
+
+if TYPE_CHECKING:
+    from .begin import begin_points as begin_points
+    from .begin import briskest as briskest
+    from .begin import coarse_programme as coarse_programme
+    from .family_search import FamilyFound as FamilyFound
+    from .family_search import search_family as search_family
+    from .multistart import Found as Found
+    from .multistart import Progress as Progress
+    from .multistart import Start as Start
+    from .multistart import least_violation as least_violation
+    from .multistart import resume as resume
+    from .multistart import search as search
+    from .nodes import cost_nodes as cost_nodes
+    from .nodes import margin_nodes as margin_nodes
+    from .polishing import KEPT as KEPT
+    from .polishing import look as look
+    from .polishing import polish as polish
+    from .polishing import thinned as thinned
+    from .polishing import view_of as view_of
+    from .programme import Pace as Pace
+    from .programme import Programme as Programme
+    from .programme import Solved as Solved
+else:
+    __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

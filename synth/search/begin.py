@@ -12,17 +12,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ..loop.assess import Assessment
-from ..question.problem import Goal, Problem
+from models.basics import FloatArray
+
+from ..loop import Assessment
+from ..question import Goal, Problem
 from .nodes import cost_nodes, margin_nodes
 from .programme import Programme
 from .starts import candidates, pick_spread, stabilise
-
-__all__ = ["begin_points", "briskest", "coarse_programme", "start_coefficient"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _WEIGHTS = (5.0, 1.0)  # of broken limits against the log cost
 _WORST = 20.0  # what one broken limit may add to the merit of a candidate

@@ -9,21 +9,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from ..limits.limits import Limit
-from ..loop.assess import Assessment
-from ..loop.disturbance import Disturbance
-from ..question.family_problem import FamilyProblem, Scenario
-from ..question.problem import Problem
+from models.basics import FloatArray
+
+from ..limits import Limit
+from ..loop import Assessment, Disturbance
+from ..question import FamilyProblem, Problem, Scenario
 from .family_programme import FamilyProgramme, FamilySolved
 from .nodes import cost_nodes, margin_nodes
 from .polishing import KEPT, thinned, view_of
 from .programme import Pace
-
-__all__ = ["PER_DECADE", "looks_at", "own_limits", "polish_family", "shaken_by_all", "view_from"]
-
-FloatArray = npt.NDArray[np.float64]
 
 PER_DECADE = 16  # margin nodes of the first pass; the exchange finds what lies between
 _ROUNDS = 10  # of the exchange of nodes

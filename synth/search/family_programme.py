@@ -18,18 +18,13 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.quadrature import Quadrature
+from models.basics import FloatArray, Quadrature
 
-from ..limits.symbols import Symbols
-from ..question.family_problem import FamilyProblem, Objective, Scenario
-from ..question.problem import Goal, Values
-from .programme import Guard, Pace, Solved, solver_options
-
-__all__ = ["FamilyProgramme", "FamilySolved"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..limits import Symbols
+from ..question import FamilyProblem, Goal, Objective, Scenario, Values
+from .guard import Guard, solver_options
+from .programme import Pace, Solved
 
 _ROOM = 12.0  # how far the logarithms of drags and of the cost may move: e^12
 

@@ -13,11 +13,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from ..loop.assess import Assessment
-from ..question.family_problem import FamilyProblem
-from ..question.problem import Problem, Values
+from models.basics import FloatArray
+
+from ..loop import Assessment
+from ..question import FamilyProblem, Problem, Values
 from .family_polish import PER_DECADE, looks_at, polish_family, shaken_by_all, view_from
 from .family_programme import FamilyProgramme, FamilySolved
 from .multistart import Start
@@ -26,9 +26,6 @@ from .polishing import KEPT, thinned
 from .programme import Pace
 from .starts import candidates, pick_spread, stabilise
 
-__all__ = ["FamilyFound", "begin_points", "coarse_programme", "polish_family", "search_family"]
-
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 _CANDIDATES = 512

@@ -17,11 +17,8 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 
-__all__ = ["Follower"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import FloatArray
 
 _STEPS = 12  # quadratic programmes before it gives up
 _HALVINGS = 4  # of a step that does not help

@@ -10,12 +10,9 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 from typing_extensions import override
 
-__all__ = ["Guard", "solver_options"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import FloatArray
 
 _PATIENCE = 60  # rejected trial points before a solve is given up
 

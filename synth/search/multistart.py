@@ -13,10 +13,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from ..loop.assess import Assessment
-from ..question.problem import Goal, Problem
+from models.basics import FloatArray
+
+from ..loop import Assessment
+from ..question import Goal, Problem
 from .begin import begin_points as begin_points
 from .begin import briskest as briskest
 from .begin import coarse_programme as coarse_programme
@@ -26,18 +27,6 @@ from .polishing import KEPT, look, polish, thinned
 from .programme import Pace, Programme, Solved
 from .starts import pick_spread
 
-__all__ = [
-    "Found",
-    "Progress",
-    "Start",
-    "begin_points",
-    "coarse_programme",
-    "least_violation",
-    "resume",
-    "search",
-]
-
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 _AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer

@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import SolverError
-from models.basics.quadrature import Quadrature, adaptive_nodes, spectral_nodes
+from models.basics import (
+    ComplexArray,
+    FloatArray,
+    Quadrature,
+    SolverError,
+    adaptive_nodes,
+    spectral_nodes,
+)
 
-from ..loop.assess import Assessment, frequency_grid, integration_band
-from ..loop.loop import closed_loop, numeric_blocks
-from .programme import Problem
-
-__all__ = ["cost_nodes", "margin_nodes"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
+from ..loop import Assessment, closed_loop, frequency_grid, integration_band, numeric_blocks
+from ..question import Problem
 
 _SLOW_SIDE = 8  # nodes per decade below everything that moves
 _FAST_SIDE = 24  # ... and above it, where a loop may cross over narrowly with the wrong gains

@@ -10,16 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from ..loop.assess import Assessment
-from ..question.problem import Goal, Problem
+from models.basics import FloatArray
+
+from ..loop import Assessment
+from ..question import Goal, Problem
 from .nodes import cost_nodes, margin_nodes
 from .programme import Pace, Programme, Solved
-
-__all__ = ["KEPT", "look", "polish", "thinned", "view_of"]
-
-FloatArray = npt.NDArray[np.float64]
 
 KEPT = 1e-5  # a limit counts as kept up to this relative excess
 _MOST_CRITICAL = 300  # frequencies that one look adds

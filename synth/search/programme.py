@@ -27,30 +27,16 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.quadrature import Quadrature
+from models.basics import FloatArray, Quadrature
 
-from ..limits.symbols import Symbols as Symbols
-from ..question.problem import Goal as Goal
-from ..question.problem import Problem as Problem
-from ..question.problem import Values
+from ..limits import Symbols as Symbols
+from ..question import Goal as Goal
+from ..question import Problem as Problem
+from ..question import Values
 from .follow import Follower
 from .guard import Guard as Guard
 from .guard import solver_options as solver_options
-
-__all__ = [
-    "Goal",
-    "Guard",
-    "Pace",
-    "Problem",
-    "Programme",
-    "Solved",
-    "Symbols",
-    "solver_options",
-]
-
-FloatArray = npt.NDArray[np.float64]
 
 _ROOM = 12.0  # how far the logarithms of drag, sea and factors may move: e^12
 _ITERATIONS, _MOST_ITERATIONS = 150, 400  # of a solve with few and with many parameters

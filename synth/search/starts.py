@@ -11,16 +11,14 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
-from ..question.problem import Problem
-from ..structures.structure import pace
+from models.basics import FloatArray
 
-__all__ = ["candidates", "pick_spread", "stabilise"]
+from ..question import Problem
+from ..structures import pace
 
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 _SPREAD = 0.5  # least distance of two starts, in decades over all parameters

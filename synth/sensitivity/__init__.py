@@ -5,9 +5,18 @@ and of the law, and from those, by the gradient of the spectral integral, to ela
 ranges: from a sweep to Sobol indices, and Morris screening.
 """
 
-from __future__ import annotations
+from typing import TYPE_CHECKING
 
-from .elasticity import sensitivity
-from .results import Elasticity, Sensitivity
+from models.basics.lazy import lazy_face
 
-__all__ = ["Elasticity", "Sensitivity", "sensitivity"]
+if TYPE_CHECKING:
+    from .elasticity import sensitivity as sensitivity
+    from .global_indices import SobolIndices as SobolIndices
+    from .global_indices import sobol_indices as sobol_indices
+    from .results import Elasticity as Elasticity
+    from .results import Moved as Moved
+    from .results import Sensitivity as Sensitivity
+    from .screening import Screening as Screening
+    from .screening import morris_screening as morris_screening
+else:
+    __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

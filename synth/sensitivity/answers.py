@@ -14,33 +14,19 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, SolverError
-from models.basics.physics_warning import PhysicsWarning
-from models.basics.white import White
-from models.case.case import Case
-from models.hook.hook import HookMotion
-from models.plant.plant import build_plant
-from models.plant.plant_data import PlantData
-from models.sensing.plant import sensed_plant, sensed_spectra
+from models.basics import ComplexArray, InputError, PhysicsWarning, SolverError, White
+from models.case import Case
+from models.hook import HookMotion
+from models.plant import PlantData, build_plant
+from models.sensing import sensed_plant, sensed_spectra
 
-from ..design.design import GainDesign
-from ..design.structure_design import StructureDesign
-from ..loop.assess import Assessment
-from ..loop.controller import Controller
-from ..loop.disturbance import Disturbance, disturbances
-from ..loop.element import DragElement
-from ..question.question import HOOK, pose
-from ..question.structure_question import SampledNoise
-from ..structures.structure import Law
+from ..design import GainDesign, StructureDesign
+from ..loop import Assessment, Controller, Disturbance, DragElement, disturbances
+from ..question import HOOK, SampledNoise, pose
+from ..structures import Law
 from .differences import derivative
 from .fields import numbers_of
-
-__all__ = ["Answers", "answers_of"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

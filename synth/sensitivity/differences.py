@@ -13,11 +13,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError
-
-__all__ = ["StepError", "derivative"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import InputError
 
 _STEP = 2e-3  # of the value: truncation is its fourth power, cancellation its inverse
 _ROUGH = 0.02  # share by which derivatives from two steps may differ before it is a jump ...

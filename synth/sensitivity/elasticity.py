@@ -24,15 +24,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.basics.physics_warning import PhysicsWarning
-from models.plant.plant_data import PlantData
+from models.basics import FloatArray, InputError, PhysicsWarning
+from models.plant import PlantData
 
-from ..loop.assess import Assessment
-from ..loop.disturbance import Disturbance
-from ..question.question import PAYLOAD
+from ..loop import Assessment, Disturbance
+from ..question import PAYLOAD
 from .answers import Answers, answers_of
 from .differences import StepError, derivative
 from .fields import Number, numbers_of
@@ -41,12 +38,8 @@ from .results import FIGURES, Elasticity, Sensitivity
 from .slopes import PlantSlopes, changed
 
 if TYPE_CHECKING:
-    from ..design.design import GainDesign
-    from ..design.structure_design import StructureDesign
+    from ..design import GainDesign, StructureDesign
 
-__all__ = ["sensitivity"]
-
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 _OUTPUTS = {"payload_rms": PAYLOAD, "torque_rms": "motor.torque", "speed_rms": "motor.speed"}

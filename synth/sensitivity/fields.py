@@ -12,11 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from models.case.case import Case
-from models.casefile.quantity import Quantity
-from models.casefile.section import Section
-
-__all__ = ["Number", "numbers_of"]
+from models.case import Case
+from models.casefile import Quantity, Section
 
 _NOT_PHYSICAL = ("stillhook", "name", "description", "sources", "limits", "gains", "gain_bounds")
 

@@ -17,20 +17,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, check_range, read_only
+from models.basics import FloatArray, InputError, check_range, read_only
 from models.spread import Spread
 
 from .rows import evaluate_rows
 
 if TYPE_CHECKING:
-    from ..design.design import GainDesign
-    from ..design.structure_design import StructureDesign
+    from ..design import GainDesign, StructureDesign
 
-__all__ = ["SobolIndices", "indices_of", "sobol_indices"]
-
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 Evaluate = Callable[[FloatArray], FloatArray]
 

@@ -25,18 +25,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from models.plant.linear import LinearPlant
+from models.basics import ComplexArray, FloatArray
+from models.plant import LinearPlant
 
-from ..loop.controller import Controller
-from ..loop.disturbance import Disturbance
+from ..loop import Controller, Disturbance
 from .slopes import BLOCKS, MatrixSlope
-
-__all__ = ["Gradient", "sensitivity_gradient", "variance_gradient"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

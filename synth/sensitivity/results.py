@@ -12,18 +12,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics.checks import InputError
+from models.basics import InputError
 
-from ..question.question import PAYLOAD
+from ..question import PAYLOAD
 from .answers import Answers, answers_of
 from .fields import numbers_of
 from .slopes import changed
 
 if TYPE_CHECKING:
-    from ..design.design import GainDesign
-    from ..design.structure_design import StructureDesign
-
-__all__ = ["FIGURES", "Elasticity", "Moved", "Sensitivity"]
+    from ..design import GainDesign, StructureDesign
 
 FIGURES = ("payload_rms", "max_sensitivity", "torque_rms", "speed_rms")
 """The figures of a design that have elasticities."""

@@ -6,17 +6,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from models.basics import FloatArray
 from models.spread import Spread
 
 if TYPE_CHECKING:
-    from ..design.design import GainDesign
-    from ..design.structure_design import StructureDesign
+    from ..design import GainDesign, StructureDesign
 
-__all__ = ["evaluate_rows"]
-
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 
@@ -47,7 +43,7 @@ def evaluate_rows(
     InputError
         If the spread does not fit the case, or there is no such figure.
     """
-    from ..sweeps.frequency import FrequencyEngine
+    from ..sweeps import FrequencyEngine
 
     inverse = figure == "modulus_margin"
     metric = "max_sensitivity" if inverse else figure

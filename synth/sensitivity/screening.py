@@ -16,21 +16,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import check_range, read_only
+from models.basics import FloatArray, check_range, read_only
 from models.spread import Spread
 
 from .global_indices import on_ranges
 from .rows import evaluate_rows
 
 if TYPE_CHECKING:
-    from ..design.design import GainDesign
-    from ..design.structure_design import StructureDesign
+    from ..design import GainDesign, StructureDesign
 
-__all__ = ["Screening", "effects_of", "morris_screening"]
-
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 Evaluate = Callable[[FloatArray], FloatArray]
 

@@ -19,22 +19,14 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.physics_warning import PhysicsWarning
-from models.case.case import Case
-from models.plant.equations import parameter_values
-from models.plant.linear import LinearPlant
-from models.plant.plant import MEAN_LOSSES, Plant, build_plant
-from models.plant.plant_data import PlantData
-from models.sensing.plant import with_sensors
+from models.basics import FloatArray, PhysicsWarning
+from models.case import Case
+from models.plant import MEAN_LOSSES, LinearPlant, Plant, PlantData, build_plant, parameter_values
+from models.sensing import with_sensors
 
 from .differences import derivative
 from .fields import Number
-
-__all__ = ["BLOCKS", "MatrixSlope", "PlantSlopes", "changed"]
-
-FloatArray = npt.NDArray[np.float64]
 
 BLOCKS = ("A", "B", "E", "C", "D", "F", "Cz", "Dz", "Fz")
 """The matrices of a linear plant, in the order of `Plant.jacobians`."""

@@ -22,17 +22,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from models.basics.checks import InputError
-from models.case.case import Case
-from models.rig.winch import ACMotor, DCMotor, Drive
+from models.basics import InputError
+from models.case import Case
+from models.rig import ACMotor, DCMotor, Drive
 
-from ..question.problem import Goal
-from ..search.multistart import Progress
+from ..question import Goal
+from ..search import Progress
 from .follow import Answer, Posed, follow
 from .motor import MotorData, changed, motor_changes
 from .point import with_target
-
-__all__ = ["CatalogueMotor", "Choice", "choose", "read_catalogue"]
 
 _GEARS = 7  # that a motor is tried behind
 _NEEDED = ("torque_continuous", "torque_peak", "inertia")

@@ -24,18 +24,14 @@ from typing import Any
 
 import numpy as np
 
-from models.basics.checks import InputError, check_range
-from models.basics.threads import one_thread
-from models.case.case import Case
+from models.basics import InputError, check_range, one_thread
+from models.case import Case
 
-from ..design.structure_design import StructureDesign
-from ..design.structure_search import optimise_structure
-from ..search.multistart import Progress
+from ..design import StructureDesign, optimise_structure
+from ..search import Progress
 from .follow import Answer, Posed, follow, slope
 from .motor import changed
 from .sizing_design import designed
-
-__all__ = ["CoDesign", "CoPoint", "co_design", "gear_changes"]
 
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 _GRID = 7  # gears that are tried before the golden section

@@ -21,28 +21,27 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from typing_extensions import override
 
-from models.basics.physics_warning import PhysicsWarning
-from models.basics.quadrature import Quadrature
-from models.case.case import Case
+from models.basics import FloatArray, PhysicsWarning, Quadrature
+from models.case import Case
 
-from ..design.structure_design import StructureDesign
-from ..limits.case_limits import drive_limits
-from ..limits.limits import Limit
-from ..loop.assess import Assessment
-from ..question.problem import Goal, Problem
-from ..question.question import PAYLOAD
-from ..question.structure_question import StructureQuestion, pose_structure
-from ..search.multistart import begin_points
-from ..search.nodes import cost_nodes, margin_nodes
-from ..search.polishing import look, polish, thinned, view_of
-from ..search.programme import Pace, Programme, Solved
-
-__all__ = ["Answer", "Posed", "begin_from", "follow", "slope"]
-
-FloatArray = npt.NDArray[np.float64]
+from ..design import StructureDesign
+from ..limits import Limit, drive_limits
+from ..loop import Assessment
+from ..question import PAYLOAD, Goal, Problem, StructureQuestion, pose_structure
+from ..search import (
+    Pace,
+    Programme,
+    Solved,
+    begin_points,
+    cost_nodes,
+    look,
+    margin_nodes,
+    polish,
+    thinned,
+    view_of,
+)
 
 EXCESS = 1e-4  # relative excess over a limit that an answer on the way may have
 _ROUNDS = 5  # of the exchange of nodes

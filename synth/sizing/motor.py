@@ -20,12 +20,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from models.basics.checks import check_range
-from models.basics.physics_warning import PhysicsWarning
-from models.case.case import Case
-from models.rig.winch import DCMotor
-
-__all__ = ["INERTIA_EXPONENT", "MotorData", "changed", "motor_changes", "with_motor"]
+from models.basics import PhysicsWarning, check_range
+from models.case import Case
+from models.rig import DCMotor
 
 INERTIA_EXPONENT = 5.0 / 3.0
 """Of the rotor's inertia over the torque."""

@@ -16,26 +16,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, SynthesisError, check_range
-from models.basics.threads import one_thread
-from models.case.case import Case
+from models.basics import FloatArray, InputError, SynthesisError, check_range, one_thread
+from models.case import Case
 
-from ..limits.limits import Limit
-from ..limits.margin_limits import DelayMargin, MaxSensitivity
-from ..limits.signal_limits import Rms
-from ..question.problem import Problem
-from ..question.question import pose
-from ..search.multistart import Found, search
-from ..search.polishing import KEPT
+from ..limits import DelayMargin, Limit, MaxSensitivity, Rms
+from ..question import Problem, pose
+from ..search import KEPT, Found, search
 from .pareto_exchange import exchanged
 from .pareto_point import ParetoPoint
 from .pareto_walk import Walk, with_bound
 
-__all__ = ["AGAINST", "ParetoFront", "ParetoPoint", "pareto_front"]
-
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 #: What a front can be drawn against: name -> (limit's name, unit).

@@ -9,21 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import SynthesisError
-from models.case.case import Case
+from models.basics import FloatArray, SynthesisError
+from models.case import Case
 
-from ..question.problem import Problem
-from ..question.question import pose
-from ..search.multistart import search
-from ..search.polishing import KEPT, polish
-from ..search.programme import Solved
+from ..question import Problem, pose
+from ..search import KEPT, Solved, polish, search
 from .pareto_point import ParetoPoint, point_of
 
-__all__ = ["delay_points"]
-
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 _STARTS = 8

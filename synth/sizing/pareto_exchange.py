@@ -12,19 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
-import numpy.typing as npt
+from models.basics import FloatArray
 
-from ..loop.assess import Assessment
-from ..question.problem import Problem
-from ..search.polishing import KEPT, polish, thinned, view_of
-from ..search.programme import Pace, Programme, Solved
+from ..loop import Assessment
+from ..question import Problem
+from ..search import KEPT, Pace, Programme, Solved, polish, thinned, view_of
 from .pareto_point import ParetoPoint, point_of
 from .pareto_walk import Walk, local_programme, with_bound
 
-__all__ = ["exchanged"]
-
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 _STRETCH = 8  # points that share a programme

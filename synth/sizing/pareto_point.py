@@ -7,18 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.basics.checks import SolverError
+from models.basics import SolverError
 
-from ..design.tuning import tuning_of
-from ..loop.assess import Assessment
-from ..question.problem import Problem
-from ..question.question import PAYLOAD
-from ..search.multistart import Found
-from ..search.polishing import KEPT, view_of
-from ..search.programme import Solved
-from ..verify.verification import Verification
-
-__all__ = ["ParetoPoint", "point_of"]
+from ..design import tuning_of
+from ..loop import Assessment
+from ..question import PAYLOAD, Problem
+from ..search import KEPT, Found, Solved, view_of
+from ..verify import Verification
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

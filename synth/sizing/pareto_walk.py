@@ -17,17 +17,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from ..loop.assess import Assessment
-from ..question.problem import Problem
-from ..search.nodes import cost_nodes, margin_nodes
-from ..search.polishing import thinned, view_of
-from ..search.programme import Pace, Programme, Solved
+from models.basics import FloatArray
 
-__all__ = ["Walk", "local_programme", "with_bound"]
+from ..loop import Assessment
+from ..question import Problem
+from ..search import Pace, Programme, Solved, cost_nodes, margin_nodes, thinned, view_of
 
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 Place = tuple[float, FloatArray]  # a step, and the programme's vector there
 

@@ -15,32 +15,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
+from models.basics import FloatArray, InputError, check_range, parse_quantity
+from models.case import Case
 
-from models.basics.checks import InputError, check_range
-from models.basics.units import parse_quantity
-from models.case.case import Case
-
-from ..limits.limits import Limit
-from ..limits.signal_limits import Rms
-from ..question.problem import Goal, Problem
+from ..limits import Limit, Rms
+from ..question import Goal, Problem
 from .follow import Answer, Posed, follow
 from .motor import MotorData, changed, with_motor
-
-__all__ = [
-    "AT_REST",
-    "RATINGS",
-    "TARGET",
-    "Least",
-    "SizePoint",
-    "least_motor",
-    "sea_factor",
-    "target_of",
-    "with_target",
-]
-
-FloatArray = npt.NDArray[np.float64]
 
 TARGET = "payload.displacement.rms"
 """Name of the target among the limits."""

@@ -17,18 +17,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from models.basics.threads import one_thread
-from models.case.case import Case
+from models.basics import one_thread
+from models.case import Case
 
-from ..design.structure_design import StructureDesign
-from ..design.structure_search import optimise_structure
-from ..limits.limits import Limit
-from ..question.problem import Problem
-from ..search.multistart import Progress
+from ..design import StructureDesign, optimise_structure
+from ..limits import Limit
+from ..question import Problem
+from ..search import Progress
 from .follow import Answer, Posed, begin_from, follow, slope
 from .purchase_items import Item, limit_items, part_items
-
-__all__ = ["Worth", "WorthRow", "worth"]
 
 _STEP = 0.05  # of the logarithm, for the elasticity
 _SMALL = 1e-4  # of the logarithm, for the price

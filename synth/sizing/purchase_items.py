@@ -11,14 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from models.basics.checks import InputError
-from models.case.case import Case
+from models.basics import InputError
+from models.case import Case
 
-from ..limits.limits import Limit
+from ..limits import Limit
 from .follow import Posed
 from .motor import changed, motor_changes
-
-__all__ = ["Item", "limit_items", "part_items"]
 
 _RPM = 0.10471975511965977
 _NOISE = ("acceleration", "velocity", "displacement")

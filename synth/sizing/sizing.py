@@ -19,15 +19,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, check_range
-from models.basics.threads import one_thread
-from models.case.case import Case
-from models.plant.rope import MAX_MASSES
+from models.basics import FloatArray, InputError, check_range, one_thread
+from models.case import Case
+from models.plant import MAX_MASSES
 
-from ..search.multistart import Progress, search
-from ..search.polishing import KEPT
+from ..search import KEPT, Progress, search
 from .catalogue import Choice, choose, read_catalogue
 from .follow import EXCESS, Answer, Posed, follow
 from .motor import MotorData, changed, with_motor
@@ -35,10 +32,6 @@ from .point import Least, least_motor, target_of
 from .sizing_design import designed, why_not
 from .sizing_result import Sizing as Sizing
 from .sizing_sea import highest_sea
-
-__all__ = ["Sizing", "size_winch"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _SPAN = 2.5  # gears that are tried: the case's over and times this
 _FINE = 0.03  # of the logarithm of the gear, to which the best is found

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from models.case.case import Case
+from models.case import Case
 
-from ..design.structure_design import _SOURCES, StructureDesign
+from ..design import StructureDesign, tuning_of
+from ..design.structure_design import _SOURCES
 from ..design.structure_search import _design, _verified
-from ..design.tuning import tuning_of
-from ..loop.assess import Assessment
-from ..question.question import HOOK, PAYLOAD
-from ..question.structure_question import pose_structure
-from ..search.multistart import Found, Progress
+from ..loop import Assessment
+from ..question import HOOK, PAYLOAD, pose_structure
+from ..search import Found, Progress
 from .follow import Answer, Posed, follow
 from .sizing_result import Sizing
-
-__all__ = ["designed", "why_not"]
 
 
 def designed(

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from models.case.case import Case
+from models.case import Case
 
-from ..design.structure_design import StructureDesign
+from ..design import StructureDesign
 from .catalogue import Choice
 from .point import SizePoint
-
-__all__ = ["Sizing"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -7,15 +7,13 @@ from __future__ import annotations
 
 import math
 
-from models.case.case import Case
-from models.hook.hook import HookMotion
+from models.case import Case
+from models.hook import HookMotion
 
-from ..search.multistart import Progress
+from ..search import Progress
 from .follow import Answer
 from .motor import changed
 from .point import sea_factor, target_of
-
-__all__ = ["highest_sea"]
 
 _SEA_STEPS, _SEA_FINE = 8, 2e-3  # of the search
 _LOWEST, _HIGHEST = 0.05, 6.0  # of the sea asked for, that are looked at

@@ -20,13 +20,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
+
+from models.basics import FloatArray
 
 from .structure import Parameter
 
-__all__ = ["Integral", "LeadLag", "LeadTime", "Matrices", "Notch", "RollOff", "Section", "series"]
-
-FloatArray = npt.NDArray[np.float64]
 Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 Range = tuple[float, float]
 

@@ -22,13 +22,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
-__all__ = ["Block", "BlockForm"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
+from models.basics import ComplexArray, FloatArray
 
 _NEAR = 1e-6  # poles closer than this, relatively, are pulled apart
 _FAINT = 1e-6  # least share of a mode that a fixed row must hear

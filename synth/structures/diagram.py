@@ -21,17 +21,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.signals import pick
-from models.plant.linear import LinearPlant
+from models.basics import ComplexArray, FloatArray, pick
+from models.plant import LinearPlant
 
-from ..loop.controller import Controller
+from ..loop import Controller
 from .blocks import Matrices, Section, series
 from .structure import Bounds, Law, Parameter, check_bounds
-
-__all__ = ["Branch", "DiagramLaw", "Group", "Weight"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 #: From the parameters by name to the weight of a measurement; sums and products only.
 Weight = Callable[[Mapping[str, Any]], Any]

@@ -42,20 +42,14 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import SynthesisError, check_range
-from models.case.case import Case
-from models.plant.plant import MEAN_LOSSES, Plant, build_plant
-from models.plant.plant_data import PlantData
-from models.sensing.control import Recursion
+from models.basics import FloatArray, SynthesisError, check_range
+from models.case import Case
+from models.plant import MEAN_LOSSES, Plant, PlantData, build_plant
+from models.sensing import Recursion
 
 from .recursive import checked_sample_time, make_recursion
 from .sampling import sampled_loop
-
-__all__ = ["DrumSpeedLoop", "SteadyMotion"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _OWNER = "drum-speed loop"
 _PHASE = 0.25  # what all delays together may take at omega_b [rad]

@@ -14,25 +14,20 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import block_diag
 
-from models.basics.checks import InputError, SynthesisError
-from models.plant.linear import LinearPlant
+from models.basics import ComplexArray, FloatArray, InputError, SynthesisError
+from models.plant import LinearPlant
 
-from ..loop.controller import Controller
+from ..loop import Controller
 from .canonical import BlockForm
 from .lqg import Estimator, Regulator, designs, estimator, projected, reduced, regulator, weighing
 from .structure import Bounds, Law, Parameter, Structure, check_bounds, gain_scales, pace
 from .whitened import whitened
 
 if TYPE_CHECKING:
-    from ..question.problem import Problem
+    from ..question import Problem
 
-__all__ = ["LowOrder"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _PADE = 4  # of the delays, in the designs that candidates are made of
 _SIDE = 12  # so many regulators times so many filters

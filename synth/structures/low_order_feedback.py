@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.plant.linear import LinearPlant
+from models.plant import LinearPlant
 
-from ..loop.controller import Controller
+from ..loop import Controller
 from .low_order import LowOrder
 from .low_order import _LowOrderLaw as LowOrderLaw
 from .structure import PAYLOAD_MEASUREMENTS, Bounds, Law, Structure
-
-__all__ = ["LowOrderFeedback"]
 
 
 @dataclass(frozen=True, kw_only=True)

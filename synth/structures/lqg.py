@@ -15,32 +15,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
 
-from models.basics.checks import InputError, SynthesisError
-from models.basics.riccati import balanced_truncation
-from models.plant.linear import LinearPlant
+from models.basics import (
+    BoolArray,
+    FloatArray,
+    InputError,
+    SynthesisError,
+    White,
+    balanced_truncation,
+)
+from models.plant import LinearPlant
 
-from ..loop.controller import Controller
-from ..loop.disturbance import White
-
-__all__ = [
-    "LQG",
-    "Estimator",
-    "Regulator",
-    "designs",
-    "estimator",
-    "lqg",
-    "projected",
-    "reduced",
-    "regulator",
-    "state_covariance",
-    "weighing",
-]
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
+from ..loop import Controller
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -18,13 +18,11 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import check_range
-from models.plant.plant import OperatingPoint
-from models.sensing.control import MEASURED, Measurement, Recursion
+from models.basics import FloatArray, check_range
+from models.plant import OperatingPoint
+from models.sensing import Measurement, Recursion
+from models.sensing.control import MEASURED
 
-__all__ = ["RecursiveController", "at_rest", "make_recursion"]
-
-FloatArray = npt.NDArray[np.float64]
 Signals = Mapping[str, ca.SX]
 Law = Callable[[ca.SX, Signals], tuple[ca.SX, ca.SX]]
 

@@ -8,18 +8,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
-from models.basics.checks import InputError, SynthesisError, check_range
-from models.basics.signals import pick
-from models.plant.discrete import zero_order_hold
+from models.basics import FloatArray, InputError, SynthesisError, check_range, pick
+from models.plant import zero_order_hold
 
-from ..loop.controller import Controller
+from ..loop import Controller
 
-__all__ = ["Matrices", "low_pass_matrices", "sampled", "tracking_gain"]
-
-FloatArray = npt.NDArray[np.float64]
 Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 _OWNER = "linear feedback"

@@ -27,20 +27,13 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from models.basics.checks import check_finite
-from models.basics.signals import pick
-from models.case.case import Case
-from models.plant.discrete import zero_order_hold
-from models.plant.linear import LinearPlant
-from models.plant.plant import MEAN_LOSSES, Plant
-from models.sensing.control import MEASURED, Measurement, Recursion
+from models.basics import ComplexArray, FloatArray, check_finite, pick
+from models.case import Case
+from models.plant import MEAN_LOSSES, LinearPlant, Plant, zero_order_hold
+from models.sensing import Measurement, Recursion
+from models.sensing.control import MEASURED
 
 from .recursive import at_rest
-
-__all__ = ["SampledLoop", "sampled_loop"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 PAYLOAD = ("payload.acceleration", "payload.velocity", "payload.displacement")
 WINCH = ("drum.haul", "motor.speed", "motor.torque", "rope.tension")

@@ -17,32 +17,17 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError, check_range
-from models.basics.signals import pick
-from models.plant.linear import LinearPlant
+from models.basics import ComplexArray, FloatArray, InputError, check_range, pick
+from models.plant import LinearPlant
 
-from ..loop.controller import Controller, closed_loop_matrix
+from ..loop import Controller, closed_loop_matrix
 from .lqg import designs, projected
 from .whitened import whitened
 
 if TYPE_CHECKING:
-    from ..question.problem import Problem
+    from ..question import Problem
 
-__all__ = [
-    "Law",
-    "Parameter",
-    "PayloadFeedback",
-    "StaticGain",
-    "Structure",
-    "check_bounds",
-    "gain_scales",
-    "pace",
-]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 Bounds = Mapping[str, tuple[float, float]]
 
 PAYLOAD_MEASUREMENTS = ("payload.acceleration", "payload.velocity", "payload.displacement")

@@ -10,11 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.plant.linear import LinearPlant
+from models.plant import LinearPlant
 
-from ..loop.disturbance import Disturbance
-
-__all__ = ["whitened"]
+from ..loop import Disturbance
 
 
 def whitened(plant: LinearPlant, disturbances: Sequence[Disturbance]) -> LinearPlant:

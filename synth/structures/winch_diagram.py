@@ -31,17 +31,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from models.basics.checks import InputError, check_range
-from models.basics.signals import pick
-from models.plant.linear import LinearPlant
+from models.basics import InputError, check_range, pick
+from models.plant import LinearPlant
 
 from .blocks import LeadTime, Section
 from .diagram import Branch, Group, Weight
 from .drum_speed import SteadyMotion
 from .structure import PAYLOAD_MEASUREMENTS, Bounds, Law, Parameter, Structure, gain_scales
 from .winch_law import ASKED, WinchLaw
-
-__all__ = ["TRANSPARENT", "WinchStructure"]
 
 SAMPLE_TIME = 0.01  # that the drum loop must leave room for [s]
 TRANSPARENT = 500.0  # a roll-off with this corner is hardly there [rad/s]

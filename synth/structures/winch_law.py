@@ -10,23 +10,18 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import qmc
 
-from models.plant.linear import LinearPlant
-from models.plant.response import PlantResponse
+from models.basics import ComplexArray, FloatArray
+from models.plant import LinearPlant, PlantResponse
 
 from .diagram import DiagramLaw
 from .structure import PAYLOAD_MEASUREMENTS
 
 if TYPE_CHECKING:
-    from ..question.problem import Problem
+    from ..question import Problem
     from .winch_diagram import WinchStructure
 
-__all__ = ["ASKED", "WinchLaw"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 #: What the payload asks of the drum: speed per acceleration [s], velocity [-], position [1/s].
 ASKED = ("payload.acceleration_gain", "payload.velocity_gain", "payload.position_gain")

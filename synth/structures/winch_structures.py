@@ -9,19 +9,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from models.basics.signals import pick
-from models.case.case import Case
-from models.plant.plant_data import PlantData
-from models.plant.rope import fixed_top_modes
+from models.basics import pick
+from models.case import Case
+from models.plant import PlantData, fixed_top_modes
 
 from .blocks import Integral, LeadLag, Notch, RollOff, Section
 from .drum_speed import SteadyMotion
 from .low_order_feedback import LowOrderFeedback as LowOrderFeedback
 from .winch_diagram import TRANSPARENT
 from .winch_diagram import WinchStructure as WinchStructure
-
-__all__ = ["DESCRIPTIONS", "LowOrderFeedback", "WinchStructure", "structure_named"]
-__all__ += ["structure_names"]
 
 #: What each structure is, for tables and help texts.
 DESCRIPTIONS: Mapping[str, str] = {

@@ -12,12 +12,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from models.basics import FloatArray
+
 from .chain import ChainLoops
 from .winding_count import frequencies
 
-__all__ = ["calming_drag"]
-
-FloatArray = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 
 _STEP = 64

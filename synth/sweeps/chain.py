@@ -22,14 +22,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.plant.rope import RopeLumps
+from models.basics import ComplexArray, FloatArray
+from models.plant import RopeLumps
 
 from .numbers import PlantNumbers
 
-__all__ = ["ChainLoops"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 Index = npt.NDArray[np.intp]
 
 BLOCK = 12_000  # numbers of an array at once: the half dozen in use stay in the cache

@@ -14,21 +14,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.case.case import Case
-from models.casefile.yaml_lines import read_yaml
+from models.basics import FloatArray, InputError
+from models.case import Case
+from models.casefile import read_yaml
 from models.spread import Samples, Spread
 
-from ..design.design import GainDesign
-from ..design.structure_design import StructureDesign
+from ..design import GainDesign, StructureDesign
 from .metrics import Metric
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["case_of", "dataset_of", "gains_of", "spread_of"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _LISTED = 1000  # samples that are written into the attributes
 

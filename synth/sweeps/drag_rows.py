@@ -12,9 +12,8 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Velocity", "agreeing_drag"]
+from models.basics import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 Velocity = Callable[[Index, FloatArray], FloatArray]
 

@@ -13,15 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError, check_range
-from models.basics.quadrature import Quadrature
-from models.basics.threads import one_thread
-from models.case.case import Case
+from models.basics import BoolArray, FloatArray, InputError, Quadrature, check_range, one_thread
+from models.case import Case
+from models.operation import PREFIX as FAULTS
 from models.spread import Spread
-from models.spread.fields import FAULTS
 
-from ..design.design import GainDesign
-from ..design.structure_design import StructureDesign
+from ..design import GainDesign, StructureDesign
 from .dataset import dataset_of
 from .gain_rows import GainRows
 from .metrics import chosen_metrics
@@ -30,10 +27,6 @@ from .structure_rows import StructureRows
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FrequencyEngine", "frequency_chunks", "frequency_sweep"]
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 Progress = Callable[[str, int, int], None]
 Design = GainDesign | StructureDesign
 

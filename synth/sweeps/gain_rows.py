@@ -17,13 +17,11 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.basics.quadrature import Quadrature
-from models.plant.rope import lump_rope
-from models.spread import Spread
-from models.spread.fields import GAINS
+from models.basics import BoolArray, FloatArray, InputError, Quadrature
+from models.plant import lump_rope
+from models.spread import GAINS, Spread
 
-from ..design.design import GainDesign
+from ..design import GainDesign
 from .calming import calming_drag
 from .chain import ChainLoops
 from .drag_rows import Velocity, agreeing_drag
@@ -35,10 +33,6 @@ from .sea_rows import SeaRows
 from .sweep_nodes import SweepNodes, sweep_nodes
 from .winding_count import count_unstable, light_poles, peak_sensitivity
 
-__all__ = ["GainRows"]
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 Index = npt.NDArray[np.intp]
 Loops = SpringLoops | ChainLoops
 

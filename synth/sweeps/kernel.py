@@ -22,12 +22,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from models.basics import BoolArray, FloatArray
+
 from .numbers import PlantNumbers
 
-__all__ = ["SpringLoops", "hurwitz", "product"]
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 Columns = list[FloatArray]  # coefficients of s^0, s^1, .., each (n,), or (1,) if all have the same
 
 CHUNK = 500  # loops at once: two arrays of 500 x 200 numbers stay in the second-level cache

@@ -6,14 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.casefile.messages import suggestion
-
-__all__ = ["DEFAULT", "METRICS", "Metric", "chosen_metrics", "finished"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import FloatArray, InputError
+from models.casefile import suggestion
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,15 +15,10 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError
-from models.case.case import Case
-from models.plant.plant_data import PlantData
-from models.spread import Spread
-from models.spread.fields import DRAG, GAINS
-
-__all__ = ["PlantNumbers", "numbers_of"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import FloatArray, InputError
+from models.case import Case
+from models.plant import PlantData
+from models.spread import DRAG, GAINS, Spread
 
 _AGREE = 1e-12
 _NEWTON = 30

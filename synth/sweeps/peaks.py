@@ -10,12 +10,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from models.basics import ComplexArray, FloatArray
+
 from .kernel import SpringLoops
 
-__all__ = ["spring_peaks"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 Index = npt.NDArray[np.intp]
 
 _COMMON = 64

@@ -13,16 +13,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.physics_warning import PhysicsWarning
-from models.case.case import Case
-from models.hook.hook import HookMotion
+from models.basics import FloatArray, PhysicsWarning
+from models.case import Case
+from models.hook import HookMotion
 from models.spread import Spread
-
-__all__ = ["SeaRows"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _HEIGHT = "sea.significant_height"
 _PERIODS = ("sea.peak_period", "sea.significant_period")

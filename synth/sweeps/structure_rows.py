@@ -14,21 +14,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError, SolverError
-from models.basics.metrics import peak_factor
-from models.basics.physics_warning import PhysicsWarning
-from models.basics.quadrature import Quadrature
+from models.basics import (
+    BoolArray,
+    FloatArray,
+    InputError,
+    PhysicsWarning,
+    Quadrature,
+    SolverError,
+    peak_factor,
+)
 from models.spread import Spread
 
-from ..design.structure_design import StructureDesign
-from ..loop.assess import Assessment
-from ..question.structure_question import pose_structure
+from ..design import StructureDesign
+from ..loop import Assessment
+from ..question import pose_structure
 from .metrics import Metric
-
-__all__ = ["StructureRows"]
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 
 class StructureRows:

@@ -14,15 +14,15 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import read_only
-from models.basics.panels import FrequencyAxis, cut_panels, longest_panel
-from models.basics.quadrature import Quadrature
-
-__all__ = ["SweepNodes", "sweep_nodes"]
-
-FloatArray = npt.NDArray[np.float64]
+from models.basics import (
+    FloatArray,
+    FrequencyAxis,
+    Quadrature,
+    cut_panels,
+    longest_panel,
+    read_only,
+)
 
 _SHORT = 0.12  # panels shorter than this, in ln omega, get the 7-point rule
 _PER_DECADE = 3.0

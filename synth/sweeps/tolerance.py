@@ -12,22 +12,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics.checks import InputError, check_range
-from models.basics.intervals import Share, share
-from models.spread import Samples, Spread, Uniform
-from models.spread.fields import DRAG, GAINS
+from models.basics import InputError, Share, check_range, share
+from models.spread import DRAG, GAINS, Samples, Spread, Uniform
 
-from ..design.design import GainDesign
-from ..design.structure_design import StructureDesign
-from ..loop.element import with_drag
-from ..question.question import pose
-from ..robust.perturbation import GainRadius, gain_radius
+from ..design import GainDesign, StructureDesign
+from ..loop import with_drag
+from ..question import pose
+from ..robust import GainRadius, gain_radius
 from .frequency import FrequencyEngine
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-
-__all__ = ["GainTolerance", "gain_tolerance", "radius_of"]
 
 _OUTSIDE = 1.001  # times the radius, where the nearest unstable gains have to be unstable
 _FACES = 0.5  # share of the draws that are put on the faces of the box

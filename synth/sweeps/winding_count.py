@@ -20,10 +20,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Loops", "count_unstable", "frequencies", "light_poles", "peak_sensitivity"]
+from models.basics import ComplexArray, FloatArray
 
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 Index = npt.NDArray[np.intp]
 Follow = Callable[[Index, ComplexArray], ComplexArray]
 

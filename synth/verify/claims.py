@@ -12,22 +12,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import SolverError
-from models.basics.metrics import peak_factor, zero_crossing_period
-from models.case.case import Case
-from models.plant.linear import LinearPlant
-from models.plant.plant_data import PlantData
-from models.plant.rope import fixed_top_modes, lump_rope, lumped_modes
+from models.basics import FloatArray, SolverError, peak_factor, zero_crossing_period
+from models.case import Case
+from models.plant import LinearPlant, PlantData, fixed_top_modes, lump_rope, lumped_modes
 
-from ..limits.limits import Limit
+from ..limits import Limit
 from .nyquist import CurveMargins, largest
 from .recompute import Loop, imaginary
 
-__all__ = ["HOOK", "PAYLOAD", "VELOCITY", "Demand", "case_demands", "limit_demand"]
-
-FloatArray = npt.NDArray[np.float64]
 Moments = Mapping[str, tuple[float, ...]]
 
 PAYLOAD = "payload.displacement"

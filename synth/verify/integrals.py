@@ -10,15 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 import scipy.integrate
 
-from models.basics.checks import SolverError
-
-__all__ = ["integrate", "panels"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
+from models.basics import ComplexArray, FloatArray, SolverError
 
 _INTERVALS = 40  # of quad_vec, each with 15 nodes on every panel
 _PANELS_PER_DECADE = 4.0

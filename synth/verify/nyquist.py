@@ -14,14 +14,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq, minimize_scalar
 
-from models.basics.checks import SolverError
+from models.basics import ComplexArray, FloatArray, SolverError
 
 from .winding import Function, lively, trace
-
-__all__ = ["Curve", "CurveMargins", "largest"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _FLOOR = 1e-3  # |L| below which the curve's phase is not followed
 _VALLEYS = 6  # local extrema that are solved for, the most extreme first

@@ -9,29 +9,13 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import StillhookError
-from models.plant.linear import LinearPlant
+from models.basics import ComplexArray, StillhookError
+from models.plant import LinearPlant
 
 from .nyquist import Curve, CurveMargins
 from .recompute import LawMatrices, Loop, closed_matrices
 from .verification import Check, agreement, failure
 from .winding import Winding, count_unstable, open_loop_poles
-
-__all__ = [
-    "PADE",
-    "TIGHT",
-    "closed_loop_marks",
-    "guarded",
-    "inverse_agreement",
-    "loop_margins",
-    "margin_checks",
-    "pade_order",
-    "pole_check",
-    "winding_check",
-    "winding_of_plant",
-]
-
-ComplexArray = npt.NDArray[np.complex128]
 
 PADE = 8  # order of the delay models: those of the optimiser have five or six
 _LATE, _LATE_PADE = 0.2, 12  # delay beyond which that is too little [s], and the order it takes

@@ -16,27 +16,12 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from models.basics.checks import SolverError
-from models.plant.linear import LinearPlant
-from models.plant.response import PlantResponse
-from models.plant.shaping import ShapingFilter
+from models.basics import ComplexArray, FloatArray, SolverError
+from models.plant import LinearPlant, PlantResponse, ShapingFilter
 
-from ..loop.controller import Controller
+from ..loop import Controller
 from .integrals import integrate, panels
 from .winding import Function
-
-__all__ = [
-    "LawMatrices",
-    "Loop",
-    "Source",
-    "closed_matrices",
-    "imaginary",
-    "lyapunov_variances",
-    "moments",
-]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _SMOOTH_TAIL, _RINGING_TAIL = 20, 1000  # panels of 1/omega above all poles
 _RUNG_OUT = 3000.0  # omega times delay where the ringing is too small to matter

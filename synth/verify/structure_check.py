@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics.threads import one_thread
-from models.plant.linear import LinearPlant
-from models.plant.rope import MAX_MASSES
-from models.sensing.plant import sensed_plant
+from models.basics import one_thread
+from models.plant import MAX_MASSES, LinearPlant
+from models.sensing import sensed_plant
 
-from ..limits.margin_limits import MaxSensitivity
-from ..question.question import PAYLOAD
+from ..limits import MaxSensitivity
+from ..question import PAYLOAD
 from .recheck import (
     TIGHT,
     closed_loop_marks,
@@ -29,9 +28,7 @@ from .tuning_check import verify_tuning
 from .verification import Check, Verification, agreement, bounded
 
 if TYPE_CHECKING:
-    from ..design.structure_design import StructureDesign
-
-__all__ = ["verify_structure"]
+    from ..design import StructureDesign
 
 _DECAY = 1e-7  # slowest decay that counts as stable [1/s]
 _ROPE = 0.02  # what twice the masses may add to M_s, or change in the rms

@@ -14,13 +14,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.threads import one_thread
-from models.plant.linear import LinearPlant
+from models.basics import White, one_thread
+from models.plant import LinearPlant
 
-from ..loop.controller import Controller
-from ..loop.disturbance import White
+from ..loop import Controller
 from .claims import limit_demand
 from .nyquist import CurveMargins
 from .recheck import (
@@ -39,12 +37,8 @@ from .recompute import LawMatrices, Loop, Source, imaginary, lyapunov_variances,
 from .verification import Check, Verification, agreement, failure
 
 if TYPE_CHECKING:
-    from ..design.tuning import Tuning
+    from ..design import Tuning
 
-__all__ = ["verify_tuning"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _DECAY = 1e-10  # of a pole, over the size of the fastest one, to count as stable
 _COST = 1e-6  # cost by another quadrature or a Lyapunov equation

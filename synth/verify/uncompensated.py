@@ -10,19 +10,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.checks import SolverError
-from models.plant.plant_data import PlantData
-from models.plant.rope import fixed_top_modes
+from models.basics import ComplexArray, FloatArray, SolverError
+from models.plant import PlantData, fixed_top_modes
 
 from .integrals import integrate, panels
 from .recompute import Source, imaginary
-
-__all__ = ["HeldDrum"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _RTOL = 1e-8
 _MODES = 40

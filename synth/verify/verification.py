@@ -9,8 +9,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-__all__ = ["Check", "Verification", "agreement", "bounded", "failure"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Check:

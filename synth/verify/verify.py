@@ -18,16 +18,17 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics.threads import one_thread
-from models.hook.hook import HookMotion
-from models.plant.line import line_response_at
-from models.plant.linear import LinearPlant
-from models.plant.plant import build_plant
-from models.plant.plant_data import PlantData
-from models.plant.rope import MAX_MASSES
-from models.plant.shaping import fit_shaping_filter
+from models.basics import one_thread
+from models.hook import HookMotion
+from models.plant import (
+    MAX_MASSES,
+    LinearPlant,
+    PlantData,
+    build_plant,
+    fit_shaping_filter,
+    line_response_at,
+)
 
 from .claims import HOOK, PAYLOAD, VELOCITY, Demand, case_demands
 from .nyquist import CurveMargins
@@ -44,18 +45,13 @@ from .recheck import (
     winding_of_plant,
 )
 from .recompute import LawMatrices, Loop, Source, lyapunov_variances, moments
-from .tuning_check import verify_tuning
 from .uncompensated import HeldDrum
 from .verification import Check, Verification, agreement, bounded, failure
 from .winding import count_unstable, open_loop_poles
 
 if TYPE_CHECKING:
-    from ..design.design import GainDesign
+    from ..design import GainDesign
 
-__all__ = ["Check", "Verification", "verify_design", "verify_tuning"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _UNDAMPED = 1e-5  # a rope damped less than this has modes without end on the axis
 _DECAY = 1e-7  # slowest decay that counts as stable [1/s]: a time constant of four months

@@ -28,10 +28,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-__all__ = ["Trace", "Winding", "count_unstable", "lively", "open_loop_poles", "trace"]
+from models.basics import ComplexArray, FloatArray
 
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 Function = Callable[[ComplexArray], ComplexArray]
 
 _TURN = 0.5  # largest phase step between neighbours [rad]

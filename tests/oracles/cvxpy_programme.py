@@ -15,9 +15,8 @@ import cvxpy
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import SolverError
-from mpc.linear.condensed import WATCHED
-from mpc.linear.linear import LinearMPC
+from models.basics import SolverError
+from mpc.linear import WATCHED, LinearMPC
 
 cp: Any = cvxpy  # its stubs know too few of its functions
 

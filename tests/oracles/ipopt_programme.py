@@ -16,9 +16,9 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import SolverError
-from mpc.linear.condensed import WATCHED
-from mpc.nonlinear.nonlinear import NonlinearMPC
+from models.basics import SolverError
+from mpc.linear import WATCHED
+from mpc.nonlinear import NonlinearMPC
 
 __all__ = ["NlpAnswer", "nlp_oracle"]
 

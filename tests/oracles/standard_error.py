@@ -14,9 +14,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from models.basics.checks import InputError, check_finite, check_range
+from models.basics import InputError, Quadrature, check_finite, check_range
 from models.basics.metrics import Density
-from models.basics.quadrature import Quadrature
 
 __all__ = ["spectral_standard_error", "standard_error_of_variance"]
 

@@ -11,7 +11,7 @@ from cables import cable_study
 from scipy.integrate import quad
 
 from models import HookMotion, PhysicsWarning, load_case
-from models.basics.checks import InputError
+from models.basics import InputError
 
 # The thesis's rule for C: the energy of a sine of 5.7 s, here with 0.12 m of amplitude.
 ENERGY = {"payload.drag": {"method": "energy", "amplitude": 0.12, "frequency": 1.1}}

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpc.linear.linear import LinearMPC
-from mpc.nonlinear.nonlinear import NonlinearMPC
+from mpc.linear import LinearMPC
+from mpc.nonlinear import NonlinearMPC
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
 

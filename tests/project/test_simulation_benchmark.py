@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from models.simulation import run_simulation
 from models.simulation.compiler import find_compiler
 from models.simulation.integrate import hermite_midpoint
-from models.simulation.simulate import run_simulation
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
 

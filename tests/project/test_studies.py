@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.basics.threads import one_thread
-from synth.loop.assess import Assessment
-from synth.question.structure_question import pose_structure
-from synth.verify.recheck import closed_loop_marks, winding_of_plant
-from synth.verify.recompute import LawMatrices
+from models.basics import one_thread
+from synth.loop import Assessment
+from synth.question import pose_structure
+from synth.verify import LawMatrices, winding_of_plant
+from synth.verify.recheck import closed_loop_marks
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
 SVG = b"<?xml"

@@ -11,7 +11,7 @@ import pytest
 
 from models import load_case
 from synth import evaluate_gains
-from synth.sweeps.frequency import FrequencyEngine
+from synth.sweeps import FrequencyEngine
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
 

@@ -21,10 +21,10 @@ from plant_numbers import THESIS, THESIS_GAINS, thesis_numbers, thesis_transfer
 from time_response import Sine, Step, time_response
 
 from models import HookMotion, build_plant, load_case
-from models.basics.quadrature import spectral_nodes
-from synth.design.optimise import evaluate_gains
-from synth.loop.controller import Controller, closed_loop_poles
-from synth.question.question import pose
+from models.basics import spectral_nodes
+from synth.design import evaluate_gains
+from synth.loop import Controller, closed_loop_poles
+from synth.question import pose
 
 PAYLOAD, HAUL, HOOK = "payload.displacement", "drum.haul", "hook.heave"
 MEASURED = ("payload.acceleration", "payload.velocity", "payload.displacement")
@@ -80,7 +80,7 @@ def band_rms(loop, hook, output, low, high):
 
 
 def closed_forms(case, omega, **gains):
-    from models.plant.plant_data import PlantData
+    from models.plant import PlantData
 
     numbers = thesis_numbers(PlantData.from_case(case), case.payload.fixed_drag)
     return thesis_transfer(omega, **numbers, **gains)

@@ -11,10 +11,9 @@ from feedback import with_feedback
 from plant_numbers import MODERN, THESIS, THESIS_DRAG, THESIS_FEEDBACK
 from time_response import Sine, Step, time_response
 
-from models.basics.checks import InputError
-from models.plant.linear import LinearPlant
-from models.plant.plant import build_plant
-from synth.loop.controller import Controller, closed_loop_poles
+from models.basics import InputError
+from models.plant import LinearPlant, build_plant
+from synth.loop import Controller, closed_loop_poles
 
 PAYLOAD = ("payload.acceleration", "payload.velocity", "payload.displacement")
 THESIS_CONTROLLER = Controller.static(THESIS_FEEDBACK, PAYLOAD, ("drive.command",))

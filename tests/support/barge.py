@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from models import Case, load_case
-from models.basics.dispersion import wave_number
-from models.vessel import VesselRaos, write_raos
+from models.basics import wave_number
+from models.vessel import VesselRaos
+from models.vessel.readers import write_raos
 
 LENGTH, BEAM = 80.0, 18.0
 ROLL, DAMPING = 0.62, 0.08  # natural frequency [rad/s], share of the critical damping

@@ -7,7 +7,7 @@ from functools import cache
 
 from models import load_case
 from synth import GainDesign, evaluate_gains
-from synth.design.tuning import LimitUse
+from synth.design import LimitUse
 
 THESIS_GAINS = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
 

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from models import Case
-from models.plant.plant import MEAN_LOSSES, build_plant
-from models.sensing.control import Controller, Measurement
+from models.plant import MEAN_LOSSES, build_plant
+from models.sensing import Controller, Measurement
 
 FloatArray = npt.NDArray[np.float64]
 Motion = Callable[[float], tuple[float, float]]

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from models.plant.linear import LinearPlant
-from synth.loop.controller import Controller
-from synth.loop.disturbance import White
+from models.basics import White
+from models.plant import LinearPlant
+from synth.loop import Controller
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]

@@ -5,9 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 from models import Case, load_case
-from mpc.linear.linear import LinearMPC
-from mpc.winch.doubts import Doubts
-from mpc.winch.weights import Weights
+from mpc.linear import LinearMPC
+from mpc.winch import Doubts, Weights
 
 #: White noise of 1 % of the heave's rms sampled at 4 Hz (`docs/structures.md`).
 NOISY_UNIT = {"noise_floor": 0.0, "noise_fraction": 0.01, "noise_bandwidth": 11.31}

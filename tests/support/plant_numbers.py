@@ -7,8 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from models.plant.linear import LinearPlant
-from models.plant.plant_data import PlantData
+from models.plant import LinearPlant, PlantData
 
 # 1975 thesis, worst case (K/M = 0.890 1/s2, zeta = 0.0070), winch and gains of its section on
 # the design; submerged weights such that the tension at the winch is 452 kN.

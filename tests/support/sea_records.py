@@ -11,12 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 import models
-from models.case.case import Case
-from models.hook.hook import HookMotion
-from models.operation.excitation import SpectrumMotion
-from models.rig.sensors import MRU
-from models.sensing.mru import MruModel
-from mpc.forecast.forecast import Predictor
+from models.case import Case
+from models.hook import HookMotion
+from models.operation import SpectrumMotion
+from models.rig import MRU
+from models.sensing import MruModel
+from mpc.forecast import Predictor
 
 FloatArray = npt.NDArray[np.float64]
 

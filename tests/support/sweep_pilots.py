@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from synth.controllers.linear_feedback import LinearFeedback
+from synth.controllers import LinearFeedback
 
 
 def linear(case: Any) -> LinearFeedback:

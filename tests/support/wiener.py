@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from models.hook.hook import HookMotion
-from models.sensing.mru import MruModel
+from models.hook import HookMotion
+from models.sensing import MruModel
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]

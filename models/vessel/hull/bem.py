@@ -19,18 +19,22 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...basics.checks import InputError, SolverError, check_ascending, check_range
-from ...basics.dispersion import wave_number
-from ...basics.tables import GRAVITY, SEA_WATER_DENSITY
+from ...basics import (
+    GRAVITY,
+    SEA_WATER_DENSITY,
+    FloatArray,
+    InputError,
+    SolverError,
+    check_ascending,
+    check_range,
+    wave_number,
+)
 from ..raos import MODES
 from .froude_krylov import froude_krylov
 from .hull import Hull
 from .hydrodynamics import Hydrodynamics
 from .lid import waterplane_lid
 
-__all__ = ["capytaine", "capytaine_mesh", "quiet", "shortest_wave", "solve_hull", "versions"]
-
-FloatArray = npt.NDArray[np.float64]
 Point = tuple[float, float, float]
 Progress = Callable[[int, int], None]
 

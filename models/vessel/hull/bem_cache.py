@@ -20,15 +20,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ...basics.checks import InputError
-from ...basics.files import replace_atomically
-from ...basics.tables import GRAVITY
-from ...simulation.compiler import cache_folder
+from ...basics import GRAVITY, FloatArray, InputError, replace_atomically
+from ...simulation import cache_folder
 from .bem import Point, Progress, solve_hull, versions
-from .hull import FloatArray, Hull
+from .hull import Hull
 from .hydrodynamics import Hydrodynamics
-
-__all__ = ["KEPT", "cached_hydrodynamics", "digest_of"]
 
 KEPT = 64
 """Computations kept; the ones longest unused go first."""

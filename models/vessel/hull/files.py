@@ -14,15 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ...basics.checks import InputError, check_range
+from ...basics import FloatArray, InputError, check_range
 from ..assemble import read_bytes
 from .hull import Hull
-
-__all__ = ["FORMATS", "MOST_PANELS", "read_hull"]
-
-FloatArray = npt.NDArray[np.float64]
 
 FORMATS = (".stl", ".gdf", ".pnl", ".hst", ".mar")
 """Endings of the files that are read."""

@@ -14,14 +14,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from ...basics.dispersion import wave_number
-from ...basics.tables import GRAVITY, SEA_WATER_DENSITY
+from ...basics import GRAVITY, SEA_WATER_DENSITY, ComplexArray, FloatArray, wave_number
 from .hull import Hull
-
-__all__ = ["froude_krylov"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 
 def froude_krylov(

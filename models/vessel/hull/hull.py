@@ -21,13 +21,9 @@ from operator import itemgetter
 from types import MappingProxyType
 
 import numpy as np
-import numpy.typing as npt
 
-from ...basics.checks import InputError, check_finite, check_range, read_only
+from ...basics import FloatArray, InputError, check_finite, check_range, read_only
 
-__all__ = ["Hull", "box_hull", "panel_integral", "patch", "volumes"]
-
-FloatArray = npt.NDArray[np.float64]
 Point = tuple[float, float, float]
 
 _OPEN = 0.02  # of the volume by which its three expressions may differ for the surface to be closed

@@ -25,15 +25,19 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from ...basics.checks import InputError, check_ascending, check_range, read_only
-from ...basics.tables import GRAVITY, SEA_WATER_DENSITY
+from ...basics import (
+    GRAVITY,
+    SEA_WATER_DENSITY,
+    ComplexArray,
+    FloatArray,
+    InputError,
+    check_ascending,
+    check_range,
+    read_only,
+)
 from ..raos import MODES
 from .hydrostatics import moved, undamped_period
 
-__all__ = ["FloatingBody", "Hydrodynamics", "NaturalPeriods", "solved_motions"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 Point = tuple[float, float, float]
 
 _ROLL = MODES.index("roll")

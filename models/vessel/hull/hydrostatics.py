@@ -13,24 +13,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from ...basics.checks import InputError, check_range
-from ...basics.tables import GRAVITY, SEA_WATER_DENSITY
+from ...basics import GRAVITY, SEA_WATER_DENSITY, FloatArray, InputError, check_range
 from .hull import Hull, panel_integral
 
-__all__ = [
-    "Loading",
-    "Waterplane",
-    "centre_of_mass",
-    "mass_matrix",
-    "moved",
-    "stiffness_matrix",
-    "transport",
-    "undamped_period",
-]
-
-FloatArray = npt.NDArray[np.float64]
 Point = tuple[float, float, float]
 
 

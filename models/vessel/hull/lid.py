@@ -11,13 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from ...basics import FloatArray
 from .hull import Hull, patch
-
-__all__ = ["waterplane_lid"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def waterplane_lid(hull: Hull) -> FloatArray | None:

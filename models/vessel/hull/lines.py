@@ -23,16 +23,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import brentq
 from scipy.special import gammaln
 
-from ...basics.checks import InputError, check_range
+from ...basics import FloatArray, InputError, check_range
 from .hull import Hull, patch, volumes
-
-__all__ = ["ShipLines", "section_coefficient", "section_exponent"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _RUN = 0.8  # length of the run over that of the entrance
 _ENDS = (2.0, 1.1)  # how full waterlines of the ends are: 2 a parabola, 1 a wedge

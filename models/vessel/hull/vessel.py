@@ -17,19 +17,20 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ...basics.checks import InputError, check_ascending, check_range
-from ...basics.tables import GRAVITY, SEA_WATER_DENSITY
+from ...basics import (
+    GRAVITY,
+    SEA_WATER_DENSITY,
+    FloatArray,
+    InputError,
+    check_ascending,
+    check_range,
+)
 from ..raos import VesselRaos
 from .bem import Progress, shortest_wave, versions
 from .bem_cache import cached_hydrodynamics
 from .hull import Hull
 from .hydrodynamics import FloatingBody, NaturalPeriods
 from .hydrostatics import Loading, Waterplane, mass_matrix, stiffness_matrix
-
-__all__ = ["HullVessel", "usual_frequencies", "vessel_from_hull", "well_spaced"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _BEND = 0.005  # of a motion's largest value that a straight line between two rows may be off
 _ROWS = 160  # of the table of motions, at most

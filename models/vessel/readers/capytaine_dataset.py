@@ -16,14 +16,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...basics.checks import InputError
-from ...basics.tables import GRAVITY
+from ...basics import GRAVITY, FloatArray, InputError
 from ..raos import MODES
-
-__all__ = ["CapytaineData", "mode_of"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 LARGEST = 20_000_000
 """Most numbers in a variable that is read; Capytaine's files have some ten thousand."""

@@ -18,19 +18,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ...basics.checks import InputError, check_finite, check_range
-from ...basics.hdf5_check import check_hdf5
+from ...basics import ComplexArray, FloatArray, InputError, check_finite, check_hdf5, check_range
 from ..assemble import finished, read_bytes
-from ..hull.hydrodynamics import FloatingBody, Hydrodynamics, solved_motions
-from ..hull.hydrostatics import centre_of_mass
+from ..hull import FloatingBody, Hydrodynamics, centre_of_mass, solved_motions
 from ..raos import MODES, VesselRaos
 from .capytaine_dataset import CapytaineData
 from .capytaine_parts import kept_rows, places, square_matrix, turned_headings, wave_force
 
-__all__ = ["read_capytaine"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 Point = tuple[float, float, float]
 
 _ROLL = MODES.index("roll")

@@ -10,14 +10,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from ...basics.checks import InputError, check_finite
+from ...basics import ComplexArray, FloatArray, InputError, check_finite
 from ..raos import MODES
 from .capytaine_dataset import CapytaineData, mode_of
-
-__all__ = ["kept_rows", "places", "square_matrix", "turned_headings", "wave_force"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 
 def places(data: CapytaineData, dofs: tuple[str, ...], body: str | None) -> dict[str, int]:

@@ -26,19 +26,12 @@ import re
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
-from ...basics.checks import InputError, check_range
-from ...basics.dispersion import wave_number
+from ...basics import ComplexArray, FloatArray, InputError, check_range, wave_number
 from ..assemble import finished, grid, numbers
 from ..convention import CHOICES, Convention, one_of
 from ..raos import MODES, VesselRaos
 from ..symmetry import SYMMETRIES
-
-__all__ = ["csv_text", "looks_like_csv", "parse_csv"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 FORMAT = "Stillhook RAOs, version 1"
 

@@ -18,17 +18,19 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ...basics.checks import InputError, StillhookError, check_finite
-from ...basics.files import write_text_atomically
-from ...basics.hdf5_check import check_hdf5
-from ...basics.physics_warning import PhysicsWarning
+from ...basics import (
+    InputError,
+    PhysicsWarning,
+    StillhookError,
+    check_finite,
+    check_hdf5,
+    write_text_atomically,
+)
 from ..assemble import finished, read_bytes, text_of
 from ..convention import one_of
 from ..raos import VesselRaos
 from ..symmetry import SYMMETRIES
 from .long_waves import check_long_waves
-
-__all__ = ["FORMATS", "bundled_vessels", "file_format_of", "read_raos", "write_raos"]
 
 FORMATS = {
     "csv": "the project's CSV, or one of your own with the same columns",

@@ -21,14 +21,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from ...basics import ComplexArray, FloatArray
 from ..raos import VesselRaos
-
-__all__ = ["LongWaveCheck", "LongWaveRow", "check_long_waves"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _COLUMNS = (0, 1, 2, 3, 4)  # surge, sway, heave, roll, pitch
 _WEIGHTS = np.array([0.5, 0.5, 1.0, 1.0, 1.0])

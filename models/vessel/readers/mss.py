@@ -15,17 +15,12 @@ import io
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ...basics.checks import InputError, check_range
+from ...basics import FloatArray, InputError, check_range
 from ..assemble import finished, grid
 from ..convention import Convention
 from ..raos import VesselRaos
 from .shipx import chosen_speed
-
-__all__ = ["MSS", "parse_mss"]
-
-FloatArray = npt.NDArray[np.float64]
 
 MSS = Convention(
     phase_unit="radians",

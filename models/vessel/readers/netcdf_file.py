@@ -14,14 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...basics.checks import InputError, check_range
-from ...basics.files import replace_atomically
+from ...basics import InputError, check_range, replace_atomically
 from ..raos import MODES, VesselRaos
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["FORMAT", "is_ours", "parse_netcdf", "to_dataset", "write_netcdf"]
 
 FORMAT = "Stillhook RAOs, version 1"
 

@@ -19,20 +19,14 @@ import re
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ...basics.checks import InputError, check_finite
-from ...basics.dispersion import wave_number
+from ...basics import ComplexArray, FloatArray, InputError, check_finite, wave_number
 from ..assemble import finished, grid
 from ..convention import Convention, one_of
 from ..raos import VesselRaos
 from ..symmetry import SYMMETRIES
 from .orcaflex_text import TABLE_KEYS, read_vessel_types, table_of
 
-__all__ = ["looks_like_orcaflex", "parse_orcaflex"]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 Entry = dict[str, Any]
 
 _KINDS = {"displacement": "DisplacementRAOs", "load": "LoadRAOs"}

@@ -12,13 +12,8 @@ import re
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ...basics.checks import InputError
-
-__all__ = ["TABLE_KEYS", "read_vessel_types"]
-
-FloatArray = npt.NDArray[np.float64]
+from ...basics import FloatArray, InputError
 
 TABLE_KEYS = ("RAOPeriodOrFrequency", "RAOPeriodOrFreq")
 """How the heading of a RAO table begins, in newer and in older versions."""

@@ -16,12 +16,10 @@ import math
 
 import numpy as np
 
-from ...basics.checks import InputError, check_range
+from ...basics import InputError, check_range
 from ..assemble import finished, grid, numbers
 from ..convention import Convention
 from ..raos import VesselRaos
-
-__all__ = ["SHIPX", "looks_like_shipx", "parse_shipx"]
 
 SHIPX = Convention(
     surge="aft",

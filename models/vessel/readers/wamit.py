@@ -21,15 +21,10 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from ...basics.checks import InputError, check_range
-from ...basics.dispersion import wave_number
+from ...basics import FloatArray, InputError, check_range, wave_number
 from ..assemble import finished, grid, numbers
 from ..convention import Convention, one_of
 from ..raos import VesselRaos
-
-__all__ = ["looks_like_wamit", "parse_wamit"]
-
-FloatArray = npt.NDArray[np.float64]
 
 _COLUMNS = 7
 _MISMATCH = 2e-3  # of the amplitude, between its two forms on a line: six digits are printed

@@ -12,13 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...basics.checks import InputError
+from ...basics import InputError
 from ..raos import MODES, VesselRaos
 
 if TYPE_CHECKING:
     from waveresponse import RAO
-
-__all__ = ["from_waveresponse", "to_waveresponse"]
 
 
 def to_waveresponse(raos: VesselRaos) -> dict[str, RAO]:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import argparse
 
-from models.basics.checks import InputError, check_range
+from models.basics import InputError, check_range
 
-from ...text.terminal import commands, console, progress
+from ...text import commands, console, progress
 from ..given import case_words, given_case
-
-__all__ = ["run"]
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -21,7 +19,7 @@ def run(arguments: argparse.Namespace) -> int:
         heard = [name.strip() for name in arguments.sensors.split(",") if name.strip()]
         if not heard:
             raise InputError("--sensors: names of measurements with commas between, got none")
-    from synth.bound.case import bound_for
+    from synth.bound import bound_for
 
     with progress(shown=not arguments.quiet) as tell:
         tell("bound", 0, 1)

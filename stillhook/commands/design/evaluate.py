@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import argparse
 
-from models.basics.checks import InputError
+from models.basics import InputError
 
-from ...text.folder import OutputFolder
-from ...text.terminal import commands, console, progress, show_design
+from ...text import OutputFolder, commands, console, progress, show_design
 from ..given import case_words, given_case, parse_gains
-
-__all__ = ["run"]
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -31,7 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
     with progress(shown=not arguments.quiet) as tell:
         design = evaluate_gains(case, gains)
         if folder is not None:
-            from ...designs.report import write_report
+            from ...designs import write_report
 
             write_report(folder.path, design=design, bound=arguments.bound, progress=tell)
     out = console()

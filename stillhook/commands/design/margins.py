@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import argparse
 
-from models.basics.checks import InputError, check_range
+from models.basics import InputError, check_range
 
-from ...text.terminal import commands, console, progress
+from ...text import commands, console, progress
 from ..design_argument import given_design
 from ..given import case_words, given_case
 from .optimise import interruptible
-
-__all__ = ["parse_off", "run"]
 
 _USUAL = {"payload.mass": 0.3, "stiffness": 0.2, "drag": 0.5}
 
@@ -22,7 +20,7 @@ def run(arguments: argparse.Namespace) -> int:
     case = given_case(arguments)
     off = parse_off(arguments.off) or _USUAL
     design = given_design(case, arguments)
-    from synth.robust.mu import robustness
+    from synth.robust import robustness
 
     with progress(shown=not arguments.quiet) as tell, interruptible() as check:
 

@@ -12,17 +12,22 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...text.folder import OutputFolder, folder_name
-from ...text.quantities import number
-from ...text.summary import AT_LEAST
-from ...text.terminal import Progress, commands, console, progress, show_design
+from ...text import (
+    AT_LEAST,
+    OutputFolder,
+    Progress,
+    commands,
+    console,
+    folder_name,
+    number,
+    progress,
+    show_design,
+)
 from ..given import case_words, gains_text, given_case
 
 if TYPE_CHECKING:
     from models import Case
-    from synth.design.design import GainDesign
-
-__all__ = ["run"]
+    from synth.design import GainDesign
 
 # Where a limit stands in the case file, to suggest a change of it.
 _FIELDS = {
@@ -47,7 +52,7 @@ _AGAIN = 0.25  # s between two attempts to interrupt
 
 def run(arguments: argparse.Namespace) -> int:
     """Optimise, show and save; return 0 if the design is ok, 1 if not."""
-    from models.basics.checks import check_range
+    from models.basics import check_range
 
     check_range("optimise", "--starts", arguments.starts, low=1, high=4096)
     check_range("optimise", "--seed", arguments.seed, low=0)
@@ -85,7 +90,7 @@ def _optimised(case: Case, arguments: argparse.Namespace, tell: Progress) -> Gai
 
 
 def _report(folder: OutputFolder, design: GainDesign, tell: Progress, *, bound: bool) -> None:
-    from ...designs.report import write_report
+    from ...designs import write_report
 
     write_report(folder.path, design=design, bound=bound, progress=tell)
 

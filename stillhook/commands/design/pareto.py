@@ -6,24 +6,20 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...text.folder import OutputFolder, folder_name
-from ...text.quantities import number, quantity
-from ...text.terminal import commands, console, progress
+from ...text import OutputFolder, commands, console, folder_name, number, progress, quantity
 from ..given import case_words, gains_text, given_case
 from .optimise import interruptible
 from .vary import parse_range
 
 if TYPE_CHECKING:
-    from synth.sizing.pareto import ParetoFront
-
-__all__ = ["run"]
+    from synth.sizing import ParetoFront
 
 _ROWS = 12  # of the table on the terminal
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Compute, show and save a front; return 0 if it holds, 1 if not."""
-    from synth.sizing.pareto import pareto_front
+    from synth.sizing import pareto_front
 
     case = given_case(arguments)
     between = parse_range("--between", arguments.between) if arguments.between else None
@@ -44,8 +40,8 @@ def run(arguments: argparse.Namespace) -> int:
             progress=step,
         )
     if len(front.points) >= 2:
-        from ...designs.pareto_plot import pareto_figure
-        from ...text.style import picture
+        from ...designs import pareto_figure
+        from ...text import picture
 
         figure = pareto_figure(front)
         folder.write("pareto.csv", front.to_csv())
@@ -76,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _verdict(front: ParetoFront) -> str:
-    from ...designs.pareto_plot import finding
+    from ...designs import finding
 
     if len(front.points) < 2:
         return "no front: fewer than two points hold"
@@ -88,7 +84,7 @@ def _verdict(front: ParetoFront) -> str:
 
 
 def _show(front: ParetoFront) -> None:
-    from ...designs.pareto_plot import value_text
+    from ...designs import value_text
     from ...text.terminal import _put, _table
 
     out = console()

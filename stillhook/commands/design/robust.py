@@ -8,21 +8,26 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from models.basics.checks import InputError
+from models.basics import InputError
 
-from ...text.folder import OutputFolder, folder_name
-from ...text.quantities import number, percent, quantity
-from ...text.terminal import Progress, commands, console, progress
+from ...text import (
+    OutputFolder,
+    Progress,
+    commands,
+    console,
+    folder_name,
+    number,
+    percent,
+    progress,
+    quantity,
+)
 from ..given import case_words, gains_text, given_case
 from .optimise import interruptible
 from .vary import parse_range, parse_seas, parse_vary
 
 if TYPE_CHECKING:
     from models import Case
-    from synth.robust.robust import RobustDesign, ScenarioResult
-    from synth.robust.schedule import GainSchedule
-
-__all__ = ["run", "scenarios_csv"]
+    from synth.robust import GainSchedule, RobustDesign, ScenarioResult
 
 _ROWS = 12  # scenarios on the terminal
 
@@ -48,8 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         if arguments.schedule is not None:
             return _scheduled(case, arguments, folder, step)
-        from synth.robust.family import Family
-        from synth.robust.robust import optimise_robust
+        from synth.robust import Family, optimise_robust
 
         design = optimise_robust(
             case,
@@ -65,11 +69,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _told(design: RobustDesign, arguments: argparse.Namespace, folder: OutputFolder) -> int:
-    from ...text.style import picture
+    from ...text import picture
 
     written = []
     if design.scenarios:
-        from ...designs.robust_plot import robust_figure
+        from ...designs import robust_figure
 
         folder.write("scenarios.csv", scenarios_csv(design))
         figure = robust_figure(design)
@@ -197,7 +201,7 @@ def _next(
 def _scheduled(
     case: Case, arguments: argparse.Namespace, folder: OutputFolder, step: Progress
 ) -> int:
-    from synth.robust.schedule import schedule_gains
+    from synth.robust import schedule_gains
 
     schedule: GainSchedule = schedule_gains(
         case,
@@ -209,8 +213,8 @@ def _scheduled(
     folder.write("schedule.csv", schedule.to_csv(101))
     written = ["schedule.yaml", "schedule.csv"]
     if schedule.points:
-        from ...designs.robust_plot import schedule_figure
-        from ...text.style import picture
+        from ...designs import schedule_figure
+        from ...text import picture
 
         figure = schedule_figure(schedule)
         for kind in ("svg", "png"):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-__all__ = ["add_pareto_arguments", "add_robust_arguments"]
-
 
 def add_robust_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""

@@ -8,29 +8,35 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from models.basics.checks import InputError, check_range
+from models.basics import InputError, check_range
 
-from ...text.folder import OutputFolder, folder_name
-from ...text.quantities import number, quantity
-from ...text.terminal import Progress, _put, _table, commands, console, pairs, progress
+from ...text import (
+    OutputFolder,
+    Progress,
+    commands,
+    console,
+    folder_name,
+    number,
+    pairs,
+    progress,
+    quantity,
+)
+from ...text.terminal import _put, _table
 from ..given import case_words, given_case
 from .optimise import interruptible
 from .vary import parse_range
 
 if TYPE_CHECKING:
     from models import Case
-    from synth.design.structure_design import StructureDesign
-    from synth.sizing.codesign import CoDesign
-    from synth.sizing.sizing import Sizing
-
-__all__ = ["run"]
+    from synth.design import StructureDesign
+    from synth.sizing import CoDesign, Sizing
 
 _ROWS = 14  # of the table on the terminal
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Size, or co-design, show and save; return 0 if a verified design came out, 1 if not."""
-    from synth.structures.winch_structures import structure_named
+    from synth.structures import structure_named
 
     check_range("size", "--starts", arguments.starts, low=1, high=4096)
     check_range("size", "--seed", arguments.seed, low=0)
@@ -56,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         if arguments.co_design:
             return _co_designed(case, arguments, gear, radius, folder, step)
-        from synth.sizing.sizing import size_winch
+        from synth.sizing import size_winch
 
         sizing = size_winch(
             case,
@@ -114,8 +120,8 @@ def _told(sizing: Sizing, arguments: argparse.Namespace, folder: OutputFolder) -
 
 
 def _write(sizing: Sizing, folder: OutputFolder) -> list[str]:
-    from ...designs.structure_file import structure_text
-    from ...text.style import picture
+    from ...designs import structure_text
+    from ...text import picture
 
     written = ["case.yaml"]
     folder.write("case.yaml", sizing.case.to_yaml())
@@ -125,7 +131,7 @@ def _write(sizing: Sizing, folder: OutputFolder) -> list[str]:
         folder.write("size.csv", sizing.to_csv())
         written.append("size.csv")
     if sizing.chosen is not None:
-        from ...designs.size_plot import size_figure
+        from ...designs import size_figure
 
         figure = size_figure(sizing)
         for kind in ("svg", "png"):
@@ -188,9 +194,9 @@ def _co_designed(
     folder: OutputFolder,
     step: Progress,
 ) -> int:
-    from synth.sizing.codesign import co_design
+    from synth.sizing import co_design
 
-    from ...designs.structure_file import structure_text
+    from ...designs import structure_text
 
     found: CoDesign = co_design(
         case,

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-__all__ = ["add_size_arguments", "add_worth_arguments"]
-
 
 def add_size_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""

@@ -7,24 +7,32 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...designs.structure_table import HEADINGS, markdown, structure_rows
-from ...text.bound_text import bound_sentence, bounds_note
-from ...text.folder import OutputFolder, folder_name
-from ...text.quantities import count, number, quantity
-from ...text.terminal import Progress, commands, console, pairs, progress
+from ...designs import HEADINGS, markdown, structure_rows
+from ...text import (
+    OutputFolder,
+    Progress,
+    bound_sentence,
+    bounds_note,
+    commands,
+    console,
+    count,
+    folder_name,
+    number,
+    pairs,
+    progress,
+    quantity,
+)
 from ..given import case_words, given_case
 
 if TYPE_CHECKING:
     from models import Case
-    from synth.design.structure_design import StructureDesign
-
-__all__ = ["run"]
+    from synth.design import StructureDesign
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Compare structures on a case, or optimise one; return 0 if one of them is ok, else 1."""
-    from models.basics.checks import check_range
-    from synth.structures.winch_structures import structure_named, structure_names
+    from models.basics import check_range
+    from synth.structures import structure_named, structure_names
 
     check_range(arguments.command, "--starts", arguments.starts, low=1, high=4096)
     check_range(arguments.command, "--seed", arguments.seed, low=0)
@@ -57,9 +65,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _optimise_one(arguments: argparse.Namespace) -> int:
     """Optimise one structure, show and save it; return 0 if it is ok, 1 if not."""
-    from synth.structures.winch_structures import structure_named
+    from synth.structures import structure_named
 
-    from ...designs.structure_file import structure_text
+    from ...designs import structure_text
 
     case = given_case(arguments)
     structure_named(arguments.structure, case)
@@ -88,7 +96,7 @@ def _optimise_one(arguments: argparse.Namespace) -> int:
 
 
 def _names(text: str) -> tuple[str, ...]:
-    from models.basics.checks import InputError
+    from models.basics import InputError
 
     # Each once, in the order given.
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
@@ -103,7 +111,7 @@ def _names(text: str) -> tuple[str, ...]:
 def _design(
     case: Case, name: str, arguments: argparse.Namespace, tell: Progress, stage: str
 ) -> StructureDesign:
-    from synth.design.structure_search import optimise_structure
+    from synth.design import optimise_structure
 
     from .optimise import interruptible
 
@@ -122,9 +130,8 @@ def _write(folder: OutputFolder, designs: Sequence[StructureDesign], *, bound: b
     """Write what there is so far: an interrupted comparison keeps what is done."""
     import math
 
-    from ...designs.structure_file import structure_text
-    from ...designs.structure_plot import structures
-    from ...text.style import picture
+    from ...designs import structure_text, structures
+    from ...text import picture
 
     last = designs[-1]
     folder.write(f"{last.structure}.yaml", structure_text(last))

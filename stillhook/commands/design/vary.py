@@ -11,11 +11,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from models.basics.checks import InputError
-from models.casefile.yaml_lines import read_yaml
-from synth.robust.family import Choice, SeaState, read_scatter
-
-__all__ = ["parse_range", "parse_seas", "parse_vary"]
+from models.basics import InputError
+from models.casefile import read_yaml
+from synth.robust import Choice, SeaState, read_scatter
 
 
 def parse_vary(texts: Sequence[str]) -> dict[str, list[Any] | Choice]:

@@ -8,24 +8,21 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from models.basics.checks import check_range
+from models.basics import check_range
 
-from ...text.folder import OutputFolder, folder_name
-from ...text.quantities import number, quantity
-from ...text.terminal import _put, _table, commands, console, progress
+from ...text import OutputFolder, commands, console, folder_name, number, progress, quantity
+from ...text.terminal import _put, _table
 from ..given import case_words, given_case
 from .optimise import interruptible
 
 if TYPE_CHECKING:
-    from synth.sizing.purchase import Worth
-
-__all__ = ["run"]
+    from synth.sizing import Worth
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Price everything, show and save; return 0 if there is an optimum to begin with, else 1."""
-    from synth.sizing.purchase import worth
-    from synth.structures.winch_structures import structure_named
+    from synth.sizing import worth
+    from synth.structures import structure_named
 
     check_range("worth", "--starts", arguments.starts, low=1, high=4096)
     check_range("worth", "--seed", arguments.seed, low=0)
@@ -50,8 +47,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _told(result: Worth, arguments: argparse.Namespace, folder: OutputFolder) -> int:
-    from ...designs.size_plot import worth_figure
-    from ...text.style import picture
+    from ...designs import worth_figure
+    from ...text import picture
 
     for stale in ("worth.csv", "worth.svg", "worth.png"):
         folder.discard(stale)
@@ -91,7 +88,8 @@ def _told(result: Worth, arguments: argparse.Namespace, folder: OutputFolder) ->
 
 
 def _show(result: Worth) -> None:
-    from ...designs.size_plot import step_text, value_text
+    from ...designs import step_text
+    from ...designs.size_plot import value_text
 
     out = console()
     table = _table("", "is", "1 % of it", "per step", "twice as good")

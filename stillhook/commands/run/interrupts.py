@@ -7,8 +7,6 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 
-__all__ = ["Stop", "stoppable"]
-
 Stop = Callable[[], bool]
 """Whether the user has asked to stop."""
 

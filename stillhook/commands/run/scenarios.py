@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import argparse
 
-from models.basics.units import KINDS
-from models.operation.options import Choice, Option
-from models.operation.scenarios import scenario_names, scenario_options
+from models.basics import KINDS
+from models.operation import Choice, Option, scenario_names, scenario_options
 
-from ...controllers.controllers import PREDICTIVE
-from ...text.quantities import quantity
-from ...text.terminal import commands, console, pairs
-
-__all__ = ["CONTROLLER_TEXTS", "run"]
+from ...controllers import PREDICTIVE
+from ...text import commands, console, pairs, quantity
 
 CONTROLLER_TEXTS = {
     "feedback": "the gains of a design, on what comes up from the payload",
@@ -31,7 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.name is not None:
         _options(arguments.name)
         return 0
-    from synth.controllers.controllers import CONTROLLERS
+    from synth.controllers import CONTROLLERS
 
     out.print("Scenarios (--scenario)", style="bold")
     pairs(list(scenario_names().items()), out)

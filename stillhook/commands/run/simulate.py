@@ -13,16 +13,22 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from models.basics.checks import StillhookError, SynthesisError
+from models.basics import StillhookError, SynthesisError
 
-from ...runs.report import RunFolder
-from ...runs.runs import Runs, keep_worst
-from ...runs.series import Series
-from ...runs.terminal import Ticker, run_progress, show_comparison, show_events, show_runs
-from ...runs.words import headline_of, tree
-from ...text.folder import OutputFolder, folder_name
-from ...text.quantities import count
-from ...text.terminal import commands, console, progress
+from ...runs import (
+    RunFolder,
+    Runs,
+    Series,
+    Ticker,
+    headline_of,
+    keep_worst,
+    run_progress,
+    show_comparison,
+    show_events,
+    show_runs,
+    tree,
+)
+from ...text import OutputFolder, commands, console, count, folder_name, progress
 from ..given import case_words
 from .interrupts import Stop, stoppable
 from .simulate_given import Asked, again, asked_of
@@ -30,9 +36,7 @@ from .simulate_given import Asked, again, asked_of
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from models.run.run import Run
-
-__all__ = ["run"]
+    from models.run import Run
 
 _MEGABYTE = 1e6
 
@@ -96,7 +100,7 @@ def _with_gains(asked: Asked, folder: OutputFolder, stop: Stop, *, shown: bool) 
         return asked
     from synth import optimise_gains
 
-    from ...designs.design_file import design_text
+    from ...designs import design_text
 
     with progress(shown=shown) as tell:
 
@@ -162,7 +166,7 @@ def _prepared(asked: Asked, name: str, tune: Callable[[float], None]) -> Series:
     feedback = name.startswith("feedback")
     with contextlib.ExitStack() as stack:
         if "mpc" in name:  # whose weights take seconds
-            from mpc.winch.weights import watched
+            from mpc.winch import watched
 
             stack.enter_context(watched(tune))
         return _series(asked, name, feedback)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-__all__ = ["add_simulate_arguments"]
-
 
 def add_simulate_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `simulate` to its parser, which has the case already."""

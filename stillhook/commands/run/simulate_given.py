@@ -8,20 +8,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from models.basics.checks import InputError, check_range
-from models.casefile.quantity import Quantity
-from models.casefile.yaml_lines import read_yaml
+from models.basics import InputError, check_range
+from models.casefile import Quantity, read_yaml
 
-from ...text.terminal import told_once
+from ...text import told_once
 from ..given import given_case, parse_gains
 
 if TYPE_CHECKING:
     from models import Case
-    from models.operation.excitation import MotionSource
-    from models.operation.scenario import Scenario
-    from synth.design.design import GainDesign
-
-__all__ = ["Asked", "again", "asked_of", "parse_options"]
+    from models.operation import MotionSource, Scenario
+    from synth.design import GainDesign
 
 _MANY = 10_000  # seeds: more than anybody wants on purpose
 _TIME = Quantity("time", 0.0, 1e8, open_low=True)
@@ -98,7 +94,7 @@ def asked_of(arguments: argparse.Namespace) -> Asked:
     InputError
         If any of it is wrong.
     """
-    from models.operation.scenarios import scenario_named
+    from models.operation import scenario_named
 
     check_range("simulate", "--seeds", arguments.seeds, low=1, high=_MANY)
     check_range("simulate", "--first-seed", arguments.first_seed, low=0)
@@ -141,10 +137,10 @@ def parse_controllers(text: str) -> tuple[str, ...]:
     InputError
         If there is no such controller, or one is named twice.
     """
-    from models.basics.signals import pick
-    from synth.controllers.controllers import CONTROLLERS
+    from models.basics import pick
+    from synth.controllers import CONTROLLERS
 
-    from ...controllers.controllers import known_controllers
+    from ...controllers import known_controllers
 
     if text == "all":
         return tuple(CONTROLLERS)
@@ -208,9 +204,7 @@ def _quantity(arguments: argparse.Namespace, name: str) -> float | None:
 
 
 def _hook(arguments: argparse.Namespace) -> MotionSource | None:
-    from models.operation.excitation import SineMotion
-    from models.operation.record_file import RecordMotion
-    from models.operation.six_dof import SixDofMotion
+    from models.operation import RecordMotion, SineMotion, SixDofMotion
 
     if arguments.tip is not None and arguments.hook is None:
         raise InputError("--tip: belongs to --hook, a file with heave, roll and pitch")
@@ -259,7 +253,7 @@ def _design(arguments: argparse.Namespace, case: Case) -> GainDesign | None:
         return None
     import sys
 
-    from ...designs.design_file import load_design
+    from ...designs import load_design
 
     design = load_design(arguments.design)
     if design.case.name != case.name:

@@ -13,21 +13,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from models.basics.checks import InputError, check_range
+from models.basics import InputError, check_range
 
-from ...comparison.comparison import Comparison
-from ...text.folder import folder_name
-from ...text.quantities import count, number
-from ...text.terminal import commands, console, pairs
+from ...comparison import Comparison
+from ...text import commands, console, count, folder_name, number, pairs
 from ..given import case_words, given_case
-from ..run.interrupts import Stop, stoppable
+from ..run import Stop, stoppable
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rich.console import Console
-
-__all__ = ["run"]
 
 _MANY = 10_000  # seeds: more than anybody wants on purpose
 _SMALL = 0.3  # of a bar's width
@@ -35,7 +31,7 @@ _SMALL = 0.3  # of a bar's width
 
 def run(arguments: argparse.Namespace) -> int:
     """Compare, show and save; return the exit status."""
-    from ...comparison.run import compare
+    from ...comparison import compare
 
     if arguments.list:
         return _list()
@@ -85,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _list() -> int:
-    from ...controllers.contenders import CONTENDERS, DEFAULTS
+    from ...controllers import CONTENDERS, DEFAULTS
 
     out = console()
     for name, each in CONTENDERS.items():
@@ -110,8 +106,7 @@ def _controllers(text: str | None) -> list[object] | None:
         if not name.endswith((".yaml", ".yml")):
             found.append(name)
             continue
-        from ...designs.design_file import load_design
-        from ...designs.structure_file import load_structure
+        from ...designs import load_design, load_structure
 
         try:
             found.append((Path(name).stem, load_design(name)))
@@ -189,7 +184,7 @@ def _progress(stop: Stop, *, shown: bool) -> Iterator[Callable[[str, int, int], 
 def _show(found: Comparison, place: Path, arguments: argparse.Namespace, out: Console) -> None:
     from rich.table import Table
 
-    from ...comparison.words import HEADINGS, LEGEND, headline_of, left_out, rows_at
+    from ...comparison import HEADINGS, LEGEND, headline_of, left_out, rows_at
 
     out.print(headline_of(found), style="bold", soft_wrap=True)
     for height in found.heights if not arguments.quiet else ():

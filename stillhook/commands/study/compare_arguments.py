@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-__all__ = ["add_compare_arguments"]
-
 
 def add_compare_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `compare` to its parser, which has the case already."""

@@ -13,23 +13,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics.checks import InputError
-from models.basics.units import parse_quantity
+from models.basics import InputError, parse_quantity
 
-from ...text.folder import OutputFolder, folder_name
-from ...text.terminal import Progress, commands, console, progress
-from ..design.optimise import interruptible
+from ...text import OutputFolder, Progress, commands, console, folder_name, progress
+from ..design import interruptible
 from ..design_argument import given_design
 from ..given import case_words, gains_text, given_case
 
 if TYPE_CHECKING:
     from models import Case
-    from synth.design.design import GainDesign
-    from synth.design.structure_design import StructureDesign
-    from synth.operability.recheck import ContourCheck
-    from synth.operability.result import Operability
-
-__all__ = ["parse_axis", "run"]
+    from synth.design import GainDesign, StructureDesign
+    from synth.operability import ContourCheck, Operability
 
 _FINEST = 400  # points of an axis
 
@@ -123,10 +117,16 @@ def parse_axis(name: str, text: str, step: float | None) -> list[float]:
 
 def write_operability(study: Operability, folder: OutputFolder) -> list[str]:
     """Write a study: case, tables, figures; return the names of the files."""
-    from ...seas.operability_plot import capability_figure, contour_figure, depth_figure
-    from ...seas.operability_site_plot import heading_figure, scatter_figure
-    from ...seas.operability_text import netcdf, workable_csv
-    from ...text.style import picture
+    from ...seas import (
+        capability_figure,
+        contour_figure,
+        depth_figure,
+        heading_figure,
+        netcdf,
+        scatter_figure,
+        workable_csv,
+    )
+    from ...text import picture
 
     folder.write("case.yaml", study.case.to_yaml())
     folder.write("operability.csv", study.to_csv())
@@ -168,7 +168,7 @@ def _told(
     arguments: argparse.Namespace,
     folder: OutputFolder,
 ) -> int:
-    from ...seas.operability_text import show_operability
+    from ...seas import show_operability
 
     works = any(float(at.main.limit.max()) > 0.0 for at in study.depths)
     good = works and all(check.ok for check in checks)
@@ -185,7 +185,7 @@ def _told(
 def _next(
     study: Operability, arguments: argparse.Namespace, folder: OutputFolder
 ) -> list[tuple[str, str]]:
-    from synth.design.design import GainDesign as Gains
+    from synth.design import GainDesign as Gains
 
     words = case_words(arguments, str(folder.path / "case.yaml"))
     design = ""

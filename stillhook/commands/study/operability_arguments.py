@@ -6,8 +6,6 @@ import argparse
 
 from ..design_argument import add_design_arguments
 
-__all__ = ["add_operability_arguments"]
-
 
 def add_operability_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""

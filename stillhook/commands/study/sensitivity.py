@@ -8,31 +8,23 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from models.basics.checks import InputError, check_range
-from models.basics.units import read_quantity
+from models.basics import InputError, check_range, read_quantity
 
-from ...text.folder import OutputFolder, folder_name
-from ...text.quantities import number, quantity
-from ...text.terminal import _put, _table, commands, console, progress
-from ..design.optimise import interruptible
+from ...text import OutputFolder, commands, console, folder_name, number, progress, quantity
+from ...text.terminal import _put, _table
+from ..design import interruptible
 from ..design_argument import given_design
 from ..given import case_words, given_case
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from synth.design.design import GainDesign
-    from synth.design.structure_design import StructureDesign
-    from synth.sensitivity import Sensitivity
-    from synth.sensitivity.global_indices import SobolIndices
-    from synth.sensitivity.results import Moved
-    from synth.sensitivity.screening import Screening
+    from synth.design import GainDesign, StructureDesign
+    from synth.sensitivity import Moved, Screening, Sensitivity, SobolIndices
 
-    from ...text.terminal import Progress
+    from ...text import Progress
 
     Wide = tuple[Sequence[SobolIndices], Screening]
-
-__all__ = ["run"]
 
 _ROWS = 16
 
@@ -92,10 +84,9 @@ def _over_ranges(
     """Return Sobol's indices and Morris's effects over the ranges given, if any are wanted."""
     if not (arguments.ranges or arguments.spread or arguments.vary):
         return None
-    from synth.sensitivity.global_indices import sobol_indices
-    from synth.sensitivity.screening import morris_screening
+    from synth.sensitivity import morris_screening, sobol_indices
 
-    from ...sweeps.usual import usual_spread
+    from ...sweeps import usual_spread
     from .sweep import given_spread
 
     spread = given_spread(design.case, arguments) or usual_spread(design.case, "frequency")
@@ -123,8 +114,8 @@ def _show_wide(wide: Wide) -> None:
 
 
 def _write_wide(wide: Wide, folder: OutputFolder) -> list[str]:
-    from ...designs.indices_plot import indices_figure
-    from ...text.style import picture
+    from ...designs import indices_figure
+    from ...text import picture
 
     studies, screening = wide
     lines = ["figure,path,first,first_low,first_high,total,total_low,total_high,mu_star,sigma"]
@@ -172,8 +163,8 @@ def _show(study: Sensitivity, moved: tuple[Moved, ...]) -> None:
 
 
 def _write(study: Sensitivity, moved: tuple[Moved, ...], folder: OutputFolder) -> list[str]:
-    from ...designs.tornado_plot import tornado_figure
-    from ...text.style import picture
+    from ...designs import tornado_figure
+    from ...text import picture
 
     folder.write("sensitivity.csv", study.to_csv())
     lines = ["path,share,payload_rms [m],max_sensitivity"]

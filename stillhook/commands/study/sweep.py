@@ -13,22 +13,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from models.basics.checks import InputError, check_range
+from models.basics import InputError, check_range
 
-from ...text.folder import OutputFolder, folder_name
-from ...text.quantities import count
-from ...text.terminal import console
+from ...text import OutputFolder, console, count, folder_name
 from ..design_argument import given_design
 from ..given import given_case
-from ..run.interrupts import stoppable
+from ..run import stoppable
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from models import Case
     from models.spread import Spread
-
-__all__ = ["run"]
 
 _MOST = 100  # of the worst cases that are told
 
@@ -67,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _swept(arguments: argparse.Namespace) -> Swept:
     """Return the sweep that was asked for."""
-    from ...sweeps.sweeping import spread_of, sweep
+    from ...sweeps import spread_of, sweep
 
     if arguments.case is None:
         raise InputError("sweep: say which case, or --resume and the folder of a sweep")
@@ -130,11 +126,9 @@ def _resumed(arguments: argparse.Namespace) -> Swept:
     """Return the sweep of a folder, gone on with."""
     import warnings
 
-    from models.basics.physics_warning import PhysicsWarning
+    from models.basics import PhysicsWarning
 
-    from ...sweeps.header import question_from, read_header
-    from ...sweeps.store import RESULT
-    from ...sweeps.sweeping import resume_sweep
+    from ...sweeps import RESULT, question_from, read_header, resume_sweep
     from .compare import _progress
 
     if arguments.case is not None:
@@ -186,7 +180,7 @@ def given_spread(case: Case, arguments: argparse.Namespace) -> Spread | None:
     """
     from models.spread import Spread
 
-    from ...sweeps.usual import fault_spread
+    from ...sweeps import fault_spread
 
     del case
     parts = []
@@ -249,7 +243,7 @@ def _number(text: str) -> float | str:
 
 def _options(texts: list[str]) -> dict[str, object]:
     """Return the options of an operation from texts KEY=VALUE."""
-    from models.casefile.yaml_lines import read_yaml
+    from models.casefile import read_yaml
 
     found: dict[str, object] = {}
     for text in texts:

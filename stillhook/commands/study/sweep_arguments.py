@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-__all__ = ["add_sweep_arguments"]
-
 _CASE = "a bundled case (see `stillhook cases`) or a case file; none with --resume"
 
 

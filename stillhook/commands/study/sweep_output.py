@@ -11,21 +11,23 @@ from typing import TYPE_CHECKING, Any
 
 from models.spread import Spread
 
-from ...sweeps.export import write_result
-from ...sweeps.header import ATTRIBUTE
-from ...sweeps.time_metrics import STATUS
-from ...sweeps.words import SweepSummary, case_at, varied_paths, worst_cases
-from ...text.folder import OutputFolder
-from ...text.quantities import count, number, quantity, scale
-from ...text.terminal import _put, _table, commands
+from ...sweeps import (
+    ATTRIBUTE,
+    STATUS,
+    SweepSummary,
+    case_at,
+    varied_paths,
+    worst_cases,
+    write_result,
+)
+from ...text import OutputFolder, commands, count, number, quantity, scale
+from ...text.terminal import _put, _table
 
 if TYPE_CHECKING:
     import xarray as xr
     from rich.console import Console
 
     from .sweep import Swept
-
-__all__ = ["show", "write"]
 
 _FEW = 20_000  # cases up to which a CSV file is written too
 _ROWS = (
@@ -73,11 +75,10 @@ def write(swept: Swept, arguments: argparse.Namespace) -> list[Path]:
 
 def _figures(swept: Swept) -> list[Path]:
     """Draw and write the figures; return their files."""
-    from synth.design.design import GainDesign
-    from synth.design.structure_design import StructureDesign
+    from synth.design import GainDesign, StructureDesign
 
-    from ...sweeps.figures import sweep_figures
-    from ...text.style import picture
+    from ...sweeps import sweep_figures
+    from ...text import picture
 
     linear = isinstance(swept.design, GainDesign | StructureDesign)
     in_time = swept.result.attrs.get("mode") == "time"

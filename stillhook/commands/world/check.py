@@ -11,22 +11,19 @@ import math
 import shlex
 from typing import TYPE_CHECKING
 
-from ...text.quantities import duration, number, percent, quantity
-from ...text.terminal import commands, console, table_of
+from ...text import commands, console, duration, number, percent, quantity, table_of
 from ..given import case_words, given_case
 
 if TYPE_CHECKING:
     from models import Case
-    from models.hook.hook import HookMotion
-
-__all__ = ["derived_figures", "run"]
+    from models.hook import HookMotion
 
 Rows = list[tuple[str, str, str]]
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Read the case and show what follows from it; return 0."""
-    from models.hook.hook import HookMotion
+    from models.hook import HookMotion
 
     case = given_case(arguments)
     hook = HookMotion.from_case(case)
@@ -112,10 +109,9 @@ def _sea(case: Case, hook: HookMotion) -> Rows:
 
 def _vessel(case: Case) -> Rows:
     """Return the vessel, the heading of the waves and the hook's place, where the case has them."""
-    from models.vessel.crane import place_text
-    from models.vessel.hook_operator import case_raos
+    from models.vessel import case_raos, place_text
 
-    from ...text.hook_words import heading_words
+    from ...text import heading_words
 
     vessel, place = case.vessel, case.vessel.hook_point
     if place is None or vessel.heading is None:
@@ -129,8 +125,8 @@ def _vessel(case: Case) -> Rows:
 
 
 def _rope(case: Case, hook: HookMotion) -> Rows:
-    from models.plant.plant_data import PlantData
-    from synth.question.question import uncompensated
+    from models.plant import PlantData
+    from synth.question import uncompensated
 
     rope, payload = case.rope, case.payload
     drag, rms = uncompensated(case, PlantData.from_case(case), hook)
@@ -216,7 +212,7 @@ def _limits(case: Case) -> Rows:
 
 def _modes(case: Case) -> list[float]:
     """Return the natural frequencies with the drum held [rad/s]: the first three."""
-    from models.plant.rope import fixed_top_modes
+    from models.plant import fixed_top_modes
 
     rope = case.rope
     if rope.lumping == "thesis":

@@ -8,11 +8,9 @@ import shlex
 from pathlib import Path
 
 from models import bundled_cases, case_schema, template_text, write_text_atomically
-from models.basics.checks import InputError
+from models.basics import InputError
 
-from ...text.terminal import commands, console, pairs
-
-__all__ = ["run"]
+from ...text import commands, console, pairs
 
 
 def run(arguments: argparse.Namespace) -> int:

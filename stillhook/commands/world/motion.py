@@ -14,29 +14,38 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics.checks import InputError
-from models.vessel.crane import side_of
+from models.basics import InputError
+from models.vessel import side_of
 
-from ...text.folder import OutputFolder, folder_name
-from ...text.hook_words import heading_text, sea_words, vessel_words
-from ...text.quantities import duration, number, percent, quantity
-from ...text.terminal import _put, _table, commands, console, pairs
+from ...text import (
+    OutputFolder,
+    commands,
+    console,
+    duration,
+    folder_name,
+    heading_text,
+    number,
+    pairs,
+    percent,
+    quantity,
+    sea_words,
+    vessel_words,
+)
+from ...text.terminal import _put, _table
 from ..given import case_words, given_case
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from models import Case
-    from models.hook.hook_survey import HookSurvey
-
-__all__ = ["parse_steps", "run"]
+    from models.hook import HookSurvey
 
 _ROWS = 12  # of a table over headings on the terminal
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Survey the hook's motion, show it and save it; return 0."""
-    from models.hook.hook_survey import hook_motion
+    from models.hook import hook_motion
 
     headings = _optional("--headings", arguments.headings, 15.0, -360.0, 360.0)
     periods = _optional("--tp", arguments.tp, 1.0, 1.0, 40.0)
@@ -201,8 +210,8 @@ def _own_place(survey: HookSurvey) -> tuple[int, int]:
 
 
 def _write(survey: HookSurvey, folder: OutputFolder) -> list[str]:
-    from ...seas.hook_plot import motion_figure, spectra_figure
-    from ...text.style import picture
+    from ...seas import motion_figure, spectra_figure
+    from ...text import picture
 
     folder.write("case.yaml", survey.case.to_yaml())
     folder.write("motion.csv", survey.to_csv())

@@ -16,19 +16,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models import bundled_cases, load_case
-from models.basics.checks import InputError, check_range
-from models.sea.records import read_seas
+from models.basics import InputError, check_range
+from models.sea import read_seas
 
-from ...text.folder import OutputFolder, folder_name
-from ...text.quantities import percent, quantity
-from ...text.style import picture
-from ...text.terminal import _put, _table, commands, console, pairs, told_once
+from ...text import (
+    OutputFolder,
+    commands,
+    console,
+    folder_name,
+    pairs,
+    percent,
+    picture,
+    quantity,
+    told_once,
+)
+from ...text.terminal import _put, _table
 
 if TYPE_CHECKING:
-    from models.sea.records import SeaRecords
-    from models.sea.sea import SeaSpectrum
-
-__all__ = ["run"]
+    from models.sea import SeaRecords, SeaSpectrum
 
 _CASES = {".yaml", ".yml", ".toml"}
 
@@ -80,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _of_case(arguments: argparse.Namespace) -> int:
-    from ...seas.sea_plot import spectrum_figure
+    from ...seas import spectrum_figure
 
     if arguments.record is not None or arguments.format is not None:
         raise InputError("sea: --record and --format are for a file of spectra, not for a case")
@@ -130,7 +135,8 @@ def _write(
     arguments: argparse.Namespace,
     folder: OutputFolder,
 ) -> list[str]:
-    from ...seas.sea_plot import scatter_figure, spectrum_figure
+    from ...seas import spectrum_figure
+    from ...seas.sea_plot import scatter_figure
 
     steps = {"height_step": arguments.height_step, "period_step": arguments.period_step}
     scatter = records.scatter(**steps)

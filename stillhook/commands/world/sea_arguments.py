@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-__all__ = ["add_sea_arguments"]
-
 
 def add_sea_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""

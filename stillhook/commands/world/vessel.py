@@ -5,9 +5,7 @@ from __future__ import annotations
 import argparse
 from importlib import import_module
 
-from ...text.terminal import commands, console, pairs
-
-__all__ = ["run"]
+from ...text import commands, console, pairs
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -19,7 +17,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _list() -> int:
-    from models.vessel.readers.files import bundled_vessels
+    from models.vessel.readers import bundled_vessels
 
     out = console()
     found = bundled_vessels()

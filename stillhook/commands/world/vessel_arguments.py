@@ -6,8 +6,6 @@ import argparse
 
 from .vessel_hull_arguments import add_hull_arguments
 
-__all__ = ["add_vessel_arguments"]
-
 _FORMATS = ("csv", "netcdf", "wamit", "orcaflex", "capytaine", "mss", "shipx")
 
 

@@ -11,28 +11,33 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics.checks import InputError, check_range
-from models.vessel.readers.files import write_raos
-from models.vessel.readers.long_waves import check_long_waves
+from models.basics import InputError, check_range
+from models.vessel.readers import check_long_waves, write_raos
 
-from ...text.folder import OutputFolder, folder_name
-from ...text.quantities import number, percent, quantity
-from ...text.terminal import commands, console, pairs, progress, table_of
-from ..design.vary import parse_range
+from ...text import (
+    OutputFolder,
+    commands,
+    console,
+    folder_name,
+    number,
+    pairs,
+    percent,
+    progress,
+    quantity,
+    table_of,
+)
+from ..design import parse_range
 from .vessel_import import _largest, _show_check, _verdict
 
 if TYPE_CHECKING:
-    from models.vessel.hull.hull import Hull
-    from models.vessel.hull.vessel import HullVessel
-
-__all__ = ["run"]
+    from models.vessel.hull import Hull, HullVessel
 
 _STAGE = "computing waves on the hull"
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Compute, check, show and write; return 0."""
-    from models.vessel.hull.vessel import usual_frequencies, vessel_from_hull
+    from models.vessel.hull import usual_frequencies, vessel_from_hull
 
     low, high = parse_range("--frequencies", arguments.frequencies)
     check_range("hull", "--frequencies", low, low=0.01, unit="rad/s")
@@ -74,7 +79,7 @@ def _hull(arguments: argparse.Namespace) -> Hull:
     """Return the hull that the arguments describe."""
     named = {k: getattr(arguments, k) for k in ("length", "beam", "draught")}
     if arguments.mesh is not None:
-        from models.vessel.hull.files import read_hull
+        from models.vessel.hull import read_hull
 
         if arguments.length is not None or arguments.beam is not None:
             raise InputError("hull: --length and --beam go with main dimensions, not with --mesh")
@@ -87,10 +92,10 @@ def _hull(arguments: argparse.Namespace) -> Hull:
             f"hull: give --length, --beam and --draught, or --mesh; {', '.join(missing)} missing"
         )
     if arguments.shape == "box":
-        from models.vessel.hull.hull import box_hull
+        from models.vessel.hull import box_hull
 
         return box_hull(**named, panels=arguments.panels, name=arguments.name)
-    from models.vessel.hull.lines import ShipLines
+    from models.vessel.hull import ShipLines
 
     width, depth = _numbers("--transom", arguments.transom, 2)
     lines = ShipLines(
@@ -142,9 +147,8 @@ def _command(arguments: argparse.Namespace) -> str:
 
 def _write(vessel: HullVessel, folder: OutputFolder, table: Path) -> list[Path]:
     """Write the table and the pictures; return their paths."""
-    from ...seas.hull_plot import hull_figure
-    from ...seas.rao_plot import rao_figure
-    from ...text.style import picture
+    from ...seas import hull_figure, rao_figure
+    from ...text import picture
 
     written = [write_raos(table, vessel.raos)]
     for name, figure in (

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-__all__ = ["add_hull_arguments"]
-
 
 def add_hull_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""

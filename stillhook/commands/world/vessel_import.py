@@ -10,17 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics.checks import InputError
-from models.vessel.readers.files import read_raos, write_raos
-from models.vessel.readers.long_waves import LongWaveCheck, check_long_waves
+from models.basics import InputError
+from models.vessel.readers import LongWaveCheck, check_long_waves, read_raos, write_raos
 
-from ...text.folder import OutputFolder, folder_name
-from ...text.terminal import _put, _table, commands, console, pairs, told_once
+from ...text import OutputFolder, commands, console, folder_name, pairs, told_once
+from ...text.terminal import _put, _table
 
 if TYPE_CHECKING:
     from models.vessel import VesselRaos
-
-__all__ = ["run"]
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -94,8 +91,8 @@ def _point(text: str | None) -> tuple[float, ...] | None:
 
 def _write(raos: VesselRaos, arguments: argparse.Namespace) -> tuple[Path, list[Path]]:
     """Write the table and the picture; return the table's path, and all of them."""
-    from ...seas.rao_plot import rao_figure
-    from ...text.style import picture
+    from ...seas import rao_figure
+    from ...text import picture
 
     target = Path(arguments.out or Path("out") / folder_name(raos.name))
     alone = target.suffix.lower() in {".csv", ".nc"}

@@ -8,9 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from models.basics import hdf5_check
-from models.basics.checks import InputError
-from models.basics.hdf5_check import check_hdf5
+from models.basics import InputError, check_hdf5, hdf5_check
 
 
 @pytest.fixture

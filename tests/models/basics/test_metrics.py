@@ -9,16 +9,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from models.basics.checks import InputError
-from models.basics.metrics import (
+from models.basics import (
+    InputError,
     SpectrumStatistics,
-    moments,
     most_probable_maximum,
     peak_factor,
+    spectral_nodes,
     spectrum_statistics,
     zero_crossing_period,
 )
-from models.basics.quadrature import spectral_nodes
+from models.basics.metrics import moments
 
 
 @given(

@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from models.basics.checks import InputError, SolverError
-from models.basics.quadrature import Quadrature, adaptive_nodes, spectral_nodes
+from models.basics import InputError, Quadrature, SolverError, adaptive_nodes, spectral_nodes
 
 
 def oscillator(zeta: float, omega0: float):

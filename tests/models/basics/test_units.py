@@ -12,8 +12,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from models import InputError, parse_quantity
-from models.basics.units import KINDS, units_of
-from models.casefile.quantity import Quantity
+from models.basics import KINDS, units_of
+from models.casefile import Quantity
 
 EVERY_UNIT = [(kind, unit) for kind in KINDS for unit in units_of(kind) if unit != "dB"]
 

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from models import InputError, PhysicsWarning, bundled_cases, load_case, write_text_atomically
-from models.casefile.yaml_lines import read_yaml, yaml_text
+from models.casefile import read_yaml, yaml_text
 from models.rig.rig import StochasticDrag
 
 NAMES = [name for name, _ in bundled_cases()]

@@ -13,8 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from models import InputError, load_case, template_text, write_text_atomically
-from models.casefile.toml import toml_lines
-from models.casefile.yaml_lines import read_yaml
+from models.casefile import read_yaml, toml_lines
 
 
 class TestFiles:

@@ -21,9 +21,8 @@ from models import (
     template_text,
     write_text_atomically,
 )
+from models.casefile import Quantity, read_yaml
 from models.casefile.messages import sections_of
-from models.casefile.quantity import Quantity
-from models.casefile.yaml_lines import read_yaml
 
 NAMES = [name for name, _ in bundled_cases()]
 CASES_FOLDER = Path(__file__).parents[3] / "models" / "cases"

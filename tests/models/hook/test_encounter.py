@@ -11,14 +11,11 @@ from barge import barge_case
 from hypothesis import given
 from hypothesis import strategies as st
 
-from models.basics.checks import InputError
-from models.basics.dispersion import wave_number
-from models.basics.physics_warning import PhysicsWarning
-from models.basics.tables import GRAVITY
-from models.hook.encounter import Encounter, speed_along
-from models.hook.hook import HookMotion
-from models.sea.sea import SeaSpectrum
-from models.vessel.vessel import HeaveRao
+from models.basics import GRAVITY, InputError, PhysicsWarning, wave_number
+from models.hook import Encounter, HookMotion
+from models.hook.encounter import speed_along
+from models.sea import SeaSpectrum
+from models.vessel import HeaveRao
 
 SEA = SeaSpectrum(kind="jonswap", significant_height=2.0, peak_period=9.0)
 FLAT = HeaveRao(omega=[0.2, 2.0], amplitude=[1.0, 1.0], below="hold", beyond="hold")

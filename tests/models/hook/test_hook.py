@@ -8,13 +8,10 @@ import numpy as np
 import pytest
 
 from models import load_case
-from models.basics.checks import InputError
-from models.basics.metrics import peak_factor
-from models.basics.physics_warning import PhysicsWarning
-from models.basics.quadrature import spectral_nodes
-from models.hook.hook import HookMotion
-from models.sea.sea import SeaSpectrum
-from models.vessel.vessel import HeaveRao
+from models.basics import InputError, PhysicsWarning, peak_factor, spectral_nodes
+from models.hook import HookMotion
+from models.sea import SeaSpectrum
+from models.vessel import HeaveRao
 
 # 1975 thesis, Table 5: omega [rad/s], A_R [m/m], S [m^2 s] and R_H [m^2 s] (wave height).
 TABLE_5 = np.array(

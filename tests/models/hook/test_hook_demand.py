@@ -14,11 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from models import InputError, load_case
-from models.basics.metrics import peak_factor
-from models.basics.physics_warning import PhysicsWarning
-from models.hook.hook import HookMotion
-from models.hook.hook_demand import HookDemand, MotionFigures, fractile_factor
-from models.hook.hook_survey import hook_motion
+from models.basics import PhysicsWarning, peak_factor
+from models.hook import HookDemand, HookMotion, hook_motion
+from models.hook.hook_demand import MotionFigures, fractile_factor
 
 
 @given(t_z=st.floats(2.0, 20.0), p=st.floats(0.01, 0.999))

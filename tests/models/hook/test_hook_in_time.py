@@ -14,11 +14,11 @@ import pytest
 from barge import barge_case, motions
 from standard_error import spectral_standard_error
 
-from models.basics.dispersion import wave_number
+from models.basics import wave_number
+from models.hook import HookMotion
 from models.hook.encounter import speed_along
-from models.hook.hook import HookMotion
-from models.operation.six_dof import SixDofMotion
-from models.sea.spreading import Spreading
+from models.operation import SixDofMotion
+from models.sea import Spreading
 
 SPREAD = {"kind": "cos-2s", "exponent": 6.0}
 CASES = {

@@ -15,18 +15,12 @@ from scipy.interpolate import BPoly
 from scipy.spatial.transform import Rotation
 
 from models import InputError, PhysicsWarning, load_case
-from models.operation.excitation import (
-    SECOND_BODY,
-    SURFACE,
-    SineMotion,
-    SpectrumMotion,
-    StillMotion,
-)
+from models.operation import RecordMotion, SineMotion, SixDofMotion, SpectrumMotion
+from models.operation.excitation import SECOND_BODY, SURFACE, StillMotion
 from models.operation.hermite import interpolated
 from models.operation.long_record import LongRecord, seed_for
-from models.operation.record_file import RecordMotion
 from models.operation.second_bodies import boat_motion, surface_motion
-from models.operation.six_dof import SixDofMotion, tip_heave
+from models.operation.six_dof import tip_heave
 
 NAMES = ("displacement", "velocity", "acceleration")
 

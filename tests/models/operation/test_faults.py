@@ -8,18 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import stillhook as sh
-from models.basics.checks import InputError
-from models.basics.units import KINDS
-from models.operation.faults import FAULTS, PREFIX, fault_of, with_faults
-from models.operation.scenario import Scenario
-from models.operation.scenarios import scenario_named
-from models.rig.sensors import MRU, Telemetry
-from models.sensing.mru import MruModel
-from models.sensing.sensing import SensorModel
-from models.sensing.telemetry import TelemetrySchedule
+from models.basics import KINDS, InputError
+from models.operation import FAULTS, PREFIX, Scenario, fault_of, scenario_named, with_faults
+from models.rig import MRU, Telemetry
+from models.sensing import MruModel, SensorModel, TelemetrySchedule
 from models.spread import Spread, Uniform
-from stillhook.runs.simulation import simulate
-from stillhook.sweeps.usual import FAULT_SPREADS, fault_spread, usual_spread
+from stillhook.runs import simulate
+from stillhook.sweeps import fault_spread, usual_spread
+from stillhook.sweeps.usual import FAULT_SPREADS
 
 CASE = sh.load_case("subsea-crane")
 HOLD = scenario_named("hold", CASE)

@@ -12,11 +12,17 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from models import InputError, build_plant, load_case
-from models.operation.excitation import SineMotion, StillMotion
-from models.operation.scenario import Scenario
-from models.operation.scenarios import scenario_named, scenario_names, scenario_options
-from models.operation.schedule import Move, Profile, Schedule
-from models.plant.surroundings import Deck, Seabed, Surroundings
+from models.operation import (
+    Scenario,
+    Schedule,
+    SineMotion,
+    scenario_named,
+    scenario_names,
+    scenario_options,
+)
+from models.operation.excitation import StillMotion
+from models.operation.schedule import Move, Profile
+from models.plant import Deck, Seabed, Surroundings
 from models.sensing.telemetry import during
 
 CASES = ("thesis-1975", "thesis-1975-rope", "subsea-crane", "landing")

@@ -12,15 +12,9 @@ from hypothesis import strategies as st
 from plant_numbers import THESIS
 
 from models import load_case
-from models.basics.checks import InputError, SolverError
-from models.plant.drag import (
-    consistent_drag,
-    energy_equivalent,
-    gaussian_gain,
-    gaussian_mean,
-    stochastic_equivalent,
-)
-from models.plant.plant import build_plant
+from models.basics import InputError, SolverError
+from models.plant import build_plant, consistent_drag, energy_equivalent, stochastic_equivalent
+from models.plant.drag import gaussian_gain, gaussian_mean
 
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(200)
 WEIGHTS = WEIGHTS / math.sqrt(2.0 * math.pi)

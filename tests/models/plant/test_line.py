@@ -13,11 +13,15 @@ from hypothesis import strategies as st
 from plant_numbers import MODERN, THESIS
 
 from models import load_case
-from models.basics.checks import InputError
-from models.plant.line import line_response, line_response_at, rope_transfers
-from models.plant.plant import build_plant
-from models.plant.plant_data import PlantData
-from models.plant.rope import fixed_top_modes
+from models.basics import InputError
+from models.plant import (
+    PlantData,
+    build_plant,
+    fixed_top_modes,
+    line_response,
+    line_response_at,
+    rope_transfers,
+)
 
 ROPE = replace(THESIS, lumping="distributed", masses=None, damping_ratio=0.02)
 VARIANTS = {

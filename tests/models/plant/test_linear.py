@@ -12,10 +12,9 @@ import scipy.signal
 from hypothesis import given
 from hypothesis import strategies as st
 
-from models.basics.checks import InputError
-from models.plant.discrete import zero_order_hold
-from models.plant.linear import LinearPlant, PlantResponse
-from models.plant.pade import pade_bank, pade_state_space
+from models.basics import InputError
+from models.plant import LinearPlant, PlantResponse, pade_bank, zero_order_hold
+from models.plant.pade import pade_state_space
 
 OMEGA = np.geomspace(0.05, 20.0, 40)
 

@@ -9,13 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from models import InputError, load_case
+from models.operation import Scenario, scenario_named
 from models.operation.excitation import StillMotion
-from models.operation.scenario import Scenario
-from models.operation.scenarios import scenario_named
 from models.operation.schedule import Move, Profile
-from models.plant.payout import DrumTravel
+from models.plant import DrumTravel
 from models.simulation.simulate import simulate
-from synth.controllers.linear_feedback import LinearFeedback
+from synth.controllers import LinearFeedback
 
 CRANE = {"A": 1.0, "a": 16.03, "a1": 44.47, "a2": 6.41}
 RATIO, RADIUS = 100.0, 1.0

@@ -24,10 +24,9 @@ from plant_numbers import (
 )
 
 from models import bundled_cases, load_case
-from models.basics.checks import InputError, SolverError
-from models.plant.plant import build_plant
-from models.plant.plant_data import PlantData, as_plant_data
-from models.plant.rope import fixed_top_modes
+from models.basics import InputError, SolverError
+from models.plant import PlantData, build_plant, fixed_top_modes
+from models.plant.plant_data import as_plant_data
 
 OMEGA = np.geomspace(0.05, 30.0, 60)
 ROPE = replace(THESIS, lumping="distributed", masses=5, damping_ratio=0.01)

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from models.basics.checks import InputError, SolverError
-from models.plant.linear import LinearPlant
-from models.plant.shaping import fit_shaping_filter
-from models.sea.sea import SeaSpectrum
-from synth.verify.integrals import integrate, panels
-from synth.verify.recompute import LawMatrices, Loop, Source, lyapunov_variances, moments
+from models.basics import InputError, SolverError
+from models.plant import LinearPlant, fit_shaping_filter
+from models.sea import SeaSpectrum
+from synth.verify import LawMatrices, Loop, Source, lyapunov_variances, moments, panels
+from synth.verify.integrals import integrate
 
 
 def oscillator(zeta: float, **options: object) -> LinearPlant:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from models import InputError, build_plant, load_case
-from models.plant.surroundings import Deck, Seabed, SplashZone, Surroundings
+from models.plant import Deck, Seabed, SplashZone, Surroundings
 
 NAMES = ("force", "mass", "drag_factor", "relative_velocity")
 ZONE = SplashZone(

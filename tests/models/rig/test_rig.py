@@ -10,19 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from models import InputError
-from models.basics.tables import (
-    ADDED_MASS_PRISM,
-    DRAG_COEFFICIENTS,
-    DRUM_LAYERS,
-    GRAVITY,
-    prism_added_mass,
-)
-from models.case.environment import HeaveRAO, Sea
+from models.basics import DRAG_COEFFICIENTS, DRUM_LAYERS, GRAVITY, prism_added_mass
+from models.basics.tables import ADDED_MASS_PRISM
+from models.rig import ACMotor, GainBounds, Gains, Payload, Rope, Sensors, Winch
 from models.rig.drum import Drum
-from models.rig.limits import GainBounds, Gains
-from models.rig.rig import EnergyDrag, GivenDrag, Payload, Rope, StochasticDrag
-from models.rig.sensors import Sensors
-from models.rig.winch import ACMotor, Winch
+from models.rig.rig import EnergyDrag, GivenDrag, StochasticDrag
+from models.sea import Sea
+from models.vessel import HeaveRAO
 
 ROPE = {"diameter": "44 mm", "mass_per_length": 8.1, "length": 2000}
 PAYLOAD = {

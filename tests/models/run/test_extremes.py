@@ -11,21 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom, genpareto, gumbel_r
 
-from models.basics.checks import InputError
-from models.hook.hook import HookMotion
-from models.run.extremes import (
-    FEWEST_MAXIMA,
-    FEWEST_PEAKS,
-    ExtremeEstimate,
-    cluster_maxima,
-    extreme_over_seeds,
-    gumbel_maximum,
-    pareto_maximum,
-)
+from models.basics import InputError
+from models.hook import HookMotion
+from models.run import FEWEST_MAXIMA, Accumulator, ExtremeEstimate, extreme_over_seeds
+from models.run.exceedances import cluster_maxima
+from models.run.extremes import FEWEST_PEAKS, gumbel_maximum, pareto_maximum
 from models.run.gumbel import gumbel_fit
-from models.run.statistics import Accumulator
-from models.sea.sea import SeaSpectrum
-from models.vessel.vessel import HeaveRao
+from models.sea import SeaSpectrum
+from models.vessel import HeaveRao
 
 THREE_HOURS = 10800.0
 

@@ -12,14 +12,11 @@ from scipy.stats import CensoredData, beta, chi2, ecdf, expon, t
 from standard_error import spectral_standard_error, standard_error_of_variance
 
 from models import load_case
-from models.basics.checks import InputError
-from models.basics.intervals import fall_time, mean_interval, share
-from models.hook.hook import HookMotion
-from models.run.metrics import Summary
-from models.run.run import Event, Run, Timings
-from models.run.statistics import Accumulator
-from models.sea.sea import SeaSpectrum
-from models.vessel.vessel import HeaveRao
+from models.basics import InputError, fall_time, mean_interval, share
+from models.hook import HookMotion
+from models.run import Accumulator, Event, Run, Summary, Timings
+from models.sea import SeaSpectrum
+from models.vessel import HeaveRao
 
 SIGNALS = ("hook.heave", "payload.displacement", "rope.minimum_tension", "rope.tension")
 UNITS = {"hook.heave": "m", "payload.displacement": "m", "rope.tension": "N"}

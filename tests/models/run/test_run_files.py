@@ -15,12 +15,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from models import load_case
-from models.basics.checks import InputError, StillhookError
-from models.basics.files import replace_atomically
-from models.case.case_file import read_yaml
+from models.basics import InputError, StillhookError, replace_atomically
+from models.casefile import read_yaml
+from models.run import Accumulator, Event, Run, Timings
 from models.run.files import read_csv, read_netcdf, read_parquet
-from models.run.run import Event, Run, Timings
-from models.run.statistics import Accumulator
 
 SIGNALS = ("hook.heave", "payload.displacement", "drive.saturated")
 UNITS = {"hook.heave": "m", "payload.displacement": "m"}

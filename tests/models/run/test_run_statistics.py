@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.basics.checks import InputError
-from models.hook.hook import HookMotion
-from models.run.statistics import ERROR, Accumulator
-from models.sea.sea import SeaSpectrum
-from models.vessel.vessel import HeaveRao
+from models.basics import InputError
+from models.hook import HookMotion
+from models.run import ERROR, Accumulator
+from models.sea import SeaSpectrum
+from models.vessel import HeaveRao
 
 STEP = 0.05
 SIGNALS = (

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from models.basics.checks import InputError
-from models.sea.scatter import Scatter, read_scatter, zero_crossing_ratio
-from models.sea.sea import SeaSpectrum
+from models.basics import InputError
+from models.sea import Scatter, SeaSpectrum, read_scatter
+from models.sea.scatter import zero_crossing_ratio
 
 LIST = """\
 # a site

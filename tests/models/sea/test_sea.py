@@ -16,11 +16,11 @@ from scipy.special import gamma as gamma_function
 from scipy.special import gammaincc
 
 from models import load_case
-from models.basics.checks import InputError
-from models.basics.quadrature import spectral_nodes
-from models.hook.hook import HookMotion
-from models.sea.sea import SPECTRA, SeaSpectrum
-from models.vessel.vessel import HeaveRao
+from models.basics import InputError, spectral_nodes
+from models.hook import HookMotion
+from models.sea import SeaSpectrum
+from models.sea.kinds import SPECTRA
+from models.vessel import HeaveRao
 
 # 1975 thesis, Table 3: the design sea has H_S = 8.0 ft; App. B: T_S = 8.1 s.
 DESIGN_SEA = SeaSpectrum(

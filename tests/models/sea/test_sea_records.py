@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.basics.checks import InputError
+from models.basics import InputError
+from models.sea import SeaRecords, read_seas
 from models.sea.formats import FORMATS
 from models.sea.quality import sift
-from models.sea.records import SeaRecords, read_seas
 
 DATA = Path(__file__).parents[4] / "shared" / "data" / "wavespectra"
 REAL = pytest.mark.skipif(not DATA.exists(), reason="../shared/data is not here")

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from models import Case, InputError, load_case
-from models.sea.sea import SPECTRA, SeaSpectrum
-from models.sea.sea_section import Sea
-from models.sea.spreading import Spreading
+from models.sea import Sea, SeaSpectrum, Spreading
+from models.sea.kinds import SPECTRA
 from models.sea.wind import WIND_TABLE
 
 TABLE = {"omega": [0.4, 0.6, 0.8, 1.5], "density": [0.0, 1.0, 0.5, 0.02]}

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import gammaln
 
-from models.basics.checks import InputError
-from models.sea.spreading import SPREADINGS, Spreading
+from models.basics import InputError
+from models.sea import Spreading
+from models.sea.spreading import SPREADINGS
 
 QUARTER = 0.5 * math.pi
 LAWS = st.builds(Spreading, kind=st.sampled_from(SPREADINGS), exponent=st.floats(0.0, 500.0))

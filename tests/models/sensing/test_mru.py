@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from models import InputError
-from models.rig.sensors import MRU
-from models.sensing.mru import MruModel
+from models.rig import MRU
+from models.sensing import MruModel
 
 TS = 0.05
 QUIET = MRU(heave_filter_period=30.0, noise_floor=0.0, noise_fraction=0.0)

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 
 from models import Case, load_case
-from models.basics.checks import InputError
-from models.hook.hook import HookMotion
-from models.plant.plant import build_plant
-from models.plant.plant_data import PlantData
+from models.basics import InputError, White
+from models.hook import HookMotion
+from models.plant import PlantData, build_plant
+from models.sensing import MEASURED, MruModel, SensorModel, sensed_plant, sensed_spectra
 from models.sensing.control import MEASURED as SIMULATED
-from models.sensing.mru import MruModel
-from models.sensing.plant import MEASURED, NOISES, sensed_plant, sensed_spectra
-from models.sensing.sensing import SensorModel
-from synth.loop.disturbance import White, disturbances
+from models.sensing.plant import NOISES
+from synth.loop import disturbances
 
 OMEGA = np.array([0.05, 0.3, 1.0, 4.0, 11.0])
 DRAG = 12_000.0

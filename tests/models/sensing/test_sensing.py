@@ -15,11 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from models import InputError, load_case
-from models.rig.sensors import MRU, Encoder, LoadCell, PayloadSensor, Telemetry
+from models.rig import MRU, Encoder, LoadCell, PayloadSensor, Telemetry
+from models.sensing import NOISE, MruModel, SensorModel, TelemetrySchedule
 from models.sensing.control import MEASURED
-from models.sensing.mru import MruModel
-from models.sensing.sensing import NOISE, RAW, SensorModel
-from models.sensing.telemetry import TelemetrySchedule, during
+from models.sensing.sensing import RAW
+from models.sensing.telemetry import during
 
 TS = 0.02
 SENT = ("acceleration", "velocity", "displacement")

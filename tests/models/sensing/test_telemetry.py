@@ -12,9 +12,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from models import InputError
-from models.basics.draws import TELEMETRY, draw
-from models.rig.sensors import Telemetry
-from models.sensing.telemetry import TelemetrySchedule, during
+from models.basics import TELEMETRY, draw
+from models.rig import Telemetry
+from models.sensing import TelemetrySchedule
+from models.sensing.telemetry import during
 
 TS = 0.02
 

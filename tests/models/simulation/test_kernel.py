@@ -26,9 +26,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from models import InputError, SolverError, build_plant, load_case
-from models.simulation.compiler import cache_folder, find_compiler, load_library
+from models.simulation import Kernel, cache_folder
+from models.simulation.compiler import find_compiler, load_library
 from models.simulation.integrate import hermite_midpoint, rk4_step
-from models.simulation.kernel import _DRIVER, BLOCK, VM_BLOCKS, Kernel, _Compiled
+from models.simulation.kernel import _DRIVER, BLOCK, VM_BLOCKS, _Compiled
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -14,17 +14,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from models import Case, InputError, PhysicsWarning, build_plant, load_case
-from models.operation.excitation import SineMotion, StillMotion
-from models.operation.scenario import Scenario
+from models.operation import Scenario, SineMotion
+from models.operation.excitation import StillMotion
 from models.operation.schedule import Move, Profile
-from models.plant.drive import DriveLimits
-from models.plant.rope import fixed_top_modes
-from models.run.run import Run
-from models.sensing.control import MEASURED, Measurement
-from models.simulation.simulate import run_simulation, simulate
-from models.simulation.simulation import Simulation, prepare
-from synth.controllers.brake_on import BrakeOn
-from synth.controllers.linear_feedback import LinearFeedback
+from models.plant import DriveLimits, fixed_top_modes
+from models.run import Run
+from models.sensing import Measurement
+from models.sensing.control import MEASURED
+from models.simulation import Simulation, prepare, run_simulation
+from models.simulation.simulate import simulate
+from synth.controllers import BrakeOn, LinearFeedback
 
 THESIS = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
 CRANE = {"A": 1.0, "a": 16.03, "a1": 44.47, "a2": 6.41}

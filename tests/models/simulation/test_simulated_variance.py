@@ -15,12 +15,11 @@ import numpy as np
 import pytest
 
 from models import Case, HookMotion, build_plant, load_case
-from models.plant.drive import DriveLimits
-from models.simulation.simulate import run_simulation
-from models.simulation.simulation import prepare
+from models.plant import DriveLimits
+from models.simulation import prepare, run_simulation
 from synth import evaluate_gains
-from synth.controllers.linear_feedback import LinearFeedback
-from synth.structures.sampling import sampled_loop
+from synth.controllers import LinearFeedback
+from synth.structures import sampled_loop
 
 SEEDS, DURATION = 16, 1260.0
 OUTPUTS = (

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from models import load_case
-from models.basics.checks import InputError
-from models.case.case import Case
+from models.basics import InputError
+from models.case import Case
 from models.spread import (
     METHODS,
     Distribution,

@@ -10,17 +10,21 @@ import numpy.typing as npt
 import pytest
 
 import models.vessel.hull.bem_cache as bem_cache
-from models.basics.checks import InputError
-from models.basics.dispersion import wave_number
-from models.basics.tables import GRAVITY, SEA_WATER_DENSITY
+from models.basics import GRAVITY, SEA_WATER_DENSITY, InputError, wave_number
+from models.vessel import VesselRaos
+from models.vessel.hull import (
+    FloatingBody,
+    Hull,
+    Hydrodynamics,
+    ShipLines,
+    box_hull,
+    usual_frequencies,
+    vessel_from_hull,
+)
 from models.vessel.hull.froude_krylov import froude_krylov
-from models.vessel.hull.hull import Hull, box_hull
-from models.vessel.hull.hydrodynamics import FloatingBody, Hydrodynamics
 from models.vessel.hull.hydrostatics import Loading, Waterplane, mass_matrix, stiffness_matrix
 from models.vessel.hull.lid import waterplane_lid
-from models.vessel.hull.lines import ShipLines
-from models.vessel.hull.vessel import usual_frequencies, vessel_from_hull, well_spaced
-from models.vessel.raos import VesselRaos
+from models.vessel.hull.vessel import well_spaced
 
 BOX = box_hull(60.0, 14.0, 4.0, panels=120)
 PLANE = Waterplane.of(BOX)

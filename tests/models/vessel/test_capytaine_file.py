@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from models.basics.checks import InputError
-from models.vessel.hull.hull import box_hull
-from models.vessel.hull.hydrodynamics import FloatingBody, Hydrodynamics
+from models.basics import InputError
+from models.vessel import MODES
+from models.vessel.hull import FloatingBody, Hydrodynamics, box_hull
 from models.vessel.hull.hydrostatics import Loading, Waterplane, mass_matrix, stiffness_matrix
-from models.vessel.raos import MODES
+from models.vessel.readers import read_raos
 from models.vessel.readers.capytaine_file import read_capytaine
-from models.vessel.readers.files import read_raos
 
 DATA = Path(__file__).parents[4] / "shared" / "data"
 NAMES = tuple(mode.capitalize() for mode in MODES)

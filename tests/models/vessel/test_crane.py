@@ -10,10 +10,9 @@ from barge import barge, motions
 from hypothesis import given
 from hypothesis import strategies as st
 
-from models.basics.checks import InputError
-from models.basics.dispersion import wave_number
-from models.vessel.crane import across, crane_tip, place_text
-from models.vessel.hook_operator import equivalent, heave_operators
+from models.basics import InputError, wave_number
+from models.vessel import across, equivalent, heave_operators, place_text
+from models.vessel.crane import crane_tip
 
 ANGLES = st.floats(-3.1, 3.1)
 LENGTHS = st.floats(0.0, 50.0)

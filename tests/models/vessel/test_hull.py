@@ -10,21 +10,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.basics.checks import InputError
-from models.basics.tables import GRAVITY
-from models.vessel.hull.files import read_hull
-from models.vessel.hull.hull import Hull, box_hull, volumes
+from models.basics import GRAVITY, InputError
+from models.vessel import VesselRaos
+from models.vessel.hull import Hull, ShipLines, box_hull, centre_of_mass, read_hull
+from models.vessel.hull.hull import volumes
 from models.vessel.hull.hydrostatics import (
     Loading,
     Waterplane,
-    centre_of_mass,
     mass_matrix,
     moved,
     stiffness_matrix,
     transport,
 )
-from models.vessel.hull.lines import ShipLines, section_coefficient, section_exponent
-from models.vessel.raos import VesselRaos
+from models.vessel.hull.lines import section_coefficient, section_exponent
 
 SHIP = ShipLines(length=80.0, beam=18.0, draught=6.0, block=0.70)
 

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from vessel_tables import DATA, orcaflex_text, swinging, wamit_text
 
-from models.basics.checks import InputError
-from models.basics.physics_warning import PhysicsWarning
-from models.vessel import VesselRaos, read_raos, write_raos
-from models.vessel.readers.long_waves import check_long_waves
+from models.basics import InputError, PhysicsWarning
+from models.vessel import VesselRaos
+from models.vessel.readers import check_long_waves, read_raos, write_raos
 
 RAOS = swinging()
 NED = (1.0, -1.0, -1.0, 1.0, -1.0, -1.0)

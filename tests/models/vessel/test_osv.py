@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.vessel.readers.files import bundled_vessels, read_raos
-from models.vessel.readers.long_waves import check_long_waves
+from models.vessel.readers import bundled_vessels, check_long_waves, read_raos
 
 DATA = Path(__file__).parents[4] / "shared" / "data" / "mss" / "supply.mat"
 PLACE = Path(__file__).parents[3] / "models" / "vessel" / "data" / "osv-83m.csv"

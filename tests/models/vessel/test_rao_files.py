@@ -23,10 +23,10 @@ from vessel_tables import (
     wamit_text,
 )
 
-from models.basics.checks import InputError
-from models.sea.sea import SeaSpectrum
-from models.vessel import VesselRaos, bundled_vessels, read_raos, write_raos
-from models.vessel.assemble import grid
+from models.basics import InputError
+from models.sea import SeaSpectrum
+from models.vessel import VesselRaos, grid
+from models.vessel.readers import bundled_vessels, read_raos, write_raos
 from models.vessel.readers.orcaflex import parse_orcaflex
 
 RAOS = swinging()

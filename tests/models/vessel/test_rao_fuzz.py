@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 from vessel_tables import DATA, mss_vessel, orcaflex_text, shipx_text, swinging, wamit_text
 
-from models.basics.checks import InputError
-from models.basics.physics_warning import PhysicsWarning
-from models.vessel import VesselRaos, read_raos, write_raos
+from models.basics import InputError, PhysicsWarning
+from models.vessel import VesselRaos
+from models.vessel.readers import read_raos, write_raos
 from models.vessel.readers.files import FORMATS
 
 RAOS = swinging(6)

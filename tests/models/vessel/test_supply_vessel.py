@@ -17,11 +17,9 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from models import load_case
-from models.basics.metrics import peak_factor
-from models.hook.hook import HookMotion
-from models.hook.hook_demand import HookDemand
-from models.hook.hook_survey import hook_motion
-from models.vessel.hook_operator import case_raos, heave_operators
+from models.basics import peak_factor
+from models.hook import HookDemand, HookMotion, hook_motion
+from models.vessel import case_raos, heave_operators
 
 FILE = Path(__file__).parents[4] / "shared" / "data" / "mss" / "supply.mat"
 pytestmark = pytest.mark.skipif(

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from models import load_case
-from models.basics.checks import InputError
-from models.sea.sea import SeaSpectrum
-from models.vessel.vessel import HeaveRao
+from models.basics import InputError
+from models.sea import SeaSpectrum
+from models.vessel import HeaveRao
 
 OMEGA = np.array([0.4, 0.6, 0.9, 1.5])
 AMPLITUDE = np.array([1.05, 1.3, 0.8, 0.3])

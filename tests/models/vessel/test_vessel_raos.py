@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from vessel_tables import swinging
 
-from models.basics.checks import InputError
-from models.basics.dispersion import wave_number
+from models.basics import InputError, wave_number
 from models.vessel import MODES, VesselRaos
 from models.vessel.symmetry import completed, looks_symmetric
 

@@ -11,13 +11,12 @@ import pytest
 from barge import barge, barge_case, barge_file
 
 from models import Case, InputError, load_case
-from models.basics.physics_warning import PhysicsWarning
-from models.hook.hook import HookMotion
+from models.basics import PhysicsWarning
+from models.hook import HookMotion
 from models.operation.second_bodies import boat_motion, surface_motion
-from models.sea.spreading import Spreading
-from models.vessel import write_raos
-from models.vessel.hook_operator import case_raos, heave_operators
-from models.vessel.vessel import HeaveRao
+from models.sea import Spreading
+from models.vessel import HeaveRao, case_raos, heave_operators
+from models.vessel.readers import write_raos
 
 VESSEL = """\
 vessel:

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import stillhook as sh
-from models.operation.excitation import Motion, SineMotion, SpectrumMotion
-from models.plant.drive import DriveLimits
+from models.operation import Motion, SineMotion, SpectrumMotion
+from models.plant import DriveLimits
 from models.simulation.simulate import simulate
+from mpc.floor import Clairvoyant, clairvoyant
 from mpc.floor.certificate import certify, rollout
-from mpc.floor.clairvoyance import Clairvoyant, clairvoyant
 from mpc.floor.plant import record_plant
 from mpc.floor.problem import RHO, RecordProblem
 from mpc.floor.qp import solve_record

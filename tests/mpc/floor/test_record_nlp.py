@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import stillhook as sh
-from models.operation.excitation import Motion, SpectrumMotion
+from models.operation import Motion, SpectrumMotion
 from models.simulation.simulate import simulate
-from mpc.floor.clairvoyance import Clairvoyant, clairvoyant
+from mpc.floor import Clairvoyant, clairvoyant
 from mpc.floor.nlp import Refinement, refine
 
 SETTLE = 30.0

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from sea_records import AT, LEADS, TS, errors_of, sea
 from wiener import Wiener
 
-from models.basics.checks import InputError
-from mpc.forecast.autoregressive import AdaptiveAR
+from models.basics import InputError
+from mpc.forecast import AdaptiveAR
 from mpc.forecast.regression import smoother
 
 

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from sea_records import TS, sea
 
-from models.basics.checks import InputError
-from models.operation.excitation import SineMotion, SpectrumMotion
-from mpc.forecast.autoregressive import AdaptiveAR
-from mpc.forecast.forecast import Predictor, hermite_weights, leads_of
-from mpc.forecast.preview import PerfectPreview
+from models.basics import InputError
+from models.operation import SineMotion, SpectrumMotion
+from mpc.forecast import AdaptiveAR, PerfectPreview, Predictor
+from mpc.forecast.forecast import hermite_weights, leads_of
 from mpc.forecast.sea_predictor import SeaPredictor
 
 HORIZON = 6.0

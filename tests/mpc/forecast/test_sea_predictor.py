@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from sea_records import AT, LEADS, TS, errors_of, sea
 from wiener import Wiener, error_covariance
 
-from models.basics.checks import InputError
-from models.rig.sensors import MRU
-from models.sea.sea import SeaSpectrum
-from models.sensing.mru import MruModel
+from models.basics import InputError
+from models.rig import MRU
+from models.sea import SeaSpectrum
+from models.sensing import MruModel
 from mpc.forecast.sea_predictor import SeaPredictor
 
 NAMES = ["1 %", "5 %", "crane"]

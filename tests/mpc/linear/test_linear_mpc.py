@@ -11,13 +11,14 @@ from cvxpy_programme import oracle
 from mpc_cases import WEIGHTS, case_of, controller_of
 
 import stillhook as sh
-from models.plant.drive import DriveLimits
-from models.sensing.control import MEASURED, Measurement
-from models.simulation.simulation import prepare
+from models.plant import DriveLimits
+from models.sensing import Measurement
+from models.sensing.control import MEASURED
+from models.simulation import prepare
 from mpc.forecast.sea_predictor import SeaPredictor
-from mpc.linear.condensed import WATCHED, default_blocking, path_of_sea, sea_at_end
-from mpc.linear.linear import LinearMPC
-from mpc.programme.qp import SoftQP, kkt_residual
+from mpc.linear import WATCHED, LinearMPC, path_of_sea, sea_at_end
+from mpc.linear.condensed import default_blocking
+from mpc.programme import SoftQP, kkt_residual
 
 _NAN = float("nan")
 

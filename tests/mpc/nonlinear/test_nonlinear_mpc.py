@@ -9,18 +9,16 @@ import pytest
 from ipopt_programme import nlp_oracle
 
 import stillhook as sh
-from models.plant.drive import DriveLimits
-from models.plant.plant import MEAN_LOSSES, build_plant
-from models.plant.plant_data import PlantData
-from models.sensing.control import MEASURED, Measurement
-from mpc.linear.linear import LinearMPC
+from models.plant import MEAN_LOSSES, DriveLimits, PlantData, build_plant
+from models.sensing import Measurement
+from models.sensing.control import MEASURED
+from mpc.linear import LinearMPC
+from mpc.nonlinear import NonlinearMPC
 from mpc.nonlinear.mean_torque import mean_torque, start_torque
-from mpc.nonlinear.nonlinear import NonlinearMPC
 from mpc.nonlinear.stage import make_stage
-from mpc.programme.qp import kkt_residual
-from mpc.winch.doubts import Doubts
+from mpc.programme import kkt_residual
+from mpc.winch import Doubts, Weights
 from mpc.winch.sampled import sampled_winch
-from mpc.winch.weights import Weights
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -9,13 +9,18 @@ import pytest
 from mpc_cases import WEIGHTS, case_of, controller_of
 
 import stillhook as sh
-from models.sensing.plant import MEASURED
-from mpc.winch.doubts import Doubts, doubted
-from mpc.winch.planning import plan_model
-from mpc.winch.prediction import PredictionModel, prediction_model
-from mpc.winch.regulation import regulator
+from models.sensing import MEASURED
+from mpc.winch import (
+    Doubts,
+    PredictionModel,
+    Weights,
+    doubted,
+    plan_model,
+    prediction_model,
+    regulator,
+)
 from mpc.winch.unsaturated import Unsaturated, _plant
-from mpc.winch.weights import OFF, Weights
+from mpc.winch.weights import OFF
 
 #: Found by `tune_weights` for the rope at 1.25 m.
 ROPE = Weights(

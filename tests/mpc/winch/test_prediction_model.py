@@ -10,19 +10,17 @@ from mpc_cases import WEIGHTS, case_of
 from scipy.integrate import solve_ivp
 
 from models import SolverError
-from models.hook.hook import HookMotion
-from models.plant.plant import build_plant
-from models.sensing.plant import MEASURED
-from mpc.programme.holds import hermite_hold, noisy_hold, root_of
+from models.hook import HookMotion
+from models.plant import build_plant
+from models.sensing import MEASURED
+from mpc.programme import hermite_hold, noisy_hold, root_of
+from mpc.winch import doubted, plan_model, prediction_model, regulator, tune_weights
 from mpc.winch.doubling import lyapunov, riccati
-from mpc.winch.doubts import doubted
 from mpc.winch.estimator import kalman_covariance, kalman_gain
-from mpc.winch.planning import plan_model
-from mpc.winch.prediction import CONSTANTS, prediction_model
-from mpc.winch.regulation import regulator
+from mpc.winch.prediction import CONSTANTS
 from mpc.winch.sampled import sampled_winch
 from mpc.winch.unsaturated import Unsaturated
-from mpc.winch.weights import OFF, saturates, tune_weights
+from mpc.winch.weights import OFF, saturates
 
 NAMES = ("thesis-1975", "thesis-1975-rope", "subsea-crane")
 

@@ -8,7 +8,7 @@ import pytest
 
 from models import load_case
 from stillhook.cli import main
-from synth.bound.case import bound_for
+from synth.bound import bound_for
 
 
 def test_the_bound_is_that_of_python(capsys: pytest.CaptureFixture[str]) -> None:

@@ -20,9 +20,9 @@ from designs import infeasible_design, loopless_design, thesis_design, unstable_
 import stillhook as sh
 from models import SolverError, load_case, template_text
 from stillhook import cli
+from stillhook.commands import gains_text, parse_gains
 from stillhook.commands.design import optimise as optimise_command
-from stillhook.commands.given import gains_text, parse_gains
-from stillhook.text.terminal import console, progress, show_design, told_once
+from stillhook.text import console, progress, show_design, told_once
 
 THESIS = "A=200,a=50,a1=100,a2=100"
 CASE = load_case("thesis-1975").to_yaml()

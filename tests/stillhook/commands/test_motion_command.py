@@ -11,7 +11,7 @@ import pytest
 from barge import barge_case
 
 import stillhook as sh
-from models.hook.hook import HookMotion
+from models.hook import HookMotion
 from stillhook.cli import main
 from stillhook.commands.world.motion import parse_steps
 

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import stillhook as sh
-from models.sea.records import read_seas
-from models.sea.scatter import read_scatter
+from models.sea import read_scatter, read_seas
 from stillhook.cli import main
 
 FREQUENCIES = np.linspace(0.04, 0.4, 19)

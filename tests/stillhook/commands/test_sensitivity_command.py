@@ -6,8 +6,9 @@ from designs import thesis_design
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from stillhook.cli import main
-from stillhook.designs.tornado_plot import finding, tornado_figure
-from stillhook.text.style import picture
+from stillhook.designs import tornado_figure
+from stillhook.designs.tornado_plot import finding
+from stillhook.text import picture
 from synth.sensitivity import sensitivity
 
 

@@ -21,13 +21,13 @@ import pytest
 from designs import loopless_design, thesis_design
 
 import stillhook as sh
-from models.hook.hook import HookMotion
-from models.operation.scenarios import scenario_names
+from models.hook import HookMotion
+from models.operation import scenario_names
 from stillhook import cli
 from stillhook.commands.run import simulate as command
 from stillhook.commands.run.scenarios import CONTROLLER_TEXTS
 from stillhook.commands.run.simulate_given import parse_controllers, parse_options
-from synth.controllers.controllers import CONTROLLERS
+from synth.controllers import CONTROLLERS
 
 CALM = ("thesis-1975", "--set", "sea.significant_height=0.3")
 SHORT = ("--duration", "40 s", "--no-figures")
@@ -307,7 +307,7 @@ def test_controllers_are_compared_in_figures_and_folders(run, monkeypatch):
 
 
 def diverging(monkeypatch, seed: int) -> None:
-    from models.simulation.simulate import run_simulation
+    from models.simulation import run_simulation
 
     def stub(simulation, **rest):
         run = run_simulation(simulation, **rest)
@@ -577,7 +577,7 @@ def test_the_options_of_a_scenario_are_shown_with_an_example_that_works(name, ru
     assert ending.status == 0
     example = re.search(r"--option '(.+)'", ending.out)[1]
     case = sh.load_case("subsea-crane")
-    from models.operation.scenarios import scenario_named
+    from models.operation import scenario_named
 
     assert scenario_named(name, case, **parse_options([example])).name == name
 

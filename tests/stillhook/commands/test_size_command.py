@@ -8,7 +8,7 @@ import pytest
 
 import stillhook as sh
 from stillhook.cli import main
-from stillhook.designs.structure_file import load_structure
+from stillhook.designs import load_structure
 
 CALM = ["--set", "sea.significant_height=1"]
 

@@ -9,12 +9,19 @@ from pathlib import Path
 import pytest
 
 import stillhook as sh
-from models.basics.checks import InputError
+from models.basics import InputError
 from stillhook.cli import main
-from stillhook.designs.structure_file import load_structure, save_structure, structure_text
-from stillhook.designs.structure_plot import structures
-from stillhook.designs.structure_table import HEADINGS, markdown, share_of, structure_rows
-from stillhook.text.style import picture
+from stillhook.designs import (
+    HEADINGS,
+    load_structure,
+    markdown,
+    save_structure,
+    structure_rows,
+    structure_text,
+    structures,
+)
+from stillhook.designs.structure_table import share_of
+from stillhook.text import picture
 
 FAST = ["--set", "sensors.telemetry.delay=25 ms", "--starts", "2"]
 NOISY = {"sensors.mru": {"noise_floor": 0.0, "noise_fraction": 0.02}}

@@ -11,8 +11,7 @@ import pytest
 import stillhook as sh
 from stillhook.cli import main
 from stillhook.commands.study.sweep import parse_ranges
-from stillhook.sweeps.sweeping import sweep
-from stillhook.sweeps.words import SweepSummary, worst_cases
+from stillhook.sweeps import SweepSummary, sweep, worst_cases
 
 CALM = ["--set", "sea.significant_height=0.3"]
 TIME = ["--mode", "time", "--duration", "10 s", "--jobs", "1"]

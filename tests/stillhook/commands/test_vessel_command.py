@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from vessel_tables import shipx_text, swinging, wamit_text
 
-from models.vessel import read_raos, write_raos
+from models.vessel.readers import read_raos, write_raos
 from stillhook.cli import main
-from stillhook.seas.rao_plot import rao_figure
+from stillhook.seas import rao_figure
 
 RAOS = swinging()
 

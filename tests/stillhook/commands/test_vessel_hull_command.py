@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from models.vessel.readers.files import read_raos
+from models.vessel.readers import read_raos
 from stillhook.cli import main
 
 BOX = ["vessel", "hull", "--shape", "box", "--length", "40", "--beam", "10", "--draught", "3"]

@@ -13,17 +13,16 @@ import pytest
 from designs import thesis_design
 
 import stillhook as sh
-from models.sensing.control import Measurement
+from models.sensing import Measurement
+from stillhook.comparison import Comparison
 from stillhook.comparison import work as compare_work
 from stillhook.comparison.cell import Cell, Prepared, Question
-from stillhook.comparison.comparison import Comparison
 from stillhook.comparison.figures import heights, worst_moment
 from stillhook.comparison.mismatch import Mismatch
 from stillhook.comparison.store import STORE
-from stillhook.controllers.contenders import CONTENDERS, DEFAULTS, contenders_of
-from stillhook.controllers.law import Law
-from stillhook.keeper.worker import Bench, Task
-from synth.controllers.linear_feedback import LinearFeedback
+from stillhook.controllers import CONTENDERS, DEFAULTS, Law, contenders_of
+from stillhook.keeper import Bench, Task
+from synth.controllers import LinearFeedback
 
 CASE = sh.load_case("thesis-1975").replace({"sea.significant_height": 0.5})
 NOISY = CASE.replace({"sensors.mru": {"noise_floor": 0.02, "delay": 0.1}})

@@ -11,8 +11,8 @@ from designs import infeasible_design, loopless_design, thesis_design, unstable_
 
 import stillhook as sh
 from models import Case, InputError
-from synth.search.multistart import Start
-from synth.verify.verification import Verification
+from synth.search import Start
+from synth.verify import Verification
 
 DESIGNS = {
     "given gains": thesis_design,

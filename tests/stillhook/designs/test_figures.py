@@ -13,9 +13,9 @@ import pytest
 from designs import infeasible_design, loopless_design, thesis_design, unstable_design
 
 from models import InputError
-from stillhook.designs.figures import FIGURES, limits, nyquist, payload_spectrum, responses
-from stillhook.text.motion import MotionView
-from stillhook.text.style import picture
+from stillhook.designs.figures import FIGURES, limits, payload_spectrum, responses
+from stillhook.designs.nyquist_plot import nyquist
+from stillhook.text import MotionView, picture
 
 LABELS = {
     "payload_spectrum": [("frequency [rad/s]", "variance density [m² s/rad]")],

@@ -13,7 +13,7 @@ from designs import infeasible_design, loopless_design, thesis_design, unstable_
 import stillhook as sh
 from models import InputError, load_case
 from stillhook.designs.report import figures_of, summary_text
-from stillhook.text.summary import (
+from stillhook.text import (
     command_text,
     effect,
     facts,

@@ -16,15 +16,14 @@ from hypothesis.extra import numpy as arrays
 from PIL import Image
 
 import stillhook as sh
-from models.run.run import Event
-from models.run.summary import Quantity
+from models.run import Event, Quantity
 from stillhook.runs import animation as animation_module
 from stillhook.runs.animation import animation
 from stillhook.runs.figures import comparison, exceedance, figures_of
 from stillhook.runs.strip import Scene, strip
 from stillhook.runs.trace_figure import traces
 from stillhook.runs.window import Window, envelope, runs_of_true, window_of
-from stillhook.text.style import picture
+from stillhook.text import picture
 
 
 @cache

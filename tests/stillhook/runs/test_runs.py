@@ -14,12 +14,11 @@ from designs import thesis_design
 from scipy import stats
 
 import stillhook as sh
-from models.operation.scenarios import scenario_named
-from models.plant.plant import build_plant
-from stillhook.runs.runs import EXTREMES, keep_worst
-from stillhook.runs.series import Series
+from models.operation import scenario_named
+from models.plant import build_plant
+from stillhook.runs import Series, headline_of, keep_worst
+from stillhook.runs.runs import EXTREMES
 from stillhook.runs.table import rows_of
-from stillhook.runs.words import headline_of
 
 THESIS = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
 
@@ -154,7 +153,7 @@ def test_an_operation_with_a_warm_up_is_judged_after_it():
 
 
 def test_lock_is_watched_at_the_significant_height_of_the_hook():
-    from models.hook.hook import HookMotion
+    from models.hook import HookMotion
 
     height = HookMotion.from_case(calm()).displacement.significant_height
     assert three().lock_limit == pytest.approx(height, rel=1e-9)
@@ -192,7 +191,7 @@ def test_a_lift_is_made_with_the_weight_in_air():
     under_water = build_plant(case).operating_point().command
     assert held != pytest.approx(under_water, rel=0.1)
     controller = series.simulation.controller
-    from models.sensing.control import Measurement
+    from models.sensing import Measurement
 
     seen = Measurement.of({"drive.applied": held, "rope.tension": 4e5})
     assert controller.step(seen, 0.0) == pytest.approx(held, rel=0.05)

@@ -7,17 +7,14 @@ import pytest
 import xarray as xr
 from designs import thesis_design, unstable_design
 
-from models.basics.checks import InputError
+from models.basics import InputError
 from models.spread import Spread
-from stillhook.sweeps.figures import (
-    cumulative_share,
-    nyquist_cloud,
-    scatter_matrix,
-    sweep_figures,
-    violins,
-)
-from stillhook.text.style import picture
-from synth.sweeps.frequency import frequency_sweep
+from stillhook.sweeps import sweep_figures
+from stillhook.sweeps.cloud_figure import nyquist_cloud
+from stillhook.sweeps.figures import cumulative_share, violins
+from stillhook.sweeps.scatter_figure import scatter_matrix
+from stillhook.text import picture
+from synth.sweeps import frequency_sweep
 
 SPREAD = Spread(
     {

@@ -17,14 +17,13 @@ import pytest
 import sweep_pilots
 
 import stillhook as sh
-from models.basics.checks import InputError
+from models.basics import InputError
 from models.spread import Uniform
-from stillhook.keeper.journal import Journal
+from stillhook.keeper import Journal
+from stillhook.sweeps import RESULT, resume_sweep, sweep, write_result
 from stillhook.sweeps import header as headers
 from stillhook.sweeps import store as stores
-from stillhook.sweeps.export import write_result
-from stillhook.sweeps.store import JOURNAL, RESULT, piece_of
-from stillhook.sweeps.sweeping import resume_sweep, sweep
+from stillhook.sweeps.store import JOURNAL, piece_of
 
 CASE = sh.load_case("thesis-1975").replace({"sea.significant_height": 0.3})
 SPREAD = {"payload.mass": Uniform("20 %"), "payload.drag_coefficient": Uniform("50 %")}

@@ -13,17 +13,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import stillhook as sh
-from models.basics.checks import InputError
+from models.basics import InputError
 from models.spread import Spread, Uniform
-from stillhook.runs.simulation import simulate
+from stillhook.runs import simulate
+from stillhook.sweeps import STATUS, sweep
 from stillhook.sweeps.cluster import Cluster
 from stillhook.sweeps.engines import Processes
 from stillhook.sweeps.pilots import pilot_of
-from stillhook.sweeps.sweeping import sweep
 from stillhook.sweeps.time_cases import CaseTask, TimeQuestion, seed_of
-from stillhook.sweeps.time_metrics import METRICS, STATUS
+from stillhook.sweeps.time_metrics import METRICS
 from stillhook.sweeps.trim import shift_between, static_of, trimmed
-from synth.controllers.linear_feedback import LinearFeedback
+from synth.controllers import LinearFeedback
 
 CASE = sh.load_case("thesis-1975").replace({"sea.significant_height": 0.3})
 GAINS = {name: getattr(CASE.gains, name) for name in ("A", "a", "a1", "a2")}

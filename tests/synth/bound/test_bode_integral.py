@@ -6,14 +6,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from models.basics.checks import InputError
-from models.plant.linear import LinearPlant
-from models.sea.sea import SeaSpectrum
+from models.basics import InputError
+from models.plant import LinearPlant
+from models.sea import SeaSpectrum
 from synth.bound.bode_integral import bode_estimate, bode_integral, least_sensitivity
-from synth.loop.assess import Assessment
-from synth.loop.controller import Controller
-from synth.loop.disturbance import disturbances
-from synth.loop.margins import loop_margins
+from synth.loop import Assessment, Controller, disturbances, loop_margins
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -12,22 +12,19 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from models.basics.checks import InputError, SynthesisError
-from models.basics.riccati import solve_lyapunov, solve_riccati
-from models.plant.linear import LinearPlant
-from models.sea.sea import SeaSpectrum
+from models.basics import InputError, SynthesisError, White, solve_lyapunov, solve_riccati
+from models.plant import LinearPlant
+from models.sea import SeaSpectrum
 from stillhook import load_case
-from synth.bound.bound import Bound, lqg_bound
-from synth.bound.case import bound_for, rms_limits
+from synth.bound import Bound, bound_for
+from synth.bound.bound import lqg_bound
+from synth.bound.case import rms_limits
 from synth.bound.dual import Dual
 from synth.bound.shaped import shaped
-from synth.design.optimise import evaluate_gains
-from synth.design.tuning import tune
-from synth.limits.signal_limits import Continuous, Least, Peak, Power, Rms
-from synth.loop.controller import Controller
-from synth.loop.disturbance import White
-from synth.structures.lqg import reduced
-from synth.structures.structure import StaticGain
+from synth.design import evaluate_gains, tune
+from synth.limits import Continuous, Least, Peak, Power, Rms
+from synth.loop import Controller
+from synth.structures import StaticGain, reduced
 
 FloatArray = npt.NDArray[np.float64]
 cp: Any = cvxpy  # its signatures are not typed

@@ -10,14 +10,12 @@ import numpy as np
 import pytest
 
 import stillhook as sh
-from models.basics.checks import InputError, SolverError
-from stillhook.designs.structure_plot import structures
-from stillhook.designs.structure_table import HEADINGS, markdown, structure_rows
-from stillhook.text.bound_text import bound_cell, bound_figures, bound_sentence, bounds_note
-from stillhook.text.summary import facts
-from synth.bound.beside import DesignBound, bound_beside, exact_sensors
-from synth.loop.assess import Assessment
-from synth.question.structure_question import pose_structure
+from models.basics import InputError, SolverError
+from stillhook.designs import HEADINGS, markdown, structure_rows, structures
+from stillhook.text import bound_cell, bound_figures, bound_sentence, bounds_note, facts
+from synth.bound import DesignBound, bound_beside, exact_sensors
+from synth.loop import Assessment
+from synth.question import pose_structure
 
 CRANE_GAINS = {"A": 1.0, "a": 16.03, "a1": 44.47, "a2": 6.410}
 NOISY_MRU = {"sensors.mru": {"noise_floor": "1 cm", "noise_fraction": 0.02}}

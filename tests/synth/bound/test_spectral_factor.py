@@ -8,10 +8,10 @@ import pytest
 from scipy.integrate import quad
 from scipy.linalg import solve_continuous_lyapunov
 
-from models.basics.checks import InputError
-from models.sea.sea import SeaSpectrum
+from models.basics import InputError
+from models.sea import SeaSpectrum
 from synth.bound.spectral_factor import fit_spectral_factor, spectral_factor
-from synth.loop.disturbance import disturbances
+from synth.loop import disturbances
 
 FloatArray = npt.NDArray[np.float64]
 SEA = SeaSpectrum(kind="jonswap", significant_height=2.0, peak_period=9.0)

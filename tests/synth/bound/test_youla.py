@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_lyapunov
 
-from models.basics.checks import InputError, SynthesisError
-from models.plant.linear import LinearPlant
-from models.sea.sea import SeaSpectrum
-from synth.bound.bound import Bound, lqg_bound
+from models.basics import InputError, SynthesisError, White
+from models.plant import LinearPlant
+from models.sea import SeaSpectrum
+from synth.bound import Bound
+from synth.bound.bound import lqg_bound
 from synth.bound.youla import youla_design
 from synth.bound.youla_parts import laguerre
-from synth.loop.assess import Assessment
-from synth.loop.disturbance import White
+from synth.loop import Assessment
 
 SEA = SeaSpectrum(kind="jonswap", significant_height=2.0, peak_period=9.0)
 

@@ -7,10 +7,11 @@ import pytest
 from linear_runs import linear_run, still, swell
 
 from models import load_case
-from models.basics.checks import InputError, SynthesisError
-from models.plant.plant import MEAN_LOSSES, build_plant
-from models.sensing.control import MEASURED, Measurement
-from synth.controllers.constant_tension import ConstantTension
+from models.basics import InputError, SynthesisError
+from models.plant import MEAN_LOSSES, build_plant
+from models.sensing import Measurement
+from models.sensing.control import MEASURED
+from synth.controllers import ConstantTension
 from synth.structures.recursive import at_rest
 
 CASES = ("thesis-1975", "thesis-1975-rope", "subsea-crane")

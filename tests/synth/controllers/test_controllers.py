@@ -14,24 +14,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from models import load_case
-from models.basics.checks import InputError
-from models.plant.plant import MEAN_LOSSES, build_plant
-from models.sensing.control import (
-    MEASURED,
-    Controller,
-    Measurement,
-    Recursion,
-    holds_brake,
-    recursion_of,
+from models.basics import InputError
+from models.plant import MEAN_LOSSES, build_plant
+from models.sensing import Controller, Measurement, Recursion, holds_brake, recursion_of
+from models.sensing.control import MEASURED
+from models.simulation import Kernel
+from synth.controllers import (
+    CONTROLLERS,
+    BrakeOn,
+    ConstantTension,
+    LinearFeedback,
+    VelocityFeedForward,
+    controller_named,
 )
-from models.simulation.kernel import Kernel
-from synth.controllers.brake_on import BrakeOn
-from synth.controllers.constant_tension import ConstantTension
-from synth.controllers.controllers import CONTROLLERS, controller_named
-from synth.controllers.feed_forward import VelocityFeedForward
-from synth.controllers.linear_feedback import LinearFeedback
-from synth.loop.controller import Controller as StateSpace
-from synth.structures.recursive import RecursiveController, at_rest
+from synth.loop import Controller as StateSpace
+from synth.structures import RecursiveController
+from synth.structures.recursive import at_rest
 
 CASES = ("thesis-1975", "thesis-1975-rope", "subsea-crane")
 # A design with an integrator and a lag stands for what `tune` hands over.

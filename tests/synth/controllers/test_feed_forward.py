@@ -7,14 +7,14 @@ import pytest
 from linear_runs import linear_run, sine_part, still, swell
 
 from models import Case, load_case
-from models.basics.checks import InputError, SynthesisError
-from models.plant.plant import build_plant
-from models.sea.sea import SeaSpectrum
-from models.sensing.control import Measurement
-from models.vessel.vessel import HeaveRao
-from synth.controllers.feed_forward import VelocityFeedForward, lead_of
-from synth.structures.drum_speed import DrumSpeedLoop
-from synth.structures.sampling import sampled_loop
+from models.basics import InputError, SynthesisError
+from models.plant import build_plant
+from models.sea import SeaSpectrum
+from models.sensing import Measurement
+from models.vessel import HeaveRao
+from synth.controllers import VelocityFeedForward
+from synth.controllers.feed_forward import lead_of
+from synth.structures import DrumSpeedLoop, sampled_loop
 
 CASES = ("thesis-1975", "thesis-1975-rope", "subsea-crane")
 

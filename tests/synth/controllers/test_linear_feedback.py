@@ -12,14 +12,13 @@ from hypothesis import strategies as st
 from linear_runs import linear_run, still
 
 from models import load_case
-from models.basics.checks import InputError, SynthesisError
-from models.plant.plant import MEAN_LOSSES, build_plant
-from models.sensing.control import Measurement
+from models.basics import InputError, SynthesisError
+from models.plant import MEAN_LOSSES, build_plant
+from models.sensing import Measurement
 from synth import LowOrder, MaxSensitivity, White, evaluate_gains, tune
-from synth.controllers.linear_feedback import LinearFeedback
-from synth.loop.controller import Controller
-from synth.structures.sampled_controller import sampled, tracking_gain
-from synth.structures.sampling import sampled_loop
+from synth.controllers import LinearFeedback
+from synth.loop import Controller
+from synth.structures import sampled, sampled_loop, tracking_gain
 
 PAYLOAD = ("payload.acceleration", "payload.velocity", "payload.displacement")
 COMMAND = ("drive.command",)

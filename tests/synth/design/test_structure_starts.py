@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from models import Case, load_case
-from models.basics.threads import one_thread
-from synth.design.structure_search import optimise_structure
+from models.basics import one_thread
+from synth.design import optimise_structure
 from synth.design.structure_starts import as_values, nested_starts, no_worse, starts_from
-from synth.question.structure_question import pose_structure
-from synth.search.multistart import search
+from synth.question import pose_structure
+from synth.search import search
 
 OMEGA = np.geomspace(0.05, 30.0, 13)
 # About what `optimise_structure` finds on one spring at 50 ms.
@@ -81,7 +81,7 @@ def test_drum_feedback_within_combined_gets_the_feed_forward_that_suits_it(late)
 
 
 def search_cost(problem, values) -> float:
-    from synth.loop.assess import Assessment
+    from synth.loop import Assessment
 
     controller = problem.law.controller(values)
     view = Assessment(problem.plant, controller, problem.disturbances, drag=problem.drag)

@@ -21,13 +21,13 @@ from loop_numbers import (
 from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov
 from scipy.optimize import brentq, differential_evolution, minimize
 
-from models.basics.checks import InputError
-from models.plant.linear import LinearPlant
+from models.basics import InputError
+from models.plant import LinearPlant
 from synth import LowOrder, MaxSensitivity, Rms, StaticGain, White, tune
-from synth.loop.controller import Controller
+from synth.loop import Controller
+from synth.structures import Law
 from synth.structures.low_order import _LowOrderLaw
 from synth.structures.lqg import lqg
-from synth.structures.structure import Law
 
 WHITE = {"f": White(1.0), "n": White(0.01)}
 WEIGHTS = {"x": 1.0, "effort": 0.1}

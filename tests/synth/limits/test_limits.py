@@ -22,8 +22,8 @@ from loop_numbers import (
 )
 from scipy.linalg import solve_continuous_lyapunov
 
-from models.basics.checks import InputError
-from models.plant.linear import LinearPlant
+from models.basics import InputError
+from models.plant import LinearPlant
 from synth import (
     Continuous,
     DelayMargin,
@@ -41,10 +41,8 @@ from synth import (
     White,
     tune,
 )
-from synth.limits.limits import Limit
-from synth.loop.assess import Assessment
-from synth.loop.controller import Controller
-from synth.loop.disturbance import disturbances
+from synth.limits import Limit
+from synth.loop import Assessment, Controller, disturbances
 from synth.loop.phasor import constant
 
 WHITE = {"f": White(1.0), "n": White(0.01)}

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from models.basics.checks import InputError
-from synth.loop.disturbance import Disturbance, White, disturbances
+from models.basics import InputError, White
+from synth.loop import Disturbance, disturbances
 
 OMEGA = np.geomspace(0.1, 10.0, 9)
 

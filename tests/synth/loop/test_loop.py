@@ -8,18 +8,22 @@ import pytest
 from loop_numbers import ComplexArray, FloatArray, closed_matrices, loop_response
 from numpy.typing import NDArray
 
-from models.plant.linear import LinearPlant
-from synth.loop.controller import Controller, closed_loop_matrix, closed_loop_poles
-from synth.loop.element import DragElement, with_drag
-from synth.loop.loop import (
+from models.plant import LinearPlant
+from synth.loop import (
     Blocks,
+    Controller,
+    DragElement,
+    Phasor,
     close_scalar,
     closed_loop,
+    closed_loop_matrix,
+    closed_loop_poles,
     determinant,
     numeric_blocks,
     return_differences,
+    with_drag,
 )
-from synth.loop.phasor import Phasor, constant, squared_magnitude
+from synth.loop.phasor import constant, squared_magnitude
 
 OMEGA = np.geomspace(0.05, 30.0, 25)
 

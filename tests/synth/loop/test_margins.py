@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from loop_numbers import loop_response, stable_with, two_carts
 
-from synth.loop.controller import Controller
-from synth.loop.margins import Margins, loop_margins, refine_minima, worst_margins
+from synth.loop import Controller, Margins, loop_margins, refine_minima
+from synth.loop.margins import worst_margins
 
 GRID = np.geomspace(1e-4, 1e4, 1500)
 

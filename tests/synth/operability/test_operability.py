@@ -13,22 +13,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from models import Case, InputError, load_case
-from models.basics.metrics import peak_factor
-from models.basics.quadrature import Quadrature
-from models.hook.hook import HookMotion
-from models.plant.plant_data import PlantData
+from models.basics import Quadrature, peak_factor
+from models.hook import HookMotion
+from models.plant import PlantData
 from synth import GainDesign, evaluate_gains
-from synth.design.structure_design import StructureDesign
-from synth.loop.assess import Assessment
-from synth.operability import operability
+from synth.design import StructureDesign
+from synth.loop import Assessment
+from synth.operability import Criterion, operability
 from synth.operability.asked import asked_of
 from synth.operability.capability import capability
 from synth.operability.columns import SeaColumn, sea_column
-from synth.operability.criteria import Criterion, Moments, case_criteria, payload_criteria
+from synth.operability.criteria import Moments, case_criteria, payload_criteria
 from synth.operability.depths import rope_state
 from synth.operability.limiting import SeaStates, limiting_heights
 from synth.operability.recheck import evaluate_in
-from synth.question.question import pose, uncompensated
+from synth.question import pose, uncompensated
 
 pytestmark = pytest.mark.filterwarnings("ignore::models.basics.physics_warning.PhysicsWarning")
 

@@ -15,18 +15,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from models import InputError, load_case
-from models.sea.scatter import Scatter
+from models.sea import Scatter
 from models.sea.scatter_files import write_scatter
 from stillhook.cli import main
 from stillhook.commands.study.operability import parse_axis
-from stillhook.seas.operability_plot import capability_figure, contour_figure, depth_figure
-from stillhook.seas.operability_site_plot import heading_figure, scatter_figure
-from stillhook.seas.operability_text import netcdf
-from synth.operability import operability
-from synth.operability.contour import Contour, over_headings
+from stillhook.seas import (
+    capability_figure,
+    contour_figure,
+    depth_figure,
+    heading_figure,
+    netcdf,
+    scatter_figure,
+)
+from synth.operability import Contour, Operability, operability
+from synth.operability.contour import over_headings
 from synth.operability.criteria import STABILITY
 from synth.operability.example_site import example_scatter
-from synth.operability.result import Operability
 from synth.operability.rules import RULES
 from synth.operability.workable import class_width, rule_shares, workable
 
@@ -237,7 +241,7 @@ def test_the_tree_and_the_table_hold_every_contour() -> None:
 
 @pytest.mark.parametrize("kind", ["contour", "capability", "scatter", "headings", "depths"])
 def test_every_figure_can_be_drawn(kind: str) -> None:
-    from stillhook.text.style import picture
+    from stillhook.text import picture
 
     draw = {
         "contour": contour_figure,

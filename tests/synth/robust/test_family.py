@@ -10,10 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from models import load_case
-from models.basics.checks import InputError
-from models.plant.plant_data import PlantData
-from synth.loop.assess import Assessment
-from synth.robust.family import Choice, Family, Member, SeaState, read_scatter
+from models.basics import InputError
+from models.plant import PlantData
+from synth.loop import Assessment
+from synth.robust import Choice, Family, SeaState, read_scatter
+from synth.robust.family import Member
 from synth.robust.family_plants import FamilyPlants
 from synth.robust.plant_stack import numbers_of
 from synth.robust.worst_case import draw_check, exact_figures, figures_of

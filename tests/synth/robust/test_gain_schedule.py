@@ -7,10 +7,11 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from models import load_case
-from models.basics.checks import InputError
-from synth.loop.controller import closed_loop_poles
-from synth.question.question import assess_gains, pose
-from synth.robust.schedule import GainSchedule, blend_of, schedule_gains
+from models.basics import InputError
+from synth.loop import closed_loop_poles
+from synth.question import assess_gains, pose
+from synth.robust import GainSchedule, schedule_gains
+from synth.robust.gain_schedule import blend_of
 
 
 @pytest.fixture(scope="module")

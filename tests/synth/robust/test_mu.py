@@ -14,12 +14,12 @@ from scipy.optimize import linprog
 
 import stillhook as sh
 from models import load_case
-from models.basics.checks import InputError
-from models.plant.linear import LinearPlant
+from models.basics import InputError
+from models.plant import LinearPlant
 from stillhook.cli import main
 from stillhook.commands.design.margins import parse_off
-from synth.loop.controller import Controller, closed_loop_poles
-from synth.robust.mu import robustness
+from synth.loop import Controller, closed_loop_poles
+from synth.robust import robustness
 from synth.robust.mu_doubts import Doubt, doubts_of
 from synth.robust.mu_plant import UncertainLoop, uncertain_loop
 from synth.robust.mu_search import critical_point, grid_of, proved_bound

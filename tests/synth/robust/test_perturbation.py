@@ -8,12 +8,12 @@ import pytest
 from loop_numbers import double_integrator, integrator, two_carts, with_full_state
 
 from models import load_case
-from models.basics.checks import InputError
+from models.basics import InputError
 from synth import PayloadFeedback, StaticGain, Structure
-from synth.loop.controller import Controller, closed_loop_poles
-from synth.question.question import pose
-from synth.robust.perturbation import gain_radius
-from synth.structures.structure import Law, Parameter
+from synth.loop import Controller, closed_loop_poles
+from synth.question import pose
+from synth.robust import gain_radius
+from synth.structures import Law, Parameter
 
 GAINS = (50.0, 100.0, 100.0)
 

@@ -10,15 +10,13 @@ from loop_numbers import lyapunov_cost, oscillator, with_full_state
 from scipy.optimize import minimize
 
 from models import load_case
-from models.basics.checks import InputError
+from models.basics import InputError
 from stillhook.cli import main
 from synth import MaxSensitivity, StaticGain, White
-from synth.loop.controller import Controller
-from synth.loop.disturbance import disturbances
-from synth.question.family_problem import FamilyProblem, Objective, Scenario
-from synth.question.problem import Problem
-from synth.robust.family import Family
-from synth.robust.robust import optimise_robust, tune_family
+from synth.loop import Controller, disturbances
+from synth.question import FamilyProblem, Objective, Problem, Scenario
+from synth.robust import Family, optimise_robust
+from synth.robust.robust import tune_family
 from synth.robust.worst_case import exact_figures
 
 WEIGHTS = {"x": 1.0, "effort": 1e-2}

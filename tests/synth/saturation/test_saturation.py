@@ -16,14 +16,13 @@ from hypothesis import strategies as st
 
 import stillhook as sh
 from models import build_plant
-from models.plant.drive import DriveLimits
-from models.simulation.simulate import run_simulation
-from models.simulation.simulation import prepare
-from synth.loop.controller import Controller, closed_loop_poles
+from models.plant import DriveLimits
+from models.simulation import prepare, run_simulation
+from synth.loop import Controller, closed_loop_poles
 from synth.saturation.describing import bias_for, gaussian_response, sine_response
 from synth.saturation.limit_cycles import clipped_harmonics, limit_cycles
 from synth.saturation.torque_loop import TorqueLoop
-from synth.structures.sampling import sampled_loop
+from synth.structures import sampled_loop
 
 sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks"))
 try:

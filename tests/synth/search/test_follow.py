@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 
 from models import load_case
-from models.basics.threads import one_thread
-from synth.question.question import pose
-from synth.search.multistart import search
-from synth.search.nodes import cost_nodes, margin_nodes
-from synth.search.polishing import view_of
-from synth.search.programme import Pace, Programme
+from models.basics import one_thread
+from synth.question import pose
+from synth.search import Pace, Programme, cost_nodes, margin_nodes, search, view_of
 
 CASES = {
     "one spring": ("thesis-1975", {}),

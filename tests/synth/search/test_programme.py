@@ -14,8 +14,8 @@ from loop_numbers import (
     with_full_state,
 )
 
-from models.basics.quadrature import Quadrature
-from models.plant.linear import LinearPlant
+from models.basics import Quadrature
+from models.plant import LinearPlant
 from synth import (
     Continuous,
     DelayMargin,
@@ -32,12 +32,10 @@ from synth import (
     StaticGain,
     White,
 )
-from synth.loop.assess import Assessment
-from synth.loop.disturbance import disturbances
-from synth.question.problem import Goal, Problem
-from synth.search.nodes import cost_nodes
-from synth.search.programme import Programme
-from synth.structures.structure import Structure
+from synth.loop import Assessment, disturbances
+from synth.question import Goal, Problem
+from synth.search import Programme, cost_nodes
+from synth.structures import Structure
 
 OMEGA = np.geomspace(1e-3, 1e3, 60)
 LIMITS = (

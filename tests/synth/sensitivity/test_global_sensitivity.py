@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.basics.checks import InputError
+from models.basics import InputError
 from models.spread import Spread, Uniform
 from synth.sensitivity.global_indices import indices_of
 from synth.sensitivity.screening import effects_of

@@ -9,9 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import stillhook as sh
-from models.basics.checks import InputError
-from models.plant.plant import build_plant
-from models.plant.plant_data import PlantData
+from models.basics import InputError
+from models.plant import PlantData, build_plant
 from synth.sensitivity import sensitivity
 from synth.sensitivity.differences import derivative
 from synth.sensitivity.fields import numbers_of

@@ -7,8 +7,9 @@ import math
 import pytest
 
 import stillhook as sh
-from models.basics.checks import InputError
-from synth.sizing.codesign import CoDesign, gear_changes
+from models.basics import InputError
+from synth.sizing import CoDesign
+from synth.sizing.codesign import gear_changes
 from synth.sizing.follow import Answer, Posed, begin_from, follow, slope
 
 STRUCTURE = "payload-feedback"

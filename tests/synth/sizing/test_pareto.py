@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from models import load_case
-from models.basics.checks import InputError
-from models.basics.threads import one_thread
+from models.basics import InputError, one_thread
 from synth import Rms, optimise_gains
-from synth.question.question import pose
-from synth.search.multistart import search
-from synth.sizing.pareto import pareto_front
+from synth.question import pose
+from synth.search import search
+from synth.sizing import pareto_front
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,10 @@ from dataclasses import replace
 import pytest
 
 import stillhook as sh
-from synth.sizing import purchase
+from synth.sizing import Worth, purchase
 from synth.sizing.follow import Posed, begin_from, follow
-from synth.sizing.purchase import Worth
 from synth.sizing.purchase_items import limit_items, part_items
-from synth.structures.winch_structures import structure_named
+from synth.structures import structure_named
 
 LATE = {"sensors.telemetry.delay": "50 ms"}
 HARD = {

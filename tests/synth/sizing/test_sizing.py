@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 import stillhook as sh
-from models.basics.checks import InputError
+from models.basics import InputError
+from synth.sizing import Sizing
 from synth.sizing.catalogue import read_catalogue
 from synth.sizing.motor import MotorData, with_motor
 from synth.sizing.point import _next, target_of
-from synth.sizing.sizing import Sizing
 
 TARGET = 0.15
 CALM = {"sea.significant_height": 1.0}

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synth.loop.phasor import Phasor
+from synth.loop import Phasor
 from synth.structures.blocks import Integral, LeadLag, LeadTime, Notch, RollOff, Section, series
 
 SECTIONS: dict[str, Section] = {

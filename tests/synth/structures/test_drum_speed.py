@@ -9,12 +9,10 @@ import pytest
 from linear_runs import linear_run, still
 
 from models import Case, load_case
-from models.basics.checks import InputError, SynthesisError
-from models.plant.plant import build_plant
-from models.sensing.control import Measurement
-from synth.structures.drum_speed import DrumSpeedLoop
-from synth.structures.recursive import RecursiveController
-from synth.structures.sampling import sampled_loop
+from models.basics import InputError, SynthesisError
+from models.plant import build_plant
+from models.sensing import Measurement
+from synth.structures import DrumSpeedLoop, RecursiveController, sampled_loop
 
 
 def torque_commanded() -> Case:

@@ -20,16 +20,13 @@ from loop_numbers import (
 from scipy.integrate import quad
 from scipy.stats import qmc
 
-from models.basics.checks import InputError, SynthesisError
-from models.plant.linear import LinearPlant
-from synth.loop.controller import Controller
-from synth.loop.disturbance import Disturbance, White, disturbances
-from synth.loop.phasor import Phasor
-from synth.question.problem import Problem
+from models.basics import InputError, SynthesisError, White
+from models.plant import LinearPlant
+from synth.loop import Controller, Disturbance, Phasor, disturbances
+from synth.question import Problem
 from synth.search.starts import candidates, crossover_grid
-from synth.structures.low_order import LowOrder
-from synth.structures.lqg import designs, lqg, reduced, regulator, weighing
-from synth.structures.structure import Law
+from synth.structures import Law, LowOrder, reduced, weighing
+from synth.structures.lqg import designs, lqg, regulator
 from synth.structures.whitened import whitened
 
 WHITE = {"f": White(1.0), "n": White(0.01)}

@@ -7,14 +7,11 @@ import pytest
 from linear_runs import linear_run, sine_part, swell
 
 from models import load_case
-from models.basics.checks import InputError
-from models.plant.plant import build_plant
-from synth.controllers.constant_tension import ConstantTension
-from synth.controllers.feed_forward import VelocityFeedForward
-from synth.controllers.linear_feedback import LinearFeedback
-from synth.loop.controller import Controller, closed_loop_matrix
-from synth.structures.drum_speed import DrumSpeedLoop
-from synth.structures.sampling import sampled_loop
+from models.basics import InputError
+from models.plant import build_plant
+from synth.controllers import ConstantTension, LinearFeedback, VelocityFeedForward
+from synth.loop import Controller, closed_loop_matrix
+from synth.structures import DrumSpeedLoop, sampled_loop
 
 DRAG = 3e4  # so much that transients end within the run [N s/m]
 GAINS = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}

@@ -11,14 +11,13 @@ from loop_numbers import double_integrator, integrator, two_carts, with_full_sta
 from scipy.linalg import solve_continuous_are
 from scipy.stats import qmc
 
-from models.basics.checks import InputError
-from models.plant.linear import LinearPlant
-from synth.loop.controller import closed_loop_matrix
-from synth.loop.disturbance import White, disturbances
-from synth.loop.phasor import Phasor
-from synth.question.problem import Problem
+from models.basics import InputError, White
+from models.plant import LinearPlant
+from synth.loop import Phasor, closed_loop_matrix, disturbances
+from synth.question import Problem
 from synth.search.starts import candidates, crossover_grid, pick_spread, stabilise
-from synth.structures.structure import Law, PayloadFeedback, StaticGain, gain_scales
+from synth.structures import Law, PayloadFeedback, StaticGain
+from synth.structures.structure import gain_scales
 
 
 def problem(plant: LinearPlant, law: Law, minimise: dict[str, float] | None = None) -> Problem:

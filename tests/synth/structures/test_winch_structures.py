@@ -11,20 +11,17 @@ import pytest
 from scipy.stats import qmc
 
 from models import Case, load_case
-from models.basics.checks import InputError
-from models.plant.drive import DriveLimits
-from models.simulation.simulate import run_simulation
-from models.simulation.simulation import prepare
+from models.basics import InputError
+from models.plant import DriveLimits
+from models.simulation import prepare, run_simulation
 from synth import optimise_gains
-from synth.controllers.linear_feedback import LinearFeedback
-from synth.design.structure_design import StructureDesign
-from synth.design.structure_search import optimise_structure
-from synth.loop.controller import closed_loop_matrix
-from synth.loop.phasor import Phasor
-from synth.question.structure_question import pose_structure
+from synth.controllers import LinearFeedback
+from synth.design import StructureDesign, optimise_structure
+from synth.loop import Phasor, closed_loop_matrix
+from synth.question import pose_structure
 from synth.search.starts import candidates
-from synth.structures.winch_structures import structure_named, structure_names
-from synth.verify.verification import Check
+from synth.structures import structure_named, structure_names
+from synth.verify import Check
 
 OMEGA = np.geomspace(0.05, 30.0, 11)
 DIAGRAMS = [name for name in structure_names() if not name.startswith("low-order")]
@@ -296,7 +293,7 @@ def test_simulated_combined_structure_has_the_predicted_rms(crane: Case) -> None
 
 
 def pose_plant(case: Case, drag: float) -> object:
-    from models.sensing.plant import sensed_plant
+    from models.sensing import sensed_plant
 
     return sensed_plant(case, drag=drag).select(
         measurements=structure_named("combined", case).measurements

@@ -12,22 +12,26 @@ import pytest
 from designs import THESIS_GAINS, thesis_design, unstable_design
 
 from models import load_case
-from models.basics.checks import InputError
-from models.basics.quadrature import Quadrature, spectral_nodes
-from models.case.case import Case
-from models.hook.hook import HookMotion
-from models.plant.drag import consistent_drag
-from models.plant.plant_data import PlantData
+from models.basics import InputError, Quadrature, spectral_nodes
+from models.case import Case
+from models.hook import HookMotion
+from models.plant import PlantData, consistent_drag
 from models.spread import LogNormal, Samples, Spread, Uniform
 from synth import GainDesign, evaluate_gains
-from synth.design.structure_search import optimise_structure
-from synth.loop.assess import Assessment
-from synth.question.question import Question, pose
-from synth.sweeps.dataset import case_of, spread_of
-from synth.sweeps.frequency import FrequencyEngine, frequency_chunks, frequency_sweep
-from synth.sweeps.metrics import DEFAULT, METRICS
+from synth.design import optimise_structure
+from synth.loop import Assessment
+from synth.question import Question, pose
+from synth.sweeps import (
+    METRICS,
+    FrequencyEngine,
+    case_of,
+    frequency_sweep,
+    gain_tolerance,
+    spread_of,
+)
+from synth.sweeps.frequency import frequency_chunks
+from synth.sweeps.metrics import DEFAULT
 from synth.sweeps.numbers import numbers_of
-from synth.sweeps.tolerance import gain_tolerance
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -10,21 +10,20 @@ import pytest
 from designs import thesis_design
 
 from models import load_case
-from models.plant.plant import build_plant
-from models.plant.rope import lump_rope
+from models.plant import build_plant, lump_rope
 from models.spread import LogNormal, Normal, Spread
 from synth import evaluate_gains
-from synth.loop.controller import closed_loop_poles
-from synth.question.question import pose
-from synth.structures.structure import PayloadFeedback
+from synth.loop import closed_loop_poles
+from synth.question import pose
+from synth.structures import PayloadFeedback
+from synth.sweeps import FrequencyEngine
 from synth.sweeps.calming import calming_drag
 from synth.sweeps.chain import ChainLoops
-from synth.sweeps.frequency import FrequencyEngine
 from synth.sweeps.kernel import hurwitz
 from synth.sweeps.numbers import numbers_of
 from synth.sweeps.sweep_nodes import sweep_nodes
 from synth.sweeps.winding_count import count_unstable, peak_sensitivity
-from synth.verify.recompute import LawMatrices
+from synth.verify import LawMatrices
 from synth.verify.winding import count_unstable as wind_one
 
 FloatArray = npt.NDArray[np.float64]

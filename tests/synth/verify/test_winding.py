@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 
 from models import load_case
-from models.plant.line import line_response_at
-from models.plant.linear import LinearPlant
-from models.plant.plant import build_plant
-from models.plant.plant_data import PlantData
+from models.plant import LinearPlant, PlantData, build_plant, line_response_at
+from synth.verify import LawMatrices, Loop, closed_matrices, winding_of_plant
 from synth.verify.nyquist import Curve, largest
-from synth.verify.recheck import closed_loop_marks, winding_of_plant
-from synth.verify.recompute import LawMatrices, Loop, closed_matrices
+from synth.verify.recheck import closed_loop_marks
 from synth.verify.winding import count_unstable, lively, open_loop_poles, trace
 
 
