@@ -16,7 +16,7 @@ PIP_INSTALL := $(PY) -m pip install --quiet --disable-pip-version-check -c const
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo test test-all lint bench docs clean
+.PHONY: help demo test test-ci test-all lint bench docs studies clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F'\t' '{printf "make %-9s %s\n", $$1, $$2}'
@@ -24,10 +24,13 @@ help:  ## list the targets
 demo: $(VENV)/.installed  ## install, then find the gains of the bundled subsea crane
 	$(VENV)/bin/stillhook optimise subsea-crane --out out/subsea-crane
 
-test: $(VENV)/.installed-dev  ## the tests, without those marked slow
+test: $(VENV)/.installed-dev  ## the tests of every change, within 6 minutes on two cores
 	$(PY) -m pytest $(PYTEST_ARGS)
 
-test-all: $(VENV)/.installed-dev  ## the tests, the slow ones too
+test-ci: $(VENV)/.installed-dev  ## notebooks, pages, whole studies: what CI runs after those
+	$(PY) -m pytest -m "ci and not slow" $(PYTEST_ARGS)
+
+test-all: $(VENV)/.installed-dev  ## all tests
 	$(PY) -m pytest -m "slow or not slow" $(PYTEST_ARGS)
 
 lint: $(VENV)/.installed-dev  ## ruff, mypy --strict and the import contract

@@ -84,6 +84,7 @@ def test_python_control_makes_the_same_loop(name, gains, peers, request):
     assert by_control[3] == pytest.approx(slow[0], rel=1e-4)
 
 
+@pytest.mark.ci
 def test_fixed_drag_is_the_plants_own(rope, peers):
     fixed = replace(rope, drag=None)
     log_rms, *_ = peers.SampledLoop(fixed).measure(ROPE_GAINS[:1].T)
@@ -92,6 +93,7 @@ def test_fixed_drag_is_the_plants_own(rope, peers):
     assert rope.exact(ROPE_GAINS[0]).rms > 1.01 * np.exp(log_rms[0])
 
 
+@pytest.mark.ci
 def test_small_run_ends_in_a_row_of_each_table(spring, synthesis):
     effort = synthesis.Effort(
         runs=1,

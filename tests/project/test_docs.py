@@ -22,6 +22,17 @@ import pytest
 ROOT = Path(__file__).parents[2]
 DOCS = sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "examples").glob("*.md")])
 PAGES = [path for path in [ROOT / "README.md", *DOCS] if path.exists()]
+#: Pages that run studies of seconds: CI's.
+STUDIES = {
+    "compare",
+    "quickstart",
+    "robust",
+    "simulation",
+    "sizing",
+    "structures",
+    "sweeps",
+    "tune_any_plant",
+}
 FENCE = re.compile(r"^(?P<fence>```+)(?P<language>[^`\s]*)[^`]*$")
 REMARK = re.compile(r"^<!-- (?P<what>not run|exit status): (?P<value>.+?) -->$")
 LINK = re.compile(r"!?\[[^\]]*\]\((?P<target>[^)\s]+)\)")
@@ -135,7 +146,13 @@ def run_commands(block: Block, path: Path) -> None:
         assert (status or 0) == wanted, f"{where}: exit status {status}, not {wanted}"
 
 
-@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, marks=[pytest.mark.ci] if path.stem in STUDIES else [], id=path.name)
+        for path in PAGES
+    ],
+)
 def test_page_does_what_it_says(path, tmp_path):
     namespace: dict[str, object] = {"__name__": "__main__"}
     with contextlib.chdir(tmp_path):

@@ -47,6 +47,7 @@ def test_agrees_with_its_text(path):
     assert stored == [(cell.cell_type, cell.source) for cell in text.cells]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_runs_without_a_warning(path):
     pytest.importorskip("ipykernel")

@@ -30,6 +30,7 @@ def evaluate(travel: DrumTravel, angle: np.ndarray) -> tuple[np.ndarray, np.ndar
 layers = st.lists(st.tuples(st.floats(0.5, 20.0), st.floats(0.5, 2.0)), max_size=3)
 
 
+@pytest.mark.ci
 @given(layers, layers)
 def test_haul_is_the_integral_of_the_radius_in_use(
     outward: list[tuple[float, float]], inward: list[tuple[float, float]]

@@ -146,6 +146,7 @@ def test_at_rest_nothing_moves() -> None:
         assert np.abs(run["motor.speed"]).max() < 1e-7
 
 
+@pytest.mark.ci
 @settings(max_examples=10)
 @given(
     height=st.floats(0.2, 6.0),
@@ -405,6 +406,7 @@ def test_a_lost_link_is_held_and_shown() -> None:
     assert run.completed
 
 
+@pytest.mark.ci
 def test_a_day_needs_little_memory() -> None:
     case = thesis()
     simulation = prepare(case, feedback(case, THESIS, 0.1))

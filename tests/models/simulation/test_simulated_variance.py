@@ -96,6 +96,7 @@ def _rms(rows: dict[str, np.ndarray], hook: HookMotion, omega: np.ndarray) -> di
     }
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", CASES)
 def test_simulated_variance_is_within_three_standard_errors_of_the_spectral_value(
     name: str,
@@ -124,6 +125,7 @@ def test_simulated_variance_is_within_three_standard_errors_of_the_spectral_valu
         assert error < 0.05 * expected[signal] ** 2, signal  # or the test says little
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("height", [1.0, 2.5])
 def test_stochastic_drag_predicts_the_rms_that_quadratic_drag_leaves(height: float) -> None:
     # On the same seeds as a linear plant with that drag: what is left is the linearisation.

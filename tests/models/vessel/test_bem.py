@@ -26,6 +26,8 @@ from models.vessel.hull.hydrostatics import Loading, Waterplane, mass_matrix, st
 from models.vessel.hull.lid import waterplane_lid
 from models.vessel.hull.vessel import well_spaced
 
+pytestmark = pytest.mark.ci  # whole optimisations in fixtures
+
 BOX = box_hull(60.0, 14.0, 4.0, panels=120)
 PLANE = Waterplane.of(BOX)
 LOADING = Loading.of(PLANE, gm=1.5)

@@ -113,6 +113,7 @@ def take(path: Path, kind: str | None) -> VesselRaos | None:
     return found
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_damaged_file_of_any_format_is_refused_or_read(
     change: Callable[[bytes, random.Random], bytes], tmp_path: Path

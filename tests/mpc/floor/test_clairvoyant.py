@@ -181,6 +181,7 @@ def test_power_is_limited_on_the_outside_of_its_hyperbola() -> None:
     assert ends[[0, -1]] == pytest.approx([1.0, 1.0])
 
 
+@pytest.mark.ci
 def test_simulated_feedback_stays_above_the_floor() -> None:
     case = case_at(1.6)
     source = SpectrumMotion.from_case(case)

@@ -47,6 +47,7 @@ def saturated() -> Refinement:
     return refined(1.9, 90.0, 1)
 
 
+@pytest.mark.ci
 def test_the_nonlinear_optimum_is_close_to_the_linear_floor(saturated: Refinement) -> None:
     assert saturated.floor.shares["torque"] > 0.1
     assert saturated.payload_rms > 2e-3

@@ -307,6 +307,7 @@ def test_it_holds_where_the_thesis_loses_lock():
     assert ours.statistics.value("payload rms") < 0.01
 
 
+@pytest.mark.ci
 def test_preview_beats_the_seas_own_forecast_and_that_beats_none():
     case = case_of("thesis-1975", 1.9)
     rms = {}
@@ -433,6 +434,7 @@ def random_measurement(rng: np.random.Generator, controller: LinearMPC) -> Measu
     return Measurement.of(values)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", ["thesis-1975", "subsea-crane"])
 def test_whatever_is_measured_every_command_is_finite_and_within_limits(name):
     controller = controller_of(name, thermal=True)

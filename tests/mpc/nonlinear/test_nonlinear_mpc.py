@@ -325,6 +325,7 @@ def case_tension(controller: LinearMPC) -> float:
     return controller.model.winch.rest_tension
 
 
+@pytest.mark.ci
 def test_torque_that_is_a_mean_is_worth_having_where_the_drive_saturates(thesis: sh.Case) -> None:
     rms = {}
     for mean in (False, True):

@@ -45,6 +45,7 @@ def highest_growth(name: str, weights: Weights, stiffness: float, share: float) 
     )
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("name", "weights"), [("thesis-1975", WEIGHTS["thesis-1975"]), ("thesis-1975-rope", ROPE)]
 )
@@ -144,6 +145,7 @@ def test_a_slow_error_of_five_centimetres_that_nobody_spoke_of_does_not_lose_the
     assert run.statistics.value("tracking error rms") < 5e-3
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("mismatch", ["payload=-30%", "E=+30%"])
 def test_a_lighter_load_or_a_stiffer_rope_makes_no_limit_cycle_where_the_drive_saturates(mismatch):
     from stillhook.comparison.mismatch import Mismatch
@@ -157,6 +159,7 @@ def test_a_lighter_load_or_a_stiffer_rope_makes_no_limit_cycle_where_the_drive_s
     assert rms[1] < 2.0 * rms[0] < 0.02
 
 
+@pytest.mark.ci
 def test_only_who_knows_the_future_plans_on_the_rope_that_is_there():
     case = case_of("thesis-1975", 1.25)
     causal, told = (sh.LinearMPC(case, predictor=kind) for kind in ("kalman", "preview"))

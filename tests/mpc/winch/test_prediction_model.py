@@ -282,6 +282,7 @@ def test_a_drive_saturates_where_the_sea_asks_for_more_than_its_peak():
     assert not saturates(prediction_model(case_of("subsea-crane")))
 
 
+@pytest.mark.ci
 def test_margins_that_no_weights_have_are_said_to_be_out_of_reach():
     with pytest.raises(SolverError, match=r"no weights are stable .* with M_s <= 1\.0001"):
         tune_weights(case_of("thesis-1975", 0.5), max_sensitivity=1.0001)

@@ -614,6 +614,7 @@ def test_an_interrupt_that_is_swallowed_comes_again():
     assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
 
 
+@pytest.mark.ci
 @main_thread
 def test_ctrl_c_in_the_midst_of_the_search(tmp_path):
     started = subprocess.Popen(

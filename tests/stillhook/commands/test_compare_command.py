@@ -135,6 +135,7 @@ def test_nobody_who_can_take_part_is_not_ok(run):
     assert "the case subsea-crane has no gains in use" in ending.out
 
 
+@pytest.mark.ci
 def test_ctrl_c_keeps_what_is_there_and_the_same_command_goes_on(tmp_path):
     words = [sys.executable, "-m", "stillhook", *CALM, *WHO, "--no-figures", "--out", "here"]
     words += ["--seeds", "200", "--duration", "1 h", "--jobs", "2"]

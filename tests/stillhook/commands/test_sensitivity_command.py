@@ -37,6 +37,7 @@ def test_a_study_ends_well_and_fills_its_folder(tmp_path, monkeypatch, capsys, s
     assert (by_path[list(study.without_effect)] == 0.0).all()
 
 
+@pytest.mark.ci
 def test_ranges_are_studied_too(tmp_path, capsys):
     words = ["--vary", "payload.mass=30%", "--vary", "gains.a1=10%", "--samples", "64"]
     assert main(["sensitivity", "thesis-1975", *words, "--out", str(tmp_path / "out")]) == 0
@@ -48,6 +49,7 @@ def test_ranges_are_studied_too(tmp_path, capsys):
     assert (tmp_path / "out" / "indices.png").stat().st_size > 1000
 
 
+@pytest.mark.ci
 def test_quietly_it_says_one_sentence(tmp_path, capsys, study):
     assert (
         main(["sensitivity", "thesis-1975", "--quiet", "--second", "0", "--out", str(tmp_path)])

@@ -10,6 +10,8 @@ import stillhook as sh
 from stillhook.cli import main
 from stillhook.designs import load_structure
 
+pytestmark = pytest.mark.ci  # whole optimisations in fixtures
+
 CALM = ["--set", "sea.significant_height=1"]
 
 

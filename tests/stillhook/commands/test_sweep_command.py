@@ -80,6 +80,7 @@ def test_the_command_and_the_library_agree(tmp_path):
     assert np.array_equal(table["sensors.telemetry.delay"], found["sensors.telemetry.delay"])
 
 
+@pytest.mark.ci
 def test_a_case_that_does_not_hold_is_told_by_the_exit_status(tmp_path, capsys):
     words = ["--samples", 2, "--vary", "sea.significant_height=2.4..2.5", "--no-figures"]
     status = run("thesis-1975", "--mode", "time", "--duration", "1 min", *words, "--out", tmp_path)

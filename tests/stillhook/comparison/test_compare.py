@@ -130,6 +130,7 @@ def test_a_run_is_that_of_simulate_with_the_same_seed():
             assert cell.quantities["motor torque rms"] == run.statistics.value("motor torque rms")
 
 
+@pytest.mark.ci
 def test_runs_shared_by_processes_are_those_of_one_process_to_the_bit():
     who = ["none", "feed-forward", ("listener", listener)]
     alone = sh.compare(CASE, who, jobs=1, **FAST)
@@ -239,6 +240,7 @@ def test_another_contender_of_the_same_name_is_run_anew(tmp_path, monkeypatch):
 # contenders that fail
 
 
+@pytest.mark.ci
 def test_a_process_that_dies_costs_its_own_runs_only_and_is_tried_twice(monkeypatch):
     made = []
     begin = compare_work.Pool.submit

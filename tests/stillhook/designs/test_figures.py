@@ -178,6 +178,7 @@ def test_a_loop_without_gains_has_no_nyquist_curve():
         nyquist(loopless_design())
 
 
+@pytest.mark.ci
 def test_figures_leave_matplotlib_as_it_was_and_need_no_pyplot():
     before = dict(mpl.rcParams)
     picture(limits(thesis_design()), "png")

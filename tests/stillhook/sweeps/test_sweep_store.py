@@ -216,6 +216,7 @@ def test_a_controller_in_python_is_gone_on_with_by_the_same_call(tmp_path):
         sweep(("linear", sweep_pilots.told), SPREAD, store=tmp_path / "s", **HOW)
 
 
+@pytest.mark.ci
 def test_a_design_is_gone_on_with_from_the_store_alone(tmp_path):
     gains = {name: getattr(CASE.gains, name) for name in ("A", "a", "a1", "a2")}
     design = sh.evaluate_gains(CASE, {**gains, "a2": 90.0})
@@ -225,6 +226,7 @@ def test_a_design_is_gone_on_with_from_the_store_alone(tmp_path):
     assert same(resume_sweep(tmp_path / "s", engine="serial"), there) == []
 
 
+@pytest.mark.ci
 def test_a_small_sweep_fits_one_netcdf_file(tmp_path, whole):
     path = tmp_path / "s.nc"
     sweep("feedback", SPREAD, store=path, progress=stopping(7), **HOW)

@@ -117,6 +117,7 @@ def test_a_process_that_is_killed_loses_nothing(alone):
     assert same(alone, found) == []
 
 
+@pytest.mark.ci
 def test_a_case_that_kills_every_process_is_told_and_the_others_are_run():
     spread = {"payload.mass": Uniform(36e3, 44e3)}
     found = sweep(
@@ -248,6 +249,7 @@ def test_gains_vary_about_those_of_the_design():
     assert found["seed"][0] == found["seed"][1]
 
 
+@pytest.mark.ci
 def test_what_became_of_a_case_is_told():
     # In its own sea the thesis's loop saturates, and the payload moves more than the hook.
     rough = sweep(

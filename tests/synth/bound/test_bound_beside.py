@@ -165,6 +165,7 @@ def test_bound_is_below_the_thesis_winch_with_a_noisy_reference(name: str, struc
     holds(design.bound)
 
 
+@pytest.mark.ci
 def test_both_numbers_stand_on_the_terms_of_the_design() -> None:
     design = crane()
     found = design.bound
@@ -185,6 +186,7 @@ def test_rms_by_another_quadrature() -> None:
     assert other.sigma("payload.displacement") == pytest.approx(found.rms, rel=1e-4)
 
 
+@pytest.mark.ci
 def test_no_limit_of_the_bound_is_tighter_than_what_the_design_uses() -> None:
     tight = crane().case.replace(TIGHT)
     design = sh.evaluate_gains(tight, CRANE_GAINS)

@@ -54,6 +54,7 @@ def test_without_margins_it_comes_down_to_the_bound(bound: Bound) -> None:
     assert found[2] < 1.03 * bound.value
 
 
+@pytest.mark.ci
 def test_with_a_limit_on_sensitivity(bound: Bound) -> None:
     found = [youla_design(bound, max_sensitivity=1.6, functions=n) for n in (12, 16, 24)]
     values = [design.value for design in found]

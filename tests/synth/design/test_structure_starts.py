@@ -88,6 +88,7 @@ def search_cost(problem, values) -> float:
     return view.sigma("payload.displacement")
 
 
+@pytest.mark.ci
 def test_a_better_point_that_is_known_is_not_lost(late):
     posed = pose_structure(late, "drum-feedback")
     problem = posed.problem(posed.limits)

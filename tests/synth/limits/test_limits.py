@@ -316,6 +316,7 @@ def test_limit_that_does_not_bind_changes_nothing_and_costs_nothing() -> None:
         assert use.price < 1e-6 * free.cost
 
 
+@pytest.mark.ci
 def test_limits_that_exclude_each_other_are_a_failure_that_names_them() -> None:
     # x'' = 1.5 x + ...: without a certain effort the mass cannot be held at all.
     limits = [Rms(output="u_sent", bound=0.5), MaxSensitivity(bound=2.0)]
@@ -344,6 +345,7 @@ def test_several_limits_at_once_are_all_kept() -> None:
     assert high.max() < 0.15 * (1.0 + 1e-4)
 
 
+@pytest.mark.ci
 def test_margins_hold_for_every_loop_of_a_plant_with_two_inputs() -> None:
     plant = with_full_state(two_carts(2))
     # The regulator of a measured state has M_s = 1; a delay spoils it.

@@ -81,6 +81,7 @@ def bisected(design: GainDesign, criterion: Criterion, low: float, high: float) 
     return low
 
 
+@pytest.mark.ci
 def test_the_contour_is_where_single_evaluations_change_sides() -> None:
     study = operability(thesis_design(), periods=[7.0, 11.0], payload_rms=0.05, payload_max="10 cm")
     contour = study.depths[0].contours["loop"]
@@ -93,6 +94,7 @@ def test_the_contour_is_where_single_evaluations_change_sides() -> None:
     assert compared == 8
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", ["payload.rms", "motor.torque.peak"])
 def test_so_it_is_where_the_drag_changes_with_the_sea(name: str) -> None:
     study = operability(dragged(), periods=[11.0], payload_rms=0.2)
@@ -112,6 +114,7 @@ def test_the_response_is_not_linear_in_the_height_where_the_drag_is_not() -> Non
     assert sigma[1] < 3.0 * sigma[0]
 
 
+@pytest.mark.ci
 @settings(max_examples=15, deadline=None)
 @given(st.floats(0.0, 3e5), st.floats(0.4, 9.0))
 def test_responses_at_any_drag_are_those_of_the_plant_with_that_drag(C: float, w: float) -> None:
@@ -196,6 +199,7 @@ def test_with_fixed_drag_the_limit_grows_as_the_bound() -> None:
     assert heights[1] == pytest.approx(2.0 * heights[0], rel=1e-8)
 
 
+@pytest.mark.ci
 @settings(max_examples=8, deadline=None)
 @given(st.floats(0.02, 1.0), st.floats(1.01, 3.0), st.floats(5.0, 14.0))
 def test_a_wider_bound_never_lowers_the_limit(bound: float, factor: float, period: float) -> None:
@@ -212,6 +216,7 @@ def test_a_wider_bound_never_lowers_the_limit(bound: float, factor: float, perio
     assert np.all(high[np.isfinite(low) & (low > 0.0)] > low[np.isfinite(low) & (low > 0.0)])
 
 
+@pytest.mark.ci
 @settings(max_examples=10, deadline=None)
 @given(st.floats(5.0, 14.0), st.floats(0.05, 8.0), st.floats(1.05, 4.0))
 def test_a_higher_sea_moves_everything_more(period: float, height: float, factor: float) -> None:
@@ -345,6 +350,7 @@ def test_a_rope_length_takes_its_layer_with_it() -> None:
     assert rope_state(load_case("thesis-1975")).layer == 0
 
 
+@pytest.mark.ci
 def test_gains_stay_when_the_rope_gets_longer() -> None:
     study = operability(dragged(), periods=[9.0], payload_rms=0.2, depths=[1500.0, 2500.0])
     assert study.depths[0].max_sensitivity != pytest.approx(study.depths[1].max_sensitivity)
@@ -364,6 +370,7 @@ def test_gains_stay_when_the_rope_gets_longer() -> None:
         assert at.max_sensitivity == pytest.approx(view.margins.max_sensitivity, rel=1e-6)
 
 
+@pytest.mark.ci
 def test_an_unstable_loop_works_in_no_sea() -> None:
     with pytest.raises(InputError, match="no stabilising gains"):
         operability(unstable_design(), periods=[8.0])

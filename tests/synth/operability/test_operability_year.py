@@ -265,6 +265,7 @@ def test_axes_are_read_as_ranges_and_lists() -> None:
         parse_axis("--depths", "100..200", None)
 
 
+@pytest.mark.ci
 def test_the_command_writes_tables_and_figures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

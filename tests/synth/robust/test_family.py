@@ -99,6 +99,7 @@ def test_stacked_loops_agree_with_loops_one_by_one(family):
         assert figures.max_sensitivity == pytest.approx(exact.max_sensitivity, rel=1e-4)
 
 
+@pytest.mark.ci
 def test_stacked_loops_agree_where_the_drag_follows_the_response(crane):
     plants = FamilyPlants(crane)
     plants.nominal  # noqa: B018  # sets the number of rope masses

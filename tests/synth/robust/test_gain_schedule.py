@@ -13,6 +13,8 @@ from synth.question import assess_gains, pose
 from synth.robust import GainSchedule, schedule_gains
 from synth.robust.gain_schedule import blend_of
 
+pytestmark = pytest.mark.ci  # whole optimisations in fixtures
+
 
 @pytest.fixture(scope="module")
 def schedule():

@@ -66,6 +66,7 @@ def study(request):
     return sensitivity(thesis_design() if request.param == "thesis" else crane())
 
 
+@pytest.mark.ci
 def test_every_elasticity_is_that_of_finite_differences(study):
     for entry in study.elasticities:
         ours = [getattr(entry, name) for name in FIGURES]
@@ -74,6 +75,7 @@ def test_every_elasticity_is_that_of_finite_differences(study):
         ), entry.path
 
 
+@pytest.mark.ci
 def test_numbers_without_effect_have_none(study):
     view = figures(study._answers.view())
     for path in study.without_effect:
@@ -111,6 +113,7 @@ def test_the_scale_of_the_three_gains_is_the_amplifier():
     assert total == pytest.approx(by_differences, rel=1e-4)
 
 
+@pytest.mark.ci
 def test_a_drum_that_takes_one_more_turn_has_no_elasticity_there():
     # 2.2 m hold 44 turns of 50 mm exactly.
     found = sensitivity(crane())
@@ -137,6 +140,7 @@ def test_second_order_foretells_ten_per_cent_better_than_first():
         assert abs(entry.predicted(0.1) - true) < 0.2 * abs(first - true), entry.path
 
 
+@pytest.mark.ci
 def test_slopes_of_the_matrices_are_those_of_another_linearisation():
     case = crane().case
     slopes = PlantSlopes(case, masses=1, drag=2e4, measurements=None)

@@ -12,6 +12,8 @@ from synth.sizing import CoDesign
 from synth.sizing.codesign import gear_changes
 from synth.sizing.follow import Answer, Posed, begin_from, follow, slope
 
+pytestmark = pytest.mark.ci  # whole optimisations in fixtures
+
 STRUCTURE = "payload-feedback"
 
 

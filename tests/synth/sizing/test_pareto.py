@@ -16,6 +16,8 @@ from synth.question import pose
 from synth.search import search
 from synth.sizing import pareto_front
 
+pytestmark = pytest.mark.ci  # whole optimisations in fixtures
+
 
 @pytest.fixture(scope="module")
 def torque():

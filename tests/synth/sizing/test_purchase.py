@@ -13,6 +13,8 @@ from synth.sizing.follow import Posed, begin_from, follow
 from synth.sizing.purchase_items import limit_items, part_items
 from synth.structures import structure_named
 
+pytestmark = pytest.mark.ci  # whole optimisations in fixtures
+
 LATE = {"sensors.telemetry.delay": "50 ms"}
 HARD = {
     "sea.significant_height": 1.0,

@@ -14,6 +14,8 @@ from synth.sizing.catalogue import read_catalogue
 from synth.sizing.motor import MotorData, with_motor
 from synth.sizing.point import _next, target_of
 
+pytestmark = pytest.mark.ci  # whole optimisations in fixtures
+
 TARGET = 0.15
 CALM = {"sea.significant_height": 1.0}
 ROWS = [

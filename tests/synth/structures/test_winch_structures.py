@@ -189,6 +189,7 @@ def test_payload_feedback_is_what_optimise_gains_finds(spring: Case) -> None:
     assert "V" in design.units["a"]
 
 
+@pytest.mark.ci
 def test_a_roll_off_only_helps(spring: Case) -> None:
     plain, filtered = (
         optimise_structure(spring, name, starts=4).payload_rms

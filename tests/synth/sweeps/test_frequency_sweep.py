@@ -291,6 +291,7 @@ def test_worst_case_runs_again_alone_with_the_same_numbers() -> None:
         case_of(result, 200)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("name", "vary"),
     [
