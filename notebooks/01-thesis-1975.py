@@ -46,7 +46,7 @@ from stillhook.text import AFTER, BEFORE, DRUM, HOOK, REFERENCE
 from synth.loop import Controller, closed_loop_poles
 from synth.question import locked_response, pose
 
-sys.path.insert(0, str(Path.cwd().parent / "benchmarks"))
+sys.path.insert(0, str(Path.cwd().parent / "docs" / "make"))
 import headline
 
 # %matplotlib inline
@@ -547,7 +547,7 @@ table(["rope masses", "growth rate [1/s]", "at [rad/s]", "unstable poles"], rows
 # The same winch, redesigned by `optimise_gains` for $M_s \le 2$ with 0, 50 and 100 ms of
 # telemetry delay, on one spring and on the rope, at four depths. In all rows drag agrees with the
 # payload's motion, $|P/Z| \le 0.1$ up to 0.01 rad/s, and the drive's limits are reported, not
-# enforced. The designs take minutes, so the table is stored by `benchmarks/headline.py`; two of
+# enforced. The designs take minutes, so the table is stored by `docs/make/headline.py`; two of
 # its rows are repeated below.
 #
 # First what the thesis's own gains do:

@@ -49,7 +49,7 @@ from synth.saturation.limit_cycles import limit_cycles
 from synth.saturation.torque_loop import TorqueLoop
 from synth.structures import sampled_loop
 
-sys.path.insert(0, str(Path.cwd().parent / "benchmarks"))
+sys.path.insert(0, str(Path.cwd().parent / "docs" / "make"))
 import saturation
 from saturation import GROWING, SAMPLE_TIME, TORQUE, Sea
 
@@ -279,7 +279,7 @@ table(["", "", "simulated", "one harmonic", "five"], rows)
 # ## 4. How often
 #
 # In a sea all this is a first passage: the loop holds until some group of waves carries it over
-# the edge. 100 seeds of 20 minutes in each sea, by `python benchmarks/saturation.py`; a run has
+# the edge. 100 seeds of 20 minutes in each sea, by `python docs/make/saturation.py`; a run has
 # fallen once the payload is half a metre off. The bars are Clopper and Pearson's 95 % intervals.
 #
 # The heave operator ends at 1.46 rad/s, the loop resonates at 7.7 rad/s, and in between lies

@@ -11,7 +11,7 @@ import pytest
 
 import stillhook as sh
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "docs" / "make"))
 try:
     import landing
 finally:

@@ -16,7 +16,7 @@ from synth.question import pose_structure
 from synth.verify import LawMatrices, winding_of_plant
 from synth.verify.recheck import closed_loop_marks
 
-FOLDER = Path(__file__).parents[2] / "benchmarks"
+FOLDER = Path(__file__).parents[2] / "docs" / "make"
 SVG = b"<?xml"
 
 

@@ -550,7 +550,7 @@ def test_a_table_of_the_documentation_is_that_of_the_study(name):
     from pathlib import Path
 
     root = Path(__file__).resolve().parents[3]
-    sys.path.insert(0, str(root / "benchmarks"))
+    sys.path.insert(0, str(root / "docs" / "make"))
     try:
         import comparison
     finally:

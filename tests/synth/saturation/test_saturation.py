@@ -24,7 +24,7 @@ from synth.saturation.limit_cycles import clipped_harmonics, limit_cycles
 from synth.saturation.torque_loop import TorqueLoop
 from synth.structures import sampled_loop
 
-sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks"))
+sys.path.insert(0, str(Path(__file__).parents[3] / "docs" / "make"))
 try:
     import saturation
 finally:

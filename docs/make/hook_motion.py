@@ -1,7 +1,7 @@
 """The hook of a vessel: its figure for the docs, and how long it takes to find it.
 
-    python benchmarks/hook_motion.py            # docs/images/hook-motion.svg
-    python benchmarks/hook_motion.py --time     # how long each step takes
+    python docs/make/hook_motion.py            # docs/images/hook-motion.svg
+    python docs/make/hook_motion.py --time     # how long each step takes
 
 The bundled crane on the bundled vessel `osv-83m`, in a short-crested sea.
 """
@@ -18,7 +18,7 @@ from models.hook import HookMotion, hook_motion
 from models.vessel import case_raos
 from models.vessel.readers import read_raos
 
-IMAGE = Path(__file__).resolve().parents[1] / "docs" / "images" / "hook-motion.svg"
+IMAGE = Path(__file__).resolve().parents[2] / "docs" / "images" / "hook-motion.svg"
 VESSEL = {
     "vessel.raos": "osv-83m",
     "vessel.hook": {"x": -32.0, "y": 12.0, "z": 20.0},

@@ -1,4 +1,4 @@
-"""Figures of `docs/operability.md`, and its figures: `python benchmarks/operability_figures.py`.
+"""Figures of `docs/operability.md`, and its figures: `python docs/make/operability_figures.py`.
 
 A present-day winch (`subsea-crane`) over the starboard quarter of the bundled supply vessel, with
 the gains of the structure `combined`, against the made-up scatter diagram.  About three minutes.
@@ -10,7 +10,7 @@ import time
 import warnings
 from pathlib import Path
 
-IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
+IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 VESSEL = {
     "vessel.raos": "osv-83m",
     "vessel.hook": {"x": -25.0, "y": -15.0, "z": 20.0},

@@ -1,4 +1,4 @@
-"""The figure of `docs/seas.md`: `python benchmarks/sea_figures.py`.
+"""The figure of `docs/seas.md`: `python docs/make/sea_figures.py`.
 
 `seas.svg`: the standard forms with one H_s and T_p, and the spreading laws.
 """
@@ -14,7 +14,7 @@ from models.sea import SeaSpectrum, Spreading
 from stillhook.text import AFTER, BEFORE, DRUM, HOOK, REFERENCE, new_figure, picture, styled
 from stillhook.text import typeset as math_text
 
-IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
+IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 HEIGHT, PERIOD = 2.5, 10.0
 
 FORMS = (

@@ -1,6 +1,6 @@
 """Predictive control against linear feedback on the 1975 winch, in the same seas.
 
-    python benchmarks/comparison.py [--out DIR] [--only PART,...] [--until HH:MM]
+    python docs/make/comparison.py [--out DIR] [--only PART,...] [--until HH:MM]
 
 Torque of at most twice the rating, quadratic drag, and a reference unit whose error is white noise
 of 1 or 5 % of the heave's rms sampled at 4 Hz.  Runs of 20 minutes.  It takes some hours on two
@@ -22,7 +22,7 @@ from pathlib import Path
 import stillhook as sh
 from stillhook.comparison.cell import Cell
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 CSV = ROOT / "docs" / "data" / "comparison.csv"
 HEIGHTS = (1.0, 1.25, 1.9, 2.43, 3.75)  # H_s [m]
 CALM = (0.5, 1.0)  # H_s where next to nothing saturates [m]
@@ -130,7 +130,7 @@ def write(rows: Iterable[Mapping[str, str]]) -> None:
         return (*first, who, float(row["height"]), int(row["seed"]))
 
     with CSV.open("w", encoding="utf-8", newline="") as file:
-        file.write("# Written by benchmarks/comparison.py. SI units; a row for each run.\n")
+        file.write("# Written by docs/make/comparison.py. SI units; a row for each run.\n")
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()
         writer.writerows(sorted(kept.values(), key=place))

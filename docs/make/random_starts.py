@@ -1,6 +1,6 @@
 """A thousand random starts on each case: where they end, and whether any answer is unstable.
 
-    nice -n 19 python benchmarks/random_starts.py [--starts N]
+    nice -n 19 python docs/make/random_starts.py [--starts N]
 
 Gains are drawn over signs, crossovers and decades, and those whose loop is stable are starts of the
 solver: no screening by cost, no guesses, no polishing.  Every answer that it accepts (converged,
@@ -41,7 +41,7 @@ from synth.verify import LawMatrices, winding_of_plant
 
 FloatArray = npt.NDArray[np.float64]
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 CSV = ROOT / "docs" / "data" / "random_starts.csv"
 FIGURE = ROOT / "docs" / "images" / "random_starts.svg"
 #: Questions by what tables call them.  At 2000 m the rope's drive can follow no sea in which the

@@ -4,7 +4,7 @@ The 1975 thesis's winch is redesigned by `optimise_gains` for M_s <= 2, on the t
 of the rope (one spring) and on a rope with its axial modes.  Writes `docs/headline.md`, the
 tables, and `docs/data/headline.csv`, every figure:
 
-    python benchmarks/headline.py
+    python docs/make/headline.py
 
 The notebook `notebooks/01-thesis-1975.ipynb` shows the tables and repeats some of the rows.
 """
@@ -22,7 +22,7 @@ import numpy as np
 import stillhook as sh
 from synth.question import pose
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 CSV = ROOT / "docs" / "data" / "headline.csv"
 PAGE = ROOT / "docs" / "headline.md"
 
@@ -253,7 +253,7 @@ def page(rows: Sequence[Row], seconds: Sequence[float]) -> str:
     some_failed = f"{len(failed)} of them are not ok; `ok` in the data file says which."
     return f"""# Headline: the 1975 winch, honestly
 
-Written by `benchmarks/headline.py`; every figure is in `docs/data/headline.csv`.
+Written by `docs/make/headline.py`; every figure is in `docs/data/headline.csv`.
 
 The winch of the 1975 thesis in its own design sea: $H_s$ = 2.44 m, in which the hook heaves
 {hook:.0f} mm rms. All figures in mm are standard deviations of the payload's motion.
@@ -312,7 +312,7 @@ def write(rows: Sequence[Row], seconds: Sequence[float]) -> None:
     """Write the data file and the page."""
     CSV.parent.mkdir(parents=True, exist_ok=True)
     with CSV.open("w", encoding="utf-8", newline="") as file:
-        file.write("# Written by benchmarks/headline.py. SI units; margin.phase in rad.\n")
+        file.write("# Written by docs/make/headline.py. SI units; margin.phase in rad.\n")
         writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
         writer.writeheader()
         for row in rows:

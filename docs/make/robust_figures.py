@@ -1,4 +1,4 @@
-"""Figures of what robust design buys, from `docs/data`: `python benchmarks/robust_figures.py`.
+"""Figures of what robust design buys, from `docs/data`: `python docs/make/robust_figures.py`.
 
 `pareto.svg`: payload motion against torque, M_s and delay margin.  `robust.svg`: each scenario of a
 family with one set of gains for the worst and for the mean.  `structure_bounds.svg`: each structure
@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 DATA, IMAGES = ROOT / "docs" / "data", ROOT / "docs" / "images"
 LABELS = {
     "torque": "torque [kN m rms]",

@@ -4,7 +4,7 @@ One spring, quadratic drag, perfect sensors, and a torque of at most twice the r
 other limit of the drive is off.  A run has fallen when the payload is half a metre off its place:
 while the loop holds, that is a hundred times what it does.
 
-    python benchmarks/saturation.py
+    python docs/make/saturation.py
 
 writes `docs/data/saturation.csv`; the notebook `notebooks/02-saturation.ipynb` shows it, and
 repeats the first seeds.
@@ -26,7 +26,7 @@ import stillhook as sh
 from models.basics import FallTime, Share, fall_time, share
 from models.plant import DriveLimits
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 CSV = ROOT / "docs" / "data" / "saturation.csv"
 
 TORQUE = 11_880.0  # twice the rating [N m]
@@ -163,7 +163,7 @@ def write(rows: Sequence[Falls]) -> None:
     CSV.parent.mkdir(parents=True, exist_ok=True)
     with CSV.open("w", encoding="utf-8", newline="") as file:
         file.write(
-            "# Written by benchmarks/saturation.py. SI units; fell_at of seeds 0, 1, 2, ...\n"
+            "# Written by docs/make/saturation.py. SI units; fell_at of seeds 0, 1, 2, ...\n"
         )
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(

@@ -3,7 +3,7 @@
 The scenario of the same name holds the module 7.5 m above the seabed, lowers it to 5 m, holds it
 there and sets it down with half a metre of rope to spare.
 
-    python benchmarks/landing.py
+    python docs/make/landing.py
 
 writes `docs/landing.md`, `docs/data/landing.csv` with a row for each run, and
 `docs/images/landing.svg`.
@@ -23,7 +23,7 @@ from models.basics import Interval, mean_interval
 from models.sensing import Controller
 from synth.controllers.feed_forward import lead_of
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 CSV = ROOT / "docs" / "data" / "landing.csv"
 PAGE = ROOT / "docs" / "landing.md"
 FIGURE = ROOT / "docs" / "images" / "landing.svg"
@@ -242,7 +242,7 @@ def page(rows: Sequence[Row]) -> str:
     )
     return f"""# Landing a module within 4 cm
 
-Written by `benchmarks/landing.py`; `docs/data/landing.csv` has a row for each run.
+Written by `docs/make/landing.py`; `docs/data/landing.csv` has a row for each run.
 
 The bundled case `landing` sets a module of 12 t down on the seabed at 350 m, in $H_s$ = 1.7 m and
 waves of 10 s; its positioning is wanted within 4 cm. The job is that of a crane assignment of the
@@ -342,7 +342,7 @@ def write(rows: Sequence[Row]) -> None:
     """Write the data file, the figure and the page."""
     CSV.parent.mkdir(parents=True, exist_ok=True)
     with CSV.open("w", encoding="utf-8", newline="") as file:
-        file.write("# Written by benchmarks/landing.py. SI units; nan is what did not happen.\n")
+        file.write("# Written by docs/make/landing.py. SI units; nan is what did not happen.\n")
         writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
         writer.writeheader()
         for row in rows:

@@ -1,4 +1,4 @@
-"""How fast robust design is, and what it buys: `python benchmarks/robust.py [--quick]`.
+"""How fast robust design is, and what it buys: `python docs/make/robust.py [--quick]`.
 
 Four questions: 27 scenarios minimax, in seconds a start; what one set of gains costs each of those
 scenarios, designed for the worst, for the mean or for the regret; Pareto fronts of 100 points,
@@ -37,7 +37,7 @@ from synth.search.family_search import begin_points, coarse_programme
 from synth.sizing import pareto_front
 from synth.structures import structure_names
 
-DATA = Path(__file__).resolve().parents[1] / "docs" / "data"
+DATA = Path(__file__).resolve().parents[2] / "docs" / "data"
 SEAS = ((1.5, 7.0), (2.4, 8.5), (3.5, 10.0))
 VARY = {"depth": [1000.0, 1500.0, 2000.0], "payload": [20e3, 36844.0, 50e3]}
 OBJECTIVES = ("worst", "mean", "regret")

@@ -1,7 +1,7 @@
 """Compute the bundled vessel `osv-83m`: an offshore supply vessel of 83 m, from our own hull lines.
 
-    .venv/bin/python benchmarks/osv.py              # writes models/vessel/data/osv-83m.csv
-    .venv/bin/python benchmarks/osv.py --check      # computes it on fewer panels and compares
+    .venv/bin/python docs/make/osv.py              # writes models/vessel/data/osv-83m.csv
+    .venv/bin/python docs/make/osv.py --check      # computes it on fewer panels and compares
 
 Main dimensions are those of a usual offshore supply and construction vessel.  Its lines are not
 those of any ship that was built: they are the simple ship of `models/vessel/hull/lines.py`.  It
@@ -25,7 +25,7 @@ from models.vessel.readers.csv_file import csv_text
 from stillhook.seas import hull_figure
 from stillhook.text import picture
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PLACE = ROOT / "models" / "vessel" / "data" / "osv-83m.csv"
 PICTURE = ROOT / "docs" / "images" / "osv-83m-hull.png"
 COMMAND = (

@@ -1,6 +1,6 @@
-"""The table and the figure of `benchmarks/structures.py`: from `docs/data` to `docs/structures.md`.
+"""The table and the figure of `docs/make/structures.py`: from `docs/data` to `docs/structures.md`.
 
-    python benchmarks/structures_page.py
+    python docs/make/structures_page.py
 
 The table stands between two marks in the page, and a test holds it against the data.
 """
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from structures import DELAYS, HEARS_NO_PAYLOAD, LENGTHS, STRUCTURES, Row, read
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 CSV = ROOT / "docs" / "data" / "structures.csv"
 PAGE = ROOT / "docs" / "structures.md"
 FIGURE = ROOT / "docs" / "images" / "structures.svg"

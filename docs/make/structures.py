@@ -1,6 +1,6 @@
 """Every structure on the 1975 winch, by depth and delay of the telemetry, as CSV.
 
-    nice -n 19 python benchmarks/structures.py [--starts N] [--structures A,B] [--lengths 2000,300]
+    nice -n 19 python docs/make/structures.py [--starts N] [--structures A,B] [--lengths 2000,300]
 
 M_s <= 2, lower gain margin <= 0.5; what the drive would need is reported, not enforced.  The
 reference unit's error is white noise of 1 % of the heave's rms sampled at 4 Hz.  Delays: given
@@ -62,7 +62,7 @@ LIMITS = {
     "limits.max_sensitivity": 2.0,
     "limits.gain_margin_down": 0.5,
 }
-OUTPUT = Path(__file__).parent.parent / "docs" / "data" / "structures.csv"
+OUTPUT = Path(__file__).parents[2] / "docs" / "data" / "structures.csv"
 _BETTER = 1e-3  # relative, of the payload's rms that counts as better
 _DIGITS = 9
 
