@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .draws import TELEMETRY as TELEMETRY
     from .draws import check_seed as check_seed
     from .draws import draw as draw
+    from .files import cache_folder as cache_folder
     from .files import reason as reason
     from .files import replace_atomically as replace_atomically
     from .files import write_text_atomically as write_text_atomically

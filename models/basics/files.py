@@ -1,9 +1,10 @@
-"""Writing files so that nobody ever sees half of one."""
+"""Atomic writing of files, and the cache folder."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -79,3 +80,21 @@ def write_text_atomically(path: str | Path, text: str) -> Path:
     return replace_atomically(
         path, lambda place: place.write_text(text, encoding="utf-8", newline="\n")
     )
+
+
+def cache_folder() -> Path:
+    """Return the folder of what is kept from one run to the next; it need not exist yet.
+
+    ``$STILLHOOK_CACHE`` if set; else the system's usual place for a user's cache.
+    """
+    given = os.environ.get("STILLHOOK_CACHE")
+    if given:
+        return Path(given).expanduser()
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        given = os.environ.get("XDG_CACHE_HOME", "")
+        base = Path(given) if os.path.isabs(given) else Path.home() / ".cache"
+    return base / "stillhook"

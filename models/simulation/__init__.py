@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .compiler import cache_folder as cache_folder
     from .kernel import Kernel as Kernel
     from .simulate import run_simulation as run_simulation
     from .simulation import EASE as EASE

@@ -25,7 +25,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..basics import SolverError
+from ..basics import SolverError, cache_folder
 
 # No fast-math and no fused multiply-add: the compiled recursion must give the same numbers as
 # CasADi's virtual machine.  Hidden symbols cannot clash with those of another library.
@@ -83,24 +83,6 @@ def _version(command: tuple[str, ...], changed: int, size: int) -> str | None:
     except (OSError, subprocess.SubprocessError):
         return None
     return _first_line(answer.stdout) if answer.returncode == 0 else None
-
-
-def cache_folder() -> Path:
-    """Return the folder for compiled libraries; it need not exist yet.
-
-    ``$STILLHOOK_CACHE`` if set; else the system's usual place for a user's cache.
-    """
-    given = os.environ.get("STILLHOOK_CACHE")
-    if given:
-        return Path(given).expanduser()
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        given = os.environ.get("XDG_CACHE_HOME", "")
-        base = Path(given) if os.path.isabs(given) else Path.home() / ".cache"
-    return base / "stillhook"
 
 
 def load_library(source: str, compiler: Compiler) -> ctypes.CDLL:

@@ -20,8 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...basics import GRAVITY, FloatArray, InputError, replace_atomically
-from ...simulation import cache_folder
+from ...basics import GRAVITY, FloatArray, InputError, cache_folder, replace_atomically
 from .bem import Point, Progress, solve_hull, versions
 from .hull import Hull
 from .hydrodynamics import Hydrodynamics

@@ -26,7 +26,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from models import InputError, SolverError, build_plant, load_case
-from models.simulation import Kernel, cache_folder
+from models.simulation import Kernel
 from models.simulation.compiler import find_compiler, load_library
 from models.simulation.integrate import hermite_midpoint, rk4_step
 from models.simulation.kernel import _DRIVER, BLOCK, VM_BLOCKS, _Compiled
@@ -397,18 +397,6 @@ def test_cache_that_cannot_be_written_is_done_without(
     assert Kernel(small(), compiled=True).compiled
     monkeypatch.setattr(subprocess, "run", None)
     assert Kernel(small(), compiled=True).compiled  # kept for the process
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="the usual places of Linux")
-def test_cache_folder_follows_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("STILLHOOK_CACHE", "~/here")
-    assert cache_folder() == Path.home() / "here"
-    monkeypatch.delenv("STILLHOOK_CACHE")
-    monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
-    assert cache_folder() == Path("/somewhere/stillhook")
-    for value in ("", "relative"):  # the XDG specification: a relative path is ignored
-        monkeypatch.setenv("XDG_CACHE_HOME", value)
-        assert cache_folder() == Path.home() / ".cache" / "stillhook"
 
 
 @needs_compiler
