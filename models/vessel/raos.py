@@ -288,9 +288,20 @@ class VesselRaos:
 
     def to_waveresponse(self) -> dict[str, RAO]:
         """Return the six motions as :class:`waveresponse.RAO` objects, named by :data:`MODES`."""
-        from .readers import to_waveresponse
+        from waveresponse import RAO
 
-        return to_waveresponse(self)
+        return {
+            mode: RAO(
+                self.omega,
+                self.heading,
+                self.values[:, :, i],
+                freq_hz=False,
+                degrees=False,
+                clockwise=False,
+                waves_coming_from=False,
+            )
+            for i, mode in enumerate(MODES)
+        }
 
     @classmethod
     def from_waveresponse(
@@ -313,9 +324,37 @@ class VesselRaos:
         InputError
             If a motion is unknown, or two of them have different frequencies or headings.
         """
-        from .readers import from_waveresponse
-
-        return from_waveresponse(raos, name=name, depth=depth)
+        strange = sorted(set(raos) - set(MODES))
+        if strange or not raos:
+            raise InputError(
+                f"{name}: the motions are {', '.join(MODES)}; got {', '.join(strange) or 'none'}"
+            )
+        grids = {}
+        for mode, rao in raos.items():
+            # The library lets each motion have a convention of its own.
+            ours = rao.copy()
+            ours.set_wave_convention(clockwise=False, waves_coming_from=False)
+            grids[mode] = ours.grid(freq_hz=False, degrees=False)
+        omega, heading, _ = next(iter(grids.values()))
+        values = np.zeros((omega.size, heading.size, len(MODES)), dtype=np.complex128)
+        for mode, (frequency, direction, grid) in grids.items():
+            if (
+                omega.shape != frequency.shape
+                or heading.shape != direction.shape
+                or not (np.allclose(omega, frequency) and np.allclose(heading, direction))
+            ):
+                raise InputError(
+                    f"{name}: {mode} has other frequencies or headings than the first RAO"
+                )
+            values[:, :, MODES.index(mode)] = grid
+        return cls(
+            name=name,
+            omega=omega,
+            heading=heading,
+            values=values,
+            depth=depth,
+            source="waveresponse",
+        )
 
     def _wave_phase(self, omega: FloatArray, heading: FloatArray) -> ComplexArray:
         """Return the elevation at the origin over that at the phase origin (...,)."""

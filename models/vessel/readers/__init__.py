@@ -10,7 +10,5 @@ if TYPE_CHECKING:
     from .files import write_raos as write_raos
     from .long_waves import LongWaveCheck as LongWaveCheck
     from .long_waves import check_long_waves as check_long_waves
-    from .waveresponse_bridge import from_waveresponse as from_waveresponse
-    from .waveresponse_bridge import to_waveresponse as to_waveresponse
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)
