@@ -3,8 +3,8 @@
     MRU --> Predictor.update --> Predictor.forecast --> Forecast --> QP
 
 First room of `mpc`: the controllers preview the hook's motion through this protocol and do not
-know which predictor stands behind it, `SeaPredictor` (knows the spectrum), `AdaptiveAR` (knows
-the record alone) or `PerfectPreview` (knows the future, for reference).
+know which predictor stands behind it: `AdaptiveAR` (knows the record alone), `PerfectPreview`
+(knows the future, for reference) or one of the user's own.
 """
 
 from __future__ import annotations

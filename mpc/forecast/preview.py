@@ -1,7 +1,7 @@
 """Perfect preview: a predictor that has read the future, for reference only.
 
-It shows what prediction costs: the same controller with this one and with `SeaPredictor` or
-`AdaptiveAR` differs by the forecast alone.  Nothing of the kind exists on board.
+It shows what prediction costs: the same controller with this one and with `AdaptiveAR` differs
+by the forecast alone.  Nothing of the kind exists on board.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@ r"""The hook's motion foretold by who knows the sea: a Kalman filter on a shapin
     case --> spectrum of the hook --> shaping filter --+
                     MRU: high-pass, error, delay ------+--> steady-state Kalman filter --> Forecast
 
-The hook's displacement is the answer of a rational filter to white noise (`mpc.forecast.sea_fit`);
+The hook's displacement is the answer of a rational filter to white noise (`sea_fit`);
 the reference unit's high-pass and error (`models.sensing.mru`) are states beside it, and what it
 shows is heave and heave rate together.  Everything is Gaussian and linear, so the filter's forecast
 is the best there is for the fitted spectrum; how much the fit costs against the true one is known
@@ -21,14 +21,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
+from sea_fit import fit_for_forecast
+from sea_model import SeenHook, seen_hook, true_variances
 
 from models.basics import FloatArray, SolverError, check_range, read_only
 from models.hook import HookMotion
 from models.sensing import MruModel
-
-from .forecast import Forecast, leads_of, usable
-from .sea_fit import fit_for_forecast
-from .sea_model import SeenHook, seen_hook, true_variances
+from mpc.forecast import Forecast
+from mpc.forecast.forecast import leads_of, usable
 
 if TYPE_CHECKING:
     from models.case import Case
@@ -52,7 +52,7 @@ class SeaPredictor:
     horizon
         Last lead [s].
     order
-        Order of the shaping filter: 10 or 12, fitted for forecasting (`mpc.forecast.sea_fit`), or
+        Order of the shaping filter: 10 or 12, fitted for forecasting (`sea_fit`), or
         at most 4, 6 or 8, fitted to the spectrum (`models.plant.shaping`): the one of these that is
         nearest in the L1 norm.
     floor

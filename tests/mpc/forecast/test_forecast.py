@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from sea_predictor import SeaPredictor
 from sea_records import TS, sea
 
 from models.basics import InputError
 from models.operation import SineMotion, SpectrumMotion
 from mpc.forecast import AdaptiveAR, PerfectPreview, Predictor
 from mpc.forecast.forecast import hermite_weights, leads_of
-from mpc.forecast.sea_predictor import SeaPredictor
 
 HORIZON = 6.0
 

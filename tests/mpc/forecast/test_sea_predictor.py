@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sea_predictor import SeaPredictor
 from sea_records import AT, LEADS, TS, errors_of, sea
 from wiener import Wiener, error_covariance
 
@@ -18,7 +19,6 @@ from models.basics import InputError
 from models.rig import MRU
 from models.sea import SeaSpectrum
 from models.sensing import MruModel
-from mpc.forecast.sea_predictor import SeaPredictor
 
 NAMES = ["1 %", "5 %", "crane"]
 

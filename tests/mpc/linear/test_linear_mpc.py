@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from cvxpy_programme import oracle
 from mpc_cases import WEIGHTS, case_of, controller_of
+from sea_predictor import SeaPredictor
 
 import stillhook as sh
 from models.plant import DriveLimits
 from models.sensing import Measurement
 from models.sensing.control import MEASURED
 from models.simulation import prepare
-from mpc.forecast.sea_predictor import SeaPredictor
 from mpc.linear import WATCHED, LinearMPC, path_of_sea, sea_at_end
 from mpc.linear.condensed import default_blocking
 from mpc.programme import SoftQP, kkt_residual
