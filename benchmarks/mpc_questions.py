@@ -19,7 +19,7 @@ from models.sensing import Measurement
 from models.simulation import prepare, run_simulation
 from mpc.linear import LinearMPC
 from mpc.programme import SoftQP
-from mpc.winch import Doubts, Weights
+from mpc.winch import ProcessNoise, Weights
 
 __all__ = [
     "HEIGHTS",
@@ -39,7 +39,7 @@ SAMPLE_TIME = 0.05
 #: Significant wave heights [m]: limits are met seldom or never, often, nearly always.
 HEIGHTS = {"calm": 1.0, "rough": 2.43, "extreme": 3.75}
 #: Those that `tune_weights` finds for this case, rounded.
-WEIGHTS = Weights(torque=0.03, doubts=Doubts(force=0.06, torque=0.01, rope=0.5, sensors=2e-4))
+WEIGHTS = Weights(torque=0.03, noise=ProcessNoise(force=0.06, torque=0.01, rope=0.5, sensors=2e-4))
 # White noise of 1 % of the heave's rms, sampled at 4 Hz.
 _UNIT = {"noise_floor": 0.0, "noise_fraction": 0.01, "noise_bandwidth": 11.31}
 _SEED = 1

@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from mpc.floor import clairvoyant as clairvoyant
     from mpc.linear import LinearMPC as LinearMPC
     from mpc.nonlinear import NonlinearMPC as NonlinearMPC
-    from mpc.winch import Doubts as Doubts
+    from mpc.winch import ProcessNoise as ProcessNoise
     from mpc.winch import Weights as Weights
     from mpc.winch import tune_weights as tune_weights
     from synth.bound import Bound as Bound

@@ -28,11 +28,11 @@ from ..winch import (
     Estimator,
     PredictionModel,
     Weights,
-    doubted,
     plan_model,
     prediction_model,
     regulator,
     tune_weights,
+    with_noise,
 )
 from .condensed import condense, default_blocking
 from .drive_window import DriveWindow, TorqueBudget
@@ -144,8 +144,8 @@ class LinearMPC:
     Examples
     --------
     >>> from models import load_case
-    >>> from mpc.winch.doubts import Doubts
-    >>> weights = Weights(torque=0.02, doubts=Doubts(force=0.1, torque=0.05, rope=0.1))
+    >>> from mpc.winch.process_noise import ProcessNoise
+    >>> weights = Weights(torque=0.02, noise=ProcessNoise(force=0.1, torque=0.05, rope=0.1))
     >>> controller = LinearMPC(load_case("thesis-1975"), weights=weights)
     >>> controller.name, controller.horizon, len(controller.programme.blocks)
     ('mpc', 8.0, 32)
@@ -185,7 +185,7 @@ class LinearMPC:
             if predictor == "preview":  # who knows the future may know the rope
                 weights = replace(weights, stiffness=1.0)
         self.case, self.sample_time, self.weights = case, T, weights
-        believed = doubted(prediction_model(case, sample_time=T, masses=masses), weights.doubts)
+        believed = with_noise(prediction_model(case, sample_time=T, masses=masses), weights.noise)
         self.model = plan_model(believed, weights.stiffness)
         self.regulator = regulator(self.model, weights.torque)
         self.estimator = Estimator(believed)

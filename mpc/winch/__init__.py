@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .doubts import Doubts as Doubts
-    from .doubts import doubted as doubted
     from .estimator import Estimator as Estimator
     from .planning import plan_model as plan_model
     from .prediction import PredictionModel as PredictionModel
     from .prediction import prediction_model as prediction_model
+    from .process_noise import ProcessNoise as ProcessNoise
+    from .process_noise import with_noise as with_noise
     from .regulation import Regulator as Regulator
     from .regulation import regulator as regulator
     from .sampled import SampledWinch as SampledWinch

@@ -23,8 +23,8 @@ from models.sensing import MEASURED, Measurement
 from models.sensing.control import MEASURED as HEARD
 
 from .doubling import riccati
-from .doubts import AT_FIRST, constant_scales
 from .prediction import PredictionModel
+from .process_noise import AT_FIRST, constant_scales
 
 _AT = np.array([HEARD.index(name) for name in MEASURED])
 _AGE, _FRESH = HEARD.index("payload.age"), HEARD.index("payload.valid")

@@ -10,7 +10,7 @@ The state chi holds, in this order,
   (`models.plant.shaping`), so that to predict the state is to predict the sea;
 * the error of the reference unit, a Butterworth low-pass of second order (`models.sensing.mru`),
 and a slow
-  one, of which the case does not speak (`Doubts.unit`);
+  one, of which the case does not speak (`ProcessNoise.unit`);
 * constants that are to be estimated: a force on the payload, a torque at the motor, the bias of
   the accelerometer and of the tension.  Without them a load of another weight would be held off
   its place.  (Where the payload's zero is, a heavier load has stretched the rope by more: seen from
@@ -37,7 +37,7 @@ from models.plant import MEASUREMENTS, ShapingFilter, fit_shaping_filter
 from models.sensing import MEASURED, MruModel
 
 from ..programme import noisy_hold, root_of
-from .doubts import Doubts, doubted
+from .process_noise import ProcessNoise, with_noise
 from .sampled import SampledWinch, sampled_winch
 
 _OWNER = "prediction model"
@@ -70,7 +70,8 @@ class PredictionModel:
     A, B, G
         (n, n), (n, 1), (n, ng).
     known
-        How many columns of G are of the sea and the reference unit; the others are doubts.
+        How many columns of G are of the sea and the reference unit; the others are
+        what the model does not know (`with_noise`).
     slow
         Noise over a sample of a slow error of the reference unit of one metre rms, (2, 2).
     now
@@ -156,7 +157,7 @@ def prediction_model(
     sample_time: float = 0.05,
     masses: int | None = None,
     drag: float | None = None,
-    doubts: Doubts | None = None,
+    noise: ProcessNoise | None = None,
     off: Mapping[str, float] | None = None,
 ) -> PredictionModel:
     """Return the prediction model of a case.
@@ -171,7 +172,7 @@ def prediction_model(
         Masses along the rope; by default those of the case.
     drag
         Linear drag coefficient of the payload [N s/m]; see `mpc.winch.sampled.sampled_winch`.
-    doubts
+    noise
         What the model does not know of the world; by default next to nothing.
     off
         Factors on the plant's numbers; see `mpc.winch.sampled.sampled_winch`.
@@ -243,7 +244,7 @@ def prediction_model(
         R=np.ones(len(MEASURED)),
         hook=hook_rows,
     )
-    return doubted(model, Doubts(unit=0.0) if doubts is None else doubts)
+    return with_noise(model, ProcessNoise(unit=0.0) if noise is None else noise)
 
 
 def sea_filter(hook: HookMotion) -> ShapingFilter:

@@ -31,7 +31,7 @@ _SPEED_WINDOW = 0.01  # in which a drive counts an encoder's pulses [s]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Doubts:
+class ProcessNoise:
     """Standard deviations of what the model leaves out.
 
     Parameters
@@ -65,11 +65,13 @@ class Doubts:
     def __post_init__(self) -> None:
         for field in fields(self):
             above = field.name == "sensors"
-            check_range("doubts", field.name, getattr(self, field.name), low=0.0, open_low=above)
+            check_range(
+                "process noise", field.name, getattr(self, field.name), low=0.0, open_low=above
+            )
 
 
-def doubted(model: PredictionModel, doubts: Doubts) -> PredictionModel:
-    """Return the model with other doubts."""
+def with_noise(model: PredictionModel, noise: ProcessNoise) -> PredictionModel:
+    """Return the model with other noise in process and sensors."""
     winch = model.winch
     n, T = winch.size, winch.sample_time
     shaken = [k for k, name in enumerate(winch.plant.states) if _is_mass(name)]
@@ -77,20 +79,20 @@ def doubted(model: PredictionModel, doubts: Doubts) -> PredictionModel:
     slow, first = model.slow, 2 + len(scales) + len(shaken)
     columns = np.zeros((model.size, first + slow.shape[1]))
     # An independent error over every sample that adds up to the given rms in a second.
-    unknown = scales[:2] * [doubts.force, doubts.torque] / math.sqrt(T)
+    unknown = scales[:2] * [noise.force, noise.torque] / math.sqrt(T)
     columns[:n, :2] = winch.from_constants * unknown
     drift = np.array(_DRIFT) * scales * math.sqrt(T / _DRIFT_TIME)
     columns[model.constants_at, 2 : 2 + len(scales)] = np.diag(drift)
-    kick = doubts.rope * model.waves[1] * math.sqrt(T)
+    kick = noise.rope * model.waves[1] * math.sqrt(T)
     columns[shaken, 2 + len(scales) + np.arange(len(shaken))] = kick
     # The slow error of the unit is next to the constants.
     columns[model.constants_at.start - 2 : model.constants_at.start, first:] = (
-        doubts.unit * model.waves[0] * slow
+        noise.unit * model.waves[0] * slow
     )
     return replace(
         model,
         G=np.hstack([model.G[:, : model.known], columns]),
-        R=_variances(model, doubts.sensors),
+        R=_variances(model, noise.sensors),
     )
 
 
@@ -105,7 +107,7 @@ def _is_mass(name: str) -> bool:
     return name.endswith(".velocity") and name.split(".")[0] in ("rope", "payload")
 
 
-def _variances(model: PredictionModel, doubt: float) -> FloatArray:
+def _variances(model: PredictionModel, share: float) -> FloatArray:
     """Return the variances of the white errors, (ny,)."""
     case, T = model.winch.case, model.winch.sample_time
     sensors = SensorModel.from_case(case, T)
@@ -120,7 +122,7 @@ def _variances(model: PredictionModel, doubt: float) -> FloatArray:
         "motor.speed": rate / sensors.haul_per_angle,
         "rope.tension": case.static_tension,
     }
-    rms = {name: doubt * size for name, size in sizes.items()}
+    rms = {name: share * size for name, size in sizes.items()}
     for name in MEASUREMENTS:
         own = name.removeprefix("payload.")
         step = float(getattr(sensors.payload, f"{own}_resolution"))

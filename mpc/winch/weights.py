@@ -1,13 +1,13 @@
 r"""How much to trust the model, and what torque may cost: tuned for a case.
 
-The regulator has one free number, the weight on the input; the filter has four, its doubts about
-force, torque, rope and sensors. They are chosen so that the mean square of the payload on the
-nominal plant, and at a small weight on four others whose payload or stiffness is off, is smallest,
-with the unsaturated loop's M_s within the limit of the case (broken at the torque), and within one
-and a half times that on those four. Where the drive saturates, the loop has to be stable on those
-four with a little less than half the torque, too. The error of the hook's forecast counts as much:
-where the motor saturates it decides. A controller that is good on the nominal plant and unstable on
-a softer rope has an infinite cost.
+The regulator has one free number, the weight on the input; the filter has four: how much noise it
+reckons with in force, torque, rope and sensors. They are chosen so that the mean square of the
+payload on the nominal plant, and at a small weight on four others whose payload or stiffness is
+off, is smallest, with the unsaturated loop's M_s within the limit of the case (broken at the
+torque), and within one and a half times that on those four. Where the drive saturates, the loop has
+to be stable on those four with a little less than half the torque, too. The error of the hook's
+forecast counts as much: where the motor saturates it decides. A controller that is good on the
+nominal plant and unstable on a softer rope has an infinite cost.
 
 Every evaluation is a Riccati equation, five Lyapunov equations and the poles of four loops
 (`mpc.winch.unsaturated`): tens of milliseconds.
@@ -29,9 +29,9 @@ from scipy.stats import qmc
 from models.basics import FloatArray, SolverError, check_range
 from models.case import Case
 
-from .doubts import Doubts, doubted
 from .planning import plan_model
 from .prediction import PredictionModel, prediction_model
+from .process_noise import ProcessNoise, with_noise
 from .regulation import regulator
 from .unsaturated import Unsaturated
 
@@ -90,8 +90,8 @@ class Weights:
     ----------
     torque
         What an input of the drive's peak torque costs, over a displacement of the hook's rms.
-    doubts
-        What the filter does not trust.
+    noise
+        What the filter reckons with besides the case's own noise.
     stiffness
         Axial stiffness of the rope that plans are made on, over that of the case
         (`mpc.winch.planning`).
@@ -110,7 +110,7 @@ class Weights:
     """
 
     torque: float
-    doubts: Doubts
+    noise: ProcessNoise
     stiffness: float = STIFFER
     max_sensitivity: float = math.nan
     payload_rms: tuple[float, ...] = ()
@@ -217,10 +217,10 @@ def _search(
 
     def judged(point: FloatArray) -> tuple[float, float, Weights] | None:
         weight, force, torque, rope, sensors = 10.0 ** np.clip(point, _LOW, _HIGH)
-        doubts = Doubts(
+        noise = ProcessNoise(
             force=float(force), torque=float(torque), rope=float(rope), sensors=float(sensors)
         )
-        believed = doubted(model, doubts)
+        believed = with_noise(model, noise)
         try:
             loop = Unsaturated(model=believed, regulator=regulator(planned, float(weight)))
             rms: tuple[float, ...] = ()
@@ -239,7 +239,7 @@ def _search(
             peak,
             Weights(
                 torque=float(weight),
-                doubts=doubts,
+                noise=noise,
                 max_sensitivity=loop.max_sensitivity(),
                 payload_rms=rms,
                 forecast_error=loop.forecast_error(_AHEAD),
@@ -289,7 +289,7 @@ def _silent(_: float) -> None:
 
 def saturates(model: PredictionModel) -> bool:
     """Return whether the peak torque is too small for what a stiff loop would ask of the drive."""
-    believed = doubted(model, Doubts(force=0.01, torque=0.02, rope=0.5, sensors=1e-3))
+    believed = with_noise(model, ProcessNoise(force=0.01, torque=0.02, rope=0.5, sensors=1e-3))
     loop = Unsaturated(model=believed, regulator=regulator(believed, 0.1))
     asked = abs(model.winch.rest_torque) + _SATURATED * loop.torque_rms_under(model)
     return bool(asked > model.winch.case.winch.drive.torque_peak)

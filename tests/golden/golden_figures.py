@@ -47,11 +47,11 @@ NOISY_UNIT = {"noise_floor": 0.0, "noise_fraction": 0.01, "noise_bandwidth": 11.
 WEIGHTS = {
     "thesis-1975": {
         "torque": 0.03,
-        "doubts": {"force": 0.06, "torque": 0.01, "rope": 0.5, "sensors": 2e-4},
+        "noise": {"force": 0.06, "torque": 0.01, "rope": 0.5, "sensors": 2e-4},
     },
     "subsea-crane": {
         "torque": 0.03,
-        "doubts": {"force": 0.06, "torque": 0.02, "rope": 0.7, "sensors": 3e-4},
+        "noise": {"force": 0.06, "torque": 0.02, "rope": 0.7, "sensors": 3e-4},
     },
 }
 
@@ -812,7 +812,7 @@ def _controllers(name: str) -> dict[str, tuple[sh.Case, Any]]:
     gains = THESIS_GAINS if name == "thesis-1975" else CRANE_GAINS
     designed = structure_case(name).replace({"sea.significant_height": 0.5})
     stored = WEIGHTS[name]
-    weights = sh.Weights(torque=stored["torque"], doubts=sh.Doubts(**stored["doubts"]))
+    weights = sh.Weights(torque=stored["torque"], noise=sh.ProcessNoise(**stored["noise"]))
     made = {
         "feedback": (calm, sh.LinearFeedback(calm, gains)),
         "combined": (

@@ -6,19 +6,19 @@ from functools import lru_cache
 
 from models import Case, load_case
 from mpc.linear import LinearMPC
-from mpc.winch import Doubts, Weights
+from mpc.winch import ProcessNoise, Weights
 
 #: White noise of 1 % of the heave's rms sampled at 4 Hz (`docs/structures.md`).
 NOISY_UNIT = {"noise_floor": 0.0, "noise_fraction": 0.01, "noise_bandwidth": 11.31}
 WEIGHTS = {
     "thesis-1975": Weights(
-        torque=0.03, doubts=Doubts(force=0.06, torque=0.01, rope=0.5, sensors=2e-4)
+        torque=0.03, noise=ProcessNoise(force=0.06, torque=0.01, rope=0.5, sensors=2e-4)
     ),
     "thesis-1975-rope": Weights(
-        torque=0.03, doubts=Doubts(force=0.03, torque=0.02, rope=0.5, sensors=5e-3)
+        torque=0.03, noise=ProcessNoise(force=0.03, torque=0.02, rope=0.5, sensors=5e-3)
     ),
     "subsea-crane": Weights(
-        torque=0.03, doubts=Doubts(force=0.06, torque=0.02, rope=0.7, sensors=3e-4)
+        torque=0.03, noise=ProcessNoise(force=0.06, torque=0.02, rope=0.7, sensors=3e-4)
     ),
 }
 

@@ -17,12 +17,12 @@ from mpc.nonlinear import NonlinearMPC
 from mpc.nonlinear.mean_torque import mean_torque, start_torque
 from mpc.nonlinear.stage import make_stage
 from mpc.programme import kkt_residual
-from mpc.winch import Doubts, Weights
+from mpc.winch import ProcessNoise, Weights
 from mpc.winch.sampled import sampled_winch
 
 FloatArray = npt.NDArray[np.float64]
 
-WEIGHTS = Weights(torque=0.02, doubts=Doubts(force=0.1, torque=0.02, rope=0.01))
+WEIGHTS = Weights(torque=0.02, noise=ProcessNoise(force=0.1, torque=0.02, rope=0.01))
 
 
 @pytest.fixture(scope="module")

@@ -11,13 +11,13 @@ from mpc_cases import WEIGHTS, case_of, controller_of
 import stillhook as sh
 from models.sensing import MEASURED
 from mpc.winch import (
-    Doubts,
     PredictionModel,
+    ProcessNoise,
     Weights,
-    doubted,
     plan_model,
     prediction_model,
     regulator,
+    with_noise,
 )
 from mpc.winch.unsaturated import Unsaturated, _plant
 from mpc.winch.weights import OFF
@@ -25,14 +25,14 @@ from mpc.winch.weights import OFF
 #: Found by `tune_weights` for the rope at 1.25 m.
 ROPE = Weights(
     torque=0.1056,
-    doubts=Doubts(force=0.0022, torque=0.073, rope=0.4624, sensors=1.267e-3),
+    noise=ProcessNoise(force=0.0022, torque=0.073, rope=0.4624, sensors=1.267e-3),
     stiffness=1.4,
 )
 STIFF, SAME = 1.4, 1.0
 
 
 def loop_of(name: str, weights: Weights, stiffness: float) -> Unsaturated:
-    model = doubted(prediction_model(case_of(name, 1.25)), weights.doubts)
+    model = with_noise(prediction_model(case_of(name, 1.25)), weights.noise)
     return Unsaturated(
         model=model, regulator=regulator(plan_model(model, stiffness), weights.torque)
     )
@@ -90,7 +90,7 @@ def sensitivity_on(loop: Unsaturated, plant: PredictionModel, omega: np.ndarray)
 
 @pytest.mark.parametrize("name", ["thesis-1975", "thesis-1975-rope", "subsea-crane"])
 def test_what_rests_for_the_estimator_rests_for_the_plan(name):
-    model = doubted(prediction_model(case_of(name)), WEIGHTS[name].doubts)
+    model = with_noise(prediction_model(case_of(name)), WEIGHTS[name].noise)
     planned = plan_model(model, STIFF)
     here, there = model.winch, planned.winch
     size = model.scale[: here.size]
@@ -116,7 +116,7 @@ def test_a_plan_on_the_rope_that_is_there_is_the_model_itself():
 def sea_found(doubt: float) -> float:
     """Norm of the sea's state, of covariance one, that a slow error of 5 cm is taken for."""
     weights = WEIGHTS["thesis-1975"]
-    weights = replace(weights, doubts=replace(weights.doubts, unit=doubt))
+    weights = replace(weights, noise=replace(weights.noise, unit=doubt))
     loop = loop_of("thesis-1975", weights, STIFF)
     A, B, C = _plant(loop.model)
     Ac, Bc, Cc, Dc = loop.controller

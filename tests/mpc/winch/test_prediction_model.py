@@ -14,7 +14,7 @@ from models.hook import HookMotion
 from models.plant import build_plant
 from models.sensing import MEASURED
 from mpc.programme import hermite_hold, noisy_hold, root_of
-from mpc.winch import doubted, plan_model, prediction_model, regulator, tune_weights
+from mpc.winch import plan_model, prediction_model, regulator, tune_weights, with_noise
 from mpc.winch.doubling import lyapunov, riccati
 from mpc.winch.estimator import kalman_covariance, kalman_gain
 from mpc.winch.prediction import CONSTANTS
@@ -160,7 +160,7 @@ def test_doubling_agrees_with_a_schur_form_and_says_when_there_is_no_solution():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_filter_covariance_solves_its_equation_and_missing_signals_make_it_worse(name):
-    model = doubted(prediction_model(case_of(name)), WEIGHTS[name].doubts)
+    model = with_noise(prediction_model(case_of(name)), WEIGHTS[name].noise)
     P = kalman_covariance(model)
     everything = np.ones(len(model.R), dtype=bool)
     gain = kalman_gain(model, P, everything)
@@ -207,7 +207,7 @@ def test_regulator_is_what_a_long_backward_recursion_of_the_whole_state_ends_at(
 
 
 def test_sensitivity_agrees_with_python_control():
-    model = doubted(prediction_model(case_of("thesis-1975")), WEIGHTS["thesis-1975"].doubts)
+    model = with_noise(prediction_model(case_of("thesis-1975")), WEIGHTS["thesis-1975"].noise)
     loop = Unsaturated(model=model, regulator=regulator(model, 0.03))
     T = model.winch.sample_time
     omega = np.geomspace(0.05, 50.0, 40)
@@ -232,7 +232,7 @@ def test_sensitivity_agrees_with_python_control():
 def test_payload_in_the_modelled_sea_agrees_with_a_long_simulation_of_the_model():
     case = case_of("thesis-1975")
     truth = prediction_model(case)
-    model = doubted(truth, WEIGHTS["thesis-1975"].doubts)
+    model = with_noise(truth, WEIGHTS["thesis-1975"].noise)
     loop = Unsaturated(model=model, regulator=regulator(model, 0.3))
     rng = np.random.default_rng(5)
     row = loop.regulator.feedback(model)
@@ -256,7 +256,7 @@ def test_payload_in_the_modelled_sea_agrees_with_a_long_simulation_of_the_model(
 def test_tuned_weights_are_stable_on_every_plant_that_they_have_to_get_along_with():
     case = case_of("thesis-1975", 1.25)
     weights = tune_weights(case)
-    model = doubted(prediction_model(case), weights.doubts)
+    model = with_noise(prediction_model(case), weights.noise)
     planned = plan_model(model, weights.stiffness)
     loop = Unsaturated(model=model, regulator=regulator(planned, weights.torque))
     assert loop.max_sensitivity() == pytest.approx(weights.max_sensitivity)
@@ -269,7 +269,7 @@ def test_tuned_weights_are_stable_on_every_plant_that_they_have_to_get_along_wit
     assert tune_weights(case) is weights  # asked again, it need not search
     assert max(weights.payload_rms) < 0.02 * model.waves[0]
     # Better than where the search began, by the measure that it has.
-    first = doubted(prediction_model(case), WEIGHTS["thesis-1975"].doubts)
+    first = with_noise(prediction_model(case), WEIGHTS["thesis-1975"].noise)
     begun = Unsaturated(model=first, regulator=regulator(first, 0.1))
     assert weights.payload_rms[0] < begun.payload_rms_under(prediction_model(case))
 
