@@ -144,7 +144,7 @@ class LinearMPC:
     Examples
     --------
     >>> from models import load_case
-    >>> from mpc.winch.process_noise import ProcessNoise
+    >>> from mpc.winch import ProcessNoise
     >>> weights = Weights(torque=0.02, noise=ProcessNoise(force=0.1, torque=0.05, rope=0.1))
     >>> controller = LinearMPC(load_case("thesis-1975"), weights=weights)
     >>> controller.name, controller.horizon, len(controller.programme.blocks)

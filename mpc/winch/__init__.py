@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from .planning import plan_model as plan_model
     from .prediction import PredictionModel as PredictionModel
     from .prediction import prediction_model as prediction_model
+    from .prediction import with_noise as with_noise
     from .process_noise import ProcessNoise as ProcessNoise
-    from .process_noise import with_noise as with_noise
     from .regulation import Regulator as Regulator
     from .regulation import regulator as regulator
     from .sampled import SampledWinch as SampledWinch

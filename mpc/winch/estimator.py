@@ -23,8 +23,7 @@ from models.sensing import MEASURED, Measurement
 from models.sensing.control import MEASURED as HEARD
 
 from .doubling import riccati
-from .prediction import PredictionModel
-from .process_noise import AT_FIRST, constant_scales
+from .prediction import PredictionModel, constant_scales
 
 _AT = np.array([HEARD.index(name) for name in MEASURED])
 _AGE, _FRESH = HEARD.index("payload.age"), HEARD.index("payload.valid")
@@ -33,6 +32,8 @@ _APPLIED, _SPEED = HEARD.index("drive.applied"), HEARD.index("motor.speed")
 _NO_TELEMETRY = 1  # bits of what is missing
 _NO_UNIT = 2
 _STARTING = 10.0  # in which the gain comes to its steady value [s]
+# What is not known of the constants at first, over `constant_scales`.
+_AT_FIRST = (0.3, 0.1, 0.01, 0.3)
 _LOWER = 1.0  # by which the load may hang lower or higher at first [m]
 _BITS = 1 << np.arange(len(MEASURED))
 _HUGE = 1e12
@@ -247,7 +248,7 @@ def _first_gains(model: PredictionModel, P: FloatArray) -> list[FloatArray]:
     winch = model.winch
     at = np.arange(model.constants_at.start, model.constants_at.stop)
     P = np.array(P)
-    P[at, at] += (np.array(AT_FIRST) * constant_scales(model)) ** 2
+    P[at, at] += (np.array(_AT_FIRST) * constant_scales(model)) ** 2
     # A load of another weight hangs lower: the winch's state is not known any better at first.
     moved = winch.moved[:, 0]
     P[: winch.size, : winch.size] += (_LOWER**2) * np.outer(moved, moved)

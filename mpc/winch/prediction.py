@@ -34,10 +34,10 @@ from models.basics import FloatArray, SolverError, read_only
 from models.case import Case
 from models.hook import HookMotion
 from models.plant import MEASUREMENTS, ShapingFilter, fit_shaping_filter
-from models.sensing import MEASURED, MruModel
+from models.sensing import MEASURED, MruModel, SensorModel
 
 from ..programme import noisy_hold, root_of
-from .process_noise import ProcessNoise, with_noise
+from .process_noise import ProcessNoise
 from .sampled import SampledWinch, sampled_winch
 
 _OWNER = "prediction model"
@@ -53,6 +53,10 @@ _GRAVITY = 9.81
 _ERRORS = 4  # states of the reference unit's error: two of what the case says, two of a slow one
 _SLOW = 0.12  # frequency below which that lies, over the mean one of the hook
 _SPARE = 2  # samples by which the telemetry may be later than the case says
+# How far the constants wander in so many seconds, over `constant_scales`: what is estimated has to
+# drift a little, or the filter would stop listening to it.
+_DRIFT, _DRIFT_TIME = (0.02, 0.02, 2e-4, 0.005), 1000.0
+_SPEED_WINDOW = 0.01  # in which a drive counts an encoder's pulses [s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -245,6 +249,73 @@ def prediction_model(
         hook=hook_rows,
     )
     return with_noise(model, ProcessNoise(unit=0.0) if noise is None else noise)
+
+
+def with_noise(model: PredictionModel, noise: ProcessNoise) -> PredictionModel:
+    """Return the model with other noise in process and sensors."""
+    winch = model.winch
+    n, T = winch.size, winch.sample_time
+    shaken = [k for k, name in enumerate(winch.plant.states) if _is_mass(name)]
+    scales = constant_scales(model)
+    slow, first = model.slow, 2 + len(scales) + len(shaken)
+    columns = np.zeros((model.size, first + slow.shape[1]))
+    # An independent error over every sample that adds up to the given rms in a second.
+    unknown = scales[:2] * [noise.force, noise.torque] / math.sqrt(T)
+    columns[:n, :2] = winch.from_constants * unknown
+    drift = np.array(_DRIFT) * scales * math.sqrt(T / _DRIFT_TIME)
+    columns[model.constants_at, 2 : 2 + len(scales)] = np.diag(drift)
+    kick = noise.rope * model.waves[1] * math.sqrt(T)
+    columns[shaken, 2 + len(scales) + np.arange(len(shaken))] = kick
+    # The slow error of the unit is next to the constants.
+    columns[model.constants_at.start - 2 : model.constants_at.start, first:] = (
+        noise.unit * model.waves[0] * slow
+    )
+    return replace(
+        model,
+        G=np.hstack([model.G[:, : model.known], columns]),
+        R=_variances(model, noise.sensors),
+    )
+
+
+def constant_scales(model: PredictionModel) -> FloatArray:
+    """Return what the constants are measured by: weight, peak torque, gravity, weight, (4,)."""
+    weight = model.winch.rest_tension
+    return np.array([weight, model.winch.case.winch.drive.torque_peak, _GRAVITY, weight])
+
+
+def _is_mass(name: str) -> bool:
+    """Return whether a state is the velocity of a mass along the rope, the payload's included."""
+    return name.endswith(".velocity") and name.split(".")[0] in ("rope", "payload")
+
+
+def _variances(model: PredictionModel, share: float) -> FloatArray:
+    """Return the variances of the white errors, (ny,)."""
+    case, T = model.winch.case, model.winch.sample_time
+    sensors = SensorModel.from_case(case, T)
+    heave, rate, acceleration = model.waves
+    sizes = {
+        "payload.acceleration": acceleration,
+        "payload.velocity": rate,
+        "payload.displacement": heave,
+        "mru.heave": heave,
+        "mru.heave_rate": rate,
+        "drum.haul": heave,
+        "motor.speed": rate / sensors.haul_per_angle,
+        "rope.tension": case.static_tension,
+    }
+    rms = {name: share * size for name, size in sizes.items()}
+    for name in MEASUREMENTS:
+        own = name.removeprefix("payload.")
+        step = float(getattr(sensors.payload, f"{own}_resolution"))
+        rms[name] = math.hypot(rms[name], sensors.noise_rms(own), step / math.sqrt(12.0))
+    if case.sensors.encoder is not None:
+        count = 2.0 * math.pi / case.sensors.encoder.counts_per_turn / math.sqrt(12.0)
+        rms["drum.haul"] = math.hypot(rms["drum.haul"], sensors.haul_per_angle * count)
+        rms["motor.speed"] = math.hypot(rms["motor.speed"], count / _SPEED_WINDOW)
+    if case.sensors.load_cell is not None:
+        noise = case.sensors.load_cell.noise_fraction * case.static_tension
+        rms["rope.tension"] = math.hypot(rms["rope.tension"], noise)
+    return np.array([rms[name] ** 2 for name in MEASURED])
 
 
 def sea_filter(hook: HookMotion) -> ShapingFilter:

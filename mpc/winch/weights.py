@@ -30,8 +30,8 @@ from models.basics import FloatArray, SolverError, check_range
 from models.case import Case
 
 from .planning import plan_model
-from .prediction import PredictionModel, prediction_model
-from .process_noise import ProcessNoise, with_noise
+from .prediction import PredictionModel, prediction_model, with_noise
+from .process_noise import ProcessNoise
 from .regulation import regulator
 from .unsaturated import Unsaturated
 
