@@ -16,6 +16,5 @@ if TYPE_CHECKING:
     from .sampled import SampledWinch as SampledWinch
     from .weights import Weights as Weights
     from .weights import tune_weights as tune_weights
-    from .weights import watched as watched
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -164,15 +164,11 @@ def _simulated(asked: Asked, target: RunFolder, stop: Stop, tick: Ticker) -> _Si
 
 def _prepared(asked: Asked, name: str, tune: Callable[[float], None]) -> Series:
     feedback = name.startswith("feedback")
-    with contextlib.ExitStack() as stack:
-        if "mpc" in name:  # whose weights take seconds
-            from mpc.winch import watched
+    if "mpc" in name:  # whose weights take seconds: tuned here, where it can be told, and kept
+        from mpc.winch import tune_weights
 
-            stack.enter_context(watched(tune))
-        return _series(asked, name, feedback)
-
-
-def _series(asked: Asked, name: str, feedback: bool) -> Series:
+        case = asked.scenario.case_for(asked.case)
+        tune_weights(case, sample_time=asked.rest["sample_time"] or 0.05, progress=tune)
     return Series.prepare(
         asked.case,
         name,
