@@ -27,13 +27,13 @@ if TYPE_CHECKING:
     from .plant import Plant as Plant
     from .plant import build_plant as build_plant
     from .plant_data import PlantData as PlantData
+    from .plant_data import masses_for_bandwidth as masses_for_bandwidth
     from .response import PlantResponse as PlantResponse
     from .rope import MAX_MASSES as MAX_MASSES
     from .rope import RopeLumps as RopeLumps
     from .rope import fixed_top_modes as fixed_top_modes
     from .rope import lump_rope as lump_rope
     from .rope import lumped_modes as lumped_modes
-    from .rope import masses_for_bandwidth as masses_for_bandwidth
     from .shaping import ShapingFilter as ShapingFilter
     from .shaping import fit_shaping_filter as fit_shaping_filter
     from .surroundings import Deck as Deck

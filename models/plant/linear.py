@@ -36,12 +36,13 @@ from ..basics import (
 )
 from .discrete import DiscretePlant, zero_order_hold
 from .pade import pade_bank
-from .response import PlantResponse, state_space_response
+from .response import PlantResponse
 
 if TYPE_CHECKING:
     import control
 
 _OWNER = "linear plant"
+_CHUNK = 512  # points solved at a time: keeps the stacked (n, k, columns) states in the cache
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, init=False)
@@ -182,7 +183,50 @@ class LinearPlant:
         InputError
             If a point is not finite or is a pole of the plant.
         """
-        return state_space_response(self, s)
+        points = np.array(s, dtype=np.complex128).reshape(-1)
+        check_finite(_OWNER, "s", points.view(np.float64))
+        n, nu = self.A.shape[0], self.B.shape[1]
+        if n and np.any(points == 0.0) and _integrates(self.A):
+            raise InputError(
+                f"{_OWNER}: the response is asked for at s = 0, where the plant has a pole "
+                "(an integrator); ask above zero"
+            )
+        keep = pick(_OWNER, "disturbance", self.disturbances, self.independent_disturbances)
+        forced = np.hstack([self.B, self.E[:, keep], np.zeros_like(self.E[:, keep])])
+        direct_y = np.hstack([self.D, self.F[:, keep], np.zeros_like(self.F[:, keep])])
+        direct_z = np.hstack([self.Dz, self.Fz[:, keep], np.zeros_like(self.Fz[:, keep])])
+        nw = len(keep)
+        for rate, base in self.rates.items():  # the last nw columns are the ones times s
+            i, j = self.disturbances.index(rate), keep.index(self.disturbances.index(base))
+            forced[:, nu + nw + j] += self.E[:, i]
+            direct_y[:, nu + nw + j] += self.F[:, i]
+            direct_z[:, nu + nw + j] += self.Fz[:, i]
+        y = np.empty((points.size, self.C.shape[0], nu + nw), dtype=np.complex128)
+        z = np.empty((points.size, self.Cz.shape[0], nu + nw), dtype=np.complex128)
+        T, into, out_of = self.triangular
+        for start in range(0, points.size, _CHUNK):
+            part = points[start : start + _CHUNK, None, None]
+            x = _back_substituted(T, _fold(into @ forced, nu, nw, part), part[:, 0, 0])
+            if x is None:
+                raise InputError(
+                    f"{_OWNER}: the response is asked for at a pole of the plant, s = "
+                    f"{_nearest(self.poles(), part.ravel()):.6g} 1/s"
+                )
+            y[start : start + _CHUNK] = (self.C @ out_of) @ x + _fold(direct_y, nu, nw, part)
+            z[start : start + _CHUNK] = (self.Cz @ out_of) @ x + _fold(direct_z, nu, nw, part)
+        y *= np.exp(-points[:, None] * np.array(self.delays))[:, :, None]
+        return PlantResponse(
+            omega=points.imag,
+            s=points,
+            zw=z[:, :, nu:],
+            zu=z[:, :, :nu],
+            yw=y[:, :, nu:],
+            yu=y[:, :, :nu],
+            inputs=self.inputs,
+            disturbances=self.independent_disturbances,
+            measurements=self.measurements,
+            outputs=self.outputs,
+        )
 
     @cached_property
     def triangular(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
@@ -369,3 +413,36 @@ def _matrix(name: str, value: npt.ArrayLike) -> FloatArray:
 def _delay_states(names: Sequence[str], delays: Sequence[float], order: int) -> list[str]:
     late = [name for name, delay in zip(names, delays, strict=True) if delay > 0.0]
     return [f"{name}.delay{i + 1}" for name in late for i in range(order)]
+
+
+def _back_substituted(T: ComplexArray, right: ComplexArray, s: ComplexArray) -> ComplexArray | None:
+    """Solve (s I - T) x = right for every point s, (k, n, columns); None at an eigenvalue."""
+    n = len(T)
+    x = np.empty((n, right.shape[0], right.shape[2]), dtype=np.complex128)
+    for i in range(n - 1, -1, -1):
+        pivot = s - T[i, i]
+        if not np.all(pivot):
+            return None
+        above = np.tensordot(T[i, i + 1 :], x[i + 1 :], axes=1)
+        x[i] = (right[:, i] + above) / pivot[:, None]
+    return x.transpose(1, 0, 2)
+
+
+def _fold(columns: FloatArray | ComplexArray, nu: int, nw: int, s: ComplexArray) -> ComplexArray:
+    """Return [inputs, disturbances + s rates] for every point s, (k, rows, nu + nw)."""
+    folded: ComplexArray = np.repeat(
+        columns[None, :, : nu + nw].astype(np.complex128), len(s), axis=0
+    )
+    folded[:, :, nu:] += s * columns[None, :, nu + nw :]
+    return folded
+
+
+def _integrates(A: FloatArray) -> bool:
+    """Tell whether A is singular; LU hides it behind a pivot of rounding size."""
+    values = np.linalg.svd(scipy.linalg.matrix_balance(A, permute=False)[0], compute_uv=False)
+    return bool(values[-1] <= 1e-14 * values[0])
+
+
+def _nearest(poles: ComplexArray, points: ComplexArray) -> complex:
+    distance = np.abs(poles[:, None] - points[None, :]).min(axis=1)
+    return complex(poles[int(np.argmin(distance))])

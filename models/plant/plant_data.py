@@ -11,8 +11,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..basics import InputError, check_range
-from .rope import MAX_MASSES, damping_time, masses_for_bandwidth
+from .rope import MAX_MASSES, damping_time, fixed_top_modes, lump_rope, lumped_modes
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 # Without a design there is no crossover yet.  A loop through a rope and a motor seldom
 # crosses above 8 rad/s; five times that is what `masses: auto` holds until told better.
 DEFAULT_BANDWIDTH = 40.0  # [rad/s]
+MODE_TOLERANCE = 0.05  # a mode is "in the model" if its frequency is met this well [-]
 
 _POSITIVE = {
     "axial_stiffness": "N",
@@ -238,3 +241,49 @@ class PlantData:
 def as_plant_data(source: Case | PlantData) -> PlantData:
     """Return `source` itself, or the numbers of a case."""
     return source if isinstance(source, PlantData) else PlantData.from_case(source)
+
+
+def masses_for_bandwidth(data: PlantData, omega_max: float) -> int:
+    """Return the fewest masses that hold every axial mode below `omega_max`.
+
+    The rule: each exact mode (upper end held) below `omega_max` has its counterpart of the
+    same number in the lumped rope within 5 % of its frequency.  At least two masses, as one
+    has no second mode even to miss; a ``thesis`` lumping with its number of masses given is
+    left as it is.
+
+    Parameters
+    ----------
+    data
+        The plant's numbers.
+    omega_max
+        Highest frequency [rad/s] at which the rope matters, five times the crossover of
+        the loop in a design.
+
+    Raises
+    ------
+    InputError
+        If more than 40 masses would be needed.
+    """
+    check_range("rope", "omega_max", omega_max, low=0.0, unit="rad/s", open_low=True)
+    if data.lumping == "thesis" and data.masses is not None:
+        return data.masses
+    rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
+    if data.mass_per_length == 0.0:
+        return 2
+    # the modes' spacing tends to pi c / L from below
+    wave_speed = math.sqrt(data.axial_stiffness / data.mass_per_length)
+    count = int(omega_max * data.rope_length / (math.pi * wave_speed)) + 2
+    if count <= 2 * MAX_MASSES:
+        exact = fixed_top_modes(*rope, data.payload_mass, count)
+        exact = exact[exact < omega_max]
+        for n in range(max(2, exact.size), MAX_MASSES + 1):
+            lumped = lumped_modes(lump_rope(n, data.lumping), *rope, data.payload_mass)[
+                : exact.size
+            ]
+            if np.all(np.abs(lumped / exact - 1.0) <= MODE_TOLERANCE):
+                return n
+    raise InputError(
+        f"rope: {MAX_MASSES} masses hold fewer axial modes than lie below {omega_max:.4g} rad/s "
+        f"on {data.rope_length:g} m of rope (about {count - 1}); a loop as fast as that cannot be "
+        "designed on a lumped rope: lower its bandwidth or set rope.masses"
+    )

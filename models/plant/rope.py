@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
@@ -18,11 +17,7 @@ from scipy.optimize import brentq
 
 from ..basics import FloatArray, InputError, check_range, read_only
 
-if TYPE_CHECKING:
-    from .plant_data import PlantData
-
 MAX_MASSES = 40  # more states cost more in every eigenvalue than they add to any design
-MODE_TOLERANCE = 0.05  # a mode is "in the model" if its frequency is met this well [-]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -171,49 +166,3 @@ def lumped_modes(
     diagonal = (k + np.append(k[1:], 0.0)) / mass
     beside = -k[1:] / np.sqrt(mass[1:] * mass[:-1])
     return np.sqrt(scipy.linalg.eigvalsh_tridiagonal(diagonal, beside))
-
-
-def masses_for_bandwidth(data: PlantData, omega_max: float) -> int:
-    """Return the fewest masses that hold every axial mode below `omega_max`.
-
-    The rule: each exact mode (upper end held) below `omega_max` has its counterpart of the
-    same number in the lumped rope within 5 % of its frequency.  At least two masses, as one
-    has no second mode even to miss; a ``thesis`` lumping with its number of masses given is
-    left as it is.
-
-    Parameters
-    ----------
-    data
-        The plant's numbers.
-    omega_max
-        Highest frequency [rad/s] at which the rope matters, five times the crossover of
-        the loop in a design.
-
-    Raises
-    ------
-    InputError
-        If more than 40 masses would be needed.
-    """
-    check_range("rope", "omega_max", omega_max, low=0.0, unit="rad/s", open_low=True)
-    if data.lumping == "thesis" and data.masses is not None:
-        return data.masses
-    rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
-    if data.mass_per_length == 0.0:
-        return 2
-    # the modes' spacing tends to pi c / L from below
-    wave_speed = math.sqrt(data.axial_stiffness / data.mass_per_length)
-    count = int(omega_max * data.rope_length / (math.pi * wave_speed)) + 2
-    if count <= 2 * MAX_MASSES:
-        exact = fixed_top_modes(*rope, data.payload_mass, count)
-        exact = exact[exact < omega_max]
-        for n in range(max(2, exact.size), MAX_MASSES + 1):
-            lumped = lumped_modes(lump_rope(n, data.lumping), *rope, data.payload_mass)[
-                : exact.size
-            ]
-            if np.all(np.abs(lumped / exact - 1.0) <= MODE_TOLERANCE):
-                return n
-    raise InputError(
-        f"rope: {MAX_MASSES} masses hold fewer axial modes than lie below {omega_max:.4g} rad/s "
-        f"on {data.rope_length:g} m of rope (about {count - 1}); a loop as fast as that cannot be "
-        "designed on a lumped rope: lower its bandwidth or set rope.masses"
-    )

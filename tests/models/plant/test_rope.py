@@ -13,7 +13,8 @@ from plant_numbers import MODERN, THESIS
 
 from models.basics import InputError
 from models.plant import PlantData, fixed_top_modes, lump_rope, lumped_modes, masses_for_bandwidth
-from models.plant.rope import MODE_TOLERANCE, damping_time
+from models.plant.plant_data import MODE_TOLERANCE
+from models.plant.rope import damping_time
 
 ROPE = (1.6e8, 2000.0, 8.1, 73_688.0)  # the 1975 thesis: EA, L, mass per length, M_1
 BASE = replace(THESIS, lumping="distributed", masses=None)
