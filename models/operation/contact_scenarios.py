@@ -37,7 +37,7 @@ from .options import (
     wave_height,
     weight_in_air,
 )
-from .schedule import Profile
+from .profile import Profile
 from .second_bodies import boat_motion, surface_motion
 
 

@@ -17,7 +17,7 @@ from typing import Any, TypeAlias
 from ..basics import GRAVITY, InputError
 from ..case import Case
 from ..casefile import Quantity
-from .schedule import Move, Profile
+from .profile import Move, Profile
 
 Values: TypeAlias = Mapping[str, Any]
 """Values of a scenario's options by name, in SI."""

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from ..basics import FloatArray, InputError, check_range
 from ..plant import Surroundings
 from ..sensing import Bias, Late, check_biases, check_late
-from .schedule import Period, Profile, Schedule, check_periods, events
+from .profile import Period, Profile, check_periods
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -141,7 +141,36 @@ class Scenario:
     @property
     def events(self) -> tuple[tuple[float, str, str], ...]:
         """What happens by itself: time [s], kind and sentence, in order of time."""
-        return events(self)
+        found: list[tuple[float, str, str]] = []
+        if self.warm_up > 0.0:
+            found.append((self.warm_up, "engaged", "the brake opens and the controller engages"))
+        if self.disengage_at is not None:
+            found.append((self.disengage_at, "disengaged", "the controller ramps out"))
+        for kind, what, periods in (
+            ("brake", "the brake trips", self.brake_trips),
+            ("telemetry", "the link from the payload is lost", self.telemetry_outages),
+            ("sensor", "the payload's sensor gives no numbers", self.sensor_failures),
+            ("mru", "the motion reference unit gives no numbers", self.mru_outages),
+        ):
+            found += [(start, kind, f"{what} until {end:g} s") for start, end in periods]
+        for start, end, extra in self.telemetry_delays:
+            text = f"the link from the payload is late by {extra:.4g} s more until {end:g} s"
+            found.append((start, "telemetry", text))
+        for start, end, heave, rate in self.mru_biases:
+            off = f"{heave:.4g} m and {rate:.4g} m/s"
+            text = f"the motion reference unit is off by {off} until {end:g} s"
+            found.append((start, "mru", text))
+        for move in self.profile.moves:
+            verb = "raise" if move.distance > 0.0 else "lower"
+            text = f"{verb} by {abs(move.distance):g} m at {move.speed:.3g} m/s"
+            found.append((move.start, "reference", text))
+        for time, changes in self.parameter_changes.items():
+            parts = [
+                f"{name} is {'as before' if value is None else f'{value:.4g} from now on'}"
+                for name, value in changes.items()
+            ]
+            found.append((time, "parameter", ", ".join(parts)))
+        return tuple(sorted(found))
 
     def initial_displacements(self, springs: npt.ArrayLike, compliance: float) -> FloatArray:
         """Return where the rope's masses and the payload are at rest at the start.
@@ -182,7 +211,3 @@ class Scenario:
             return case.replace(self.case_changes)
         except InputError as error:
             raise InputError(f"scenario {self.name}: {error}") from error
-
-    def schedule(self, sample_time: float) -> Schedule:
-        """Return the scenario as rows at a sample time [s]."""
-        return Schedule(scenario=self, sample_time=sample_time)

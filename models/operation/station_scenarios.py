@@ -27,7 +27,7 @@ from .options import (
     speed_option,
     time_option,
 )
-from .schedule import Profile
+from .profile import Profile
 
 _AFTER = 240.0  # [s] in which a failure's consequences are seen
 

@@ -21,7 +21,7 @@ from models.operation import (
     scenario_options,
 )
 from models.operation.excitation import StillMotion
-from models.operation.schedule import Move, Profile
+from models.operation.profile import Move, Profile
 from models.plant import Deck, Seabed, Surroundings
 from models.sensing.telemetry import during
 
@@ -119,7 +119,7 @@ class TestSchedule:
         sample_time=st.sampled_from([0.05, 0.01, 1.0 / 30.0]),
     )
     def test_chunks_make_no_difference(self, cuts, sample_time):
-        schedule = BUSY.schedule(sample_time)
+        schedule = Schedule(scenario=BUSY, sample_time=sample_time)
         whole = schedule.block(0, 2000)
         parts = [schedule.block(a, b - a) for a, b in itertools.pairwise([0, *sorted(cuts), 2000])]
         for name in COLUMNS:
@@ -148,14 +148,17 @@ class TestSchedule:
         assert state(84.0) == state(100.0) == (0.0, 1.0)
 
     def test_a_trip_while_ramping_out_is_the_end(self):
-        rows = scenario(ramp=4.0, disengage_at=80.0, brake_trips=((81.0, 82.0),)).schedule(0.1)
+        rows = Schedule(
+            scenario=scenario(ramp=4.0, disengage_at=80.0, brake_trips=((81.0, 82.0),)),
+            sample_time=0.1,
+        )
         after = rows.block(810, 190)
         assert np.all(after.brake == 1.0)
         assert np.all(after.engage == 0.0)
         assert rows.block(809, 1).brake[0] == 0.0
 
     def test_without_a_ramp_it_is_engaged_at_once(self):
-        rows = scenario().schedule(0.1).block(0, 10)
+        rows = Schedule(scenario=scenario(), sample_time=0.1).block(0, 10)
         assert np.all(rows.engage == 1.0)
         assert np.all(rows.brake == 0.0)
 
@@ -174,7 +177,7 @@ class TestSchedule:
         assert np.flatnonzero(gone)[0] == 10 * per_second
 
     def test_the_reference_is_the_profile(self):
-        rows = BUSY.schedule(0.25).block(60, 100)
+        rows = Schedule(scenario=BUSY, sample_time=0.25).block(60, 100)
         np.testing.assert_array_equal(rows.reference, BUSY.profile.at(rows.time))
 
     def test_parameters_change_and_come_back(self):
@@ -185,7 +188,7 @@ class TestSchedule:
                 30.03: {"drive.power_limit": None},
             }
         )
-        schedule = one.schedule(0.1)
+        schedule = Schedule(scenario=one, sample_time=0.1)
         assert schedule.breaks == (100, 200, 301)
         assert schedule.parameters_at(99) == {}
         drag = {"payload.quadratic_drag": 3.0}
@@ -196,7 +199,7 @@ class TestSchedule:
 
     def test_sample_time_is_checked(self):
         with pytest.raises(InputError, match="schedule: sample_time must be above 0 s, got "):
-            scenario().schedule(0.0)
+            Schedule(scenario=scenario(), sample_time=0.0)
 
 
 class TestScenario:
@@ -279,7 +282,7 @@ class TestLibrary:
         assert found.name == name
         assert found.profile.end < found.duration
         assert found.settle < found.duration
-        rows = found.schedule(0.1).block(0, round(found.duration / 0.1))
+        rows = Schedule(scenario=found, sample_time=0.1).block(0, round(found.duration / 0.1))
         assert rows.engage.max() == 1.0
         assert np.isfinite(rows.reference).all()
         # Whatever it pays out is on the drum.

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from models import InputError, load_case
 from models.operation import Scenario, scenario_named
 from models.operation.excitation import StillMotion
-from models.operation.schedule import Move, Profile
+from models.operation.profile import Move, Profile
 from models.plant import DrumTravel
 from models.simulation.simulate import simulate
 from synth.controllers import LinearFeedback

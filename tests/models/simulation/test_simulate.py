@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from models import Case, InputError, PhysicsWarning, build_plant, load_case
 from models.operation import Scenario, SineMotion
 from models.operation.excitation import StillMotion
-from models.operation.schedule import Move, Profile
+from models.operation.profile import Move, Profile
 from models.plant import DriveLimits, fixed_top_modes
 from models.run import Run
 from models.sensing import Measurement
