@@ -9,9 +9,10 @@ if TYPE_CHECKING:
     from .extremes import ExtremeEstimate as ExtremeEstimate
     from .extremes import extreme_over_seeds as extreme_over_seeds
     from .files import attributes as attributes
-    from .files import to_csv as to_csv
-    from .files import to_netcdf as to_netcdf
-    from .files import to_parquet as to_parquet
+    from .files import to_xarray as to_xarray
+    from .files import write_csv as write_csv
+    from .files import write_netcdf as write_netcdf
+    from .files import write_parquet as write_parquet
     from .metrics import Summary as Summary
     from .run import Event as Event
     from .run import Run as Run

@@ -1,7 +1,7 @@
 """A run in files: xarray, NetCDF, CSV and Parquet, written whole or not at all.
 
     Run --> to_xarray --> Dataset
-    Run --> to_netcdf, to_csv, to_parquet --> file --> read_netcdf, read_csv, read_parquet
+    Run --> write_netcdf, write_csv, write_parquet --> file --> xarray, pandas
 
 Every signal is a variable over `time` under its own name, with its unit as the attribute `units`.
 The attributes of the data set say where it came from: the case as YAML, the controller, the seed,
@@ -14,27 +14,22 @@ toolkit, and everything that reads NetCDF reads it.
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..basics import InputError, reason, replace_atomically
+from ..basics import replace_atomically
+from .run import Run
 
 if TYPE_CHECKING:
     import xarray
 
-    from .run import Run
-
 # Rows turned into text at a time: a day's run must not be held as text.
 _ROWS_AT_ONCE = 4096
 
-_HEADER = re.compile(r"(?P<name>.+?)(?: \[(?P<unit>[^\]]*)\])?")
 _INT32 = 2**31 - 1
 
 # Under this key the metadata of a Parquet file holds the attributes as JSON.
@@ -92,7 +87,7 @@ def to_xarray(run: Run) -> xarray.Dataset:
     )
 
 
-def to_netcdf(run: Run, path: str | Path) -> Path:
+def write_netcdf(run: Run, path: str | Path) -> Path:
     """Write the signals of a run as NetCDF.
 
     Raises
@@ -111,7 +106,7 @@ def to_netcdf(run: Run, path: str | Path) -> Path:
     )
 
 
-def to_csv(run: Run, path: str | Path) -> Path:
+def write_csv(run: Run, path: str | Path) -> Path:
     """Write the signals of a run as CSV: a header of `name [unit]`, then a row for each time.
 
     Numbers are the shortest texts that read back as the same number.
@@ -129,7 +124,7 @@ def to_csv(run: Run, path: str | Path) -> Path:
     return replace_atomically(path, write)
 
 
-def to_parquet(run: Run, path: str | Path) -> Path:
+def write_parquet(run: Run, path: str | Path) -> Path:
     """Write the signals of a run as Parquet, which pandas reads with one column for each signal.
 
     Units are metadata of the columns (key `units`), the attributes metadata of the file (key
@@ -151,89 +146,6 @@ def to_parquet(run: Run, path: str | Path) -> Path:
     arrays = [pa.array(np.ascontiguousarray(values)) for _, _, values in columns]
     table = pa.Table.from_arrays(arrays, schema=schema)
     return replace_atomically(path, lambda place: parquet.write_table(table, place))
-
-
-def read_csv(path: str | Path) -> xarray.Dataset:
-    """Read a CSV that :func:`to_csv` wrote, or any with a header and a column `time`.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or is no table of numbers with a column `time`.
-    """
-    import xarray
-
-    with _reading(path, "a CSV of a run"), Path(path).open(encoding="utf-8") as file:
-        header = file.readline().rstrip("\n").split(",")
-        values, first = np.zeros((0, len(header))), file.readline()
-        if first.strip():
-            values = np.loadtxt(chain([first], file), delimiter=",", ndmin=2, dtype=np.float64)
-        if values.shape[1] != len(header):
-            raise ValueError(f"{len(header)} names above {values.shape[1]} columns")
-        heads = [match.groupdict("") for match in map(_HEADER.fullmatch, header) if match]
-        names = [head["name"] for head in heads]
-        if "time" not in names or len(heads) < len(header):
-            raise ValueError(f"the header has no column `time`, or an empty name: {header}")
-        variables = {
-            head["name"]: ("time", values[:, i], {"units": head["unit"]})
-            for i, head in enumerate(heads)
-        }
-        return xarray.Dataset(variables, coords={"time": variables.pop("time")})
-
-
-def read_netcdf(path: str | Path) -> xarray.Dataset:
-    """Read a NetCDF that :func:`to_netcdf` wrote.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read as NetCDF.
-    """
-    import xarray
-
-    with _reading(path, "a NetCDF of a run"):
-        return xarray.load_dataset(path, engine="scipy")
-
-
-def read_parquet(path: str | Path) -> xarray.Dataset:
-    """Read a Parquet that :func:`to_parquet` wrote.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or :func:`to_parquet` did not write it.
-    """
-    import xarray
-    from pyarrow import parquet
-
-    with _reading(path, "a Parquet of a run"), Path(path).open("rb") as file:
-        table = parquet.read_table(file)
-        metadata = table.schema.metadata or {}
-        variables = {
-            field.name: (
-                "time",
-                table.column(field.name).to_numpy(),
-                {"units": (field.metadata or {}).get(b"units", b"").decode()},
-            )
-            for field in table.schema
-        }
-        return xarray.Dataset(
-            variables,
-            coords={"time": variables.pop("time")},
-            attrs=json.loads(metadata[_METADATA]),
-        )
-
-
-@contextmanager
-def _reading(path: str | Path, wanted: str) -> Iterator[None]:
-    """Tell in one sentence what is wrong with a file that is being read."""
-    try:
-        yield
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        if isinstance(error, OSError) and error.errno is not None:
-            raise InputError(f"{path}: cannot be read: {reason(error)}") from error
-        why = str(error).partition("\n")[0]
-        raise InputError(f"{path}: is not {wanted}: {why}") from error
 
 
 def _csv_lines(run: Run) -> Iterator[str]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -21,8 +20,6 @@ from ..basics import FloatArray, InputError
 from .summary import Statistics, unknown
 
 if TYPE_CHECKING:
-    import xarray
-
     from ..case import Case
 
 
@@ -201,30 +198,6 @@ class Run:
             raise InputError(unknown("run", "signal", name, self.signals))
         column: FloatArray = self.values[:, self.signals.index(name)]
         return column
-
-    def to_xarray(self) -> xarray.Dataset:
-        """Return the signals as an `xarray.Dataset` over time; see `models/run/files.py`."""
-        from .files import to_xarray
-
-        return to_xarray(self)
-
-    def to_csv(self, path: str | Path) -> Path:
-        """Write the signals as CSV, one column each, headed `name [unit]`."""
-        from .files import to_csv
-
-        return to_csv(self, path)
-
-    def to_parquet(self, path: str | Path) -> Path:
-        """Write the signals as Parquet, with units and the case in its metadata."""
-        from .files import to_parquet
-
-        return to_parquet(self, path)
-
-    def to_netcdf(self, path: str | Path) -> Path:
-        """Write the signals as NetCDF, with units and the case as attributes."""
-        from .files import to_netcdf
-
-        return to_netcdf(self, path)
 
     def __str__(self) -> str:
         """Return the run as a small tree."""

@@ -19,7 +19,7 @@ from typing import Any, Literal
 
 from models.basics import InputError
 from models.case import Case
-from models.run import Run, to_csv, to_netcdf, to_parquet
+from models.run import Run, write_csv, write_netcdf, write_parquet
 
 from ..text import OutputFolder, folder_name
 from .json import summary_of, summary_text
@@ -29,9 +29,9 @@ from .words import headline_of
 
 TraceFormat = Literal["csv", "parquet", "netcdf", "none"]
 FORMATS: Mapping[str, tuple[str, Callable[[Run, Path], Path]]] = {
-    "csv": ("csv", to_csv),
-    "parquet": ("parquet", to_parquet),
-    "netcdf": ("nc", to_netcdf),
+    "csv": ("csv", write_csv),
+    "parquet": ("parquet", write_parquet),
+    "netcdf": ("nc", write_netcdf),
 }
 """Suffix and writer of each format of time traces; "none" writes none."""
 
