@@ -6,7 +6,6 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .comparison import Comparison as Comparison
-    from .floor import prepare as prepare
     from .run import compare as compare
     from .words import HEADINGS as HEADINGS
     from .words import LEGEND as LEGEND

@@ -10,7 +10,6 @@ says why it did not take part.
 from __future__ import annotations
 
 import contextlib
-import os
 import sys
 import time as clock
 from collections.abc import Mapping, Sequence
@@ -22,8 +21,9 @@ from models.casefile import Quantity
 from models.simulation import EASE
 
 from ..controllers import contenders_of
-from ..keeper import Pool
+from ..keeper import Processes, usable_cores
 from ..runs.simulation import _seeds_of
+from .bench import Setup
 from .cell import Question
 from .comparison import Comparison
 from .mismatch import Mismatch
@@ -152,8 +152,8 @@ def compare(
         try:
             if workers > 1 and sys.executable:
                 names = {each.name: each for each in contenders if each.portable}
-                pool = stack.enter_context(Pool(workers, question, names))
-                work.share(pool)
+                setup = Setup(question=question, contenders=names)
+                work.share(stack.enter_context(Processes(workers).begin(setup, workers)))
             work.alone()
             if traces:
                 work.look_closely()
@@ -177,8 +177,7 @@ def _heights(case: Case, heights: Sequence[float] | None) -> tuple[float, ...]:
 def _jobs(jobs: int | None) -> int:
     if jobs is not None:
         return int(check_range("compare", "jobs", jobs, low=1, high=512))
-    affinity = getattr(os, "sched_getaffinity", None)
-    return len(affinity(0)) if affinity is not None else os.cpu_count() or 1
+    return usable_cores()
 
 
 def _seconds(name: str, value: float | str) -> float:

@@ -3,7 +3,7 @@
     Question, contenders --> Work.share (in processes), Work.alone (in this one) --> Comparison
 
 Designs come first, since runs wait for them.  A process is given what it has prepared already, as
-long as there is any.  A run whose process died is tried once more, then told as it is.
+long as there is any.
 """
 
 from __future__ import annotations
@@ -13,15 +13,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..controllers import Contender, Law
-from ..keeper import Bench, Died, Pool, Refused, Task
+from ..keeper import POLL, Died, Processes
+from .bench import Bench, Refused, Setup, Task
 from .cell import Cell, Question, Trace
 from .comparison import Comparison
 from .store import Store
 
 Progress = Callable[[str, int, int], None]
-
-_RETRIES = 1  # of a cell whose process died
-_POLL = 0.2  # between two looks at Ctrl-C [s]
 
 
 @dataclass(kw_only=True)
@@ -48,7 +46,6 @@ class Work:
     refused: dict[tuple[str, float], str] = field(default_factory=dict)
     cells: dict[tuple[str, float, int], Cell] = field(default_factory=dict)
     traces: tuple[Trace, ...] = ()
-    deaths: dict[Task, int] = field(default_factory=dict)
     no_design: dict[tuple[str, float], str] = field(default_factory=dict)
     under_way: set[Task] = field(default_factory=set)
     _bench: Bench | None = None
@@ -71,7 +68,7 @@ class Work:
             if cell is not None:
                 self.cells[task.name, task.height, task.seed] = cell
 
-    def share(self, pool: Pool) -> None:
+    def share(self, pool: Processes) -> None:
         """Do everything that can be sent to other processes."""
         self._tell("starting")
         while True:
@@ -83,7 +80,7 @@ class Work:
                 pool.submit(self._full(task))
             if not pool.busy:
                 return
-            answered = pool.wait(_POLL)
+            answered = pool.wait(POLL)
             self._tell()
             if answered is None:
                 continue
@@ -170,7 +167,7 @@ class Work:
         ]
         return designs + runs
 
-    def _next(self, pool: Pool, todo: list[Task]) -> Task:
+    def _next(self, pool: Processes, todo: list[Task]) -> Task:
         """Return what fits best: what an idle process has prepared, then what nobody has."""
         if todo[0].kind == "design":
             return todo[0]
@@ -203,7 +200,7 @@ class Work:
     def _do(self, task: Task) -> Any:
         """Do a task in this process."""
         if self._bench is None:
-            self._bench = Bench(self.question, dict(self._names))
+            self._bench = Setup(question=self.question, contenders=self._names).bench()
         full = self._full(task)
         self._tell(_words(task))
         if task.kind == "design":
@@ -213,20 +210,16 @@ class Work:
     def _full(self, task: Task) -> Task:
         """Return a task with the law that it takes."""
         law = None if task.kind == "design" else self._law(task)
-        return task if law is None else replace(task, law=law.to_dict())
+        return task if law is None else replace(task, law=law)
 
     def _take(self, task: Task, answer: Any) -> None:
         """Keep an answer."""
         key = (task.name, task.height, task.seed)
         if isinstance(answer, Died):
-            self.deaths[task] = self.deaths.get(task, 0) + 1
-            if self.deaths[task] <= _RETRIES:
-                return
-            reason = f"{answer.reason}, twice"
             if task.kind == "design":
-                self.no_design[task.group] = f"no design: {reason}"
+                self.no_design[task.group] = f"no design: {answer.reason}"
             else:
-                self.cells[key] = _without(task, "died", reason)
+                self.cells[key] = _without(task, "died", answer.reason)
         elif isinstance(answer, Refused):
             if task.kind == "design":
                 self.no_design[task.group] = f"no design: {answer.reason}"

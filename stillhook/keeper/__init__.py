@@ -5,16 +5,18 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
+    from .cluster import Cluster as Cluster
     from .digest import code_digest as code_digest
     from .digest import versions as versions
     from .journal import Journal as Journal
     from .kept_lines import difference as difference
     from .kept_lines import lock as lock
     from .kept_lines import put as put
+    from .pool import POLL as POLL
+    from .pool import Alone as Alone
     from .pool import Died as Died
     from .pool import Pool as Pool
-    from .worker import Bench as Bench
-    from .worker import Refused as Refused
-    from .worker import Task as Task
+    from .pool import usable_cores as usable_cores
+    from .processes import Processes as Processes
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

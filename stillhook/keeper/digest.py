@@ -1,7 +1,7 @@
 """Which code made a result: a digest of the toolkit's own, and the versions of what it stands on.
 
 A store of results is only gone on with by the code that began it (`stillhook.sweeps.store`), and a
-cluster's workers must have the driver's (`stillhook.sweeps.cluster`): other code may give other
+cluster's workers must have the driver's (`stillhook.keeper.cluster`): other code may give other
 numbers, and a table of both would be worth nothing.
 """
 

@@ -1,185 +1,133 @@
-"""Processes that share the runs of a comparison, and what to do when one of them dies.
+"""Pools: places where tasks are done, and what to do when a worker dies of one.
 
-    tasks --> Pool.submit --> a process of `stillhook.keeper.worker` each --> Pool.wait --> answers
+    tasks --> Pool.submit --> a worker's bench --> Pool.wait --> answers
 
-Each process has one thread here that hands it a task and waits for the answer, so that it is
-known which task a process died of.  The processes have a session of their own: Ctrl-C reaches the
-parent alone, which ends them.
+A pool is begun with a *setup*, which goes to every worker once; `setup.bench()` makes there what
+does the tasks (`Bench.do`).  A task whose worker was killed is done once more, by another worker;
+one that kills two is answered with `Died`.
 """
 
 from __future__ import annotations
 
-import contextlib
-import json
 import os
-import queue
-import signal
-import subprocess
-import sys
-import tempfile
-import threading
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections import Counter, deque
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any
+from typing import Any, Protocol, Self, TypeVar
 
-from .worker import Task, receive, send
+from typing_extensions import override
 
-_START = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
-    "from stillhook.keeper.worker import serve; serve()"
-)
-_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+POLL = 0.2
+"""Time between two looks at Ctrl-C [s]."""
+
+_RETRIES = 1  # of a task whose worker was killed
+
+
+class Task(Protocol):
+    """Something to do; it can be hashed and pickled."""
+
+    @property
+    def group(self) -> Hashable:
+        """What is prepared once for several tasks; None if nothing is."""
+
+
+class Bench(Protocol):
+    """Does tasks, one after the other, in whatever process."""
+
+    def do(self, task: Any, /) -> Any:
+        """Return the answer to a task."""
+
+
+class Setup(Protocol):
+    """What a worker needs before its first task; it can be pickled."""
+
+    def bench(self) -> Bench:
+        """Return what does the tasks."""
+
+
+T = TypeVar("T", bound=Task)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Died:
-    """An answer that never came: the process that worked on it is gone."""
+    """An answer that never came: the worker is gone, and so was another before it."""
 
     reason: str
 
 
-class _Process:
-    """A process and the thread that talks to it."""
+class Pool(ABC):
+    """Does tasks; a context manager, once begun, that ends the work.
 
-    def __init__(self, setup: object, answers: queue.Queue[tuple[_Process, Task, Any]]) -> None:
-        self.last: tuple[str, float] | None = None
-        self._answers = answers
-        self._tasks: queue.Queue[Task | None] = queue.Queue()
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", _START, json.dumps(sys.path)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._said,
-            env={**os.environ, **dict.fromkeys(_THREADS, "1")},
-            start_new_session=True,
-        )
-        self._setup = setup
-        self._thread = threading.Thread(target=self._talk, daemon=True)
-        self._thread.start()
-
-    @property
-    def pid(self) -> int:
-        return self._process.pid
-
-    def give(self, task: Task) -> None:
-        self.last = task.group
-        self._tasks.put(task)
-
-    def end(self) -> None:
-        """End the process now, whatever it does."""
-        self._tasks.put(None)
-        self._process.kill()
-        self._process.wait()
-        self._thread.join()
-        for stream in (self._process.stdin, self._process.stdout):
-            if stream is not None:
-                with contextlib.suppress(OSError):
-                    stream.close()
-        self._said.close()
-
-    def _talk(self) -> None:
-        into, out = self._process.stdin, self._process.stdout
-        assert into is not None
-        assert out is not None
-        fresh = True
-        while (task := self._tasks.get()) is not None:
-            try:
-                if fresh:
-                    send(into, self._setup)
-                    fresh = False
-                send(into, task)
-                answer = receive(out)
-            except (EOFError, OSError, ValueError):
-                answer = Died(reason=self._obituary())
-            self._answers.put((self, task, answer))
-            if isinstance(answer, Died):
-                return
-
-    def _obituary(self) -> str:
-        """Return what the process died of."""
-        code = self._process.wait()
-        if code < 0:
-            with contextlib.suppress(ValueError):
-                return f"its process was ended by {signal.Signals(-code).name}"
-        self._said.seek(0)
-        lines = self._said.read().decode("utf-8", "replace").strip().splitlines()
-        said = f": {lines[-1].strip()}" if lines else ""
-        return f"its process ended with status {code}{said}"
-
-
-class Pool:
-    """Processes that do tasks; a context manager that ends them all.
-
-    Parameters
+    Attributes
     ----------
+    name
+        What it is called in a result.
     jobs
-        How many.
-    question, contenders
-        What `stillhook.keeper.worker.Bench` needs.
+        How many workers there are.
     """
 
-    def __init__(self, jobs: int, question: object, contenders: Mapping[str, object]) -> None:
-        self._begin(jobs, (question, dict(contenders)))
+    name: str
+    jobs: int
 
-    @classmethod
-    def of(cls, jobs: int, setup: object) -> Pool:
-        """Return processes for another kind of work: `setup.bench()` is what does the tasks."""
-        pool = cls.__new__(cls)
-        pool._begin(jobs, setup)
-        return pool
-
-    def _begin(self, jobs: int, setup: object) -> None:
-        self._setup = setup
-        self._answers: queue.Queue[tuple[_Process, Task, Any]] = queue.Queue()
-        self._idle: list[_Process] = []
-        self._busy: set[_Process] = set()
-        for _ in range(jobs):
-            self._idle.append(_Process(self._setup, self._answers))
+    def begin(self, setup: Setup, count: int) -> Self:
+        """Start the workers for as many tasks as there are; return the pool."""
+        self._deaths = Counter[Hashable]()
+        self._start(setup, count)
+        return self
 
     @property
+    @abstractmethod
     def idle(self) -> int:
-        """How many processes have nothing to do."""
-        return len(self._idle)
+        """How many tasks could be taken at once."""
 
     @property
+    @abstractmethod
     def busy(self) -> int:
-        """How many tasks are being done."""
-        return len(self._busy)
+        """How many tasks are under way."""
 
-    @property
-    def lasts(self) -> list[tuple[str, float] | None]:
-        """What each idle process has prepared."""
-        return [process.last for process in self._idle]
-
-    @property
-    def pids(self) -> list[int]:
-        """The processes' numbers."""
-        return [process.pid for process in (*self._idle, *self._busy)]
-
+    @abstractmethod
     def submit(self, task: Task) -> None:
-        """Give a task to an idle process, best to one that has prepared it already."""
-        best = next((p for p in self._idle if p.last == task.group), None)
-        process = best or next((p for p in self._idle if p.last is None), self._idle[0])
-        self._idle.remove(process)
-        self._busy.add(process)
-        process.give(task)
+        """Take a task; only while `idle`."""
 
-    def wait(self, timeout: float) -> tuple[Task, Any] | None:
+    def wait(self, timeout: float) -> tuple[Any, Any] | None:
         """Return a task and its answer, or `Died`; None if there is none in time [s]."""
-        try:
-            process, task, answer = self._answers.get(timeout=timeout)
-        except queue.Empty:
+        found = self._answer(timeout)
+        if found is None or not isinstance(found[1], Died):
+            return found
+        task, died = found
+        self._deaths[task] += 1
+        if self._deaths[task] <= _RETRIES:
+            self.submit(task)
             return None
-        self._busy.discard(process)
-        if isinstance(answer, Died):
-            process.end()
-            process = _Process(self._setup, self._answers)
-        self._idle.append(process)
-        return task, answer
+        return task, Died(reason=f"{died.reason}, twice")
 
-    def __enter__(self) -> Pool:
+    def answers(self, tasks: Iterator[T]) -> Iterator[tuple[T, Any] | None]:
+        """Yield tasks with their answers as they come; None now and then, to look at a clock.
+
+        Tasks are taken from the iterator as there is room: a million of them burden nobody.
+        """
+        ahead = next(tasks, None)
+        while ahead is not None or self.busy:
+            while ahead is not None and self.idle:
+                self.submit(ahead)
+                ahead = next(tasks, None)
+            yield self.wait(POLL)
+
+    @abstractmethod
+    def _start(self, setup: Setup, count: int) -> None:
+        """Start the workers."""
+
+    @abstractmethod
+    def _answer(self, timeout: float) -> tuple[Any, Any] | None:
+        """Return a task and its answer, or of what its worker died; None if there is none."""
+
+    @abstractmethod
+    def end(self) -> None:
+        """End the work now, whatever is under way."""
+
+    def __enter__(self) -> Self:
         """Return the pool."""
         return self
 
@@ -189,7 +137,44 @@ class Pool:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """End the processes."""
-        for process in (*self._idle, *self._busy):
-            process.end()
-        self._idle, self._busy = [], set()
+        """End the work."""
+        self.end()
+
+
+class Alone(Pool):
+    """One task after the other in this process: for what cannot leave it."""
+
+    name, jobs = "serial", 1
+
+    @property
+    @override
+    def idle(self) -> int:
+        return 1 - len(self._tasks)
+
+    @property
+    @override
+    def busy(self) -> int:
+        return len(self._tasks)
+
+    @override
+    def submit(self, task: Task) -> None:
+        self._tasks.append(task)
+
+    @override
+    def end(self) -> None:
+        self._tasks.clear()
+
+    @override
+    def _start(self, setup: Setup, count: int) -> None:
+        self._bench, self._tasks = setup.bench(), deque[Task]()
+
+    @override
+    def _answer(self, timeout: float) -> tuple[Any, Any] | None:
+        task = self._tasks.popleft()
+        return task, self._bench.do(task)
+
+
+def usable_cores() -> int:
+    """Return the number of cores that this process may use."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity is not None else os.cpu_count() or 1

@@ -22,7 +22,7 @@ from synth.design import GainDesign, StructureDesign
 if TYPE_CHECKING:
     import xarray as xr
 
-    from .engines import Engine
+    from ..keeper import Pool
     from .time_sweep import Progress
 
 SAMPLES = {"frequency": 10_000, "time": 256}
@@ -50,7 +50,7 @@ def sweep(
     common_seed: bool = False,
     first: int = 0,
     starts: int = 8,
-    engine: str | Engine | None = None,
+    engine: str | Pool | None = None,
     jobs: int | None = None,
     store: str | Path | None = None,
     chunk: int | None = None,
@@ -177,7 +177,7 @@ def sweep(
 def resume_sweep(
     store: str | Path,
     *,
-    engine: str | Engine | None = None,
+    engine: str | Pool | None = None,
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:

@@ -24,7 +24,6 @@ from models.operation import scenario_named, with_faults
 from models.run import Run
 from models.sensing import Controller
 
-from ..keeper import Task
 from ..runs import Progress, Series
 from .pilots import Pilot
 from .time_metrics import numbers_of, status_of
@@ -34,24 +33,32 @@ _PURPOSE = 7  # second entry of the seeds of cases; those of a run's own draws a
 
 
 @dataclass(frozen=True, kw_only=True)
-class CaseTask(Task):
+class CaseTask:
     """A case to be run.
 
     Attributes
     ----------
     index
         Its number in the sweep.
+    seed
+        Of its run.
     changes, gains, faults
         Values by path of the case, by gain, and by ``fault.`` path.
     """
 
-    kind: str = "sweep"
-    name: str = ""
-    height: float = 0.0
-    index: int = 0
+    index: int
+    seed: int
     changes: Mapping[str, float] = field(default_factory=dict, compare=False)
     gains: Mapping[str, float] = field(default_factory=dict, compare=False)
     faults: Mapping[str, float] = field(default_factory=dict, compare=False)
+
+    @property
+    def group(self) -> None:
+        """Nothing is prepared for several cases."""
+
+    def __str__(self) -> str:
+        """Return what it is called in a message."""
+        return f"case {self.index}"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,6 +8,7 @@ The driver knows which cases are done and hands out the others; it never looks i
 from __future__ import annotations
 
 import contextlib
+import sys
 import time as clock
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -17,11 +18,11 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import BoolArray, FloatArray, InputError
+from models.basics import BoolArray, FloatArray, InputError, check_range
 from models.operation import FAULTS, PREFIX, scenario_named
 from models.spread import Spread
 
-from .engines import Engine, engine_of
+from ..keeper import Alone, Cluster, Died, Pool, Processes
 from .header import ATTRIBUTE, Draw, header_of, text_of
 from .time_cases import CaseResult, CaseTask, TimeQuestion, seed_of
 from .time_metrics import METRICS, STATUS
@@ -75,7 +76,7 @@ def run_sweep(
     spread: Spread,
     draw: Draw,
     *,
-    engine: str | Engine | None = None,
+    engine: str | Pool | None = None,
     jobs: int | None = None,
     store: str | Path | None = None,
     progress: Progress | None = None,
@@ -121,17 +122,16 @@ def run_sweep(
         done, total = len(rows) - len(missing), len(rows)
         if missing.size and not question.design_follows:
             question.pilot.controller(question.case)  # one that cannot be made is told at once
-        # Closed at once when something raises: processes must not outlive the sweep.
-        with (
-            contextlib.suppress(KeyboardInterrupt),
-            contextlib.closing(
-                used.run(question, tasks_of(spread, draw, rows, missing), missing.size)
-            ) as answers,
-        ):
+        tasks = tasks_of(spread, draw, rows, missing)
+        with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as stack:
             tell("starting", done, total)
-            for answered in answers:
+            # Entered at once: processes must not outlive the sweep when something raises.
+            pool = stack.enter_context(used.begin(question, missing.size)) if missing.size else None
+            for answered in pool.answers(tasks) if pool is not None else ():
                 if answered is not None:
                     task, result = answered
+                    if isinstance(result, Died):
+                        result = _died(question, task, result.reason)
                     keeper.put(task.index - draw.first, row_of(result))
                     wall += result.wall if result.status != "died" else 0.0
                     done += 1
@@ -224,6 +224,56 @@ def row_of(result: CaseResult) -> dict[str, float]:
         "stable": float(result.status == "completed"),
         **result.values,
     }
+
+
+def engine_of(wanted: str | Pool | None, question: TimeQuestion, jobs: int | None = None) -> Pool:
+    """Return the pool that is meant: every one gives the same numbers.
+
+    Parameters
+    ----------
+    wanted
+        "serial", "processes", an address of a dask scheduler such as ``tcp://10.0.0.1:8786``,
+        ``local:4`` for a dask cluster of four processes here, or a pool; by default processes.
+    question
+        What is asked; a controller that cannot be sent anywhere is run in this process.
+    jobs
+        Number of processes.
+
+    Raises
+    ------
+    InputError
+        If there is no such engine, or the controller cannot be sent to it.
+    """
+    stays = not question.pilot.portable
+    found: Pool
+    if isinstance(wanted, Pool):
+        found = wanted
+    elif wanted is None or wanted == "processes":
+        if jobs is not None:
+            check_range("sweep", "jobs", jobs, low=1, high=512)
+        here = stays or jobs == 1 or not sys.executable
+        found = Alone() if here and wanted is None else Processes(jobs)
+    elif wanted == "serial":
+        found = Alone()
+    elif ":" in wanted:
+        found = Cluster(wanted)
+    else:
+        raise InputError(
+            "sweep: engine must be serial, processes, local:N or the address of a dask scheduler "
+            f"such as tcp://10.0.0.1:8786; got {wanted!r}"
+        )
+    if stays and not isinstance(found, Alone):
+        raise InputError(
+            f"sweep: the controller {question.pilot.name} cannot be sent to another process "
+            '(it was made at a prompt or in a script); put it in a module, or take engine="serial"'
+        )
+    return found
+
+
+def _died(question: TimeQuestion, task: CaseTask, reason: str) -> CaseResult:
+    """Return the result of a case whose process was killed once too often."""
+    values = dict.fromkeys(question.metrics, float("nan"))
+    return CaseResult(index=task.index, status="died", message=reason, values=values)
 
 
 def _check(question: TimeQuestion, spread: Spread) -> None:

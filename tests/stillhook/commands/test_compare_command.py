@@ -16,10 +16,10 @@ from designs import thesis_design
 
 import stillhook as sh
 from stillhook import cli
+from stillhook.comparison.bench import Bench
 from stillhook.comparison.store import STORE
 from stillhook.controllers import CONTENDERS
 from stillhook.designs import save_design
-from stillhook.keeper import Bench
 
 CALM = ("compare", "thesis-1975", "--set", "sea.significant_height=0.5")
 SHORT = ("--seeds", "2", "--duration", "30 s", "--jobs", "1")

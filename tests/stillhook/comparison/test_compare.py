@@ -16,12 +16,12 @@ import stillhook as sh
 from models.sensing import Measurement
 from stillhook.comparison import Comparison
 from stillhook.comparison import work as compare_work
+from stillhook.comparison.bench import Bench, Task
 from stillhook.comparison.cell import Cell, Prepared, Question
 from stillhook.comparison.figures import heights, worst_moment
 from stillhook.comparison.mismatch import Mismatch
 from stillhook.comparison.store import STORE
 from stillhook.controllers import CONTENDERS, DEFAULTS, Law, contenders_of
-from stillhook.keeper import Bench, Task
 from synth.controllers import LinearFeedback
 
 CASE = sh.load_case("thesis-1975").replace({"sea.significant_height": 0.5})
@@ -243,9 +243,11 @@ def test_another_contender_of_the_same_name_is_run_anew(tmp_path, monkeypatch):
 @pytest.mark.ci
 def test_a_process_that_dies_costs_its_own_runs_only_and_is_tried_twice(monkeypatch):
     made = []
-    begin = compare_work.Pool.submit
+    begin = compare_work.Processes.submit
     monkeypatch.setattr(
-        compare_work.Pool, "submit", lambda self, task: made.append(task.name) or begin(self, task)
+        compare_work.Processes,
+        "submit",
+        lambda self, task: made.append(task.name) or begin(self, task),
     )
     found = sh.compare(CASE, ["none", ("deadly", deadly)], jobs=2, **{**FAST, "seeds": 1})
     assert found.complete

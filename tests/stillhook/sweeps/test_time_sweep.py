@@ -15,10 +15,9 @@ from hypothesis import strategies as st
 import stillhook as sh
 from models.basics import InputError
 from models.spread import Spread, Uniform
+from stillhook.keeper import Cluster, Processes
 from stillhook.runs import simulate
 from stillhook.sweeps import STATUS, sweep
-from stillhook.sweeps.cluster import Cluster
-from stillhook.sweeps.engines import Processes
 from stillhook.sweeps.pilots import pilot_of
 from stillhook.sweeps.time_cases import CaseTask, TimeQuestion, seed_of
 from stillhook.sweeps.time_metrics import METRICS

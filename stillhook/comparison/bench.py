@@ -1,0 +1,103 @@
+"""Tasks of a comparison, designs and runs, and the bench that does them in any process.
+
+Setup --(to any process)--> Bench.do(Task) --> StoredDesign, Cell, Trace or Refused
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from models.basics import PhysicsWarning, StillhookError
+
+from ..controllers import Contender, Law, design_law
+from .cell import Question
+from .floor import prepare
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """Something to do.
+
+    Attributes
+    ----------
+    kind
+        "design", "run" or "trace".
+    name
+        The contender, or the design that is wanted.
+    height
+        Significant height [m].
+    seed
+        Seed of the run; -1 for a design.
+    law
+        The design that the contender is made of; None if it needs none.
+    moment
+        What to show the traces around [s].
+    """
+
+    kind: str
+    name: str
+    height: float
+    seed: int = -1
+    law: Law | None = field(default=None, compare=False)
+    moment: float = 0.0
+
+    @property
+    def group(self) -> tuple[str, float]:
+        """What is prepared once for several tasks."""
+        return self.name, self.height
+
+
+@dataclass(frozen=True, kw_only=True)
+class Refused:
+    """An answer that says why there is none, and whether it holds for every seed."""
+
+    reason: str
+    always: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Setup:
+    """What all are asked, and who is asked, by name."""
+
+    question: Question
+    contenders: Mapping[str, Contender]
+
+    def bench(self) -> Bench:
+        """Return what does the tasks."""
+        return Bench(self)
+
+
+class Bench:
+    """Does tasks, one after the other, and keeps what it prepared for the one before."""
+
+    def __init__(self, setup: Setup) -> None:
+        self._question, self._contenders = setup.question, setup.contenders
+        self._at: tuple[str, float] | None = None
+        self._prepared: Any = None
+
+    def do(self, task: Task, progress: Any = None) -> Any:
+        """Return the answer to a task: a `Law`, a `Cell`, a `Trace`, or `Refused`."""
+        with warnings.catch_warnings():  # told once, where the case was read
+            warnings.simplefilter("ignore", PhysicsWarning)
+            try:
+                if task.kind == "design":
+                    case = self._question.known(task.height)
+                    return design_law(task.name, case, self._question.starts, progress)
+                if self._at != task.group:
+                    self._at, self._prepared = None, None
+                    contender = self._contenders[task.name]
+                    self._prepared = prepare(self._question, contender, task.height, task.law)
+                    self._at = task.group
+            except StillhookError as error:
+                return Refused(reason=str(error), always=True)
+            try:
+                if task.kind == "trace":
+                    return self._prepared.trace(task.seed, task.moment, progress)
+                return self._prepared.run(task.seed, progress)
+            except Exception as error:  # what a controller of the user's own may do
+                self._at = None
+                known = isinstance(error, StillhookError)
+                return Refused(reason=str(error) if known else f"{type(error).__name__}: {error}")
