@@ -24,11 +24,9 @@ from models.plant import LinearPlant, ShapingFilter
 
 from ..loop import Controller, Disturbance, disturbances
 from ..structures import reduced
-from .dual import Dual, DualPoint
-from .nodes import refitted, truth_of
-from .shaped import shaped, with_input_outputs
+from .dual import Dual, DualPoint, shaped, with_input_outputs
 from .spectral_factor import SpectralFactor, spectral_factor
-from .truth import ClosedLoop
+from .truth import ClosedLoop, refitted, truth_of
 
 if TYPE_CHECKING:
     from ..verify import Verification

@@ -20,7 +20,7 @@ from synth.bound import Bound, bound_for
 from synth.bound.bound import lqg_bound
 from synth.bound.case import rms_limits
 from synth.bound.dual import Dual
-from synth.bound.shaped import shaped
+from synth.bound.dual import shaped
 from synth.design import evaluate_gains, tune
 from synth.limits import Continuous, Least, Peak, Power, Rms
 from synth.loop import Controller

@@ -272,7 +272,7 @@ def test_what_cannot_be_computed_is_said(monkeypatch: pytest.MonkeyPatch) -> Non
     def fails(*words: object, **more: object) -> DesignBound:
         raise SolverError("no stabilising solution")
 
-    monkeypatch.setattr("synth.bound.beside.bound_beside", fails)
+    monkeypatch.setattr("synth.bound.case.bound_beside", fails)
     again = replace(crane())
     assert bound_sentence(again) == "not computed: no stabilising solution"
     structure = replace(forward())

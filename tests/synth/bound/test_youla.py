@@ -12,7 +12,7 @@ from models.sea import SeaSpectrum
 from synth.bound import Bound
 from synth.bound.bound import lqg_bound
 from synth.bound.youla import youla_design
-from synth.bound.youla_parts import laguerre
+from synth.bound.youla import laguerre
 from synth.loop import Assessment
 
 SEA = SeaSpectrum(kind="jonswap", significant_height=2.0, peak_period=9.0)
