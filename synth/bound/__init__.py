@@ -1,4 +1,9 @@
-"""What no linear controller can do better than, and the best that was found."""
+"""Lower bounds on the payload's motion under any linear controller (LQG duality).
+
+A case, or a plant with spectra, weights and rms limits, comes in; a `Bound` with its multipliers
+and the LQG controller next to it goes out, and a design's distance from it.  `verify_bound`
+recomputes a bound by other routes, `weighted_rms` puts another controller on its terms.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -10,5 +15,7 @@ if TYPE_CHECKING:
     from .case import bound_beside as bound_beside
     from .case import bound_for as bound_for
     from .case import exact_sensors as exact_sensors
+    from .check import verify_bound as verify_bound
+    from .check import weighted_rms as weighted_rms
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -1,4 +1,4 @@
-r"""Bode's integral: why a loop cannot be quiet everywhere, in one line.
+r"""Bode's integral, and the estimate of what feedback can do in a band by it: `bode_estimate`.
 
 For a stable loop gain that falls off at least as 1/s^2 (Bode 1945),
 

@@ -1,4 +1,4 @@
-r"""What the best controller could do: a lower bound on a variance for any linear controller.
+r"""Lower bound on a variance for any linear controller, by LQG duality: `Bound`, `lqg_bound`.
 
     plant + spectra + weights + rms limits -> filters for the sea, Pade models for the delays
       -> multipliers that make the LQG optimum highest (`synth.bound.dual`)
@@ -15,7 +15,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,10 +27,6 @@ from ..structures import reduced
 from .dual import Dual, DualPoint, shaped, with_input_outputs
 from .spectral_factor import SpectralFactor, spectral_factor
 from .truth import ClosedLoop, refitted, truth_of
-
-if TYPE_CHECKING:
-    from ..verify import Verification
-
 
 _ENOUGH = 1e-3  # of the bound's variance: less need not be won by fitting again
 _BROKEN = 1.01  # a limit that is exceeded by more, at the highest multipliers, cannot be kept
@@ -115,29 +111,6 @@ class Bound:
         if above < 300.0:
             return f"within {above:.2g} % of the best possible with these sensors"
         return f"{rms / self.value:.3g} times the best possible with these sensors"
-
-    def of(self, controller: Controller) -> float:
-        """Return the root of the weighted variance of another controller on the same terms.
-
-        Raises
-        ------
-        SynthesisError
-            If its loop is unstable.
-        """
-        from .check import weighted_rms
-
-        return weighted_rms(self, controller)
-
-    def verify(self) -> Verification:
-        """Check everything that is claimed by other routes.
-
-        Returns
-        -------
-        synth.verify.verification.Verification
-        """
-        from .check import verify_bound
-
-        return verify_bound(self)
 
     @cached_property
     def whole(self) -> str:
@@ -242,6 +215,8 @@ def lqg_bound(
     squares = np.array(list(limits.values()), dtype=np.float64) ** 2
     asked = np.ones(len(limits))
     best: tuple[float, Dual, DualPoint, ClosedLoop, dict[str, ShapingFilter | float]] | None = None
+    # Whatever the fit, each round's figure is a lower bound (see `truth`), so the highest is kept;
+    # a further round only has to make the model better where the loop feels it.
     for attempt in range(max(0, refits) + 1):
         filters = {n: f.filter if isinstance(f, SpectralFactor) else f for n, f in fitted.items()}
         dual = Dual(shaped(model, filters), minimise, limits)
@@ -279,6 +254,7 @@ def _bound(
     attained = sum(w * loop.variances[name] for name, w in minimise.items())
     prices = point.multipliers * np.array(list(limits.values())) ** 2
     kept = all(rms[name] <= _BROKEN * bound for name, bound in limits.items())
+    # Multipliers that grow without end while a limit stays broken: the dual is unbounded.
     hopeless = not kept and float(prices.max()) > 1e3 * max(attained, 1e-300)
     late = {
         f"{1e3 * d:g} ms": [

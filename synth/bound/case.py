@@ -1,10 +1,18 @@
-r"""The bound of a case: the best that its winch could do with its sensors.
+r"""Bound of a case, alone (`bound_for`) or beside a design on the same terms (`bound_beside`).
 
     case -> plant with all sensors, spectra of sea and noise, drive limits -> `lqg_bound`
+    design -> its plant, drag, sensors, noise, limits -> bound with the sensors that it hears
+                                                      -> bound with all sensors of the case
+           -> its own rms on these terms              -> DesignBound
 
 Everything is put on the side that makes the bound lower: peaks become limits on the rms with the
 smallest k = sqrt(2 ln(T/T_z)) that is plausible, limits on power and on the loop's margins are
 left out, and what a case calls an exact sensor has only a faint, stated noise.
+
+Beside a design the bound is below it by construction: both live on one plant with one linear drag,
+are shaken by the same spectra, and no limit of the bound is tighter than what the design itself
+uses.  So that a direct gain on white noise has a variance, the design's law stands behind a
+low-pass far above its loop.
 """
 
 from __future__ import annotations
@@ -31,7 +39,13 @@ from .check import banded
 from .dual import with_input_outputs
 from .spectral_factor import SpectralFactor, spectral_factor
 
+_FAINT = 1e-3  # noise of an exact sensor, see `bound_for`
 _LONGER = 2.0  # T_z of any signal over that of the hook, at most
+_RTOL = 1e-7  # of the design's own variances
+_REFITS = 1
+_PADE = 6  # of the delays, for the design's poles: marks of its quadrature
+_PROPER = 1e4  # corner of the low-pass before a direct gain [rad/s]
+_SIGNALS = ("acceleration", "velocity", "displacement")
 _SAMPLE = 0.01  # of the faint noise [s]
 _SHAKEN = "payload.force"
 _FORCE = 0.1  # of the faint noise, on the payload
@@ -45,7 +59,7 @@ def bound_for(
     measurements: Sequence[str] | None = None,
     spectra: Mapping[str, Any] | None = None,
     periods: Mapping[str, float] | None = None,
-    faint: float = 1e-3,
+    faint: float = _FAINT,
     pade: int = 2,
     order: int = 8,
 ) -> Bound:
@@ -218,15 +232,6 @@ def _heard(plant: LinearPlant) -> dict[str, str]:
     return noises
 
 
-_FAINT = 1e-3  # noise of an exact sensor, see `bound_case.bound_for`
-_LONGER = 2.0  # T_z of any signal over that of the hook, at most
-_RTOL = 1e-7
-_REFITS = 1
-_PADE = 6
-_PROPER = 1e4  # corner of the low-pass before a direct gain [rad/s]
-_SIGNALS = ("acceleration", "velocity", "displacement")
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DesignBound:
     """A design next to the best that any linear controller could do.
@@ -248,11 +253,6 @@ class DesignBound:
     every: Bound
     exact_heard: tuple[str, ...]
     exact_every: tuple[str, ...]
-
-    @property
-    def meaningful(self) -> bool:
-        """Whether every sensor that the design hears has a noise of its own."""
-        return not self.exact_heard
 
     @property
     def factor(self) -> float:

@@ -1,4 +1,4 @@
-"""A bound computed a second time, and other controllers on the terms of a bound.
+"""Recomputation of a bound, `verify_bound`, and other controllers on its terms, `weighted_rms`.
 
 The value came from Riccati equations and Gauss quadrature; here the controller's loop goes
 through a Lyapunov equation, its true spectra through `quad_vec`, and a rival has to stay above.
@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics import ComplexArray, FloatArray, SynthesisError, one_thread
+from models.basics import FloatArray, SynthesisError, one_thread
 
-from ..loop import Controller, closed_loop_poles
+from ..loop import Controller, Disturbance, closed_loop_poles
 from ..verify import (
     LawMatrices,
     Loop,
@@ -26,13 +25,9 @@ from ..verify import (
     moments,
     panels,
 )
-from .truth import optimal_response
-
-if TYPE_CHECKING:
-    from ..loop import Disturbance
-    from .bound import Bound
-    from .dual import DualPoint
-
+from .bound import Bound
+from .dual import DualPoint
+from .truth import lqg_poles, optimal_response
 
 _PADE = 5  # of the delays, where another controller's stability is looked at
 _TIME = 1e-3  # cost by a Lyapunov equation, in which much cancels
@@ -162,7 +157,7 @@ def _variances(bound: Bound, names: list[str], point: DualPoint) -> dict[str, fl
         shaken = np.stack([source.density(omega) for source in sources])
         return np.asarray(np.einsum("kzw,wk->zk", gains, shaken))
 
-    marks = np.concatenate([_poles(bound, point), bound.plant.poles()])
+    marks = np.concatenate([lqg_poles(model, point.regulator, kalman), bound.plant.poles()])
     sizes = np.abs(marks)
     splits = [w for source in sources for w in source.splits]
     low = min([_NEAR * float(sizes[sizes > 1e-6].min(initial=1.0)), *splits])
@@ -191,13 +186,3 @@ def _simpson(
     omega = edges[:-1, None] + width[:, None] * inside
     weights = width[:, None] * weight / (3.0 * count)
     return np.asarray(density(omega.ravel()) @ weights.ravel(), dtype=np.float64)
-
-
-def _poles(bound: Bound, point: DualPoint) -> ComplexArray:
-    model, kalman = bound.dual.plant, bound.dual.estimator
-    return np.concatenate(
-        [
-            np.linalg.eigvals(model.A + model.B @ point.regulator.gain),
-            np.linalg.eigvals(model.A - kalman.gain @ model.C),
-        ]
-    )

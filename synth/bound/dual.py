@@ -1,4 +1,4 @@
-r"""The dual of LQG under rms limits: multipliers whose every value is a lower bound.
+r"""LQG under rms limits by its dual: multipliers whose every value is a lower bound.
 
 For multipliers of at least zero, the best controller for the weighted sum of what is minimised
 and of what is limited costs no more than any controller that keeps the limits,
@@ -11,6 +11,10 @@ and of what is limited costs no more than any controller that keeps the limits,
 and the inner minimum is plain LQG (Boyd and Barratt, *Linear Controller Design*, 1991, ch. 14;
 Zhu, Rotea and Skelton 1997).  d is concave, with the gradient J_i - b_i^2; the filter's Riccati
 equation does not depend on the multipliers and is solved once.
+
+Both Riccati equations need a plant whose disturbances are white and of intensity one: `shaped`
+takes the sea's filter into the plant, `with_input_outputs` makes a command that is charged or
+limited an output as any other.
 """
 
 from __future__ import annotations
@@ -263,6 +267,8 @@ class Dual:
             point = self._polished(point, low, high)
             if self._open(point, low) < _ARRIVED:
                 return point
+        # d is concave in lambda but not in its logarithm, which keeps the multipliers positive and
+        # of one size: the search keeps the best point by itself.
         best = point
 
         def negative(theta: FloatArray) -> tuple[float, FloatArray]:

@@ -1,4 +1,4 @@
-r"""Rational spectral factors: what the Riccati equations of a bound need of a sea.
+r"""Rational spectral factors of seas, for the Riccati equations of a bound.
 
 A spectrum of a table or a formula that is not rational is fitted by a stable, minimum-phase
 filter,
@@ -167,6 +167,8 @@ def fit_spectral_factor(
     seen = target > _NEGLIGIBLE * target.max()
     weight = _TAIL_WEIGHT / np.sqrt(max(1, int(seen.sum())))
     at = np.interp((np.arange(sections) + 0.5) / sections, np.cumsum(amplitude**2), x)
+    # The misfit has one basin for each number of zeros at the origin and elsewhere: all that leave
+    # the derivative proper are tried, from poles spread evenly over the variance.
     found: list[tuple[float, int, FloatArray]] = []
     for quadratics in range(min(1, sections - 1) + 1):
         start = np.concatenate(

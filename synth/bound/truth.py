@@ -1,4 +1,4 @@
-r"""What a controller of a model does to the true spectra and delays, and what the model missed.
+r"""Model error of a bound: the LQG optimum of a rational model on true spectra and delays.
 
 A Riccati equation needs rational models: a fitted factor of the sea, a Pade model of a delay.
 Their optimum X (the closed loop's response from the measurements' noise to the command) is not
@@ -70,6 +70,16 @@ def frequencies(
     return np.concatenate([[low], omega, 1.0 / v]), np.concatenate([[low], weights, beyond])
 
 
+def lqg_poles(plant: LinearPlant, feedback: Regulator, kalman: Estimator) -> ComplexArray:
+    """Return the poles of an LQG loop [1/s]: those of the state feedback and of the filter."""
+    return np.concatenate(
+        [
+            np.linalg.eigvals(plant.A + plant.B @ feedback.gain),
+            np.linalg.eigvals(plant.A - kalman.gain @ plant.C),
+        ]
+    )
+
+
 def optimal_response(
     plant: LinearPlant, feedback: Regulator, kalman: Estimator, omega: FloatArray
 ) -> ComplexArray:
@@ -80,8 +90,8 @@ def optimal_response(
     """
     K, L, C = feedback.gain, kalman.gain, plant.C
     ny, nu = len(plant.measurements), len(plant.inputs)
-    commanded = _system(plant.A + plant.B @ K, L, K, np.zeros((nu, ny))).response(omega).yu
-    innovated = _system(plant.A - L @ C, L, -C, np.eye(ny)).response(omega).yu
+    commanded = filter_plant(plant.A + plant.B @ K, L, K, np.zeros((nu, ny))).response(omega).yu
+    innovated = filter_plant(plant.A - L @ C, L, -C, np.eye(ny)).response(omega).yu
     return np.asarray(commanded @ innovated, dtype=np.complex128)
 
 
@@ -176,7 +186,8 @@ class Truth:
         return np.asarray(blocks.yw @ (spectra.T[:, :, None] * effect), dtype=np.complex128)
 
 
-def _system(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray) -> LinearPlant:
+def filter_plant(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray) -> LinearPlant:
+    """Return x' = Ax + Bu, y = Cx + Du as a plant that nothing shakes."""
     return LinearPlant(A=A, B=B, E=np.zeros((len(A), 0)), C=C, D=D)
 
 
@@ -204,13 +215,7 @@ def truth_of(
 ) -> tuple[Truth, ComplexArray]:
     """Return both problems on nodes, and the closed-loop response of the model's optimum."""
     augmented, kalman = dual.plant, dual.estimator
-    marks = np.concatenate(
-        [
-            np.linalg.eigvals(augmented.A + augmented.B @ point.regulator.gain),
-            np.linalg.eigvals(augmented.A - kalman.gain @ augmented.C),
-            plant.poles(),
-        ]
-    )
+    marks = np.concatenate([lqg_poles(augmented, point.regulator, kalman), plant.poles()])
     omega, weights = frequencies(sources, marks)
     names = [source.name for source in sources]
     fitted = [

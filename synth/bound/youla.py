@@ -1,4 +1,4 @@
-r"""What a linear controller of high order achieves within margins: Youla's parametrisation.
+r"""Controllers of high order within margins, by Youla's parametrisation: `youla_design`.
 
     Bound -> its LQG controller as the observer -> Q(s) from innovations to command
       -> cone programme on frequency nodes (cvxpy, Clarabel) -> Controller
@@ -8,6 +8,11 @@ through a stable Q, and every closed-loop response is affine in Q.  Variances, l
 values, M_s and roll-off are then convex, and with Q in a Laguerre basis a second-order cone
 programme (Boyd and Barratt, *Linear Controller Design*, 1991).  The answer is achievable, so it
 lies above the best possible and falls with the number of functions; a bound it is not.
+
+    u = K x^ + v,  v = Q (y - C x^ - D u):  X = [K (s - A - BK)^-1 L + M Q] N
+
+x^ is the observer's state, M = I + K (s - A - BK)^-1 B, N = I - C (s - A + LC)^-1 L, and X the
+response from noise on the measurements to the command.
 """
 
 from __future__ import annotations
@@ -17,7 +22,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import cvxpy
 import numpy as np
@@ -36,7 +41,7 @@ from models.basics import (
 )
 from models.plant import LinearPlant
 
-from ..loop import Assessment, Controller, closed_loop_poles
+from ..loop import Assessment, Controller, Margins, closed_loop_poles
 from ..verify import (
     Check,
     LawMatrices,
@@ -47,11 +52,8 @@ from ..verify import (
     lyapunov_variances,
 )
 from .bound import Bound
-from .truth import densities, frequencies
-
-if TYPE_CHECKING:
-    from ..loop import Margins
-    from .bound import Bound
+from .check import weighted_rms
+from .truth import densities, filter_plant, frequencies
 
 
 def laguerre(a: float, count: int, channels: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -78,12 +80,9 @@ class AffineLoop:
         self.plant = bound.plant
         self.shaking = [source.name for source in bound.sources]
 
-        def system(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray) -> LinearPlant:
-            return LinearPlant(A=A, B=B, E=np.zeros((len(A), 0)), C=C, D=D)
-
-        self.from_innovations = system(AK, L, K, np.zeros((nu, ny)))
-        self.from_command = system(AK, plant.B, K, np.eye(nu))
-        self.innovations = system(AL, L, -plant.C, np.eye(ny))
+        self.from_innovations = filter_plant(AK, L, K, np.zeros((nu, ny)))
+        self.from_command = filter_plant(AK, plant.B, K, np.eye(nu))
+        self.innovations = filter_plant(AL, L, -plant.C, np.eye(ny))
 
     def response(
         self, omega: FloatArray, columns: ComplexArray
@@ -238,7 +237,7 @@ class YoulaDesign:
         for order in range(1, most + 1):
             controller = self.reduced(order)
             try:
-                found = self.bound.of(controller)
+                found = weighted_rms(self.bound, controller)
             except SynthesisError:
                 continue
             if found <= (1.0 + within) * self.value:
@@ -262,7 +261,9 @@ class YoulaDesign:
             checks.append(
                 agreement("value.time", self.value, rms, _TIME + worst, "Lyapunov, fitted sea")
             )
-            checks.append(agreement("value", self.value, bound.of(self.controller), 1e-3, "exact"))
+            checks.append(
+                agreement("value", self.value, weighted_rms(bound, self.controller), 1e-3, "exact")
+            )
             checks.append(bounded("bound", bound.value, self.value, 0.0, "", at_least=True))
             found = Assessment(plant, self.controller, bound.sources).margins.max_sensitivity
             checks.append(
@@ -357,6 +358,7 @@ def youla_design(
     base, moved = parts.sensitivity(dense, basis(dense, a, functions))
     moved, chosen = moved * scale, np.zeros(dense.size, dtype=np.bool_)
     chosen[:: _DENSE // _POINTS] = math.isfinite(max_sensitivity)
+    # |S| on all of the dense grid would be thousands of cones: those that are broken join in turn.
     for _ in range(_EXCHANGES):
         held = list(limits)
         if chosen.any():

@@ -16,11 +16,10 @@ from models.basics import InputError, SynthesisError, White, solve_lyapunov, sol
 from models.plant import LinearPlant
 from models.sea import SeaSpectrum
 from stillhook import load_case
-from synth.bound import Bound, bound_for
+from synth.bound import Bound, bound_for, verify_bound, weighted_rms
 from synth.bound.bound import lqg_bound
 from synth.bound.case import rms_limits
-from synth.bound.dual import Dual
-from synth.bound.dual import shaped
+from synth.bound.dual import Dual, shaped
 from synth.design import evaluate_gains, tune
 from synth.limits import Continuous, Least, Peak, Power, Rms
 from synth.loop import Controller
@@ -209,7 +208,7 @@ def test_sea_and_delay_verify_and_keep_their_limits(late: Bound) -> None:
     for name, bound in late.limits.items():
         assert late.rms[name] <= 1.02 * bound
     assert late.prices["command"] > 0.0
-    checked = late.verify()
+    checked = verify_bound(late)
     assert checked.ok, str(checked)
 
 
@@ -260,7 +259,7 @@ def test_no_controller_of_any_kind_is_below(late: Bound, seed: int) -> None:
     point = other.at(late.point.multipliers * 10 ** rng.uniform(-1.5, 1.5, 2))
     rival = reduced(model, point.regulator, other.estimator, len(model.states))
     weights = {**late.minimise, **late.multipliers}
-    lagrangian = replace(late, minimise=weights).of(rival) ** 2
+    lagrangian = weighted_rms(replace(late, minimise=weights), rival) ** 2
     spent = sum(
         m * b**2 for m, b in zip(late.multipliers.values(), late.limits.values(), strict=True)
     )
@@ -279,7 +278,7 @@ def test_designs_of_a_structure_are_above() -> None:
     assert bound.value <= design.cost
     assert bound.excess(design.cost) == pytest.approx(design.cost / bound.value - 1.0)
     # The same controller on the bound's terms: what lies outside the sea's band is left out.
-    assert bound.value <= bound.of(design.controller) <= design.cost * (1.0 + 1e-6)
+    assert bound.value <= weighted_rms(bound, design.controller) <= design.cost * (1.0 + 1e-6)
     assert "best possible with these sensors" in bound.sentence(design.cost)
 
 
@@ -307,7 +306,7 @@ def test_questions_without_an_answer_are_refused() -> None:
 def test_an_unstable_controller_is_refused(late: Bound) -> None:
     gain = Controller.static([[50.0, 0.0]], ("place", "speed"), ("command",))
     with pytest.raises(SynthesisError, match="loop is unstable"):
-        late.of(gain)
+        weighted_rms(late, gain)
 
 
 def test_limits_on_peaks_as_rms() -> None:
@@ -336,7 +335,7 @@ def test_bound_of_a_case_with_all_its_sensors(name: str) -> None:
     assert bound.gap < 1e-4
     assert 0.0 < bound.value <= bound.attained < 1.1 * bound.value
     assert any("peaks as rms with T_z" in text for text in bound.assumptions)
-    checked = bound.verify()
+    checked = verify_bound(bound)
     assert checked.ok, str(checked)
 
 

@@ -9,10 +9,9 @@ from scipy.linalg import solve_continuous_lyapunov
 from models.basics import InputError, SynthesisError, White
 from models.plant import LinearPlant
 from models.sea import SeaSpectrum
-from synth.bound import Bound
+from synth.bound import Bound, weighted_rms
 from synth.bound.bound import lqg_bound
-from synth.bound.youla import youla_design
-from synth.bound.youla import laguerre
+from synth.bound.youla import laguerre, youla_design
 from synth.loop import Assessment
 
 SEA = SeaSpectrum(kind="jonswap", significant_height=2.0, peak_period=9.0)
@@ -80,10 +79,10 @@ def test_truncation_is_a_controller_of_low_order(bound: Bound) -> None:
     design = youla_design(bound, max_sensitivity=2.0, functions=10)
     low = design.lowest(within=0.1)
     assert len(low.A) < 0.6 * len(design.controller.A)
-    assert bound.value <= bound.of(low) <= 1.1 * design.value
+    assert bound.value <= weighted_rms(bound, low) <= 1.1 * design.value
     # All the states are the controller itself.
     same = design.reduced(len(design.controller.A))
-    assert bound.of(same) == pytest.approx(design.value, rel=1e-3)
+    assert weighted_rms(bound, same) == pytest.approx(design.value, rel=1e-3)
 
 
 def test_what_cannot_be_kept_is_told(bound: Bound) -> None:
