@@ -15,7 +15,7 @@ from pathlib import Path
 
 import stillhook as sh
 from models.hook import HookMotion, hook_motion
-from models.vessel import case_raos
+from models.vessel import vessel_raos
 from models.vessel.readers import read_raos
 
 IMAGE = Path(__file__).resolve().parents[2] / "docs" / "images" / "hook-motion.svg"
@@ -54,7 +54,7 @@ def best_of(work: Callable[[], object], rounds: int = 5) -> float:
 def timed() -> None:
     """Print how long each step takes."""
     own, moving = case(), case(**{"vessel.speed": "5 knots"})
-    case_raos(own)
+    vessel_raos(own.vessel)
     rows: list[tuple[str, Callable[[], object]]] = [
         ("read the vessel's file", lambda: read_raos("osv-83m")),
         ("make a case with it again", case),

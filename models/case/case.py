@@ -145,13 +145,18 @@ class Case(Section):
         >>> round(case.rope.stiffness)
         160000
         """
-        source = self.source or self.name
-        return Case.from_dict(replaced(self.to_dict(), Case, changes, source), source=source)
+        tree = replaced(self.to_dict(), Case, changes, self.label)
+        return Case.from_dict(tree, source=self.label)
 
     @property
     def source(self) -> str:
-        """Name of the file or bundled case that this came from, for messages."""
+        """Name of the file or bundled case that this came from."""
         return self._source
+
+    @property
+    def label(self) -> str:
+        """What messages call the case: its source, or its name where it has none."""
+        return self._source or self.name
 
     def to_dict(self) -> dict[str, Any]:
         """Return the case as plain dicts, lists, texts and SI numbers, without empty fields."""

@@ -30,7 +30,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..basics import GRAVITY, FloatArray, InputError, check_finite, read_only, wave_number
-from ..vessel import HeaveRao, case_raos, hook_operators
+from ..vessel import HeaveRao, hook_operators, vessel_raos
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -111,7 +111,9 @@ class Encounter:
         """
         if not case.vessel.moves:
             return None
-        omega, table, headings, weights = hook_operators(case)
+        omega, table, headings, weights = hook_operators(
+            case.vessel, case.sea.to_spectrum().spreading, case.label
+        )
         operators = None
         if hook:
             below, beyond = case.vessel.below, case.vessel.beyond
@@ -126,7 +128,7 @@ class Encounter:
             along=speed_along(case, headings),
             weights=weights,
             operators=operators,
-            depth=case_raos(case).depth,
+            depth=vessel_raos(case.vessel, case.label).depth,
         )
 
     def frequency(self, omega: npt.ArrayLike) -> FloatArray:

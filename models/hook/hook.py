@@ -36,7 +36,7 @@ from ..basics import (
     spectrum_statistics,
 )
 from ..sea import SeaSpectrum
-from ..vessel import HeaveRao, OutsideShare, speed_remark
+from ..vessel import HeaveRao, OutsideShare, hook_rao, speed_remark
 from .encounter import Encounter, MetSpectrum
 
 if TYPE_CHECKING:
@@ -126,15 +126,16 @@ class HookMotion:
             Whether to warn if much of the motion lies outside the RAO's table; not where the
             case's user has been told before.
         """
+        sea = case.sea.to_spectrum()
         motion = cls(
-            sea=SeaSpectrum.from_case(case),
-            rao=HeaveRao.from_case(case),
+            sea=sea,
+            rao=hook_rao(case.vessel, sea.spreading, case.label),
             encounter=Encounter.from_case(case),
         )
         if warn:
-            remark = speed_remark(case)
+            remark = speed_remark(case.vessel, case.label)
             if remark is not None:
-                warnings.warn(f"{case.source or case.name}: {remark}", PhysicsWarning, stacklevel=2)
+                warnings.warn(f"{case.label}: {remark}", PhysicsWarning, stacklevel=2)
             motion.warn_if_outside()
         return motion
 

@@ -29,7 +29,16 @@ from ..basics import (
     spectral_nodes,
 )
 from ..sea import SeaSpectrum
-from ..vessel import HeaveRao, Point, across, case_raos, equivalent, heave_operators, sea_directions
+from ..vessel import (
+    HeaveRao,
+    Point,
+    across,
+    equivalent,
+    heave_operators,
+    hook_rao,
+    sea_directions,
+    vessel_raos,
+)
 from .encounter import Encounter, speed_along
 from .hook_demand import ORDERS, HookDemand, MotionFigures, fractile_factor
 
@@ -201,10 +210,10 @@ def hook_motion(
     if case.vessel.raos is None:
         if headings is not None:
             raise InputError(
-                f"{case.source or case.name}: vessel.heave_rao: is that of one hook in one "
+                f"{case.label}: vessel.heave_rao: is that of one hook in one "
                 "heading; headings need vessel.raos"
             )
-        rao = HeaveRao.from_case(case)
+        rao = hook_rao(case.vessel, owner=case.label)
         waves = _Waves.of(seas, rao.omega)
         found = waves.moments(rao.gain(waves.omega))
         return HookSurvey(
@@ -219,7 +228,7 @@ def hook_motion(
     place = case.vessel.hook_point
     assert place is not None  # the section's own check
     sides = (place, across(place)) if both_sides and abs(place[1]) > 1e-9 else (place,)
-    waves = _Waves.of(seas, case_raos(case).omega)
+    waves = _Waves.of(seas, vessel_raos(case.vessel, case.label).omega)
     table = np.array([[_point(case, waves, side, angle) for angle in angles] for side in sides])
     return HookSurvey(
         case=case, headings=angles, peak_periods=periods, points=sides, moments=table,
@@ -236,10 +245,9 @@ def _seas(
     if field is None:
         if wanted is not None:
             raise InputError(
-                f"{case.source or case.name}: sea: the {case.sea.spectrum} sea has no peak_period "
-                "to vary"
+                f"{case.label}: sea: the {case.sea.spectrum} sea has no peak_period to vary"
             )
-        sea = SeaSpectrum.from_case(case)
+        sea = case.sea.to_spectrum()
         return np.array([2.0 * math.pi / sea.peak_frequency]), [sea], np.array([False])
     periods = np.atleast_1d(check_finite("hook", "peak periods", wanted or PEAK_PERIODS))
     ratio = getattr(case.sea, field) / case.sea.spectral_peak_period
@@ -249,7 +257,7 @@ def _seas(
         for period in map(float, periods):
             check_range("hook", "peak period", period, low=0.0, high=60.0, unit="s", open_low=True)
             there = case.replace({f"sea.{field}": ratio * period})
-            seas.append(SeaSpectrum.from_case(there))
+            seas.append(there.sea.to_spectrum())
             steep.append(there.sea.steepness > there.sea.breaking_steepness)
     return periods, seas, np.array(steep)
 
@@ -280,8 +288,8 @@ class _Waves:
 
 def _point(case: Case, waves: _Waves, place: Point, heading: float) -> FloatArray:
     """Return the moments (t, 7) of the hook at one place in waves of one mean heading."""
-    raos = case_raos(case)
-    angles, weights = sea_directions(case, heading)
+    raos = vessel_raos(case.vessel, case.label)
+    angles, weights = sea_directions(heading, case.sea.to_spectrum().spreading)
     operators = heave_operators(raos, place, angles)
 
     def rao(amplitude: FloatArray) -> HeaveRao:

@@ -16,7 +16,6 @@ from ..basics import GRAVITY, InputError
 from ..case import Case
 from ..casefile import Quantity
 from ..plant import Deck, Seabed, SplashZone, Surroundings
-from ..sea import SeaSpectrum
 from .excitation import MotionSource
 from .options import (
     Choice,
@@ -118,7 +117,7 @@ def _splash(case: Case, values: Values) -> dict[str, Any]:
         slamming_area=payload.area,
         slamming_coefficient=values["slamming_coefficient"],
         water_density=payload.water_density,
-        wave_number=SeaSpectrum.from_case(case).peak_frequency ** 2 / GRAVITY,
+        wave_number=case.sea.to_spectrum().peak_frequency ** 2 / GRAVITY,
     )
     surroundings = Surroundings(water=water)
     return {

@@ -14,7 +14,6 @@ import numpy as np
 
 from ..basics import GRAVITY
 from ..hook import Encounter, HookMotion
-from ..sea import SeaSpectrum
 from ..vessel import HeaveRao
 from .excitation import HOOK, SECOND_BODY, SpectrumMotion
 
@@ -66,4 +65,4 @@ def surface_motion(case: Case, side: float) -> SpectrumMotion:
 def _in_the_sea_of(case: Case, rao: HeaveRao) -> HookMotion:
     """Return a motion in the waves of a case, as they are met where its vessel is."""
     met = Encounter.from_case(case, hook=False)
-    return HookMotion(sea=SeaSpectrum.from_case(case), rao=rao, encounter=met)
+    return HookMotion(sea=case.sea.to_spectrum(), rao=rao, encounter=met)

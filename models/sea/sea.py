@@ -47,8 +47,6 @@ from .table import SpectrumTable
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..case import Case
-
 
 HIGHEST_FREQUENCY = 60.0
 """Where integrals over a sea end [rad/s]: a resonant loop still answers to the tail at 10 rad/s."""
@@ -150,11 +148,6 @@ class SeaSpectrum:
                 f"significant_height {self._shape_height:g} m with "
                 f"peak_period {self.peak_period:g} s; use jonswap or bretschneider"
             )
-
-    @classmethod
-    def from_case(cls, case: Case) -> SeaSpectrum:
-        """Return the sea of a case."""
-        return case.sea.to_spectrum()
 
     @classmethod
     def from_table(

@@ -268,7 +268,7 @@ def _rest(case: Case, masses: int | None, surroundings: Surroundings | None) -> 
     peak = case.winch.drive.torque_peak
     if abs(rest.torque) > peak:
         raise InputError(
-            f"{case.source or case.name}: winch.drive.torque_peak must be at least the static "
+            f"{case.label}: winch.drive.torque_peak must be at least the static "
             f"torque, {rest.torque:.4g} N m, got {peak:g} N m: the motor cannot hold the load"
         )
     return rest

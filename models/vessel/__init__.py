@@ -24,12 +24,13 @@ if TYPE_CHECKING:
     from .crane import across as across
     from .crane import place_text as place_text
     from .crane import side_of as side_of
-    from .hook_operator import case_raos as case_raos
     from .hook_operator import equivalent as equivalent
     from .hook_operator import heave_operators as heave_operators
     from .hook_operator import hook_operators as hook_operators
+    from .hook_operator import hook_rao as hook_rao
     from .hook_operator import sea_directions as sea_directions
     from .hook_operator import speed_remark as speed_remark
+    from .hook_operator import vessel_raos as vessel_raos
     from .raos import MODES as MODES
     from .raos import VesselRaos as VesselRaos
     from .symmetry import SYMMETRIES as SYMMETRIES

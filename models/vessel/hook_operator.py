@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import os
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,68 +21,77 @@ from ..basics import ComplexArray, FloatArray, InputError
 from ..sea import Spreading
 from .crane import Point
 from .raos import VesselRaos
-
-if TYPE_CHECKING:
-    from ..case import Case
-
+from .vessel import HeaveRao
+from .vessel_section import Vessel
 
 _ALIKE = 3.0
 """Difference of speeds that hardly matters to the motions [m/s]: a Froude number of 0.1 on 80 m."""
 
 
-def case_raos(case: Case) -> VesselRaos:
-    """Return the six motions that a case names, at the vessel's speed where the file has it.
+def vessel_raos(vessel: Vessel, owner: str = "case") -> VesselRaos:
+    """Return the six motions that a vessel names, at its own speed where the file has it.
+
+    Parameters
+    ----------
+    vessel
+        The section of the case.
+    owner
+        What messages call the case.
 
     Raises
     ------
     InputError
-        If the case has no `raos`, or the file is not what it should be; the field is named.
+        If the vessel has no `raos`, or the file is not what it should be; the field is named.
     """
-    name = case.vessel.raos
+    name = vessel.raos
     if name is None:
-        raise InputError(f"{_owner(case)}: vessel.raos: is missing: the case has heave_rao only")
+        raise InputError(f"{owner}: vessel.raos: is missing: the case has heave_rao only")
     try:
         raos = _read(name, *_stamp(name))
     except InputError as error:
         raise InputError(
-            f"{_owner(case)}: vessel.raos: {error}; `stillhook vessel import` reads a file with "
+            f"{owner}: vessel.raos: {error}; `stillhook vessel import` reads a file with "
             "options, shows what is in it, and writes one that a case can name"
         ) from error
-    speed = case.vessel.speed or 0.0
+    speed = vessel.speed or 0.0
     if abs(raos.speed - speed) > 1e-3:
         return _read_at(name, *_stamp(name), speed) or raos
     return raos
 
 
-def speed_remark(case: Case) -> str | None:
+def speed_remark(vessel: Vessel, owner: str = "case") -> str | None:
     """Return a sentence if the operators are those of quite another speed than the vessel's."""
-    if case.vessel.raos is None:
+    if vessel.raos is None:
         return None
-    at, speed = case_raos(case).speed, case.vessel.speed or 0.0
+    at, speed = vessel_raos(vessel, owner).speed, vessel.speed or 0.0
     if abs(at - speed) <= _ALIKE:
         return None
     return (
-        f"vessel.speed: the RAOs of {case.vessel.raos} hold for {at:.3g} m/s, the vessel makes "
+        f"vessel.speed: the RAOs of {vessel.raos} hold for {at:.3g} m/s, the vessel makes "
         f"{speed:.3g} m/s: what the speed does to its motions in a wave is not in them"
     )
 
 
-def sea_directions(case: Case, heading: float) -> tuple[FloatArray, FloatArray]:
-    """Return the headings of a case's sea and their shares; one heading if it is long-crested.
+@lru_cache(maxsize=256)
+def sea_directions(heading: float, spreading: Spreading | None) -> tuple[FloatArray, FloatArray]:
+    """Return the headings of a sea and their shares; one heading if it is long-crested.
 
     Parameters
     ----------
-    case
-        The case: its sea's spreading.
     heading
         The mean heading [rad].
+    spreading
+        The sea's spreading; None if it is long-crested.
 
     Returns
     -------
     headings, weights
         (n,) [rad], (n,).
     """
-    return _nodes(heading, _spreading(case))
+    if spreading is None:
+        return _frozen(np.array([heading % (2.0 * np.pi)])), _frozen(np.array([1.0]))
+    headings, weights = spreading.nodes(heading)
+    return _frozen(headings), _frozen(weights)
 
 
 def heave_operators(raos: VesselRaos, point: Point, headings: FloatArray) -> ComplexArray:
@@ -122,8 +130,19 @@ def heave_operators(raos: VesselRaos, point: Point, headings: FloatArray) -> Com
     return found
 
 
-def hook_operators(case: Case) -> tuple[FloatArray, ComplexArray, FloatArray, FloatArray]:
-    """Return the heave of a case's hook in each heading of its sea.
+def hook_operators(
+    vessel: Vessel, spreading: Spreading | None = None, owner: str = "case"
+) -> tuple[FloatArray, ComplexArray, FloatArray, FloatArray]:
+    """Return the heave of a vessel's hook in each heading of a sea.
+
+    Parameters
+    ----------
+    vessel
+        The section of the case.
+    spreading
+        The sea's spreading; None if it is long-crested.
+    owner
+        What messages call the case.
 
     Returns
     -------
@@ -135,15 +154,42 @@ def hook_operators(case: Case) -> tuple[FloatArray, ComplexArray, FloatArray, Fl
     InputError
         If the file is wrong, or the vessel has not been computed in these headings.
     """
-    raos = case_raos(case)
-    point, heading = case.vessel.hook_point, case.vessel.heading
+    raos = vessel_raos(vessel, owner)
+    point, heading = vessel.hook_point, vessel.heading
     if point is None or heading is None:  # the section's own check comes first
-        raise InputError(f"{_owner(case)}: vessel: raos need hook (or crane) and heading")
+        raise InputError(f"{owner}: vessel: raos need hook (or crane) and heading")
     try:
-        operators, headings, weights = _kept(raos, point, heading, _spreading(case))
+        operators, headings, weights = _kept(raos, point, heading, spreading)
     except InputError as error:
-        raise InputError(f"{_owner(case)}: vessel.heading: {error}") from error
+        raise InputError(f"{owner}: vessel.heading: {error}") from error
     return raos.omega, operators, headings, weights
+
+
+def hook_rao(vessel: Vessel, spreading: Spreading | None = None, owner: str = "case") -> HeaveRao:
+    """Return the heave of a vessel's hook: the table that it gives, or that of its six motions.
+
+    In a short-crested sea it is the one that gives the hook the same spectrum, see
+    :func:`equivalent`.  Parameters and errors are those of :func:`hook_operators`.
+    """
+    table = vessel.heave_rao
+    if table is not None:
+        return HeaveRao(
+            omega=np.asarray(table.omega, dtype=np.float64),
+            amplitude=np.asarray(table.amplitude, dtype=np.float64),
+            phase=None if table.phase is None else np.asarray(table.phase, dtype=np.float64),
+            below=vessel.below,
+            beyond=vessel.beyond,
+        )
+    omega, operators, _, weights = hook_operators(vessel, spreading, owner)
+    amplitude, phase = equivalent(operators, weights)
+    return HeaveRao(
+        omega=omega,
+        amplitude=amplitude,
+        phase=phase,
+        below=vessel.below,
+        beyond=vessel.beyond,
+        owner="vessel.raos",
+    )
 
 
 def equivalent(operators: ComplexArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -186,11 +232,6 @@ def _stamp(name: str) -> tuple[int, int]:
     return found.st_mtime_ns, found.st_size
 
 
-def _spreading(case: Case) -> Spreading | None:
-    section = case.sea.spreading
-    return None if section is None else Spreading(kind=section.kind, exponent=section.exponent)
-
-
 @lru_cache(maxsize=64)
 def _read_at(name: str, modified: int, size: int, speed: float) -> VesselRaos | None:
     """Return the operators of a speed; None if the file does not have them."""
@@ -204,18 +245,10 @@ def _read_at(name: str, modified: int, size: int, speed: float) -> VesselRaos | 
 
 
 @lru_cache(maxsize=256)
-def _nodes(heading: float, spreading: Spreading | None) -> tuple[FloatArray, FloatArray]:
-    if spreading is None:
-        return _frozen(np.array([heading % (2.0 * np.pi)])), _frozen(np.array([1.0]))
-    headings, weights = spreading.nodes(heading)
-    return _frozen(headings), _frozen(weights)
-
-
-@lru_cache(maxsize=256)
 def _kept(
     raos: VesselRaos, point: Point, heading: float, spreading: Spreading | None
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    headings, weights = _nodes(heading, spreading)
+    headings, weights = sea_directions(heading, spreading)
     operators = heave_operators(raos, point, headings)
     operators.setflags(write=False)
     return operators, headings, weights
@@ -224,7 +257,3 @@ def _kept(
 def _frozen(array: FloatArray) -> FloatArray:
     array.setflags(write=False)
     return array
-
-
-def _owner(case: Case) -> str:
-    return case.source or case.name

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -33,10 +32,6 @@ from ..basics import (
     check_finite,
     read_only,
 )
-
-if TYPE_CHECKING:
-    from ..case import Case
-
 
 BELOW = ("unity", "hold", "zero")
 """What the RAO may be below its table: linear to 1 at zero frequency, its first value, or 0."""
@@ -139,41 +134,6 @@ class HeaveRao:
         object.__setattr__(self, "omega", read_only(omega))
         object.__setattr__(self, "amplitude", read_only(amplitude))
         object.__setattr__(self, "phase", read_only(phase))
-
-    @classmethod
-    def from_case(cls, case: Case) -> HeaveRao:
-        """Return the RAO of a case's hook.
-
-        In a short-crested sea it is the one that gives the hook the same spectrum, see
-        :func:`models.vessel.hook_operator.equivalent`.
-
-        Raises
-        ------
-        InputError
-            If the vessel's file is wrong, or the vessel has not been computed in these headings.
-        """
-        vessel = case.vessel
-        table = vessel.heave_rao
-        if table is None:
-            from .hook_operator import equivalent, hook_operators
-
-            omega, operators, _, weights = hook_operators(case)
-            amplitude, phase = equivalent(operators, weights)
-            return cls(
-                omega=omega,
-                amplitude=amplitude,
-                phase=phase,
-                below=vessel.below,
-                beyond=vessel.beyond,
-                owner="vessel.raos",
-            )
-        return cls(
-            omega=np.asarray(table.omega, dtype=np.float64),
-            amplitude=np.asarray(table.amplitude, dtype=np.float64),
-            phase=None if table.phase is None else np.asarray(table.phase, dtype=np.float64),
-            below=vessel.below,
-            beyond=vessel.beyond,
-        )
 
     def response(self, omega: npt.ArrayLike) -> ComplexArray:
         """Return the complex operator.

@@ -123,7 +123,7 @@ def _check_static(case: Case, limits: list[Limit]) -> None:
         static = getattr(limit, "static", 0.0)
         if isinstance(limit, Peak | Continuous) and abs(static) >= limit.bound:
             raise InputError(
-                f"{case.source or case.name}: {limit.name} must be above the static load, "
+                f"{case.label}: {limit.name} must be above the static load, "
                 f"{abs(static):.6g} {limit.unit}, got {limit.bound:.6g} {limit.unit}"
             )
 

@@ -197,7 +197,7 @@ def sea_column(
         if headings is not None:
             if not has_headings(case):
                 raise InputError(
-                    f"{case.source or case.name}: vessel: has no headings, as it is given by the "
+                    f"{case.label}: vessel: has no headings, as it is given by the "
                     "heave of its hook alone; give raos for a contour over heading"
                 )
             cases = [changed.replace({"vessel.heading": float(b)}) for b in headings]
@@ -225,7 +225,7 @@ def _period_changes(case: Case, period: float) -> dict[str, float | None]:
     sea = case.sea
     if not has_period(case):
         raise InputError(
-            f"{case.source or case.name}: sea: the {sea.spectrum} spectrum has no peak_period "
+            f"{case.label}: sea: the {sea.spectrum} spectrum has no peak_period "
             "that could be changed; leave the periods out for a limit in its own shape"
         )
     if sea.spectrum == "bretschneider-1975":

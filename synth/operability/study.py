@@ -157,7 +157,7 @@ def _operability(
         )
     if diagram is not None and not has_period(case):
         raise InputError(
-            f"{case.source or case.name}: sea: the {case.sea.spectrum} spectrum has no peak_period "
+            f"{case.label}: sea: the {case.sea.spectrum} spectrum has no peak_period "
             "of its own, so that it cannot be set against a scatter diagram; use jonswap"
         )
     criteria = payload_criteria(case, **wanted)
@@ -249,7 +249,7 @@ def _periods(
 
 
 def _length(case: Case, depth: float) -> float:
-    source = case.source or case.name
+    source = case.label
     return check_range(source, "depths", depth, low=1.0, high=12000.0, unit="m")
 
 

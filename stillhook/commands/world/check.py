@@ -109,14 +109,14 @@ def _sea(case: Case, hook: HookMotion) -> Rows:
 
 def _vessel(case: Case) -> Rows:
     """Return the vessel, the heading of the waves and the hook's place, where the case has them."""
-    from models.vessel import case_raos, place_text
+    from models.vessel import place_text, vessel_raos
 
     from ...text import heading_words
 
     vessel, place = case.vessel, case.vessel.hook_point
     if place is None or vessel.heading is None:
         return []
-    raos = case_raos(case)
+    raos = vessel_raos(vessel, case.label)
     heading = f"{math.degrees(vessel.heading) % 360.0:.4g} deg"
     return [
         ("vessel", raos.name, f"hook at {place_text(place)}"),

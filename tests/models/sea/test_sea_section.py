@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from models import Case, InputError, load_case
-from models.sea import Sea, SeaSpectrum, Spreading
+from models.sea import Sea, Spreading
 from models.sea.kinds import SPECTRA
 from models.sea.wind import WIND_TABLE
 
@@ -53,7 +53,7 @@ def test_there_is_a_section_of_every_kind():
 @pytest.mark.parametrize("kind", SPECTRA)
 def test_every_kind_comes_back_from_its_yaml_and_takes_another_height(crane, kind, tmp_path):
     case = with_sea(crane, spectrum=kind, **SECTIONS[kind])
-    sea = SeaSpectrum.from_case(case)
+    sea = case.sea.to_spectrum()
     assert sea.kind == kind
     assert case.sea.significant_height == pytest.approx(sea.significant_height)
     assert case.sea.spectral_peak_period == pytest.approx(2.0 * math.pi / sea.peak_frequency)
@@ -62,15 +62,15 @@ def test_every_kind_comes_back_from_its_yaml_and_takes_another_height(crane, kin
     path.write_text(case.to_yaml(), encoding="utf-8")
     again = load_case(path)
     assert again == case
-    assert SeaSpectrum.from_case(again) == sea
-    assert SeaSpectrum.from_case(pickle.loads(pickle.dumps(case))) == sea
+    assert again.sea.to_spectrum() == sea
+    assert pickle.loads(pickle.dumps(case)).sea.to_spectrum() == sea
     higher = case.replace({"sea.significant_height": "3 m"})
-    assert SeaSpectrum.from_case(higher).significant_height == 3.0
-    assert SeaSpectrum.from_case(higher).statistics.m0 == pytest.approx(9.0 / 16.0, rel=0.02)
+    assert higher.sea.to_spectrum().significant_height == 3.0
+    assert higher.sea.to_spectrum().statistics.m0 == pytest.approx(9.0 / 16.0, rel=0.02)
     if kind not in ("pierson-moskowitz", "torsethaugen", "jonswap"):  # whose shape follows H_s
         omega = np.geomspace(0.3, 5.0, 40)
         ratio = (3.0 / sea.significant_height) ** 2
-        np.testing.assert_allclose(SeaSpectrum.from_case(higher)(omega), ratio * sea(omega), 1e-9)
+        np.testing.assert_allclose(higher.sea.to_spectrum()(omega), ratio * sea(omega), 1e-9)
 
 
 def test_what_follows_from_other_fields_is_not_written(crane):
@@ -92,7 +92,7 @@ def test_a_sea_by_its_wind_is_that_of_the_thesis(crane, kind, row):
     lower = case.replace({"sea.significant_height": 1.0})
     assert lower.sea.significant_height == 1.0
     assert lower.sea.spectral_peak_period == pytest.approx(case.sea.spectral_peak_period)
-    sea = SeaSpectrum.from_case(lower)
+    sea = lower.sea.to_spectrum()
     assert 2.0 * math.pi / sea.peak_frequency == pytest.approx(case.sea.spectral_peak_period)
 
 
@@ -107,11 +107,11 @@ def test_the_design_sea_of_the_thesis_is_its_wind_of_20_knots():
 def test_gamma_by_itself(crane):
     for height, period, gamma in ((4.0, 7.0, 5.0), (4.0, 10.5, 1.0), (4.0, 9.0, math.exp(0.575))):
         sea = {"significant_height": height, "peak_period": period, "gamma": "auto"}
-        found = SeaSpectrum.from_case(with_sea(crane, spectrum="jonswap", **sea))
+        found = with_sea(crane, spectrum="jonswap", **sea).sea.to_spectrum()
         # exp(5.75 - 1.15 T_p/sqrt(H_s)) between 3.6 and 5 (DNV-RP-C205).
         assert found.gamma == pytest.approx(gamma, rel=1e-12)
     rougher = with_sea(crane, spectrum="jonswap", **sea).replace({"sea.significant_height": 6.0})
-    assert SeaSpectrum.from_case(rougher).gamma == pytest.approx(
+    assert rougher.sea.to_spectrum().gamma == pytest.approx(
         math.exp(5.75 - 1.15 * 9.0 / math.sqrt(6.0))
     )
 
@@ -143,9 +143,9 @@ def test_a_file_is_found_beside_the_case(crane, tmp_path, monkeypatch):
 
 
 def test_spreading(crane):
-    assert SeaSpectrum.from_case(crane).spreading is None
+    assert crane.sea.to_spectrum().spreading is None
     case = crane.replace({"sea.spreading": {"kind": "cos-n", "exponent": 4}})
-    assert SeaSpectrum.from_case(case).spreading == Spreading(kind="cos-n", exponent=4.0)
+    assert case.sea.to_spectrum().spreading == Spreading(kind="cos-n", exponent=4.0)
     with pytest.raises(InputError, match=r"sea\.spreading\.kind: must be 'cos-2s' or 'cos-n'"):
         crane.replace({"sea.spreading": {"kind": "cosine", "exponent": 4}})
 
@@ -252,4 +252,4 @@ def test_a_part_of_a_sum_is_changed_by_its_path(crane):
     case = with_sea(crane, spectrum="sum", parts=PARTS)
     other = case.replace({"sea.parts.0.significant_height": "1.2 m"})
     assert other.sea.significant_height == pytest.approx(math.hypot(1.2, 2.0))
-    assert SeaSpectrum.from_case(other).parts[0].significant_height == 1.2
+    assert other.sea.to_spectrum().parts[0].significant_height == 1.2

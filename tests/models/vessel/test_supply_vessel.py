@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 from models import load_case
 from models.basics import peak_factor
 from models.hook import HookDemand, HookMotion, hook_motion
-from models.vessel import case_raos, heave_operators
+from models.vessel import heave_operators, vessel_raos
 
 FILE = Path(__file__).parents[4] / "shared" / "data" / "mss" / "supply.mat"
 pytestmark = pytest.mark.skipif(
@@ -55,7 +55,7 @@ def case_of(heading, y, period):
 def by_spline(heading, y, period):
     """Sigmas with a smooth curve through the operator against the wave at the hook."""
     case = case_of(heading, y, period)
-    raos = case_raos(case)
+    raos = vessel_raos(case.vessel)
     place = (-25.0, float(y), 20.0)
     operator = heave_operators(raos, place, np.radians([float(heading)]))[:, 0]
     omega = np.linspace(raos.omega[0], raos.omega[-1], 20_001)
@@ -87,7 +87,7 @@ def test_the_table_is_met(row):
 def test_the_table_is_met_to_its_digits_with_its_interpolation(row):
     heading, y, period, *wanted = row
     case = case_of(heading, y, period)
-    raos = case_raos(case)
+    raos = vessel_raos(case.vessel)
     operator = raos.heave_at((-25.0, float(y), 20.0), math.radians(heading))  # wave amidships
     omega = np.linspace(raos.omega[0], raos.omega[-1], 20_001)
     chord = np.interp(omega, raos.omega, operator.real) ** 2

@@ -15,7 +15,7 @@ from models.basics import PhysicsWarning
 from models.hook import HookMotion
 from models.operation.second_bodies import boat_motion, surface_motion
 from models.sea import Spreading
-from models.vessel import HeaveRao, case_raos, heave_operators
+from models.vessel import heave_operators, hook_rao, vessel_raos
 from models.vessel.readers import write_raos
 
 VESSEL = """\
@@ -173,8 +173,8 @@ def test_a_file_that_changes_is_read_again(tmp_path):
     from dataclasses import replace
 
     case = barge_case(tmp_path)
-    first = case_raos(case)
-    assert case_raos(case) is first  # read once
+    first = vessel_raos(case.vessel)
+    assert vessel_raos(case.vessel) is first  # read once
     before = HookMotion.from_case(case).displacement.rms
     write_raos(tmp_path / "barge.csv", replace(first, values=0.5 * first.values))
     with warnings.catch_warnings():
@@ -185,7 +185,7 @@ def test_a_file_that_changes_is_read_again(tmp_path):
 
 def test_the_operator_is_that_of_the_wave_at_the_hook(tmp_path):
     case = barge_case(tmp_path)
-    rao = HeaveRao.from_case(case)
+    rao = hook_rao(case.vessel)
     found = heave_operators(barge(), (-25.0, 14.0, 20.0), np.radians([150.0]))[:, 0]
     np.testing.assert_allclose(rao.response(barge().omega), found, atol=1e-5)
     assert abs(complex(rao.response(0.01)) - 1.0) < 0.02
@@ -193,7 +193,7 @@ def test_the_operator_is_that_of_the_wave_at_the_hook(tmp_path):
 
 def test_short_crested_seas_mix_the_headings(tmp_path):
     case = barge_case(tmp_path, sea__spreading={"kind": "cos-2s", "exponent": 10.0})
-    rao = HeaveRao.from_case(case)
+    rao = hook_rao(case.vessel, case.sea.to_spectrum().spreading)
     # By hand, with another rule than the law's own nodes.
     angles = np.linspace(-math.pi, math.pi, 721)[:-1]
     weights = Spreading(kind="cos-2s", exponent=10.0).density(angles) * (angles[1] - angles[0])

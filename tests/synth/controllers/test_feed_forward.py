@@ -9,9 +9,8 @@ from linear_runs import linear_run, sine_part, still, swell
 from models import Case, load_case
 from models.basics import InputError, SynthesisError
 from models.plant import build_plant
-from models.sea import SeaSpectrum
 from models.sensing import Measurement
-from models.vessel import HeaveRao
+from models.vessel import hook_rao
 from synth.controllers import VelocityFeedForward
 from synth.controllers.feed_forward import lead_of
 from synth.structures import DrumSpeedLoop, sampled_loop
@@ -103,9 +102,7 @@ def test_lead_is_the_sum_of_what_is_late() -> None:
     assert lead_of(late) - lead_of(case) == pytest.approx(0.25)
     # At the zero-crossing frequency of the hook's velocity, by moments of a plain sum.
     w = np.linspace(1e-3, 60.0, 1_200_001)
-    density = abs(HeaveRao.from_case(case).response(w)) ** 2 * SeaSpectrum.from_case(case).density(
-        w
-    )
+    density = abs(hook_rao(case.vessel).response(w)) ** 2 * case.sea.to_spectrum().density(w)
     omega = np.sqrt(np.sum(w**4 * density) / np.sum(w**2 * density))
     expected = 0.02 + DrumSpeedLoop.from_case(case).delay_at(omega)
     assert lead_of(case) == pytest.approx(expected, rel=1e-6)
