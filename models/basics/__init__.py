@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .checks import check_ascending as check_ascending
     from .checks import check_finite as check_finite
     from .checks import check_range as check_range
+    from .checks import range_text as range_text
     from .checks import read_only as read_only
     from .dispersion import wave_number as wave_number
     from .draws import MRU_ERROR as MRU_ERROR

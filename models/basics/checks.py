@@ -72,7 +72,7 @@ def check_range(
     )
     if not (math.isfinite(number) and inside):
         raise InputError(
-            f"{owner}: {name} must be {_range_text(low, high, unit, open_low, open_high)}, "
+            f"{owner}: {name} must be {range_text(low, high, unit, open_low, open_high)}, "
             f"got {value!r}"
         )
     return number
@@ -126,7 +126,8 @@ def read_only(array: npt.ArrayLike) -> FloatArray:
     return copy
 
 
-def _range_text(low: float, high: float, unit: str, open_low: bool, open_high: bool) -> str:
+def range_text(low: float, high: float, unit: str, open_low: bool, open_high: bool) -> str:
+    """Return a range in words, as in `in [0, 7) m`."""
     tail = f" {unit}" if unit else ""
     if math.isinf(low) and math.isinf(high):
         return f"a finite number{' in' + tail if unit else ''}"

@@ -2,9 +2,7 @@
 
 A case is the frozen image of a case file.  It is made through one door, `Case.from_dict`, which
 checks everything, words every error for the user, and warns about implausible physics;
-`replace` changes fields by their dotted paths and goes through the same door again.  Quantities
-that hang on several sections (static tension and torque, the drum's radius for the rope paid
-out) are properties here.
+`replace` changes fields by their dotted paths and goes through the same door again.
 """
 
 from __future__ import annotations
@@ -13,15 +11,14 @@ import warnings
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path as FilePath
-from typing import Annotated, Any, Literal
+from typing import Any
 
-from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from pydantic import PrivateAttr, ValidationError, model_validator
 
 from ..basics import InputError, PhysicsWarning
 from ..casefile import (
     FOLDER,
     Path,
-    Section,
     describe,
     line_of,
     message_line,
@@ -30,42 +27,12 @@ from ..casefile import (
     replaced,
     yaml_text,
 )
-from ..rig import GainBounds, Gains, Limits, Payload, Rope, Sensors, Winch
-from ..sea import Sea
-from ..vessel import Vessel
+from .contents import Contents
 from .plausibility import contradictions, remarks
 
 
-class Case(Section):
+class Case(Contents):
     """A case: all that a design needs to know, checked and frozen."""
-
-    stillhook: Literal[1]
-    """Version of the case format."""
-    name: Annotated[str, Field(min_length=1, max_length=100)]
-    """Name of the case."""
-    description: str = ""
-    """What the case is, in a sentence or two."""
-    sources: dict[str, str] | None = None
-    """Where the figures come from: free text under free keys."""
-    sea: Sea
-    """The sea state."""
-    vessel: Vessel
-    """The vessel: the heave of its hook, or its RAOs and the hook's place."""
-    rope: Rope
-    """The rope between the drum and the payload."""
-    payload: Payload
-    """The load at the lower end of the rope."""
-    winch: Winch
-    """Drum, gearbox, motor and drive."""
-    sensors: Sensors = Sensors()
-    """What is measured, and how."""
-    limits: Limits = Limits()
-    """What a design has to respect."""
-    gains: Gains | None = None
-    """Gains in use, if any: command = set-point - A (a P'' + a1 P' + a2 P), P in metres, the
-    command in V (DC motor), rad/s (AC with a speed regulator) or N m (AC without)."""
-    gain_bounds: GainBounds | None = None
-    """Lowest and highest value of the gains, if bounded."""
 
     _source: str = PrivateAttr(default="")
 
@@ -173,32 +140,3 @@ class Case(Section):
 
     def __hash__(self) -> int:
         return hash(self.model_dump_json())
-
-    @property
-    def drum_radius(self) -> float:
-        """Pitch radius of the drum with the rope paid out [m]."""
-        return self.winch.drum.radius_at(self.rope.length, self.rope.diameter)
-
-    @property
-    def static_tension(self) -> float:
-        """Rope tension at the winch at rest: payload and rope in water [N]."""
-        return self.payload.submerged_weight + self.rope.submerged_weight
-
-    @property
-    def static_torque(self) -> float:
-        """Motor torque that holds the static tension, without losses [N m]."""
-        return self.static_tension * self.drum_radius / self.winch.gearbox.ratio
-
-    @property
-    def static_torque_budget(self) -> float:
-        """Motor torque that raises the static tension through the gear's losses [N m]."""
-        return self.static_torque / self.winch.gearbox.efficiency
-
-    @property
-    def moving_mass(self) -> float:
-        """Mass of the one-spring model: payload, added mass, and the rope's share [kg].
-
-        A third of the rope, or all of it with the thesis's lumping.
-        """
-        share = 1.0 if self.rope.lumping == "thesis" else 1.0 / 3.0
-        return self.payload.virtual_mass + share * self.rope.mass

@@ -7,18 +7,15 @@ will change that.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from ..basics import InputError
 from ..rig import DCMotor
-
-if TYPE_CHECKING:
-    from .case import Case
+from .contents import Contents
 
 Finding = tuple[str, str]
 
 
-def contradictions(case: Case) -> list[Finding]:
+def contradictions(case: Contents) -> list[Finding]:
     """Return what makes the case impossible, as pairs of a dotted path and a sentence."""
     try:
         overloads = _overloads(case)
@@ -30,7 +27,7 @@ def contradictions(case: Case) -> list[Finding]:
     return found
 
 
-def remarks(case: Case) -> list[Finding]:
+def remarks(case: Contents) -> list[Finding]:
     """Return what is implausible, as pairs of a dotted path and a sentence."""
     found: list[Finding] = []
     sea, delay = case.sea, case.sensors.telemetry.delay
@@ -77,7 +74,7 @@ def remarks(case: Case) -> list[Finding]:
     return found
 
 
-def _overloads(case: Case) -> list[tuple[str, str, str]]:
+def _overloads(case: Contents) -> list[tuple[str, str, str]]:
     """Return the drive ratings below the static load: field, the static load, the rating."""
     drive, constant = case.winch.drive, case.winch.torque_constant
     gear, static = case.winch.gearbox, case.static_torque_budget
@@ -100,7 +97,7 @@ def _overloads(case: Case) -> list[tuple[str, str, str]]:
     return found
 
 
-def _static_limits(case: Case) -> list[Finding]:
+def _static_limits(case: Contents) -> list[Finding]:
     """Return the rope tension limits that the tension at rest breaks already."""
     found = []
     limits, tension = case.limits, case.static_tension / 1e3

@@ -8,7 +8,6 @@ if TYPE_CHECKING:
     from .data_file import FOLDER as FOLDER
     from .data_file import DataFile as DataFile
     from .messages import Path as Path
-    from .messages import describe as describe
     from .messages import line_of as line_of
     from .messages import message_line as message_line
     from .messages import suggestion as suggestion
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
     from .quantity import Quantity as Quantity
     from .quantity import custom_error as custom_error
     from .section import Section as Section
+    from .section import describe as describe
     from .section import problems as problems
     from .toml import toml_lines as toml_lines
     from .yaml_lines import read_yaml as read_yaml

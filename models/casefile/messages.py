@@ -1,52 +1,16 @@
-"""From pydantic's errors to the sentences that a user reads.
+"""The sentences that a user of case files reads: where, and what is wrong there.
 
-Each error becomes one line, `file:line: field.path: must be ..., got ...`.  Paths are those of
-the case file: the tags that pydantic puts into the path of a discriminated union are taken out
-again by walking the section classes along it.  Unknown keys get a suggestion.
+Each error is one line, `file:line: field.path: must be ..., got ...`; unknown keys get a
+suggestion.
 """
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Literal, get_args, get_origin
-
-from pydantic import ValidationError
-
-from .quantity import Quantity
-from .section import Section
+from collections.abc import Mapping, Sequence
 
 Path = tuple[str | int, ...]
-
-
-def describe(
-    error: ValidationError,
-    model: type[Section],
-    *,
-    source: str,
-    lines: Mapping[Path, int] | None = None,
-) -> str:
-    """Return one line per error, in the order of the file.
-
-    Parameters
-    ----------
-    error
-        What pydantic raised.
-    model
-        The section class that was validated.
-    source
-        Name of the file, or of what takes its place.
-    lines
-        Line number of each path, where known.
-    """
-    found: list[tuple[int, str]] = []
-    for entry in error.errors(include_url=False):
-        path, owner = _walk(model, entry["loc"])
-        for where, text in _sentences(entry, path, owner):
-            line = line_of(where, lines)
-            found.append((line, message_line(source, line, where, text)))
-    found.sort(key=lambda pair: pair[0])
-    return "\n".join(text for _, text in found)
+"""Way to a field: keys, and indices of lists."""
 
 
 def message_line(source: str, line: int, path: Path, text: str) -> str:
@@ -79,118 +43,3 @@ def suggestion(key: object, known: Sequence[str]) -> str:
     if near:
         return f"did you mean {near[0]!r}?"
     return f"known here: {', '.join(known)}"
-
-
-def sections_of(annotation: Any) -> tuple[type[Section], ...]:
-    """Return the section classes named in an annotation, however deep."""
-    return tuple(dict.fromkeys(_sections(annotation)))
-
-
-def discriminator(member: type[Section]) -> tuple[str, str] | None:
-    """Return the key and the value that select a section among its alternatives."""
-    for name in ("type", "method"):
-        field = member.model_fields.get(name)
-        if field is not None and get_origin(field.annotation) is Literal:
-            return name, str(get_args(field.annotation)[0])
-    return None
-
-
-def _sections(annotation: Any) -> Iterator[type[Section]]:
-    if isinstance(annotation, type) and issubclass(annotation, Section):
-        yield annotation
-        return
-    for argument in get_args(annotation):
-        yield from _sections(argument)
-
-
-def _walk(model: type[Section], loc: Sequence[str | int]) -> tuple[Path, type[Section] | None]:
-    """Return the path without union tags, and the section that holds its last element."""
-    path: list[str | int] = []
-    members: tuple[type[Section], ...] = (model,)
-    owner: type[Section] | None = model
-    for item in loc:
-        tagged = {tag[1]: member for member in members if (tag := discriminator(member))}
-        if len(members) > 1 and item in tagged:
-            members = (tagged[str(item)],)
-            continue
-        path.append(item)
-        if isinstance(item, int):
-            continue
-        owner = members[0] if len(members) == 1 else None
-        field = owner.model_fields.get(item) if owner is not None else None
-        members = sections_of(field.annotation) if field is not None else ()
-    return tuple(path), owner
-
-
-def _sentences(entry: Any, path: Path, owner: type[Section] | None) -> Iterator[tuple[Path, str]]:
-    kind, context = entry["type"], entry.get("ctx", {})
-    got = _got(entry.get("input"))
-    fields = owner.model_fields if owner is not None else {}
-    key = path[-1] if path else ""
-    if kind == "stillhook" and "problems" in context:
-        for name, text in context["problems"]:
-            parts = [int(part) if part.isdigit() else part for part in name.split(".") if part]
-            yield (*path, *parts), text
-    elif kind == "stillhook":
-        yield path, context["message"]
-    elif kind == "missing":
-        yield path, f"is missing{_wanted(fields.get(str(key)))}"
-    elif kind in ("extra_forbidden", "invalid_key"):
-        yield (*path[:-1], str(key)), f"unknown key; {suggestion(key, list(fields))}"
-    elif kind in ("model_type", "model_attributes_type", "dict_type"):
-        yield path, f"must be a section with keys of its own, got {got}"
-    elif kind == "literal_error":
-        yield path, f"must be {context['expected']}, got {got}{_near(entry.get('input'), context)}"
-    elif kind == "union_tag_not_found":
-        tag = str(context["discriminator"]).strip("'")
-        yield (*path, tag), f"is missing; {_choices(fields.get(str(key)))}"
-    elif kind == "union_tag_invalid":
-        tag = str(context["discriminator"]).strip("'")
-        yield (*path, tag), f"{_choices(fields.get(str(key)))}, got {context['tag']!r}"
-    elif kind in ("tuple_type", "list_type"):
-        yield path, f"must be a list, got {got}"
-    elif kind in ("too_short", "too_long"):
-        bound = context.get("min_length", context.get("max_length"))
-        side = "at least" if kind == "too_short" else "at most"
-        noun = "entry" if bound == 1 else "entries"
-        yield path, f"must have {side} {bound} {noun}, got {context['actual_length']}"
-    elif kind == "string_type":
-        yield path, f"must be text, got {got}"
-    elif kind == "string_too_short":
-        yield path, "must not be empty"
-    elif kind == "string_too_long":
-        yield path, f"must have at most {context['max_length']} characters, got {got}"
-    else:
-        message = str(entry["msg"]).removeprefix("Value error, ")
-        yield path, f"{message[:1].lower()}{message[1:]}, got {got}"
-
-
-def _got(value: object) -> str:
-    if isinstance(value, dict | list | tuple):
-        noun = "a section" if isinstance(value, dict) else "a list"
-        return f"{noun} with {len(value)} entr{'y' if len(value) == 1 else 'ies'}"
-    if value is None:
-        return "nothing"
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def _wanted(field: Any) -> str:
-    if field is None:
-        return ""
-    for item in field.metadata:
-        if isinstance(item, Quantity):
-            return f"; it must be {item.wanted}"
-    tags = [tag for member in sections_of(field.annotation) if (tag := discriminator(member))]
-    return f"; its {tags[0][0]} {_choices(field)}" if len(tags) > 1 else ""
-
-
-def _choices(field: Any) -> str:
-    tags = [tag for member in sections_of(field.annotation) if (tag := discriminator(member))]
-    return f"must be {' or '.join(repr(value) for _, value in tags)}"
-
-
-def _near(value: object, context: Mapping[str, Any]) -> str:
-    known = [part.strip("' ") for part in str(context["expected"]).replace(" or ", ",").split(",")]
-    near = difflib.get_close_matches(str(value), known, n=1, cutoff=0.6)
-    return f"; did you mean {near[0]!r}?" if near else ""

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..basics import InputError
-from .messages import discriminator, path_text, sections_of, suggestion
-from .section import Section
+from .messages import path_text, suggestion
+from .section import Section, discriminator, sections_of
 
 
 def plain(value: Any) -> Any:

@@ -16,8 +16,7 @@ from typing import Any
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from ..basics import KINDS, InputError, read_quantity, units_of
-from ..basics.checks import _range_text
+from ..basics import KINDS, InputError, range_text, read_quantity, units_of
 
 
 def custom_error(message: str, **context: Any) -> PydanticCustomError:
@@ -58,7 +57,7 @@ class Quantity:
     @property
     def range(self) -> str:
         """The range in words, with its unit."""
-        return _range_text(self.low, self.high, self.shown_unit, self.open_low, self.open_high)
+        return range_text(self.low, self.high, self.shown_unit, self.open_low, self.open_high)
 
     @property
     def shown_unit(self) -> str:

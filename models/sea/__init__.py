@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from .records import SeaRecords as SeaRecords
     from .records import read_seas as read_seas
     from .scatter import Scatter as Scatter
-    from .scatter import read_scatter as read_scatter
+    from .scatter_files import read_scatter as read_scatter
+    from .scatter_files import write_scatter as write_scatter
     from .sea import SeaSpectrum as SeaSpectrum
     from .sea_section import Sea as Sea
     from .sea_section import SeaPart as SeaPart

@@ -9,30 +9,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..basics import InputError, read_bytes
+from .library_files import FORMATS, read_with_library
 from .ndbc import is_ndbc, read_ndbc
-from .records import RawRecords
-
-FORMATS: dict[str, str] = {
-    "ndbc": "NDBC text",
-    "ndbc-netcdf": "NDBC NetCDF",
-    "spotter": "Spotter JSON or CSV",
-    "swan": "SWAN text",
-    "swan-netcdf": "SWAN NetCDF",
-    "ww3": "WAVEWATCH III NetCDF",
-    "ww3-station": "WAVEWATCH III station text",
-    "wwm": "WWM NetCDF",
-    "era5": "ERA5 NetCDF",
-    "wavespectra": "wavespectra NetCDF",
-    "wavespectra-json": "wavespectra JSON",
-    "triaxys": "TRIAXYS text",
-    "datawell": "Datawell spt",
-    "octopus": "Octopus text",
-    "obscape": "Obscape CSV",
-    "awac": "Nortek AWAC text",
-    "funwave": "FUNWAVE text",
-    "xwaves": "XWaves MAT",
-}
-"""Formats by the names that `read_seas` and `stillhook sea --format` take."""
+from .quality import RawRecords
 
 _EXTENSIONS = {".spt": "datawell", ".oct": "octopus", ".mat": "xwaves"}
 
@@ -52,8 +31,6 @@ def read_raw(path: str, file_format: str | None) -> RawRecords:
     name = file_format or guess_format(path)
     if name == "ndbc":
         return read_ndbc(path)
-    from .library_files import read_with_library
-
     return read_with_library(path, name)
 
 

@@ -19,8 +19,29 @@ import numpy as np
 import numpy.typing as npt
 
 from ..basics import GZIP, FloatArray, InputError, check_hdf5, read_bytes
-from .formats import FORMATS
-from .records import RawRecords
+from .quality import RawRecords
+
+FORMATS: dict[str, str] = {
+    "ndbc": "NDBC text",
+    "ndbc-netcdf": "NDBC NetCDF",
+    "spotter": "Spotter JSON or CSV",
+    "swan": "SWAN text",
+    "swan-netcdf": "SWAN NetCDF",
+    "ww3": "WAVEWATCH III NetCDF",
+    "ww3-station": "WAVEWATCH III station text",
+    "wwm": "WWM NetCDF",
+    "era5": "ERA5 NetCDF",
+    "wavespectra": "wavespectra NetCDF",
+    "wavespectra-json": "wavespectra JSON",
+    "triaxys": "TRIAXYS text",
+    "datawell": "Datawell spt",
+    "octopus": "Octopus text",
+    "obscape": "Obscape CSV",
+    "awac": "Nortek AWAC text",
+    "funwave": "FUNWAVE text",
+    "xwaves": "XWaves MAT",
+}
+"""Formats by the names that `read_seas` and `stillhook sea --format` take."""
 
 _READERS: dict[str, tuple[str, dict[str, Any]]] = {
     "spotter": ("spotter", {"dd": None}),  # its own directions are moments, not a second axis
@@ -56,7 +77,7 @@ def read_with_library(path: str, name: str) -> RawRecords:
     path
         The file.
     name
-        A name of `models.sea.formats.FORMATS`, or `netcdf` to find out which one it is.
+        A name of :data:`FORMATS`, or `netcdf` to find out which one it is.
 
     Raises
     ------

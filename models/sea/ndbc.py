@@ -28,8 +28,7 @@ from pathlib import Path
 import numpy as np
 
 from ..basics import InputError, read_text
-from .quality import Rejection
-from .records import RawRecords
+from .quality import RawRecords, Rejection
 
 _CODES = (999.0, 9999.0)
 _WHOLE_ROW = 99.0

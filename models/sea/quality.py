@@ -17,6 +17,8 @@ import numpy.typing as npt
 
 from ..basics import FloatArray
 
+TimeArray = npt.NDArray[np.datetime64]
+
 HIGHEST_SEA = 30.0
 """H_s above which a record is rejected [m]; the highest on record is 19 m."""
 
@@ -31,6 +33,41 @@ class Rejection:
     """How many records."""
     example: str
     """The first of them: its line, or its time."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RawRecords:
+    """What a reader found, before quality control.
+
+    Attributes
+    ----------
+    file_format
+        Name of the format, for people.
+    time
+        Times, UTC (n,); NaT where the file has none.
+    frequency
+        Frequencies, strictly ascending (k,) [Hz].
+    density
+        Variance densities (n, k) [m^2/Hz], NaN where missing.
+    direction
+        Mean direction that the waves come from, clockwise from north (n,) [deg], or None.
+    place
+        Where each record is from (n,), or empty where there is one place only.
+    names
+        What to call each record in an account (n,), or empty to call it by its time.
+    rejections, notes
+        What the reader itself had to leave out, and what it noticed.
+    """
+
+    file_format: str
+    time: TimeArray
+    frequency: FloatArray
+    density: FloatArray
+    direction: FloatArray | None = None
+    place: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
+    rejections: tuple[Rejection, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,49 +19,13 @@ import numpy as np
 import numpy.typing as npt
 
 from ..basics import FloatArray, InputError, check_range
-from .quality import QualityControl, Rejection, sift
+from .formats import read_raw
+from .quality import QualityControl, RawRecords, TimeArray, sift
 from .scatter import Scatter
 from .table import MOST_ROWS
 
 if TYPE_CHECKING:
     from .sea import SeaSpectrum
-
-TimeArray = npt.NDArray[np.datetime64]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RawRecords:
-    """What a reader found, before quality control.
-
-    Attributes
-    ----------
-    file_format
-        Name of the format, for people.
-    time
-        Times, UTC (n,); NaT where the file has none.
-    frequency
-        Frequencies, strictly ascending (k,) [Hz].
-    density
-        Variance densities (n, k) [m^2/Hz], NaN where missing.
-    direction
-        Mean direction that the waves come from, clockwise from north (n,) [deg], or None.
-    place
-        Where each record is from (n,), or empty where there is one place only.
-    names
-        What to call each record in an account (n,), or empty to call it by its time.
-    rejections, notes
-        What the reader itself had to leave out, and what it noticed.
-    """
-
-    file_format: str
-    time: TimeArray
-    frequency: FloatArray
-    density: FloatArray
-    direction: FloatArray | None = None
-    place: tuple[str, ...] = ()
-    names: tuple[str, ...] = ()
-    rejections: tuple[Rejection, ...] = ()
-    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -284,7 +248,7 @@ def read_seas(path: str | Path, *, file_format: str | None = None) -> SeaRecords
     path
         The file, plain or packed with gzip.
     file_format
-        Name of its format, one of `models.sea.formats.FORMATS`; found out if left out.
+        Name of its format, one of `models.sea.library_files.FORMATS`; found out if left out.
 
     Returns
     -------
@@ -307,8 +271,6 @@ def read_seas(path: str | Path, *, file_format: str | None = None) -> SeaRecords
 
 @lru_cache(maxsize=4)
 def _read(path: str, file_format: str | None, stamp: tuple[int, int]) -> SeaRecords:
-    from .formats import read_raw
-
     del stamp  # a part of the cache's key: a file may change under its name
     return SeaRecords.from_raw(read_raw(path, file_format), path)
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -128,18 +127,6 @@ class Scatter:
         """Return the share of the time with an H_s of at most that given [m]."""
         return float(self.occurrence[self.significant_height <= significant_height].sum())
 
-    def of_month(self, *months: int) -> Scatter:
-        """Return the diagram of some months alone, its occurrences again adding up to one.
-
-        Raises
-        ------
-        InputError
-            If the diagram has no months, or nothing in those asked for.
-        """
-        if self.month is None:
-            raise InputError(f"{self.source}: has no column of months")
-        return self._some(np.isin(self.month, months), f"month {', '.join(map(str, months))}")
-
     def binned(self, *, height_step: float = 0.5, period_step: float = 1.0) -> Scatter:
         """Return the diagram on classes of H_s and T_p, each state at the centre of its class.
 
@@ -248,82 +235,6 @@ class Scatter:
             weights=self.occurrence,
         )
         return heights, periods, table
-
-    def to_csv(self, path: str | Path) -> Path:
-        """Write the list of states as CSV, in the form that :func:`read_scatter` reads."""
-        from .scatter_files import write_scatter
-
-        return write_scatter(path, self)
-
-    def _some(self, which: npt.NDArray[np.bool_], name: str) -> Scatter:
-        if not np.any(which):
-            raise InputError(f"{self.source}: has no sea state in {name}")
-        return Scatter(
-            significant_height=self.significant_height[which],
-            peak_period=self.peak_period[which],
-            occurrence=self.occurrence[which],
-            month=None if self.month is None else self.month[which],
-            heading=None if self.heading is None else self.heading[which],
-            source=f"{self.source}, {name}",
-        )
-
-
-def read_scatter(path: str | Path, *, gamma: float = 1.0) -> Scatter:
-    r"""Read a scatter diagram from a CSV file: a list of sea states, or a matrix.
-
-    A list has a header that names its columns and, after it, one row per state.  Names are
-    `significant_height` (or H_s, Hs, Hm0), `peak_period` (T_p, Tp) or `zero_crossing_period`
-    (T_z, Tz, Tm02), `occurrence` (count, share, probability, percent) and, where there are any,
-    `month` and `heading`.  A unit stands in brackets behind the name, or in a row of units under
-    the header; without one it is m and s.  Headings need theirs::
-
-        H_s [m], T_p [s], occurrence
-        0.5, 5.5, 1210
-        1.5, 6.5, 2380
-
-    A matrix has heights down and periods across, or the other way about, and its corner says
-    which.  Classes are given by their centres or as ranges::
-
-        H_s [m] \ T_z [s], 4-5, 5-6, 6-7
-        0-1, 120, 310, 85
-        1-2, 14, 402, 516
-
-    Separators are commas, semicolons (then with decimal commas, if the file has them) or tabs;
-    lines that begin with `#` are passed over.
-
-    Parameters
-    ----------
-    path
-        The file.
-    gamma
-        Peak enhancement of the JONSWAP spectrum by which zero-crossing periods become peak
-        periods [-]; 1 is Pierson-Moskowitz's, which published diagrams of T_z assume.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a column is missing, a figure is no number or out of range.
-    """
-    from .scatter_files import scatter_from_csv
-
-    return scatter_from_csv(path, gamma=gamma)
-
-
-def zero_crossing_ratio(gamma: float) -> float:
-    """Return T_z / T_p of a JONSWAP spectrum (DNV-RP-C205, 3.5.5.5).
-
-    Parameters
-    ----------
-    gamma
-        Peak enhancement, 1 to 7 [-].
-
-    Examples
-    --------
-    >>> round(zero_crossing_ratio(1.0), 4), round(zero_crossing_ratio(3.3), 4)
-    (0.7118, 0.7777)
-    """
-    g = check_range("sea", "gamma", gamma, low=1.0, high=7.0)
-    return 0.6673 + 0.05037 * g - 0.006230 * g**2 + 0.0003341 * g**3
 
 
 def _check_all(

@@ -1,7 +1,4 @@
-"""Scatter diagrams as CSV files: a list of states or a matrix, read and written.
-
-The forms are described at `models.sea.scatter.read_scatter`, the door to this module.
-"""
+"""Scatter diagrams as CSV files: a list of states or a matrix, read and written."""
 
 from __future__ import annotations
 
@@ -13,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..basics import KINDS, InputError, read_text, write_text_atomically
-from .scatter import Scatter, zero_crossing_ratio
+from ..basics import KINDS, InputError, check_range, read_text, write_text_atomically
+from .scatter import Scatter
 
 _NAMES = {
     "significant_height": ("significantheight", "significantwaveheight", "hs", "hm0", "swh"),
@@ -37,8 +34,42 @@ _RANGE = re.compile(r"^\s*([0-9]*\.?[0-9]+)\s*(?:-|\u2013|to|\.\.)\s*([0-9]*\.?[
 _MOST_ROWS = 200_000
 
 
-def scatter_from_csv(path: str | Path, *, gamma: float = 1.0) -> Scatter:
-    """Read a diagram; see :func:`models.sea.scatter.read_scatter`."""
+def read_scatter(path: str | Path, *, gamma: float = 1.0) -> Scatter:
+    r"""Read a scatter diagram from a CSV file: a list of sea states, or a matrix.
+
+    A list has a header that names its columns and, after it, one row per state.  Names are
+    `significant_height` (or H_s, Hs, Hm0), `peak_period` (T_p, Tp) or `zero_crossing_period`
+    (T_z, Tz, Tm02), `occurrence` (count, share, probability, percent) and, where there are any,
+    `month` and `heading`.  A unit stands in brackets behind the name, or in a row of units under
+    the header; without one it is m and s.  Headings need theirs::
+
+        H_s [m], T_p [s], occurrence
+        0.5, 5.5, 1210
+        1.5, 6.5, 2380
+
+    A matrix has heights down and periods across, or the other way about, and its corner says
+    which.  Classes are given by their centres or as ranges::
+
+        H_s [m] \ T_z [s], 4-5, 5-6, 6-7
+        0-1, 120, 310, 85
+        1-2, 14, 402, 516
+
+    Separators are commas, semicolons (then with decimal commas, if the file has them) or tabs;
+    lines that begin with `#` are passed over.
+
+    Parameters
+    ----------
+    path
+        The file.
+    gamma
+        Peak enhancement of the JONSWAP spectrum by which zero-crossing periods become peak
+        periods [-]; 1 is Pierson-Moskowitz's, which published diagrams of T_z assume.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a column is missing, a figure is no number or out of range.
+    """
     ratio = zero_crossing_ratio(gamma)
     owner = str(path)
     rows = _rows(read_text(path), owner)
@@ -54,7 +85,7 @@ def scatter_from_csv(path: str | Path, *, gamma: float = 1.0) -> Scatter:
 
 
 def write_scatter(path: str | Path, scatter: Scatter) -> Path:
-    """Write a diagram as a list of states; occurrences are shares."""
+    """Write a diagram as a list of states with their shares, for :func:`read_scatter`."""
     names = ["significant_height [m]", "peak_period [s]", "occurrence"]
     columns = [scatter.significant_height, scatter.peak_period, scatter.occurrence]
     if scatter.month is not None:
@@ -66,6 +97,23 @@ def write_scatter(path: str | Path, scatter: Scatter) -> Path:
     lines = [f"# Scatter diagram: {scatter.source}".replace("\n", " "), ",".join(names)]
     lines += [",".join(f"{value:.15g}" for value in row) for row in zip(*columns, strict=True)]
     return write_text_atomically(path, "\n".join(lines) + "\n")
+
+
+def zero_crossing_ratio(gamma: float) -> float:
+    """Return T_z / T_p of a JONSWAP spectrum (DNV-RP-C205, 3.5.5.5).
+
+    Parameters
+    ----------
+    gamma
+        Peak enhancement, 1 to 7 [-].
+
+    Examples
+    --------
+    >>> round(zero_crossing_ratio(1.0), 4), round(zero_crossing_ratio(3.3), 4)
+    (0.7118, 0.7777)
+    """
+    g = check_range("sea", "gamma", gamma, low=1.0, high=7.0)
+    return 0.6673 + 0.05037 * g - 0.006230 * g**2 + 0.0003341 * g**3
 
 
 def _rows(text: str, owner: str) -> list[tuple[int, list[str]]]:

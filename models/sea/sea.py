@@ -24,7 +24,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -43,10 +42,6 @@ from .kinds import SPECTRA, check_fields
 from .peak import highest_of
 from .spreading import Spreading
 from .table import SpectrumTable
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
 
 HIGHEST_FREQUENCY = 60.0
 """Where integrals over a sea end [rad/s]: a resonant loop still answers to the tail at 10 rad/s."""
@@ -177,21 +172,6 @@ class SeaSpectrum:
         return cls(
             kind="measured", table=table, significant_height=significant_height, spreading=spreading
         )
-
-    @classmethod
-    def sum_of(
-        cls, parts: Sequence[SeaSpectrum], *, spreading: Spreading | None = None
-    ) -> SeaSpectrum:
-        """Return the sea of several that run at the same time: their variances add up.
-
-        Examples
-        --------
-        >>> wind = SeaSpectrum(kind="jonswap", significant_height=1.5, peak_period=6.0)
-        >>> swell = SeaSpectrum(kind="bretschneider", significant_height=2.0, peak_period=14.0)
-        >>> SeaSpectrum.sum_of([wind, swell]).significant_height
-        2.5
-        """
-        return cls(kind="sum", parts=tuple(parts), spreading=spreading)
 
     def density(self, omega: npt.ArrayLike) -> FloatArray:
         """Return the variance density of the surface elevation.

@@ -483,7 +483,7 @@ def sea(found: Figures) -> None:
             kind="ochi-hubble", significant_height=2.0, peak_period=9.0, order=2.0
         ),
         "swell": swell,
-        "sum": SeaSpectrum.sum_of([wind, swell]),
+        "sum": SeaSpectrum(kind="sum", parts=(wind, swell)),
         "measured": SeaSpectrum.from_table(table[:, 0], table[:, 1]),
     }
     omega = np.array([0.4, 0.7, 1.0, 2.0])

@@ -17,7 +17,7 @@ import numpy as np
 
 from models import bundled_cases, load_case
 from models.basics import InputError, check_range
-from models.sea import read_seas
+from models.sea import read_seas, write_scatter
 
 from ...text import (
     OutputFolder,
@@ -141,7 +141,7 @@ def _write(
     steps = {"height_step": arguments.height_step, "period_step": arguments.period_step}
     scatter = records.scatter(**steps)
     folder.write("records.csv", _records_csv(records))
-    scatter.to_csv(folder.path / "scatter.csv")
+    write_scatter(folder.path / "scatter.csv", scatter)
     name = Path(arguments.file).name
     count = f"{len(records)} records"
     figures = {

@@ -22,7 +22,7 @@ from models import (
     write_text_atomically,
 )
 from models.casefile import Quantity, read_yaml
-from models.casefile.messages import sections_of
+from models.casefile.section import sections_of
 
 NAMES = [name for name, _ in bundled_cases()]
 CASES_FOLDER = Path(__file__).parents[3] / "models" / "cases"

@@ -221,7 +221,7 @@ def any_sea(kind: str, height: float = 3.0, period: float = 9.0) -> SeaSpectrum:
     if kind == "sum":
         wind = SeaSpectrum(kind="jonswap", significant_height=0.8 * height, peak_period=period)
         swell = any_sea("gaussian-swell", 0.6 * height, 1.8 * period)
-        return SeaSpectrum.sum_of([wind, swell])
+        return SeaSpectrum(kind="sum", parts=(wind, swell))
     if kind == "pierson-moskowitz":
         return SeaSpectrum(kind=kind, significant_height=height)
     values = {"peak_period": period}
@@ -377,7 +377,7 @@ def test_a_tma_in_deep_water_is_a_jonswap():
 
 def test_a_sum_adds_up():
     wind, swell = any_sea("jonswap", 2.0, 7.0), any_sea("gaussian-swell", 1.5, 15.0)
-    both = SeaSpectrum.sum_of([wind, swell])
+    both = SeaSpectrum(kind="sum", parts=(wind, swell))
     omega = np.geomspace(0.1, 10.0, 300)
     np.testing.assert_allclose(both(omega), wind(omega) + swell(omega), rtol=1e-12)
     assert both.significant_height == pytest.approx(2.5)

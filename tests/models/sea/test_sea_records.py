@@ -13,7 +13,7 @@ import pytest
 
 from models.basics import InputError
 from models.sea import SeaRecords, read_seas
-from models.sea.formats import FORMATS
+from models.sea.library_files import FORMATS
 from models.sea.quality import sift
 
 DATA = Path(__file__).parents[4] / "shared" / "data" / "wavespectra"

@@ -15,8 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from models import InputError, load_case
-from models.sea import Scatter
-from models.sea.scatter_files import write_scatter
+from models.sea import Scatter, write_scatter
 from stillhook.cli import main
 from stillhook.commands.study.operability import parse_axis
 from stillhook.seas import (

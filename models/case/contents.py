@@ -1,0 +1,73 @@
+"""Contents of a case: its sections, and the statics that follow from several of them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from ..casefile import Section
+from ..rig import GainBounds, Gains, Limits, Payload, Rope, Sensors, Winch
+from ..sea import Sea
+from ..vessel import Vessel
+
+
+class Contents(Section):
+    """What stands in a case file, each section checked by itself."""
+
+    stillhook: Literal[1]
+    """Version of the case format."""
+    name: Annotated[str, Field(min_length=1, max_length=100)]
+    """Name of the case."""
+    description: str = ""
+    """What the case is, in a sentence or two."""
+    sources: dict[str, str] | None = None
+    """Where the figures come from: free text under free keys."""
+    sea: Sea
+    """The sea state."""
+    vessel: Vessel
+    """The vessel: the heave of its hook, or its RAOs and the hook's place."""
+    rope: Rope
+    """The rope between the drum and the payload."""
+    payload: Payload
+    """The load at the lower end of the rope."""
+    winch: Winch
+    """Drum, gearbox, motor and drive."""
+    sensors: Sensors = Sensors()
+    """What is measured, and how."""
+    limits: Limits = Limits()
+    """What a design has to respect."""
+    gains: Gains | None = None
+    """Gains in use, if any: command = set-point - A (a P'' + a1 P' + a2 P), P in metres, the
+    command in V (DC motor), rad/s (AC with a speed regulator) or N m (AC without)."""
+    gain_bounds: GainBounds | None = None
+    """Lowest and highest value of the gains, if bounded."""
+
+    @property
+    def drum_radius(self) -> float:
+        """Pitch radius of the drum with the rope paid out [m]."""
+        return self.winch.drum.radius_at(self.rope.length, self.rope.diameter)
+
+    @property
+    def static_tension(self) -> float:
+        """Rope tension at the winch at rest: payload and rope in water [N]."""
+        return self.payload.submerged_weight + self.rope.submerged_weight
+
+    @property
+    def static_torque(self) -> float:
+        """Motor torque that holds the static tension, without losses [N m]."""
+        return self.static_tension * self.drum_radius / self.winch.gearbox.ratio
+
+    @property
+    def static_torque_budget(self) -> float:
+        """Motor torque that raises the static tension through the gear's losses [N m]."""
+        return self.static_torque / self.winch.gearbox.efficiency
+
+    @property
+    def moving_mass(self) -> float:
+        """Mass of the one-spring model: payload, added mass, and the rope's share [kg].
+
+        A third of the rope, or all of it with the thesis's lumping.
+        """
+        share = 1.0 if self.rope.lumping == "thesis" else 1.0 / 3.0
+        return self.payload.virtual_mass + share * self.rope.mass
