@@ -16,13 +16,8 @@ if TYPE_CHECKING:
     from .checks import check_finite as check_finite
     from .checks import check_range as check_range
     from .checks import range_text as range_text
+    from .checks import check_seed as check_seed
     from .checks import read_only as read_only
-    from .dispersion import wave_number as wave_number
-    from .draws import MRU_ERROR as MRU_ERROR
-    from .draws import SENSOR_NOISE as SENSOR_NOISE
-    from .draws import TELEMETRY as TELEMETRY
-    from .draws import check_seed as check_seed
-    from .draws import draw as draw
     from .files import cache_folder as cache_folder
     from .files import reason as reason
     from .files import replace_atomically as replace_atomically
@@ -55,12 +50,6 @@ if TYPE_CHECKING:
     from .signals import signal_delays as signal_delays
     from .signals import signal_names as signal_names
     from .signals import signal_rates as signal_rates
-    from .tables import DRAG_COEFFICIENTS as DRAG_COEFFICIENTS
-    from .tables import DRUM_LAYERS as DRUM_LAYERS
-    from .tables import GRAVITY as GRAVITY
-    from .tables import SEA_WATER_DENSITY as SEA_WATER_DENSITY
-    from .tables import STEEL_DENSITY as STEEL_DENSITY
-    from .tables import prism_added_mass as prism_added_mass
     from .text import GZIP as GZIP
     from .text import read_bytes as read_bytes
     from .text import read_text as read_text
@@ -69,6 +58,9 @@ if TYPE_CHECKING:
     from .units import parse_quantity as parse_quantity
     from .units import read_quantity as read_quantity
     from .units import units_of as units_of
+    from .water import GRAVITY as GRAVITY
+    from .water import SEA_WATER_DENSITY as SEA_WATER_DENSITY
+    from .water import wave_number as wave_number
     from .white import White as White
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -119,6 +119,19 @@ def check_ascending(owner: str, name: str, values: Sequence[float] | FloatArray)
     return array
 
 
+def check_seed(owner: str, seed: int) -> int:
+    """Return the seed if it is a whole number of at least 0.
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"{owner}: seed must be a whole number of at least 0, got {seed!r}")
+    return int(seed)
+
+
 def read_only(array: npt.ArrayLike) -> FloatArray:
     """Return a float copy of `array` that cannot be written to."""
     copy = np.array(array, dtype=np.float64)

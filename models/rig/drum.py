@@ -14,8 +14,9 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..basics import DRUM_LAYERS, InputError
+from ..basics import InputError
 from ..casefile import Quantity, Section, custom_error, problems
+from .tables import DRUM_LAYERS
 
 
 class DrumLayer(Section):

@@ -12,8 +12,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from ..basics import DRAG_COEFFICIENTS, GRAVITY, SEA_WATER_DENSITY, STEEL_DENSITY, prism_added_mass
+from ..basics import GRAVITY, SEA_WATER_DENSITY
 from ..casefile import Quantity, Section, problems
+from .tables import DRAG_COEFFICIENTS, STEEL_DENSITY, prism_added_mass
 
 
 class Rope(Section):

@@ -20,17 +20,16 @@ import numpy as np
 import numpy.typing as npt
 
 from ..basics import (
-    MRU_ERROR,
     ComplexArray,
     FloatArray,
     InputError,
     check_finite,
     check_range,
     check_seed,
-    draw,
     read_only,
 )
 from ..rig import MRU
+from .draws import MRU_ERROR, draw
 from .lowpass import from_mode, integrate_to, low_pass_pole, mode_recursion, noise_root, to_mode
 from .telemetry import Interval, check_intervals, during
 

@@ -23,17 +23,16 @@ import numpy as np
 import numpy.typing as npt
 
 from ..basics import (
-    SENSOR_NOISE,
     FloatArray,
     InputError,
     check_finite,
     check_range,
     check_seed,
-    draw,
     pick,
 )
 from ..rig import Encoder, LoadCell, PayloadSensor, Telemetry
 from .control import MEASURED
+from .draws import SENSOR_NOISE, draw
 from .mru import MruBlock
 from .telemetry import Late, TelemetryBlock, TelemetrySchedule
 

@@ -20,16 +20,15 @@ import numpy as np
 import numpy.typing as npt
 
 from ..basics import (
-    TELEMETRY,
     BoolArray,
     FloatArray,
     InputError,
     check_range,
     check_seed,
-    draw,
     read_only,
 )
 from ..rig import Telemetry
+from .draws import TELEMETRY, draw
 
 IntArray = npt.NDArray[np.int64]
 Interval = tuple[float, float]

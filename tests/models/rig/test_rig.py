@@ -10,11 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from models import InputError
-from models.basics import DRAG_COEFFICIENTS, DRUM_LAYERS, GRAVITY, prism_added_mass
-from models.basics.tables import ADDED_MASS_PRISM
+from models.basics import GRAVITY
 from models.rig import ACMotor, GainBounds, Gains, Payload, Rope, Sensors, Winch
 from models.rig.drum import Drum
 from models.rig.rig import EnergyDrag, GivenDrag, StochasticDrag
+from models.rig.tables import (
+    ADDED_MASS_PRISM,
+    DRAG_COEFFICIENTS,
+    DRUM_LAYERS,
+    prism_added_mass,
+)
 from models.sea import Sea
 from models.vessel import HeaveRAO
 

@@ -12,9 +12,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from models import InputError
-from models.basics import TELEMETRY, draw
 from models.rig import Telemetry
 from models.sensing import TelemetrySchedule
+from models.sensing.draws import TELEMETRY, draw
 from models.sensing.telemetry import during
 
 TS = 0.02

@@ -12,27 +12,13 @@ from typing import Literal
 
 import numpy as np
 
-from .arrays import FloatArray
-from .checks import InputError
+from ..basics import FloatArray
 
 Law = Literal["normal", "uniform"]
 
 SENSOR_NOISE, TELEMETRY, MRU_ERROR = 1, 2, 3  # purposes: second entry of the seed
 
 _BLOCK = 65536
-
-
-def check_seed(owner: str, seed: int) -> int:
-    """Return the seed if it is a whole number of at least 0.
-
-    Raises
-    ------
-    InputError
-        If it is not.
-    """
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise InputError(f"{owner}: seed must be a whole number of at least 0, got {seed!r}")
-    return int(seed)
 
 
 def draw(

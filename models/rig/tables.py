@@ -1,4 +1,4 @@
-"""Tables of the 1975 thesis that a case file can point at, and the constants of the sea.
+"""Tables of the 1975 thesis that a case file can point at, and the density of steel.
 
 Table 4 gives drag coefficients by the body's shape, Table A-1 the added mass of a square prism,
 Table 6 the layers of rope on the drum of an American Hoist model 1000 winch.  A case names an
@@ -13,13 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .checks import check_range
-
-GRAVITY = 9.80665
-"""Standard gravity [m/s2]."""
-
-SEA_WATER_DENSITY = 1025.0
-"""Density of sea water [kg/m3]."""
+from ..basics import check_range
 
 STEEL_DENSITY = 7850.0
 """Density of steel [kg/m3]."""

@@ -1,4 +1,4 @@
-"""Wave number of a linear wave at any depth.
+"""Gravity, sea water, and the wave number of a linear wave at any depth.
 
 Source: omega^2 = g k tanh(k d), Airy's theory.  The start is Guo's explicit formula (2002), within
 0.75 % at any depth; three Newton steps then reach the last digit.
@@ -12,7 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from .arrays import FloatArray
-from .tables import GRAVITY
+
+GRAVITY = 9.80665
+"""Standard gravity [m/s2]."""
+
+SEA_WATER_DENSITY = 1025.0
+"""Density of sea water [kg/m3]."""
 
 
 def wave_number(omega: npt.ArrayLike, depth: float = math.inf) -> FloatArray:
