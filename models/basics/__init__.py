@@ -9,16 +9,20 @@ if TYPE_CHECKING:
     from .arrays import ComplexArray as ComplexArray
     from .arrays import FloatArray as FloatArray
     from .checks import InputError as InputError
+    from .checks import PhysicsWarning as PhysicsWarning
     from .checks import SolverError as SolverError
     from .checks import StillhookError as StillhookError
     from .checks import SynthesisError as SynthesisError
     from .checks import check_ascending as check_ascending
     from .checks import check_finite as check_finite
     from .checks import check_range as check_range
-    from .checks import range_text as range_text
     from .checks import check_seed as check_seed
+    from .checks import range_text as range_text
     from .checks import read_only as read_only
+    from .files import GZIP as GZIP
     from .files import cache_folder as cache_folder
+    from .files import read_bytes as read_bytes
+    from .files import read_text as read_text
     from .files import reason as reason
     from .files import replace_atomically as replace_atomically
     from .files import write_text_atomically as write_text_atomically
@@ -38,7 +42,6 @@ if TYPE_CHECKING:
     from .panels import FrequencyAxis as FrequencyAxis
     from .panels import cut_panels as cut_panels
     from .panels import longest_panel as longest_panel
-    from .physics_warning import PhysicsWarning as PhysicsWarning
     from .quadrature import Quadrature as Quadrature
     from .quadrature import SpectralDensity as SpectralDensity
     from .quadrature import adaptive_nodes as adaptive_nodes
@@ -46,13 +49,11 @@ if TYPE_CHECKING:
     from .riccati import balanced_truncation as balanced_truncation
     from .riccati import solve_lyapunov as solve_lyapunov
     from .riccati import solve_riccati as solve_riccati
+    from .signals import White as White
     from .signals import pick as pick
     from .signals import signal_delays as signal_delays
     from .signals import signal_names as signal_names
     from .signals import signal_rates as signal_rates
-    from .text import GZIP as GZIP
-    from .text import read_bytes as read_bytes
-    from .text import read_text as read_text
     from .threads import one_thread as one_thread
     from .units import KINDS as KINDS
     from .units import parse_quantity as parse_quantity
@@ -61,6 +62,5 @@ if TYPE_CHECKING:
     from .water import GRAVITY as GRAVITY
     from .water import SEA_WATER_DENSITY as SEA_WATER_DENSITY
     from .water import wave_number as wave_number
-    from .white import White as White
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -1,4 +1,4 @@
-"""Errors and the few checks made at every door.
+"""Errors, the one warning, and the few checks made at every door.
 
 Everything that enters the toolkit (a case file, a table, an argument) is checked where it
 enters, and a bad value is answered with one sentence that names its owner, the field, the
@@ -32,6 +32,14 @@ class SynthesisError(StillhookError):
 
 class SolverError(StillhookError):
     """A numerical solver failed in a way that says nothing about the user's input."""
+
+
+class PhysicsWarning(UserWarning):
+    """The input is allowed but physically implausible, or a result leans on an assumption.
+
+    A sea steeper than breaking, a phase that looks like degrees, a spectrum that reaches beyond the
+    vessel's table: the run goes on, and the user is told.  One category, to filter on.
+    """
 
 
 def check_range(
@@ -140,7 +148,7 @@ def read_only(array: npt.ArrayLike) -> FloatArray:
 
 
 def range_text(low: float, high: float, unit: str, open_low: bool, open_high: bool) -> str:
-    """Return a range in words, as in `in [0, 7) m`."""
+    """Return a range in words, as in `in [0, 2) m` or `above 0 kg`."""
     tail = f" {unit}" if unit else ""
     if math.isinf(low) and math.isinf(high):
         return f"a finite number{' in' + tail if unit else ''}"

@@ -171,11 +171,6 @@ class SpectrumStatistics:
         """Mean period T_1 = 2 pi m0 / m1 [s]."""
         return math.inf if self.m1 == 0.0 else 2.0 * math.pi * self.m0 / self.m1
 
-    @property
-    def crest_period(self) -> float:
-        """Mean period between crests, 2 pi sqrt(m2 / m4) [s]; depends on the band, see `m4`."""
-        return zero_crossing_period(self.m2, self.m4)
-
     def most_probable_maximum(self, duration: float = THREE_HOURS) -> float:
         """Most probable maximum in `duration` [s], in three hours unless told otherwise [u]."""
         return most_probable_maximum(self.rms, self.zero_crossing_period, duration)

@@ -29,7 +29,7 @@ from synth.operability.limiting import SeaStates, limiting_heights
 from synth.operability.recheck import evaluate_in
 from synth.question import pose, uncompensated
 
-pytestmark = pytest.mark.filterwarnings("ignore::models.basics.physics_warning.PhysicsWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::models.basics.checks.PhysicsWarning")
 
 T_S = 0.54**0.25 / 0.9  # significant over peak period of the 1975 spectrum
 MILD = {"A": 200.0, "a": 20.0, "a1": 12.0, "a2": 60.0}

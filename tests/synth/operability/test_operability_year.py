@@ -33,7 +33,7 @@ from synth.operability.example_site import example_scatter
 from synth.operability.rules import RULES
 from synth.operability.workable import class_width, rule_shares, workable
 
-pytestmark = pytest.mark.filterwarnings("ignore::models.basics.physics_warning.PhysicsWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::models.basics.checks.PhysicsWarning")
 
 TURN = 2.0 * math.pi
 
