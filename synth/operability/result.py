@@ -20,8 +20,7 @@ from .contour import Contour
 from .criteria import Criterion
 from .depths import RopeState
 from .recheck import ContourCheck, recheck
-from .rules import Rule
-from .workable import Workable, rule_shares
+from .workable import Rule, Workable, rule_shares
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,4 +1,4 @@
-"""In which seas can we work: `sh.operability`.
+"""Operability study of a design or a case: `operability`, the door of this room.
 
 design or case, periods, headings -> columns of seas
     -> contours of the loop, of the held drum, of a perfect winch, for each rope length
@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.special import ndtr
 
 from models.basics import (
     FloatArray,
@@ -34,7 +35,6 @@ from .columns import SeaColumn, has_headings, has_period, sea_column
 from .contour import Contour, contour_of
 from .criteria import payload_criteria
 from .depths import rope_state
-from .example_site import EXAMPLE, example_scatter
 from .limiting import HIGHEST
 from .reoptimise import reoptimised_contour
 from .result import AtDepth, Operability
@@ -42,6 +42,15 @@ from .workable import workable
 
 Progress = Callable[[str, int, int], None]
 
+EXAMPLE = "example"
+"""The name by which the command line knows the diagram."""
+
+_SCALES = (3.0, 2.8, 2.5, 2.0, 1.6, 1.4, 1.3, 1.4, 1.8, 2.3, 2.6, 2.9)  # of H_s by month [m]
+_DAYS = (31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
+_WEIBULL_SHAPE = 1.5  # of the Weibull distribution [-]
+_CLASS_HEIGHTS = np.arange(0.0, 12.5, 0.5)  # edges of the classes [m]
+_CLASS_PERIODS = np.arange(3.0, 20.5, 1.0)  # [s]
+_LEAST_SHARE = 1e-6  # share of a month below which a class is left out
 _PERIODS = (4.0, 18.0, 15)  # first, last and number of the default periods
 _STEP = 30.0  # deg between the default headings
 _MOST_HEADINGS = 361
@@ -304,3 +313,37 @@ def _sensitivity(asked: Asked, contour: Contour | None) -> float:
 def _lines(periods: FloatArray) -> FloatArray:
     low, high = float(periods[0]), float(periods[-1])
     return np.linspace(0.75 * low, 1.1 * high, 60)
+
+
+def example_scatter() -> Scatter:
+    """Return a made-up scatter diagram, classes of 0.5 m and 1 s for each month.
+
+    No site on earth, nobody's measurements.  Significant heights are Weibull distributed with a
+    scale for each month, peak periods lognormal about a mean that grows with H_s: the forms of the
+    joint environmental model of DNV-RP-C205 (3.6.3), with round numbers that make a northern
+    open-sea site with rough winters.  Real work needs the diagram of the real site.
+    """
+    heights, periods, shares, months = [], [], [], []
+    centres = 0.5 * (_CLASS_HEIGHTS[:-1] + _CLASS_HEIGHTS[1:])
+    for month, (scale, days) in enumerate(zip(_SCALES, _DAYS, strict=True), start=1):
+        below = 1.0 - np.exp(-((_CLASS_HEIGHTS / scale) ** _WEIBULL_SHAPE))
+        for height, share in zip(centres, np.diff(below), strict=True):
+            # Mean of the logarithm of T_p, and its spread, which narrows as the sea grows.
+            mean = math.log(6.0 + 1.3 * float(height) ** 0.8)
+            spread = 0.12 + 0.14 * math.exp(-0.35 * float(height))
+            within = np.diff(ndtr((np.log(_CLASS_PERIODS) - mean) / spread))
+            for period, part in zip(
+                0.5 * (_CLASS_PERIODS[:-1] + _CLASS_PERIODS[1:]), within, strict=True
+            ):
+                if share * part > _LEAST_SHARE:
+                    heights.append(float(height))
+                    periods.append(float(period))
+                    shares.append(float(share * part * days))
+                    months.append(month)
+    return Scatter(
+        significant_height=np.array(heights),
+        peak_period=np.array(periods),
+        occurrence=np.array(shares),
+        month=np.array(months),
+        source="made-up example site",
+    )

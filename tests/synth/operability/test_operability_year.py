@@ -29,9 +29,8 @@ from stillhook.seas import (
 from synth.operability import Contour, Operability, operability
 from synth.operability.contour import over_headings
 from synth.operability.criteria import STABILITY
-from synth.operability.example_site import example_scatter
-from synth.operability.rules import RULES
-from synth.operability.workable import class_width, rule_shares, workable
+from synth.operability.study import example_scatter
+from synth.operability.workable import RULES, class_width, rule_shares, workable
 
 pytestmark = pytest.mark.filterwarnings("ignore::models.basics.checks.PhysicsWarning")
 
