@@ -1,4 +1,4 @@
-r"""What a winch can follow: the maker's lines of heave height over period, in regular heave.
+r"""Capability lines of a winch: heave height over period that it can follow, in regular heave.
 
 A hook that heaves as a sine of double amplitude H and period T moves at up to v = pi H / T and
 accelerates at up to a = 2 pi^2 H / T^2.  A winch that is to hold the rope's upper end still can do

@@ -1,4 +1,4 @@
-"""The seas of a contour: for one peak period, the hook's motion in every heading, for any H_s.
+"""Seas of one peak period, in every heading and at any H_s: `SeaColumn`.
 
 case, T_p, headings -> SeaColumn -> densities of all disturbances on nodes, at given H_s
 """

@@ -1,4 +1,4 @@
-"""A contour: the limiting H_s of one system over peak period and heading, and what binds it."""
+"""Contour of one system: limiting H_s over peak period and heading, and what binds it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an operation must keep: limits of the drive and the rope, and how still the load must be.
+"""Criteria of an operation: limits of drive and rope, and how still the load must be.
 
 A `Criterion` is a limit of `synth.limits.signal_limits` that can be looked at in many sea states at
 once: variances come as arrays, one entry for each sea state, and so does the verdict.
@@ -39,7 +39,7 @@ _LABELS = {
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Moments:
+class SeaMoments:
     """Variances m0 and second moments m2 of outputs in r sea states, each (r,)."""
 
     m0: Mapping[str, FloatArray]
@@ -100,13 +100,13 @@ class Criterion:
         """The signals whose variances it needs."""
         return self.limit.outputs if self.limit is not None else ()
 
-    def value(self, moments: Moments) -> FloatArray:
+    def value(self, moments: SeaMoments) -> FloatArray:
         """Return what is compared with the bound, in its unit (r,)."""
         if self.limit is None:
             raise InputError("operability: stability has no value")
         return self.shown * _measure(self.limit, moments)
 
-    def excess(self, moments: Moments, stationary: npt.NDArray[np.bool_]) -> FloatArray:
+    def excess(self, moments: SeaMoments, stationary: npt.NDArray[np.bool_]) -> FloatArray:
         """Return by how much the limit is broken, relative; at most 0 where it is kept (r,).
 
         Parameters
@@ -220,7 +220,7 @@ def outputs_of(criteria: Sequence[Criterion]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(output for c in criteria for output in c.outputs))
 
 
-def _measure(limit: Limit, moments: Moments) -> FloatArray:
+def _measure(limit: Limit, moments: SeaMoments) -> FloatArray:
     if isinstance(limit, Continuous):  # its own measure is for one sea state
         return np.asarray(np.hypot(limit.static, moments.sigma(limit.output)))
     # All that the limit asks of the loop is `sigma` and `peak`.

@@ -1,25 +1,27 @@
-"""An operability study as an xarray Dataset and as a table of text."""
+"""Operability contours as an xarray Dataset and as a table of text: `dataset_of`, `table_text`."""
 
 from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .result import STAGES, AtDepth, Operability
+from models.case import Case
+
+from .contour import Contour
+from .depths import STAGES, AtDepth
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from .contour import Contour
-
 _SUFFIX = {"loop": "", "held": "_held", "perfect": "_perfect", "reoptimised": "_reoptimised"}
 
 
-def dataset_of(study: Operability) -> xr.Dataset:
-    """Return a study as a Dataset.
+def dataset_of(case: Case, depths: Sequence[AtDepth], status: str) -> xr.Dataset:
+    """Return the contours of a case, at each length of rope asked for, as a Dataset.
 
     Dimensions are ``rope_length`` (where lengths were asked for), ``limit``, ``heading`` (where the
     vessel has headings) and ``peak_period``.  A limit that a system does not have is NaN; one that
@@ -27,20 +29,17 @@ def dataset_of(study: Operability) -> xr.Dataset:
     """
     import xarray as xr
 
-    names = list(
-        dict.fromkeys(
-            c.name for at in study.depths for n in at.contours.values() for c in n.criteria
-        )
-    )
-    many = len(study.depths) > 1
-    turns = study.headings is not None
+    names = _names(depths)
+    main = depths[0].main
+    many = len(depths) > 1
+    turns = main.headings is not None
     tail = (*(("heading",) if turns else ()), "peak_period")
     lead = ("rope_length",) if many else ()
     variables: dict[str, Any] = {}
     for system, words in STAGES.items():
-        if system not in study.depths[0].contours:
+        if system not in depths[0].contours:
             continue
-        contours = [at.contours[system] for at in study.depths]
+        contours = [at.contours[system] for at in depths]
         every = np.array([_by_limit(contour, names) for contour in contours])
         lowest = np.array([contour.limit for contour in contours])
         binding = np.array([contour.binding for contour in contours]).astype(object)
@@ -65,49 +64,45 @@ def dataset_of(study: Operability) -> xr.Dataset:
         ):
             shown = values if turns else values.squeeze(axis=-2)
             variables[name] = ((*lead, *dims), shown if many else shown[0], about)
-    if study.design is not None:
-        peaks = np.array([at.max_sensitivity for at in study.depths])
+    if "loop" in depths[0].contours:
+        peaks = np.array([at.max_sensitivity for at in depths])
         about = {"units": "1", "long_name": "sensitivity peak M_s of the design's loop"}
         variables["max_sensitivity"] = (lead, peaks if many else peaks[0], about)
-    variables |= _shares(study, lead)
-    first = {c.name: c for n in study.depths[0].contours.values() for c in n.criteria}
+    variables |= _shares(depths, lead)
+    first = {c.name: c for n in depths[0].contours.values() for c in n.criteria}
     coordinates: dict[str, Any] = {
         "limit": ("limit", names, {"long_name": "limit"}),
         "bound": ("limit", [first[n].bound for n in names], {"long_name": "bound, in `unit`"}),
         "unit": ("limit", [first[n].unit for n in names], {"long_name": "unit of the bound"}),
         "peak_period": (
             "peak_period",
-            study.periods,
+            main.periods,
             {"units": "s", "long_name": "peak period T_p"},
         ),
     }
-    if turns and study.headings is not None:
+    if main.headings is not None:
         about = {
             "units": "degree",
             "long_name": "heading: where the waves travel to, counter-clockwise from the bow",
         }
-        coordinates["heading"] = ("heading", np.degrees(study.headings), about)
-    coordinates |= _ropes(study.depths, many)
+        coordinates["heading"] = ("heading", np.degrees(main.headings), about)
+    coordinates |= _ropes(depths, many)
     attributes = {
-        "title": f"Operability of {study.case.name}",
-        "case": study.case.to_yaml(),
-        "sea": study.case.sea.spectrum,
-        "exposure_time": study.case.limits.exposure_time,
-        "highest_height": study.depths[0].main.highest,
-        "status": study.status,
+        "title": f"Operability of {case.name}",
+        "case": case.to_yaml(),
+        "sea": case.sea.spectrum,
+        "exposure_time": case.limits.exposure_time,
+        "highest_height": main.highest,
+        "status": status,
     }
     if not turns:
         attributes["headings"] = "none: the vessel is given by the heave of its hook alone"
     return xr.Dataset(variables, coords=coordinates, attrs=attributes)
 
 
-def table_text(study: Operability) -> str:
-    """Return a study as CSV: a line for each length of rope, system, heading and period."""
-    names = list(
-        dict.fromkeys(
-            c.name for at in study.depths for n in at.contours.values() for c in n.criteria
-        )
-    )
+def table_text(depths: Sequence[AtDepth]) -> str:
+    """Return contours as CSV: a line for each length of rope, system, heading and period."""
+    names = _names(depths)
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     head = [
@@ -120,7 +115,7 @@ def table_text(study: Operability) -> str:
         "binding",
     ]
     writer.writerow([*head, *(f"{name}_height_m" for name in names)])
-    for at in study.depths:
+    for at in depths:
         for system, contour in at.contours.items():
             every = _by_limit(contour, names)
             for h in range(contour.limit.shape[0]):
@@ -151,7 +146,7 @@ def _by_limit(contour: Contour, names: list[str]) -> Any:
     return np.array([rows.get(name, nothing) for name in names])
 
 
-def _ropes(depths: tuple[AtDepth, ...], many: bool) -> dict[str, Any]:
+def _ropes(depths: Sequence[AtDepth], many: bool) -> dict[str, Any]:
     figures: dict[str, tuple[list[float], str, str]] = {
         "rope_length": ([at.rope.length for at in depths], "m", "rope paid out"),
         "drum_layer": (
@@ -182,15 +177,19 @@ def _ropes(depths: tuple[AtDepth, ...], many: bool) -> dict[str, Any]:
     }
 
 
-def _shares(study: Operability, lead: tuple[str, ...]) -> dict[str, Any]:
+def _names(depths: Sequence[AtDepth]) -> list[str]:
+    """Return the names of all criteria, each once."""
+    found = (c.name for at in depths for n in at.contours.values() for c in n.criteria)
+    return list(dict.fromkeys(found))
+
+
+def _shares(depths: Sequence[AtDepth], lead: tuple[str, ...]) -> dict[str, Any]:
     """Return the workable shares as variables; none without a scatter diagram."""
-    if study.scatter is None:
-        return {}
     found: dict[str, Any] = {}
     for system, words in STAGES.items():
-        if system not in study.depths[0].workable:
+        if system not in depths[0].workable:
             continue
-        shares = [at.workable[system] for at in study.depths]
+        shares = [at.workable[system] for at in depths]
         end = _SUFFIX[system]
         about = {"units": "1", "long_name": f"share of the time workable {words}"}
 

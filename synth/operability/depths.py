@@ -1,10 +1,25 @@
-"""What a length of rope changes: the drum's layer, the torque at rest, the rope's stiffness."""
+"""State and contours of one length of rope paid out: `RopeState`, `AtDepth`."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from models.case import Case
+
+from .capability import Capability
+from .columns import SeaColumn
+from .contour import Contour
+from .workable import Workable
+
+STAGES: Mapping[str, str] = {
+    "loop": "with the design",
+    "held": "with the drum held",
+    "perfect": "of a winch that follows the hook perfectly",
+    "reoptimised": "with gains found anew for each sea",
+}
+"""The systems that have contours, in words."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,3 +83,38 @@ def rope_state(case: Case) -> RopeState:
         torque=case.static_torque_budget,
         stiffness=case.rope.stiffness,
     )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class AtDepth:
+    """The contours with one length of rope paid out.
+
+    Attributes
+    ----------
+    rope
+        Length, layer of the drum, torque at rest, stiffness.
+    contours
+        By name of the system, see `STAGES`: ``loop`` where there is a design, ``held``,
+        ``perfect``, and ``reoptimised`` where it was asked for.
+    columns
+        The seas, one column for each period.
+    capability
+        The maker's lines: what the winch can follow in regular heave.
+    workable
+        Shares of the year by name of the system; empty without a scatter diagram.
+    max_sensitivity
+        M_s of the design's loop with this rope, at the drag of the contour nearest the case's own
+        sea; infinite where it is unstable, NaN without a design.
+    """
+
+    rope: RopeState
+    contours: Mapping[str, Contour]
+    columns: tuple[SeaColumn, ...]
+    capability: Capability
+    workable: Mapping[str, Workable]
+    max_sensitivity: float = math.nan
+
+    @property
+    def main(self) -> Contour:
+        """The design's contour, or that of the held drum where there is no design."""
+        return self.contours.get("loop", self.contours["held"])

@@ -1,4 +1,4 @@
-"""The limiting H_s: the lowest at which a criterion breaks, in all headings of a column at once.
+"""Limiting H_s: the lowest at which a criterion breaks, in all headings of a column at once.
 
 For each H_s of a coarse grid the drag coefficient that agrees with the motion is found, then the
 variances, then by how much each criterion is broken.  The first step up of a criterion from kept
@@ -19,7 +19,7 @@ from scipy.optimize import elementwise
 from models.basics import FloatArray, SolverError, read_only
 
 from .columns import SeaColumn
-from .criteria import Criterion, Moments
+from .criteria import Criterion, SeaMoments
 from .responses import DragResponses
 from .systems import System
 
@@ -81,6 +81,8 @@ class SeaStates:
             return np.full(rows, np.nan)
         if system.slope == 0.0:
             return np.full(rows, system.reference)
+        # C = slope sigma_v(C) is one equation in one unknown: its sides are compared in a bounded
+        # ratio over log C, which a bracketing method likes whatever the sea.
         weighted = self.responses.weighted_speed(densities)
 
         def surplus(size: FloatArray, row: FloatArray) -> FloatArray:
@@ -114,7 +116,7 @@ class SeaStates:
         still = np.all(weighted == 0.0, axis=1)  # no motion, no drag
         return np.where(still, max(low, 0.0), np.where(good, C, np.nan))
 
-    def look(self, heights: FloatArray, index: IntArray) -> tuple[Moments, FloatArray]:
+    def look(self, heights: FloatArray, index: IntArray) -> tuple[SeaMoments, FloatArray]:
         """Return moments and drag coefficients at heights (r,) [m] in headings `index` (r,)."""
         densities = self.densities(heights, index)
         C = self.coefficients(densities)
@@ -122,7 +124,7 @@ class SeaStates:
         m0, m2 = self.responses.moments(densities, known)
         names = self.responses.outputs
         return (
-            Moments(
+            SeaMoments(
                 m0={name: m0[:, k] for k, name in enumerate(names)},
                 m2={name: m2[:, k] for k, name in enumerate(names)},
             ),
@@ -172,6 +174,7 @@ def limiting_heights(
         If a root is not found in its bracket.
     """
     headings, count = len(states.column.hooks), len(criteria)
+    # All headings and heights are rows of one array: drag, moments and verdicts in a few calls.
     grid = np.geomspace(LOWEST, highest, _STEPS)
     row_heading = np.repeat(np.arange(headings), grid.size)
     moments, C = states.look(np.tile(grid, headings), row_heading)

@@ -1,4 +1,4 @@
-"""A contour's numbers by single evaluations: the same sea put into the case, one at a time.
+"""Check of a contour by single evaluations: the same sea put into the case, one at a time.
 
     sea on the contour -> case in that sea -> its own plant and nodes -> value against bound,
                                                          drag coefficient against the motion
@@ -25,9 +25,9 @@ from ..loop import Assessment
 from ..question import pose, pose_structure
 
 if TYPE_CHECKING:
-    from .asked import Design
     from .columns import SeaColumn
     from .contour import Contour
+    from .pose import Design
 
 _TOLERANCE = 1e-6
 

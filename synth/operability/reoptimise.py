@@ -1,4 +1,4 @@
-"""The limiting H_s when the gains are found anew for every sea: what fixed gains give away.
+"""Contour with the gains found anew for every sea: what fixed gains give away.
 
     sea -> best gains without the drive's limits -> largest sea that any gains can do -> its limit
 
@@ -21,10 +21,10 @@ from ..design import GainDesign, shortfall, tuning_of
 from ..limits import Limit
 from ..question import Question, pose
 from ..search import search
-from .asked import Asked
 from .columns import SeaColumn
 from .contour import Contour
 from .limiting import HIGHEST, SeaStates, limiting_heights
+from .pose import OperabilityQuestion
 
 _STARTS = 3  # of each search, besides the design's own gains
 
@@ -32,7 +32,7 @@ _STARTS = 3  # of each search, besides the design's own gains
 @one_thread()
 def reoptimised_contour(
     design: GainDesign,
-    asked: Asked,
+    question: OperabilityQuestion,
     columns: Sequence[SeaColumn],
     *,
     highest: float = HIGHEST,
@@ -45,8 +45,8 @@ def reoptimised_contour(
     ----------
     design
         Where the searches start from, and the rope masses.
-    asked
-        What the design is asked: its loop and criteria.
+    question
+        What is asked of the design: its loop and criteria.
     columns
         The seas.
     highest
@@ -56,8 +56,8 @@ def reoptimised_contour(
     step
         Called after each sea.
     """
-    assert asked.loop is not None
-    criteria = asked.criteria["loop"]
+    assert question.loop is not None
+    criteria = question.criteria["loop"]
     drive = tuple(c.limit for c in criteria if c.limit is not None)
     shape = (len(criteria), len(columns[0].hooks), len(columns))
     heights, drag = np.zeros(shape), np.full(shape[1:], np.nan)
@@ -69,7 +69,8 @@ def reoptimised_contour(
                 continue
             one = replace(column, headings=None, cases=(case,), hooks=(column.hooks[h],))
             loop = replace(
-                asked.loop, controller=_question(case, design.masses).assess(gains, 0.0).controller
+                question.loop,
+                controller=_question(case, design.masses).assess(gains, 0.0).controller,
             )
             found = limiting_heights(SeaStates.of(loop, one), criteria, highest=highest)
             heights[:, h, p], drag[h, p] = found.heights[:, 0], found.drag[0]

@@ -1,9 +1,8 @@
-"""`Operability`: the answer to "in which seas can we work", with the question it answers."""
+"""Result of an operability study, with the question it answers: `Operability`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -14,64 +13,20 @@ from models.basics import FloatArray, InputError
 from models.case import Case
 from models.sea import Scatter
 
-from .capability import Capability
-from .columns import SeaColumn
 from .contour import Contour
 from .criteria import Criterion
-from .depths import RopeState
+from .dataset import dataset_of, table_text
+from .depths import STAGES, AtDepth
+from .pose import Design
 from .recheck import ContourCheck, recheck
-from .workable import Rule, Workable, rule_shares
+from .workable import Rule, rule_shares
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from .asked import Design
 
-
-STAGES: Mapping[str, str] = {
-    "loop": "with the design",
-    "held": "with the drum held",
-    "perfect": "of a winch that follows the hook perfectly",
-    "reoptimised": "with gains found anew for each sea",
-}
-"""The systems that have contours, in words."""
 _CHECKS = 3
 _PRESSES = 1e-4  # of a limit: a design that was made to press against it is within
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class AtDepth:
-    """The contours with one length of rope paid out.
-
-    Attributes
-    ----------
-    rope
-        Length, layer of the drum, torque at rest, stiffness.
-    contours
-        By name of the system, see `STAGES`: ``loop`` where there is a design, ``held``,
-        ``perfect``, and ``reoptimised`` where it was asked for.
-    columns
-        The seas, one column for each period.
-    capability
-        The maker's lines: what the winch can follow in regular heave.
-    workable
-        Shares of the year by name of the system; empty without a scatter diagram.
-    max_sensitivity
-        M_s of the design's loop with this rope, at the drag of the contour nearest the case's own
-        sea; infinite where it is unstable, NaN without a design.
-    """
-
-    rope: RopeState
-    contours: Mapping[str, Contour]
-    columns: tuple[SeaColumn, ...]
-    capability: Capability
-    workable: Mapping[str, Workable]
-    max_sensitivity: float = math.nan
-
-    @property
-    def main(self) -> Contour:
-        """The design's contour, or that of the held drum where there is no design."""
-        return self.contours.get("loop", self.contours["held"])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -135,9 +90,7 @@ class Operability:
     @cached_property
     def dataset(self) -> xr.Dataset:
         """Everything as an xarray Dataset, with units and long names; `to_netcdf` writes it."""
-        from .dataset import dataset_of
-
-        return dataset_of(self)
+        return dataset_of(self.case, self.depths, self.status)
 
     def margin_text(self, at: AtDepth) -> str:
         """Return the sensitivity of the design's loop with a rope, against its limit, in words."""
@@ -181,9 +134,7 @@ class Operability:
 
     def to_csv(self) -> str:
         """Return the contours as a table, a line for each sea: what binds and every limit."""
-        from .dataset import table_text
-
-        return table_text(self)
+        return table_text(self.depths)
 
     def __str__(self) -> str:
         """Return a small tree."""

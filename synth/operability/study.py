@@ -29,15 +29,15 @@ from models.sea import Scatter, read_scatter
 
 from ..design import GainDesign
 from ..loop import Assessment
-from .asked import Asked, Design, asked_of
 from .capability import capability
 from .columns import SeaColumn, has_headings, has_period, sea_column
 from .contour import Contour, contour_of
 from .criteria import payload_criteria
-from .depths import rope_state
+from .depths import AtDepth, rope_state
 from .limiting import HIGHEST
+from .pose import Design, OperabilityQuestion, pose_operability
 from .reoptimise import reoptimised_contour
-from .result import AtDepth, Operability
+from .result import Operability
 from .workable import workable
 
 Progress = Callable[[str, int, int], None]
@@ -49,7 +49,7 @@ _SCALES = (3.0, 2.8, 2.5, 2.0, 1.6, 1.4, 1.3, 1.4, 1.8, 2.3, 2.6, 2.9)  # of H_s
 _DAYS = (31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
 _WEIBULL_SHAPE = 1.5  # of the Weibull distribution [-]
 _CLASS_HEIGHTS = np.arange(0.0, 12.5, 0.5)  # edges of the classes [m]
-_CLASS_PERIODS = np.arange(3.0, 20.5, 1.0)  # [s]
+_CLASS_PERIODS = np.arange(3.0, 20.5, 1.0)  # edges [s]
 _LEAST_SHARE = 1e-6  # share of a month below which a class is left out
 _PERIODS = (4.0, 18.0, 15)  # first, last and number of the default periods
 _STEP = 30.0  # deg between the default headings
@@ -174,7 +174,7 @@ def _operability(
     times = _periods(case, periods, diagram)
     columns = [sea_column(case, period, angles) for period in times]
     lengths = [None] if depths is None else [_length(case, d) for d in depths]
-    stages = [asked_of(design, criteria, length=length) for length in lengths]
+    stages = [pose_operability(design, criteria, length=length) for length in lengths]
     count = sum(len(stage.systems) for stage in stages) * len(columns)
     count += len(stages) * len(columns) * len(columns[0].hooks) if reoptimise else 0
     done = 0
@@ -262,22 +262,22 @@ def _length(case: Case, depth: float) -> float:
     return check_range(source, "depths", depth, low=1.0, high=12000.0, unit="m")
 
 
-def _on_rope(column: SeaColumn, asked: Asked) -> SeaColumn:
-    """Return the column with the rope of what is asked, for the searches and the checks."""
-    length = asked.case.rope.length
+def _on_rope(column: SeaColumn, question: OperabilityQuestion) -> SeaColumn:
+    """Return the column with the rope of the question, for the searches and the checks."""
+    length = question.case.rope.length
     if all(c.rope.length == length for c in column.cases):
         return column
     return replace(column, cases=tuple(c.replace({"rope.length": length}) for c in column.cases))
 
 
 def _at_depth(
-    asked: Asked,
+    question: OperabilityQuestion,
     contours: dict[str, Contour],
     columns: Sequence[SeaColumn],
     scatter: Scatter | None,
 ) -> AtDepth:
-    vessel = asked.case.vessel
-    heading = getattr(vessel, "heading", None) if has_headings(asked.case) else None
+    vessel = question.case.vessel
+    heading = getattr(vessel, "heading", None) if has_headings(question.case) else None
     # Where the diagram knows directions, the bow is along its axis until it is turned.
     turned = 0.0 if scatter is not None and scatter.heading is not None else heading
     shares = (
@@ -287,23 +287,23 @@ def _at_depth(
     )
     periods = contours["perfect"].periods
     return AtDepth(
-        rope=rope_state(asked.case),
+        rope=rope_state(question.case),
         contours=contours,
         columns=tuple(columns),
-        capability=capability(asked.perfect, asked.criteria["perfect"], _lines(periods)),
+        capability=capability(question.perfect, question.criteria["perfect"], _lines(periods)),
         workable=shares,
-        max_sensitivity=_sensitivity(asked, contours.get("loop")),
+        max_sensitivity=_sensitivity(question, contours.get("loop")),
     )
 
 
-def _sensitivity(asked: Asked, contour: Contour | None) -> float:
+def _sensitivity(question: OperabilityQuestion, contour: Contour | None) -> float:
     """Return M_s of the loop at the drag of the contour nearest the case's own sea."""
-    if asked.loop is None or contour is None:
+    if question.loop is None or contour is None:
         return math.nan
-    loop = asked.loop
+    loop = question.loop
     if loop.stable_range[0] > loop.stable_range[1] or loop.swings:
         return math.inf
-    order = np.abs(contour.periods - asked.case.sea.spectral_peak_period).argsort()
+    order = np.abs(contour.periods - question.case.sea.spectral_peak_period).argsort()
     known = [c for p in order for c in contour.drag[:, p] if np.isfinite(c)]
     drag = float(known[0]) if known and loop.drag is not None else loop.reference
     view = Assessment(loop.plant, loop.controller, (), drag=loop.drag, coefficient=drag)

@@ -1,4 +1,4 @@
-"""What a limiting sea is asked of: a loop, the hook with the drum held, a perfect winch.
+"""Systems whose limiting seas are sought: a loop, the hook with the drum held, a perfect winch.
 
 All three answer the same two questions, so that one search serves them: what are the responses on
 nodes with the drag as a variable (`responses.DragResponses`), and with which drag are they stable.

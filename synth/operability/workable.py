@@ -1,4 +1,4 @@
-"""The share of the year in which the work can be done: contours against a scatter diagram.
+"""Share of the year in which the work can be done: contours against a scatter diagram.
 
     scatter diagram, contour -> workable or not, state by state -> share of the year, of each month
 

@@ -20,12 +20,12 @@ from synth import GainDesign, evaluate_gains
 from synth.design import StructureDesign
 from synth.loop import Assessment
 from synth.operability import Criterion, operability
-from synth.operability.asked import asked_of
 from synth.operability.capability import capability
 from synth.operability.columns import SeaColumn, sea_column
-from synth.operability.criteria import Moments, case_criteria, payload_criteria
+from synth.operability.criteria import SeaMoments, case_criteria, payload_criteria
 from synth.operability.depths import rope_state
 from synth.operability.limiting import SeaStates, limiting_heights
+from synth.operability.pose import pose_operability
 from synth.operability.recheck import evaluate_in
 from synth.question import pose, uncompensated
 
@@ -106,7 +106,7 @@ def test_so_it_is_where_the_drag_changes_with_the_sea(name: str) -> None:
 
 
 def test_the_response_is_not_linear_in_the_height_where_the_drag_is_not() -> None:
-    asked = asked_of(dragged(), ())
+    asked = pose_operability(dragged(), ())
     states = SeaStates.of(asked.held, sea_column(asked.case, 7.0))
     moments, C = states.look(np.array([0.5, 2.0]), np.array([0, 0]))
     assert C[1] > 1.5 * C[0]
@@ -118,7 +118,7 @@ def test_the_response_is_not_linear_in_the_height_where_the_drag_is_not() -> Non
 @settings(max_examples=15, deadline=None)
 @given(st.floats(0.0, 3e5), st.floats(0.4, 9.0))
 def test_responses_at_any_drag_are_those_of_the_plant_with_that_drag(C: float, w: float) -> None:
-    asked = asked_of(dragged(), ())
+    asked = pose_operability(dragged(), ())
     assert asked.loop is not None
     omega = np.array([w])
     base = asked.loop.responses(Quadrature(omega=omega, weights=np.ones(1)))
@@ -144,7 +144,7 @@ def test_the_held_drum_is_that_of_the_uncompensated_payload() -> None:
 
 def test_the_tension_of_the_held_drum_carries_mass_and_drag_of_the_payload() -> None:
     # One spring: what the rope pulls with is what the load's inertia and drag ask for.
-    asked = asked_of(thesis_design(), ())
+    asked = pose_operability(thesis_design(), ())
     omega = np.array([0.5, 0.94, 2.0])
     base = asked.held.responses(Quadrature(omega=omega, weights=np.ones(3)))
     data = asked.held.data
@@ -158,7 +158,7 @@ def test_the_tension_of_the_held_drum_carries_mass_and_drag_of_the_payload() -> 
 def test_the_makers_lines_are_those_of_the_sheet() -> None:
     # H = v T / pi and H = a T^2 / (2 pi^2), with no friction to speak of.
     case = one_heading().replace({"winch.motor.viscous_friction": 0.0})
-    asked = asked_of(case, ())
+    asked = pose_operability(case, ())
     T = np.array([5.0, 8.0, 14.0])
     lines = capability(asked.perfect, asked.criteria["perfect"], T)
     rows = {c.name: h for c, h in zip(lines.criteria, lines.heights, strict=True)}
@@ -203,7 +203,7 @@ def test_with_fixed_drag_the_limit_grows_as_the_bound() -> None:
 @settings(max_examples=8, deadline=None)
 @given(st.floats(0.02, 1.0), st.floats(1.01, 3.0), st.floats(5.0, 14.0))
 def test_a_wider_bound_never_lowers_the_limit(bound: float, factor: float, period: float) -> None:
-    asked = asked_of(dragged(), ())
+    asked = pose_operability(dragged(), ())
     assert asked.loop is not None
     states = SeaStates.of(asked.loop, sea_column(asked.case, period))
     narrow, wide = (
@@ -220,7 +220,7 @@ def test_a_wider_bound_never_lowers_the_limit(bound: float, factor: float, perio
 @settings(max_examples=10, deadline=None)
 @given(st.floats(5.0, 14.0), st.floats(0.05, 8.0), st.floats(1.05, 4.0))
 def test_a_higher_sea_moves_everything_more(period: float, height: float, factor: float) -> None:
-    asked = asked_of(dragged(), ())
+    asked = pose_operability(dragged(), ())
     for system in asked.systems.values():
         states = SeaStates.of(system, sea_column(asked.case, period))
         both = np.array([height, factor * height])
@@ -250,14 +250,14 @@ def test_significant_and_rms_are_one_limit_and_the_largest_another() -> None:
 
 def test_arrays_of_moments_have_the_peaks_of_the_single_formula() -> None:
     m0, m2 = np.array([4.0, 0.0, 1e-6]), np.array([1.0, 0.0, 1e-16])
-    found = Moments(m0={"x": m0}, m2={"x": m2}).peak("x", 10800.0)
+    found = SeaMoments(m0={"x": m0}, m2={"x": m2}).peak("x", 10800.0)
     assert found[0] == pytest.approx(2.0 * peak_factor(4.0 * math.pi, 10800.0), rel=1e-12)
     assert found[1] == 0.0
     assert found[2] == pytest.approx(1e-3)  # fewer than e^(1/2) crossings: one sigma
 
 
 def test_a_spectrum_that_cannot_be_scaled_is_built_anew_at_each_height() -> None:
-    asked = asked_of(dragged(), payload_criteria(dragged().case, rms=0.1))
+    asked = pose_operability(dragged(), payload_criteria(dragged().case, rms=0.1))
     assert asked.loop is not None
     column = sea_column(asked.case, 9.0)
     assert column.scalable
@@ -374,7 +374,7 @@ def test_gains_stay_when_the_rope_gets_longer() -> None:
 def test_an_unstable_loop_works_in_no_sea() -> None:
     with pytest.raises(InputError, match="no stabilising gains"):
         operability(unstable_design(), periods=[8.0])
-    asked = asked_of(dragged(), payload_criteria(dragged().case, rms=1.0))
+    asked = pose_operability(dragged(), payload_criteria(dragged().case, rms=1.0))
     assert asked.loop is not None
     bad = pose(dragged().case).assess({**MILD, "A": -200.0}, 0.0).controller
     loop = replace(asked.loop, controller=bad)
@@ -387,7 +387,7 @@ def test_an_unstable_loop_works_in_no_sea() -> None:
 
 def test_a_loop_that_needs_drag_to_be_stable_works_in_no_sea() -> None:
     # Quadratic drag vanishes in small motion, so that such a loop swings by itself.
-    asked = asked_of(dragged(), ())
+    asked = pose_operability(dragged(), ())
     assert asked.loop is not None
 
     class Edge(type(asked.loop)):  # type: ignore[misc]
@@ -407,7 +407,7 @@ def test_a_loop_that_needs_drag_to_be_stable_works_in_no_sea() -> None:
 
 
 def test_a_loop_that_too_much_drag_destabilises_works_below_that() -> None:
-    asked = asked_of(dragged(), payload_criteria(dragged().case, rms=0.1))
+    asked = pose_operability(dragged(), payload_criteria(dragged().case, rms=0.1))
     assert asked.loop is not None
 
     class Edge(type(asked.loop)):  # type: ignore[misc]

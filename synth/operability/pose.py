@@ -1,4 +1,4 @@
-"""From a design or a case to the systems whose limiting seas are wanted, and their criteria."""
+"""Operability question of a design or a case: its systems and criteria at one rope length."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _WINCH = ("motor.torque", "motor.speed", "motor.current", "motor.voltage")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Asked:
+class OperabilityQuestion:
     """One rope length: what is moved, and what must be kept.
 
     Attributes
@@ -56,9 +56,9 @@ class Asked:
         return found if self.loop is None else {**found, "loop": self.loop}
 
 
-def asked_of(
+def pose_operability(
     source: Case | Design, wanted: Sequence[Criterion], *, length: float | None = None
-) -> Asked:
+) -> OperabilityQuestion:
     """Return what is asked of a design, or of a case alone.
 
     Parameters
@@ -124,7 +124,7 @@ def asked_of(
             controller=controller,
             drag=drag,
         )
-    return Asked(
+    return OperabilityQuestion(
         case=reported,
         held=HeldSystem(
             outputs=tuple(dict.fromkeys((PAYLOAD, VELOCITY, *outputs_of(held)))),
