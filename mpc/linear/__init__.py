@@ -12,5 +12,6 @@ if TYPE_CHECKING:
     from .condensed import sea_at_end as sea_at_end
     from .linear import LinearMPC as LinearMPC
     from .products import Products as Products
+    from .winch_mpc import WinchMPC as WinchMPC
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

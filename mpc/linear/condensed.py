@@ -30,7 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import FloatArray, InputError, check_range, read_only
+from models.basics import FloatArray, check_range, read_only
 
 from ..winch import PredictionModel, Regulator
 
@@ -143,15 +143,7 @@ def condense(
         Length of each block in samples, (nb,).
     watch
         Signals that get rows: of `WATCHED`.
-
-    Raises
-    ------
-    InputError
-        If a block is shorter than one sample.
     """
-    blocks = tuple(int(b) for b in blocks)
-    if not blocks or min(blocks) < 1:
-        raise InputError(f"{_OWNER}: blocking must be whole numbers of at least 1, got {blocks}")
     winch, n = model.winch, model.winch.size
     N, nb = sum(blocks), len(blocks)
     of = np.repeat(np.arange(nb), blocks)  # block of each sample
@@ -202,7 +194,7 @@ def condense(
     cost = N * model.waves[0] ** 2
     G = np.array(rows).reshape(len(rows), moves.stop)
     return Condensed(
-        blocks=blocks,
+        blocks=tuple(blocks),
         H=(H + H.T) / cost,
         from_state=2.0 * gradient[:, :n] / cost,
         from_path=2.0 * gradient[:, path] / cost,

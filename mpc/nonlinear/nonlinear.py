@@ -4,7 +4,7 @@ r"""Nonlinear model predictive control: a Gauss-Newton step a sample, in the pla
     m --> Estimator --> chi --> Shooting.free --> gradient, bounds --> QP --> u      feedback
 
 `NonlinearMPC` differs from `LinearMPC` in its model of the winch alone: cost, limits, estimator and
-the path of the hook are the same objects.
+the path of the hook are those of `WinchMPC`.
 """
 
 from __future__ import annotations
@@ -24,8 +24,7 @@ from models.plant import DriveLimits
 from models.sensing import Measurement
 from models.sensing.control import MEASURED as HEARD
 
-from ..linear import LinearMPC, Products, condense, path_of_sea
-from ..programme import SoftQP
+from ..linear import WinchMPC, path_of_sea
 from ..winch import Weights
 from .mean_torque import start_torque
 from .responses import with_drift
@@ -39,13 +38,11 @@ if TYPE_CHECKING:
 
 
 _OWNER = "nonlinear predictive control"
-_UNIT, _TORQUE = HEARD.index("mru.valid"), HEARD.index("motor.torque")
 _APPLIED = HEARD.index("drive.applied")
-_HEAVE, _RATE = HEARD.index("mru.heave"), HEARD.index("mru.heave_rate")
 _REFERENCE = HEARD.index("reference.displacement")
 
 
-class NonlinearMPC(LinearMPC):
+class NonlinearMPC(WinchMPC):
     r"""A predictive controller of the nonlinear winch within the limits of its drive.
 
     At every sample, with cost, limits and symbols of `LinearMPC`,
@@ -96,6 +93,8 @@ class NonlinearMPC(LinearMPC):
 
     Attributes
     ----------
+    plan
+        What the forces depend on over the horizon, by the last plan, (K my,).
     seconds
         What the last step took for feedback and preparation [s].
 
@@ -116,8 +115,7 @@ class NonlinearMPC(LinearMPC):
     ('nonlinear-mpc', ('drag', 'slack.0'))
     """
 
-    _shooting: Shooting | None = None
-    _y: FloatArray  # what the forces depend on over the horizon, by the last plan
+    plan: FloatArray
     _moves: FloatArray
 
     def __init__(
@@ -159,8 +157,10 @@ class NonlinearMPC(LinearMPC):
             thermal=thermal,
             deadline=deadline,
             limits=limits,
+            name=name,
         )
-        self.name = f"nonlinear-{self.name}" if name is None else name
+        if name is None:
+            self.name = f"nonlinear-{self.name}"
         self.iterations = int(iterations)
         self.stage = make_stage(
             self.model.winch,
@@ -172,48 +172,46 @@ class NonlinearMPC(LinearMPC):
             mean=mean_torque,
             compiled=compiled,
         )
-        covariance = None if self.predictor is None else self.estimator.sea_covariance
+        model = self.model
         if mean_torque:
-            model = replace(self.model, winch=self.stage.winch)
-            blocks, limited = self.programme.blocks, self.soft_limits
-            self.programme = with_drift(
-                condense(model, self.regulator, blocks, tuple(limited)), self.stage
-            )
-            self.products = Products.of(
-                model, self.programme, limited, covariance, self.estimator.model
-            )
-        else:
-            model = self.model
-        p, products = self.programme, self.products
-        self._shooting = self.shooting = Shooting(
-            model, self.regulator, p, products, self.stage, covariance, self.estimator.model
+            model = replace(model, winch=self.stage.winch)
+        self.programme = p = self._condense(model)
+        if mean_torque:
+            self.programme = p = with_drift(p, self.stage)
+        self.products = products = self._products(model, p)
+        self.shooting = Shooting(
+            model,
+            self.regulator,
+            p,
+            products,
+            self.stage,
+            self._sea_covariance,
+            self.estimator.model,
         )
         powers = len(p.blocks) - 1 if self._window.power < math.inf else 0
         self._low = np.concatenate([products.low, -np.ones(powers)])
         self._high = np.concatenate([products.high, np.ones(powers)])
         self._ends = path_of_sea(self.model, 1)
         self._starts = np.cumsum((0, *p.blocks[:-1])).astype(np.float64)
-        rows = np.vstack([products.rows, np.zeros((powers, len(p.blocks)))])
+        self._rows = np.vstack([products.rows, np.zeros((powers, len(p.blocks)))])
         # Where a plan has left all sense, its slopes are not to be trusted with the solver.
         reach = [_reach(name, self.model.winch.rest_tension) for name in self.stage.arguments]
         span = np.tile(reach, self.shooting.nodes)
         self._sane = self.shooting.rest - span, self.shooting.rest + span
         self._resting = self.shooting.linearise(np.array(self.shooting.rest))
-        self.qp = self._moving = _MovingQP(self.qp, rows)
+        self.qp = self._solver(self._rows)
         self.reset()
 
     @override
     def reset(self) -> None:
         """Forget every earlier measurement."""
-        if self._shooting is not None:
-            self._moving.change(self._resting.H, self._moving.rows)
+        self.qp.change(self._resting.H, self._rows.copy())
         super().reset()
         self._counts["forgotten"] = 0
         self._cut: tuple[float, float, float] | None = None
         self.seconds: Mapping[str, float] = {"feedback": 0.0, "preparation": 0.0}
-        if self._shooting is not None:
-            self._forget()
-            self._prepare()
+        self._forget()
+        self._prepare()
 
     @override
     def step(self, measurement: Measurement, time: float) -> float:
@@ -221,25 +219,20 @@ class NonlinearMPC(LinearMPC):
         began = clock.perf_counter()
         shown, winch, shooting = measurement.values, self.model.winch, self.shooting
         self._counts["steps"] += 1
-        chi = self.estimator.update(self._followed(measurement))
+        chi = self.estimator.update(measurement, applied=self._uncut(float(shown[_APPLIED])))
         ahead, known = shooting.known(chi)
         self.estimator.advance(ahead)
         reference = shown[_REFERENCE : _REFERENCE + 2]
         if reference.any():
             known = shooting.shifted(known, reference)
-        if self.predictor is not None:
-            heave, rate = float(shown[_HEAVE]), float(shown[_RATE])
-            self.predictor.update(heave, rate, bool(shown[_UNIT] > 0.5), time)
-            forecast = self.predictor.forecast()
+        forecast = self._forecast(shown, time)
+        if forecast is not None:
             known = shooting.along(known, forecast.displacement, forecast.velocity)
             ends = np.array([forecast.displacement[:2], forecast.velocity[:2]]).T.ravel()
         else:
             ends = self._ends @ chi[self.model.sea_at]
         speed = self.estimator.speed
-        cap = math.inf
-        if self._budget is not None:
-            cap = self._budget.update(max(abs(float(shown[_TORQUE])), abs(self._asked)))
-        low, high = self.hard_bounds(speed + self._gain_of_speed(chi, ends), cap)
+        low, high = self.hard_bounds(speed + self._gain_of_speed(chi, ends), self._cap(shown))
         move: float | None = None
         for k in range(self.iterations):
             if k > 0:
@@ -262,7 +255,7 @@ class NonlinearMPC(LinearMPC):
 
     def prepare(self) -> None:
         """Linearise and condense at the last plan, a sample on: all that needs no measurement."""
-        self._y = self.shooting.later(self._y)
+        self.plan = self.shooting.later(self.plan)
         moves = np.append(np.repeat(self._moves, self.programme.blocks), self._moves[-1])
         self._moves = moves[1:][self._starts.astype(int)]
         self._speeds = np.interp(self._starts + 1.0, self._starts, self._speeds)
@@ -294,11 +287,6 @@ class NonlinearMPC(LinearMPC):
                 return self._moves
             moves = self._moves
         raise SolverError(f"{_OWNER}: the moves have not settled in {iterations} iterations")
-
-    @property
-    def plan(self) -> FloatArray:
-        """What the forces depend on over the horizon, by the last plan, (K my,)."""
-        return self._y
 
     @property
     def power(self) -> float:
@@ -335,26 +323,22 @@ class NonlinearMPC(LinearMPC):
         falls = winch.gain * winch.back
         return over / falls if falls > 0.0 and math.isfinite(over) else 0.0
 
-    def _followed(self, measurement: Measurement) -> Measurement:
-        """Return the measurement with the command that the linear winch would have followed.
+    def _uncut(self, applied: float) -> float:
+        """Return the command that, never cut, has the torque's mean of the last sample.
 
-        A drive that cut the torque for a part of the sample says what it applies at the end of it;
-        the estimator wants the command that, never cut, has the same mean.
+        A drive that cut the torque for a part of the sample says what it applies at the end of it.
+        NaN where it cut nothing, or says something else: a brake, another hand on the drive.
         """
         if self._cut is None:
-            return measurement
+            return math.nan
         asked, same, reach = self._cut
-        if not abs(float(measurement.values[_APPLIED]) - asked) <= reach:
-            return measurement  # NaN, a brake or another hand on the drive
-        values = measurement.values.copy()
-        values[_APPLIED] = same
-        return Measurement(values)
+        return same if abs(applied - asked) <= reach else math.nan
 
     def _prepare(self, *, exact: bool = False) -> None:
         """Linearise and condense at arguments, moves and speeds of the plan."""
-        if math.isfinite(float(self._y.sum())):
-            np.clip(self._y, *self._sane, out=self._y)
-            self._prepared: Prepared = self.shooting.linearise(self._y, exact=exact)
+        if math.isfinite(float(self.plan.sum())):
+            np.clip(self.plan, *self._sane, out=self.plan)
+            self._prepared: Prepared = self.shooting.linearise(self.plan, exact=exact)
             if self._condensed():
                 return
         # A plan that is beyond all numbers is forgotten.
@@ -365,7 +349,7 @@ class NonlinearMPC(LinearMPC):
 
     def _forget(self) -> None:
         """Forget the plan: the load hangs at rest."""
-        self._y = np.array(self.shooting.rest)
+        self.plan = np.array(self.shooting.rest)
         self._moves = np.zeros(len(self.programme.blocks))
         self._speeds = np.zeros(len(self.programme.blocks))
 
@@ -381,7 +365,7 @@ class NonlinearMPC(LinearMPC):
             rows[count:] = (torque[1:, None] / power) * S[self.shooting.speeds][1:]
             later = np.arange(1, len(p.blocks))
             rows[count + later - 1, later] += p.unit / power * self._speeds[1:]
-        return self._moving.change(self._prepared.H, rows)
+        return self.qp.change(self._prepared.H, rows)
 
     def _feedback(
         self, known: Known, low: FloatArray, high: FloatArray, began: float
@@ -402,7 +386,7 @@ class NonlinearMPC(LinearMPC):
         if move is None or self.solved is None:
             return None
         v = self.solved.v
-        self._y = shooting.arguments(prepared, known, n, v)
+        self.plan = shooting.arguments(prepared, known, n, v)
         self._moves = v
         self._speeds = o[shooting.speeds] + prepared.outputs[shooting.speeds] @ v
         return move
@@ -413,36 +397,3 @@ def _reach(argument: str, tension: float) -> float:
     if argument.startswith("spring."):
         return 5.0 * tension
     return 20.0 if argument == "payload.velocity" else math.inf
-
-
-class _MovingQP(SoftQP):
-    """A programme whose H and R change too, kept warm all the same."""
-
-    def __init__(self, like: SoftQP, rows: FloatArray) -> None:
-        super().__init__(
-            like.H,
-            rows,
-            quadratic=like.quadratic,
-            linear=like.linear,
-            iterations=like._iterations,
-            time_limit=like._time_limit,
-        )
-
-    def change(self, H: FloatArray, rows: FloatArray) -> bool:
-        """Take another Hessian and other rows, of the same shapes; return whether that is possible.
-
-        If it is not, nothing is changed.
-        """
-        if not math.isfinite(float(H.sum()) + float(rows.sum())):
-            return False
-        before = self.H, self.rows
-        self.H, self.rows = H, rows
-        if self._model.update(H=H, A=rows) >= 0:
-            return True
-        try:
-            self.reset()
-        except SolverError:
-            self.H, self.rows = before
-            self.reset()
-            return False
-        return True

@@ -16,6 +16,7 @@ Set up once; each sample brings a gradient and bounds, and begins with the activ
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,7 +40,7 @@ class Solved:
 
 
 class SoftQP:
-    """A programme of fixed H, R and weights.
+    """A programme of fixed size and weights; H and R change by `change`.
 
     Parameters
     ----------
@@ -107,6 +108,26 @@ class SoftQP:
         w = np.full(len(self._wide), self.linear)
         model.soft_weights(rho, rho, w, w)
         self._model = model
+
+    def change(self, H: FloatArray, rows: FloatArray) -> bool:
+        """Take another Hessian and other soft rows, of the same shapes, and keep the active set.
+
+        Return whether that is possible; if it is not, nothing is changed.
+        """
+        if not math.isfinite(float(H.sum()) + float(rows.sum())):
+            return False
+        before = self.H, self.rows, self._all_rows
+        self.H, self.rows = H, rows
+        self._all_rows = np.vstack([self.hard, rows]) if len(self.hard) else rows
+        if self._model.update(H=H, A=self._all_rows) >= 0:
+            return True
+        try:  # what cannot be updated warm may still be solved cold
+            self.reset()
+        except SolverError:
+            self.H, self.rows, self._all_rows = before
+            self.reset()
+            return False
+        return True
 
     def solve(self, f: FloatArray, lower: FloatArray, upper: FloatArray) -> Solved:
         """Solve for a gradient (n,) and bounds on moves, hard and soft rows, finite or +-1e20."""

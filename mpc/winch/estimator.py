@@ -119,7 +119,9 @@ class Estimator:
         """Motor speed at the last update, as estimated [rad/s]."""
         return self._before
 
-    def update(self, measurement: Measurement, held: float = math.nan) -> FloatArray:
+    def update(
+        self, measurement: Measurement, held: float = math.nan, applied: float = math.nan
+    ) -> FloatArray:
         """Return chi at this sample, given what is shown now.
 
         The input over the sample before is that which the drive says it has followed, not the one
@@ -132,12 +134,17 @@ class Estimator:
         held
             Torque over the one at rest that the drive has held since the last sample, if it was at
             its peak all the time [N m]; NaN if it followed a command.
+        applied
+            Command that does as much as a drive which cut its torque for a part of the sample; NaN
+            for the one that the drive says it has followed.
         """
         shown = measurement.values
         winch = self.model.winch
         ahead = self._ahead
         if self._begun:
-            applied, speed = float(shown[_APPLIED]), float(shown[_SPEED])
+            speed = float(shown[_SPEED])
+            if not math.isfinite(applied):
+                applied = float(shown[_APPLIED])
             if math.isfinite(held) and math.isfinite(speed):
                 # A torque that is held does as much as one that falls to as much below it.
                 fall = 0.5 * winch.gain * winch.back * (speed - self._before)

@@ -1,0 +1,308 @@
+"""The recipe that linear and nonlinear predictive control of the winch share: `WinchMPC`.
+
+    case --> model, weights, regulator, estimator, limits          once
+    m --> Estimator --> chi ; set point, forecast, thermal cap      every sample
+    question --> QP --> first move, or that of the last good plan   every sample
+
+What the two put to the solver, and what command they make of its answer, is their own.
+
+A programme may fail, be late, or have nothing finite to start from.  The drive then gets the move
+that the last good plan had for this moment, and when that plan has run out, the command that holds
+a load at rest: a DC drive brakes by its back-EMF, a speed regulator holds the drum.
+"""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from models.basics import FloatArray, InputError, check_range
+from models.case import Case
+from models.plant import SPEED_BAND, DriveLimits
+from models.sensing import Measurement
+from models.sensing.control import MEASURED as HEARD
+
+from ..forecast import AdaptiveAR, PerfectPreview
+from ..programme import SoftQP, Solved, kkt_residual
+from ..winch import (
+    Estimator,
+    PredictionModel,
+    Weights,
+    plan_model,
+    prediction_model,
+    regulator,
+    tune_weights,
+    with_noise,
+)
+from .condensed import Condensed, condense, default_blocking
+from .drive_window import DriveWindow, TorqueBudget
+from .products import Products
+
+if TYPE_CHECKING:
+    from models.operation import Motion
+
+    from ..forecast import Forecast, Predictor
+
+
+_OWNER = "predictive control"
+_QUADRATIC, _LINEAR = 1e4, 1e2  # price of a soft row, over its scale, in units of the cost
+_CLEAR = 1.5 * SPEED_BAND  # of the highest speed, kept clear of the drive's own overspeed cut
+_HORIZON, _PREVIEWED = 8.0, 14.0  # [s]
+_PROVED = 1e-6  # residual of the optimality conditions
+_IN_BAND = 3.0  # [rad/s]
+_LEAST = 0.1  # of the static tension, that is to stay in the rope
+_UNIT, _TORQUE = HEARD.index("mru.valid"), HEARD.index("motor.torque")
+_HEAVE, _RATE = HEARD.index("mru.heave"), HEARD.index("mru.heave_rate")
+
+
+class WinchMPC(ABC):
+    """What predictive control of a winch is made of, whatever its model of the plant.
+
+    Parameters
+    ----------
+    case, horizon, sample_time, blocking, weights, predictor, masses
+        As for `LinearMPC`.
+    minimum_tension, excursion, thermal, deadline, prove, limits, name
+        As for `LinearMPC`.
+
+    Attributes
+    ----------
+    model, regulator, estimator, predictor
+        The model that plans are made on, its regulator, the filter, and where the hook's path comes
+        from: None for the estimator's own sea.
+    soft_limits
+        Lowest and highest deviation from rest by signal.
+    programme, products, qp
+        The condensed programme, what of a step does not change, and the solver.
+    question, solved
+        What the solver was asked last, and its answer; None where there was none.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of its range.
+    SolverError
+        If no weights are stable.
+    """
+
+    programme: Condensed
+    products: Products
+    qp: SoftQP
+
+    def __init__(
+        self,
+        case: Case,
+        *,
+        horizon: float | None,
+        sample_time: float,
+        blocking: Sequence[int] | None,
+        weights: Weights | None,
+        predictor: Literal["kalman", "ar", "preview"] | Predictor,
+        masses: int | None,
+        minimum_tension: float | None,
+        excursion: float | None,
+        thermal: bool,
+        deadline: float | None,
+        limits: DriveLimits | None,
+        name: str | None,
+        prove: bool = False,
+    ) -> None:
+        T = check_range(_OWNER, "sample_time", sample_time, low=0.0, unit="s", open_low=True)
+        if horizon is None:
+            horizon = _PREVIEWED if predictor == "preview" else _HORIZON
+        blocks = default_blocking(horizon, T) if blocking is None else tuple(blocking)
+        if not blocks or min(blocks) < 1:
+            raise InputError(
+                f"{_OWNER}: blocking must be whole numbers of at least 1, got {blocks}"
+            )
+        least = _least_tension(case) if minimum_tension is None else minimum_tension
+        check_range(_OWNER, "minimum_tension", least, low=0.0, unit="N")
+        if deadline is not None:
+            check_range(_OWNER, "deadline", deadline, low=0.0, unit="s", open_low=True)
+        if weights is None:
+            weights = tune_weights(case, sample_time=T, masses=masses)
+            if predictor == "preview":  # who knows the future may know the rope
+                weights = replace(weights, stiffness=1.0)
+        self.case, self.sample_time, self.weights = case, T, weights
+        believed = with_noise(prediction_model(case, sample_time=T, masses=masses), weights.noise)
+        self.model = plan_model(believed, weights.stiffness)
+        self.regulator = regulator(self.model, weights.torque)
+        self.estimator = Estimator(believed)
+        limits = DriveLimits.from_case(case) if limits is None else limits
+        self.soft_limits = _soft_limits(self.model, limits, least, excursion)
+        self._blocks = tuple(int(b) for b in blocks)
+        self._of = np.repeat(np.arange(len(blocks)), self._blocks)  # block of each sample
+        self.predictor, word = _predictor(case, predictor, T, self.horizon)
+        self.name = word if name is None else name
+        self._sea_covariance = None if self.predictor is None else self.estimator.sea_covariance
+        unit = case.winch.drive.torque_peak
+        self._window = DriveWindow(self.model.winch, limits, len(blocks), unit)
+        self._deadline = math.inf if deadline is None else deadline
+        self._prove = prove
+        self._budget = TorqueBudget(case, T, self.horizon) if thermal else None
+
+    @property
+    def horizon(self) -> float:
+        """Length of the prediction [s]."""
+        return sum(self._blocks) * self.sample_time
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Steps, iterations of the solver, and how often which fallback was used."""
+        return dict(self._counts)
+
+    def foresee(self, motion: Motion) -> None:
+        """Give the record to come to a predictor that needs it."""
+        given = getattr(self.predictor, "foresee", None)
+        if given is not None:
+            given(motion)
+
+    def reset(self) -> None:
+        """Forget every earlier measurement."""
+        self.estimator.reset()
+        self.qp.reset()
+        if self._budget is not None:
+            self._budget.reset()
+        if self.predictor is not None:
+            self.predictor.reset()
+        self._plan: FloatArray | None = None  # the last good moves, and how old they are
+        self._age = 0
+        self._speeds = np.zeros(len(self._blocks))  # at the start of each move, by the last plan
+        self._asked = self.model.winch.rest_torque  # of the drive at the sample before [N m]
+        self._counts = dict.fromkeys(
+            ("steps", "iterations", "late", "shifted", "safe", "unproved"), 0
+        )
+        self.question: tuple[FloatArray, FloatArray, FloatArray] | None = None
+        self.solved: Solved | None = None
+
+    @abstractmethod
+    def step(self, measurement: Measurement, time: float) -> float:
+        """Return the drive command, its static part included [V, rad/s or N m]."""
+
+    def _condense(self, model: PredictionModel) -> Condensed:
+        """Return the programme of the controller's cost, blocks and limits on a model."""
+        return condense(model, self.regulator, self._blocks, tuple(self.soft_limits))
+
+    def _products(self, model: PredictionModel, programme: Condensed) -> Products:
+        return Products.of(
+            model, programme, self.soft_limits, self._sea_covariance, self.estimator.model
+        )
+
+    def _solver(self, rows: FloatArray, hard: FloatArray | None = None) -> SoftQP:
+        """Return the solver of the programme with scaled soft rows and with hard ones."""
+        return SoftQP(
+            self.programme.H,
+            rows,
+            quadratic=_QUADRATIC,
+            linear=_LINEAR,
+            hard=hard,
+            time_limit=0.0 if self._deadline == math.inf else self._deadline,
+        )
+
+    def _forecast(self, shown: FloatArray, time: float) -> Forecast | None:
+        """Return the predictor's forecast, None where the hook moves as the estimator's sea."""
+        if self.predictor is None:
+            return None
+        heave, rate = float(shown[_HEAVE]), float(shown[_RATE])
+        self.predictor.update(heave, rate, bool(shown[_UNIT] > 0.5), time)
+        return self.predictor.forecast()
+
+    def _cap(self, shown: FloatArray) -> float:
+        """Return the highest torque that the windings' temperature allows [N m]."""
+        if self._budget is None:
+            return math.inf
+        # Over a sample the torque falls or rises with the speed: the larger end counts.
+        return self._budget.update(max(abs(float(shown[_TORQUE])), abs(self._asked)))
+
+    def _solve(
+        self, question: tuple[FloatArray, FloatArray, FloatArray], began: float
+    ) -> float | None:
+        """Return the first move of the answer, None if there is none that is good."""
+        self.question, self.solved = question, None
+        if not all(math.isfinite(float(part.sum())) for part in question):
+            self.estimator.reset()
+            return None
+        solved = self.qp.solve(*question)
+        self._counts["iterations"] += solved.iterations
+        if not (solved.ok and math.isfinite(float(solved.v.sum()))):
+            self.qp.reset()
+            return None
+        if self._prove and kkt_residual(self.qp, *question, solved) > _PROVED:
+            self._counts["unproved"] += 1
+        if clock.perf_counter() - began > self._deadline:
+            self._counts["late"] += 1
+            return None
+        self.solved = solved
+        self._plan, self._age = solved.v, 0
+        return float(solved.v[0])
+
+    def _otherwise(self, speed: float) -> float:
+        """Return the move of the last plan for this sample, or the one that holds the drum."""
+        self._age += 1
+        if self._plan is not None and self._age < len(self._of):
+            self._counts["shifted"] += 1
+            return float(self._plan[self._of[self._age]])
+        self._counts["safe"] += 1
+        winch = self.model.winch
+        return winch.torque(winch.rest_command, speed) / self.programme.unit
+
+
+def _least_tension(case: Case) -> float:
+    given = case.limits.minimum_tension
+    return _LEAST * case.static_tension if given is None else float(given)
+
+
+def _soft_limits(
+    model: PredictionModel, limits: DriveLimits, least: float, excursion: float | None
+) -> dict[str, tuple[float, float]]:
+    """Return the soft limits by signal, as deviations from rest: (lowest, highest)."""
+    winch = model.winch
+    found = {"tension": (least - winch.rest_tension, math.inf)}
+    if limits.speed < math.inf:
+        top = (1.0 - _CLEAR) * limits.speed
+        found["speed"] = (-top, top)
+    if excursion is not None:
+        check_range(_OWNER, "excursion", excursion, low=0.0, unit="m", open_low=True)
+        found["payload"] = (-excursion, excursion)
+    if winch.dc and limits.voltage < math.inf:
+        found["command"] = (
+            -limits.voltage - winch.rest_command,
+            limits.voltage - winch.rest_command,
+        )
+    return found
+
+
+def _predictor(
+    case: Case, given: str | Predictor, sample_time: float, horizon: float
+) -> tuple[Predictor | None, str]:
+    """Return the predictor, None for the estimator's own sea, and the controller's name."""
+    if not isinstance(given, str):
+        wanted = round(horizon / sample_time) + 1
+        leads = np.asarray(given.leads)
+        if leads.size != wanted or not math.isclose(given.sample_time, sample_time):
+            raise InputError(
+                f"{_OWNER}: predictor must forecast {wanted} leads every {sample_time:g} s, got "
+                f"{leads.size} every {given.sample_time:g} s"
+            )
+        return given, "mpc"
+    if given == "kalman":
+        return None, "mpc"
+    if given == "ar":
+        unit = case.sensors.mru
+        if unit is None:
+            return AdaptiveAR(sample_time=sample_time, horizon=horizon), "mpc-ar"
+        # An error within the band of the waves cannot be told from them.
+        error = unit.noise_floor if unit.noise_bandwidth < _IN_BAND else 0.0
+        learnt = AdaptiveAR(sample_time=sample_time, horizon=horizon, delay=unit.delay, error=error)
+        return learnt, "mpc-ar"
+    if given == "preview":
+        return PerfectPreview(sample_time=sample_time, horizon=horizon), "mpc-preview"
+    raise InputError(
+        f"{_OWNER}: predictor must be one of kalman, ar, preview or a Predictor, got {given!r}"
+    )
