@@ -16,7 +16,7 @@ from models.basics import FloatArray, InputError, StillhookError
 from models.operation import SpectrumMotion
 from models.simulation import EASE
 
-from ..controllers import Contender, Law, late
+from ..controllers import Contender, Law
 from ..runs import Progress
 from .cell import WINDOW, Cell, CommonSea, Prepared, Question, Trace
 
@@ -27,7 +27,6 @@ class Floor:
     """The clairvoyant floor in one sea: no controller, and no nonlinear plant."""
 
     def __init__(self, question: Question, contender: Contender, height: float) -> None:
-        self._solve = late("mpc.floor.clairvoyance", "clairvoyant")
         self._name, self._height, self._question = contender.name, height, question
         self._case = question.true(height)
         self._hook = SpectrumMotion.from_case(self._case).hook
@@ -65,7 +64,9 @@ class Floor:
         """Return the answer, its times (n,) [s], and the payload's displacement (n,) [m]."""
         sea = CommonSea(hook=self._hook, lasting=self._question.duration, ease=EASE)
         motion = sea.motion(self._question.duration, _SAMPLE, seed)
-        found = self._solve(
+        from mpc.floor import clairvoyant
+
+        found = clairvoyant(
             self._case,
             motion,
             sample_time=_SAMPLE,

@@ -10,12 +10,10 @@ can say what else is wrong with it.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import zlib
 from collections.abc import Mapping
-from functools import lru_cache
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
@@ -23,26 +21,14 @@ from typing import Any, BinaryIO
 from models.basics import InputError
 
 from ..controllers import Contender, Law
-from ..keeper import difference, lock, put
+from ..keeper import code_digest, difference, lock, put
 from .cell import Cell, Question
 
 STORE = "cells.jsonl"
 """Name of the file in the folder of a comparison."""
 
 _FORMAT = 1
-_PACKAGES = {"": ("models", "synth"), "predictive": ("models", "synth", "mpc")}
-
-
-@lru_cache(maxsize=4)
-def code_digest(packages: tuple[str, ...]) -> str:
-    """Return a digest of the toolkit's own code: other code may give other numbers."""
-    home = Path(__file__).resolve().parents[2]
-    digest = hashlib.sha256()
-    for package in packages:
-        for path in sorted((home / package).rglob("*.py")):
-            name = path.relative_to(home).as_posix()
-            digest.update(name.encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()[:16]
+_ENTRY = "stillhook.comparison.bench"  # whose code the results hang on
 
 
 def question_of(question: Question) -> dict[str, Any]:
@@ -102,7 +88,7 @@ class Store:
 
     def law(self, needs: str, height: float) -> Law | None:
         """Return a design, if there is one that still holds."""
-        return self._laws.get((needs, code_digest(("models", "synth")), height))
+        return self._laws.get((needs, code_digest(_ENTRY), height))
 
     def add_cell(self, contender: Contender, law: Law | None, cell: Cell) -> None:
         """Keep the result of a run."""
@@ -112,7 +98,7 @@ class Store:
 
     def add_law(self, needs: str, height: float, law: Law) -> None:
         """Keep a design."""
-        identity = code_digest(("models", "synth"))
+        identity = code_digest(_ENTRY)
         content = {"kind": "design", "identity": identity, "name": needs, "height": height}
         put(self._file, self.path, _text({**content, "law": law.to_dict()}))
         self._laws[needs, identity, height] = law
@@ -203,10 +189,7 @@ class Store:
 
 def _identity(contender: Contender, law: Law | None) -> str:
     """Return what a result hangs on besides the question: the contender, its law, the code."""
-    kind = "predictive" if contender.group in ("predictive", "reference", "floor", "own") else ""
-    return ".".join(
-        [contender.identity, "" if law is None else law.digest, code_digest(_PACKAGES[kind])]
-    )
+    return ".".join([contender.identity, "" if law is None else law.digest, code_digest(_ENTRY)])
 
 
 def _text(content: Mapping[str, Any]) -> str:

@@ -15,6 +15,5 @@ if TYPE_CHECKING:
     from .law import Law as Law
     from .law import design_law as design_law
     from .makers import given as given
-    from .makers import late as late
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -9,8 +9,7 @@ predict are imported when they are made, and not before.
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
-from typing import Any
+from typing import Any, Literal
 
 from models.basics import InputError
 from models.case import Case
@@ -55,18 +54,22 @@ def given(name: str, fixed: Law, case: Case, law: Law | None) -> Controller:
     return linear(name, True, case, fixed)
 
 
-def linear_mpc(predictor: str, case: Case, law: Law | None) -> Controller:
+def linear_mpc(
+    predictor: Literal["kalman", "ar", "preview"], case: Case, law: Law | None
+) -> Controller:
     """Return the linear MPC with a predictor."""
     del law
-    made: Controller = late("mpc.linear.linear", "LinearMPC")(case, predictor=predictor)
-    return made
+    from mpc.linear import LinearMPC
+
+    return LinearMPC(case, predictor=predictor)
 
 
 def nonlinear_mpc(case: Case, law: Law | None) -> Controller:
     """Return the nonlinear MPC."""
     del law
-    made: Controller = late("mpc.nonlinear.nonlinear", "NonlinearMPC")(case)
-    return made
+    from mpc.nonlinear import NonlinearMPC
+
+    return NonlinearMPC(case)
 
 
 def as_it_is(controller: Controller, case: Case, law: Law | None) -> Controller:
@@ -88,17 +91,3 @@ def from_factory(
             f"got {type(made).__name__}, which has no {' and no '.join(lacking)}"
         )
     return made
-
-
-def late(module: str, name: str) -> Any:
-    """Return a name of a module that may not be there.
-
-    Raises
-    ------
-    InputError
-        If it is not.
-    """
-    try:
-        return getattr(import_module(module), name)
-    except (ImportError, AttributeError) as error:
-        raise InputError(f"this version of Stillhook has no {name} ({error})") from error

@@ -98,7 +98,7 @@ class Cluster(Pool):
         self._count, self._mark = 0, f"stillhook-{uuid.uuid4().hex[:12]}"
         self._stack = contextlib.ExitStack()
         self._running = self._stack.enter_context(self._connected())
-        self._code = code_digest()
+        self._code = code_digest(type(setup))
         # A task of its own and no scattered data: should all its copies be lost with a worker,
         # the scheduler makes it again.
         self._setup = self._running.submit(
@@ -173,20 +173,20 @@ class Cluster(Pool):
 
 def _do(setup: bytes, task: Task, code: str) -> Any:
     """Do a task on a worker, whose code must be the driver's: numbers of others do not belong."""
-    if code != code_digest():
+    bench, own, alone = _bench(setup)
+    if code != own:
         raise InputError(
             "cluster: a worker has another version of Stillhook than this process; install the "
             "same everywhere"
         )
-    bench, alone = _bench(setup)
     with alone:  # threads of one worker take turns: a controller has a memory
         return bench.do(task)
 
 
 @functools.lru_cache(maxsize=2)
-def _bench(setup: bytes) -> tuple[Bench, threading.Lock]:
+def _bench(setup: bytes) -> tuple[Bench, str, threading.Lock]:
     found: Setup = pickle.loads(setup)
-    return found.bench(), threading.Lock()
+    return found.bench(), code_digest(type(found)), threading.Lock()
 
 
 def _distributed() -> Any:

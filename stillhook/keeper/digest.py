@@ -1,45 +1,188 @@
-"""Which code made a result: a digest of the toolkit's own, and the versions of what it stands on.
+"""Digests of code: which code made a result, whatever its comments say.
 
-A store of results is only gone on with by the code that began it (`stillhook.sweeps.store`), and a
-cluster's workers must have the driver's (`stillhook.keeper.cluster`): other code may give other
-numbers, and a table of both would be worth nothing.
+    entry function --> files that it imports, and theirs ... --> syntax trees --> `code_digest`
+
+A store of results is only gone on with by the code that began it, a cluster's workers must have
+the driver's, and stored studies say what made them: other code may give other numbers, and a table
+of both would be worth nothing.
 """
 
 from __future__ import annotations
 
+import ast
+import gc
 import hashlib
 import platform
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 
-_CODE = (
-    "models/**/*.py",
-    "synth/**/*.py",
-    "mpc/**/*.py",
-    "stillhook/runs/series.py",
-    "stillhook/controllers/makers.py",
-    "stillhook/sweeps/pilots.py",
-    "stillhook/sweeps/t*.py",  # time_cases, time_metrics, trim
-)
-_NUMERICAL = ("numpy", "scipy", "casadi")
+from typing_extensions import TypeIs
+
+_PACKAGES = ("models", "synth", "mpc", "stillhook")
+_NUMERICAL = ("numpy", "scipy", "casadi", "daqp")
 
 
-@lru_cache(maxsize=1)
-def code_digest() -> str:
-    """Return a digest of the code that the numbers of a sweep hang on."""
-    home = Path(__file__).resolve().parents[2]
+@lru_cache(maxsize=32)
+def code_digest(entry: Callable[..., object] | str) -> str:
+    """Return a digest of the code that the results of a function hang on.
+
+    That is the file of the function and every file that it imports, directly or through others,
+    within the toolkit (and the function's own package): at the top or later, in a function.  What
+    is imported for type checkers alone cannot change a number and does not count.  A face
+    (`models.basics.lazy`) is looked through to the file that a name comes from.  Of each file the
+    syntax tree without its docstrings counts, so that words, comments and line breaks may change;
+    and so do the versions of the numerical libraries.
+
+    Parameters
+    ----------
+    entry
+        The function (or class), or the name of its module.
+    """
+    start = entry if isinstance(entry, str) else entry.__module__
     digest = hashlib.sha256()
-    for path in sorted({path for pattern in _CODE for path in home.glob(pattern)}):
-        name = path.relative_to(home).as_posix()
-        digest.update(name.encode() + b"\0" + path.read_bytes())
+    for name, package in sorted((name, version(name)) for name in _NUMERICAL):
+        digest.update(f"{name} {package}\n".encode())
+    # The trees live until the end and hold no circles: looking for garbage would take twice as
+    # long as reading them.
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        for module, content in sorted(_Reached(start).contents.items()):
+            digest.update(f"{module} {content}\n".encode())
+    finally:
+        if collecting:
+            gc.enable()
     return digest.hexdigest()[:16]
 
 
-def versions() -> dict[str, str]:
-    """Return the versions of Stillhook, Python and the libraries that make the numbers."""
+def versions(entry: Callable[..., object] | str) -> dict[str, str]:
+    """Return the versions of Stillhook, the libraries, the code behind an entry, and Python."""
     from .._version import __version__
 
-    found = {"stillhook": __version__, "code": code_digest()}
-    found |= {name: version(name) for name in _NUMERICAL}
-    return {**found, "python": platform.python_version()}
+    found = {"stillhook": __version__, **{name: version(name) for name in _NUMERICAL}}
+    return {**found, "code": code_digest(entry), "python": platform.python_version()}
+
+
+class _Reached:
+    """The files that a module reaches, with a digest of each, by the module's name."""
+
+    def __init__(self, start: str) -> None:
+        self._ours = {*_PACKAGES, start.partition(".")[0]}
+        self._faces: dict[str, dict[str, tuple[str, str]]] = {}
+        self._homes: dict[str, Path | None] = {}
+        self.contents: dict[str, str] = {}
+        todo = [start]
+        while todo:
+            module = todo.pop()
+            path = self._file(module)
+            if module in self.contents or path is None:
+                continue
+            tree = ast.parse(path.read_bytes())
+            words: list[str] = []
+            imports: list[ast.Import | ast.ImportFrom] = []
+            _read(tree, words, imports)
+            self.contents[module] = hashlib.sha256("\0".join(words).encode()).hexdigest()
+            for line in imports:
+                todo += self._targets(line, _package(module, path))
+            if path.name == "__init__.py":  # imported as a whole: all that it hands on
+                todo += [self._source(*home) for home in self._face(module, path).values()]
+
+    def _targets(self, line: ast.Import | ast.ImportFrom, package: str) -> Iterator[str]:
+        """Yield the modules that an import in a package brings."""
+        if isinstance(line, ast.Import):
+            yield from (each.name for each in line.names)
+            return
+        base = _absolute(line, package)
+        yield from (self._source(base, each.name) for each in line.names)
+
+    def _source(self, base: str, name: str) -> str:
+        """Return the module in which a name that is imported from another stands."""
+        if self._file(f"{base}.{name}") is not None:
+            return f"{base}.{name}"
+        path = self._file(base)
+        if path is not None and path.name == "__init__.py":
+            home = self._face(base, path).get(name)
+            if home is not None:
+                return self._source(*home)
+        return base
+
+    def _face(self, module: str, path: Path) -> dict[str, tuple[str, str]]:
+        """Return where the names that a face hands on come from: module and name there."""
+        if module not in self._faces:
+            found: dict[str, tuple[str, str]] = {}
+            for block in ast.parse(path.read_bytes()).body:
+                for line in block.body if _for_types_alone(block) else ():
+                    if isinstance(line, ast.ImportFrom):
+                        base = _absolute(line, module)
+                        found |= {e.asname or e.name: (base, e.name) for e in line.names}
+            self._faces[module] = found
+        return self._faces[module]
+
+    def _file(self, module: str) -> Path | None:
+        """Return the file of a module; None if it is none of ours, or no module."""
+        if module not in self._homes:
+            top, _, rest = module.partition(".")
+            spec = find_spec(top) if top in self._ours else None
+            place = None if spec is None or spec.origin is None else Path(spec.origin)
+            if place is not None and rest:
+                below = place.parent.joinpath(*rest.split("."))
+                both = (below / "__init__.py", below.with_suffix(".py"))
+                place = next((path for path in both if path.is_file()), None)
+            self._homes[module] = place
+        return self._homes[module]
+
+
+def _package(module: str, path: Path) -> str:
+    """Return the package that relative imports of a module start from."""
+    return module if path.name == "__init__.py" else module.rpartition(".")[0]
+
+
+def _absolute(line: ast.ImportFrom, package: str) -> str:
+    """Return the full name of the module that something is imported from."""
+    if not line.level:
+        return line.module or ""
+    parts = package.split(".")[: len(package.split(".")) - line.level + 1]
+    return ".".join([*parts, *([line.module] if line.module else [])])
+
+
+def _for_types_alone(node: ast.AST) -> TypeIs[ast.If]:
+    return (
+        isinstance(node, ast.If)
+        and isinstance(node.test, ast.Name)
+        and node.test.id == "TYPE_CHECKING"
+    )
+
+
+def _read(node: ast.AST, words: list[str], imports: list[ast.Import | ast.ImportFrom]) -> None:
+    """Gather a syntax tree as words, the same for every version of Python, and its imports."""
+    if _for_types_alone(node):
+        for other in node.orelse:
+            _read(other, words, imports)
+        return
+    words.append(type(node).__name__)
+    if isinstance(node, ast.Import | ast.ImportFrom):
+        imports.append(node)
+    for field in node._fields:
+        value = getattr(node, field, None)
+        if value is None or field == "ctx":
+            continue
+        words.append(field)
+        if isinstance(value, ast.AST):
+            _read(value, words, imports)
+        elif not isinstance(value, list):
+            words.append(repr(value))
+        else:
+            for each in value:
+                if not isinstance(each, ast.AST):
+                    words.append(repr(each))
+                # A text that stands alone does nothing: a docstring.
+                elif not (
+                    isinstance(each, ast.Expr)
+                    and isinstance(each.value, ast.Constant)
+                    and isinstance(each.value.value, str)
+                ):
+                    _read(each, words, imports)
+            words.append(")")

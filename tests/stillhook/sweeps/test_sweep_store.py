@@ -24,6 +24,7 @@ from stillhook.sweeps import RESULT, resume_sweep, sweep, write_result
 from stillhook.sweeps import header as headers
 from stillhook.sweeps import store as stores
 from stillhook.sweeps.store import JOURNAL, piece_of
+from stillhook.sweeps.time_cases import TimeQuestion
 
 CASE = sh.load_case("thesis-1975").replace({"sea.significant_height": 0.3})
 SPREAD = {"payload.mass": Uniform("20 %"), "payload.drag_coefficient": Uniform("50 %")}
@@ -170,11 +171,11 @@ def test_a_store_that_answers_another_question_is_refused(half, change, message)
 
 
 def test_a_store_of_other_code_is_refused(half, monkeypatch):
-    own = headers.versions()
-    monkeypatch.setattr(headers, "versions", lambda: {**own, "code": "0123456789abcdef"})
+    own = headers.versions(TimeQuestion)
+    monkeypatch.setattr(headers, "versions", lambda entry: {**own, "code": "0123456789abcdef"})
     with pytest.raises(InputError, match="another version of Stillhook's own code"):
         resume_sweep(half)
-    monkeypatch.setattr(headers, "versions", lambda: {**own, "python": "3.99"})
+    monkeypatch.setattr(headers, "versions", lambda entry: {**own, "python": "3.99"})
     resume_sweep(half, engine="serial")
 
 
