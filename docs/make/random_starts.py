@@ -35,8 +35,7 @@ from models.basics import one_thread
 from synth.loop import closed_loop_poles, with_drag
 from synth.question import Problem, pose
 from synth.search import Solved, briskest, coarse_programme
-from synth.search.begin import start_coefficient
-from synth.search.starts import crossover_grid
+from synth.search.starts import crossover_grid, start_coefficient
 from synth.verify import LawMatrices, winding_of_plant
 
 FloatArray = npt.NDArray[np.float64]

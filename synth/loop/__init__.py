@@ -13,17 +13,17 @@ if TYPE_CHECKING:
     from .controller import closed_loop_poles as closed_loop_poles
     from .disturbance import Disturbance as Disturbance
     from .disturbance import disturbances as disturbances
-    from .element import DragElement as DragElement
-    from .element import with_drag as with_drag
     from .loop import Blocks as Blocks
+    from .loop import DragElement as DragElement
+    from .loop import Phasor as Phasor
     from .loop import close_scalar as close_scalar
     from .loop import closed_loop as closed_loop
     from .loop import determinant as determinant
     from .loop import numeric_blocks as numeric_blocks
     from .loop import return_differences as return_differences
+    from .loop import with_drag as with_drag
     from .margins import Margins as Margins
     from .margins import loop_margins as loop_margins
     from .margins import refine_minima as refine_minima
-    from .phasor import Phasor as Phasor
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

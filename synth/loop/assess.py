@@ -24,8 +24,7 @@ from models.plant import LinearPlant, consistent_drag
 
 from .controller import Controller, closed_loop_poles
 from .disturbance import Disturbance
-from .element import DragElement, with_drag
-from .loop import closed_loop, numeric_blocks, return_differences
+from .loop import DragElement, closed_loop, numeric_blocks, return_differences, with_drag
 from .margins import Margins, loop_margins, refine_minima, worst_margins
 
 _RTOL = 1e-8  # of every variance

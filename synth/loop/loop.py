@@ -14,26 +14,100 @@ r"""The closed loop on frequency nodes: every response from one diagram, exact d
     L = -C yu                               loop gain broken at u
     1 + L_i = det(I - C yu) / minor_ii      loop i broken, all others closed; S_i its inverse
 
-The formulas are stated once, for NumPy's complex arrays and for `synth.loop.phasor.Phasor`
-symbols: the optimiser and the reports thus cannot disagree on what a loop is.  (The
+The formulas are stated once, for NumPy's complex arrays and for `Phasor` symbols (CasADi knows
+only reals): the optimiser and the reports thus cannot disagree on what a loop is.  (The
 verification uses none of this.)
+
+Quadratic drag enters as an equivalent linear element: stochastic linearisation replaces the force
+q |v| v of a Gaussian velocity by C v, C = q sqrt(8/pi) sigma_v (Caughey 1963; Roberts and Spanos,
+*Random Vibration and Statistical Linearization*, 1990, ch. 5).  sigma_v is the closed loop's own,
+so C is solved together with the gains: one more variable and one equality in the programme, a
+fixed point elsewhere.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from models.plant import PlantResponse
+from models.basics import InputError, check_range, pick
+from models.plant import LinearPlant, PlantResponse
 
-from .phasor import constant
-
+# What both kinds of number share; NumPy and CasADi have no common static type.
 Complex = Any
 Matrix = list[list[Complex]]
+
+
+@dataclass(frozen=True)
+class Phasor:
+    """A vector of complex numbers as two CasADi vectors (or scalars) of equal shape."""
+
+    re: Any
+    im: Any
+
+    def __add__(self, other: Complex) -> Phasor:
+        b = _phasor(other)
+        return Phasor(self.re + b.re, self.im + b.im)
+
+    __radd__ = __add__
+
+    def __neg__(self) -> Phasor:
+        return Phasor(-self.re, -self.im)
+
+    def __sub__(self, other: Complex) -> Phasor:
+        b = _phasor(other)
+        return Phasor(self.re - b.re, self.im - b.im)
+
+    def __rsub__(self, other: Complex) -> Phasor:
+        return _phasor(other) - self
+
+    def __mul__(self, other: Complex) -> Phasor:
+        b = _phasor(other)
+        return Phasor(self.re * b.re - self.im * b.im, self.re * b.im + self.im * b.re)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Complex) -> Phasor:
+        b = _phasor(other)
+        scale = 1.0 / (b.re * b.re + b.im * b.im)
+        return Phasor(
+            (self.re * b.re + self.im * b.im) * scale, (self.im * b.re - self.re * b.im) * scale
+        )
+
+    def __rtruediv__(self, other: Complex) -> Phasor:
+        return _phasor(other) / self
+
+    def squared(self) -> Any:
+        """Return the squared magnitude."""
+        return self.re * self.re + self.im * self.im
+
+
+def _phasor(value: Complex) -> Phasor:
+    if isinstance(value, Phasor):
+        return value
+    if isinstance(value, complex | np.complexfloating):
+        return Phasor(value.real, value.imag)
+    return Phasor(value, 0.0)
+
+
+def constant(values: npt.NDArray[np.complex128]) -> Phasor:
+    """Return numbers, (k,), as a phasor of CasADi constants."""
+    return Phasor(
+        ca.DM(np.ascontiguousarray(values.real)), ca.DM(np.ascontiguousarray(values.imag))
+    )
+
+
+def squared_magnitude(value: Complex) -> Any:
+    """Return |value|^2 of a phasor or of NumPy complex numbers."""
+    if isinstance(value, Phasor):
+        return value.squared()
+    array = np.asarray(value)
+    return array.real**2 + array.imag**2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,3 +254,56 @@ def _solve(matrix: Matrix, right: Sequence[Complex]) -> list[Complex]:
             b[i] = b[i] - rows[i][j] * b[j]
         b[i] = b[i] / rows[i][i]
     return b
+
+
+@dataclass(frozen=True, kw_only=True)
+class DragElement:
+    """Quadratic drag as force = -C velocity, C = quadratic sqrt(8/pi) sigma of the velocity.
+
+    Parameters
+    ----------
+    quadratic
+        q of the drag force q |v| v [N s2/m2].
+    velocity
+        Name of the velocity among the plant's outputs.
+    force
+        Name of the force among the plant's disturbances.
+    reference
+        The coefficient that the plant already holds [N s/m]; the element adds C minus this.
+    """
+
+    quadratic: float
+    velocity: str = "payload.velocity"
+    force: str = "payload.force"
+    reference: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_range("DragElement", "quadratic", self.quadratic, low=0.0, unit="N s2/m2")
+        check_range("DragElement", "reference", self.reference, low=0.0, unit="N s/m")
+
+    @property
+    def slope(self) -> float:
+        """C per sigma of the velocity [N s2/m2]."""
+        return self.quadratic * float(np.sqrt(8.0 / np.pi))
+
+
+def with_drag(plant: LinearPlant, element: DragElement, coefficient: float) -> LinearPlant:
+    """Return the plant with the element's drag at `coefficient` [N s/m].
+
+    Raises
+    ------
+    InputError
+        If the velocity is not a pure state of the plant (it has a direct term).
+    """
+    v = pick("drag element", "output", plant.outputs, [element.velocity])[0]
+    f = pick("drag element", "disturbance", plant.disturbances, [element.force])[0]
+    if np.any(plant.Dz[v]) or np.any(plant.Fz[v]):
+        raise InputError(f"drag element: {element.velocity} must have no direct term")
+    gain = -(coefficient - element.reference)
+    row = plant.Cz[v][None, :]
+    return replace(
+        plant,
+        A=plant.A + gain * plant.E[:, f : f + 1] @ row,
+        C=plant.C + gain * plant.F[:, f : f + 1] @ row,
+        Cz=plant.Cz + gain * plant.Fz[:, f : f + 1] @ row,
+    )

@@ -5,9 +5,6 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .begin import begin_points as begin_points
-    from .begin import briskest as briskest
-    from .begin import coarse_programme as coarse_programme
     from .family_search import FamilyFound as FamilyFound
     from .family_search import search_family as search_family
     from .multistart import Found as Found
@@ -26,5 +23,8 @@ if TYPE_CHECKING:
     from .programme import Pace as Pace
     from .programme import Programme as Programme
     from .programme import Solved as Solved
+    from .starts import begin_points as begin_points
+    from .starts import briskest as briskest
+    from .starts import coarse_programme as coarse_programme
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -23,8 +23,7 @@ from models.basics import FloatArray, Quadrature
 
 from ..limits import Symbols
 from ..question import FamilyProblem, Goal, Objective, Scenario, Values
-from .guard import Guard, solver_options
-from .programme import Pace, Solved
+from .programme import Guard, Pace, Solved, solver_options
 
 _ROOM = 12.0  # how far the logarithms of drags and of the cost may move: e^12
 

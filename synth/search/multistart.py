@@ -18,14 +18,10 @@ from models.basics import FloatArray
 
 from ..loop import Assessment
 from ..question import Goal, Problem
-from .begin import begin_points as begin_points
-from .begin import briskest as briskest
-from .begin import coarse_programme as coarse_programme
-from .begin import start_coefficient as start_coefficient
 from .nodes import cost_nodes, margin_nodes
 from .polishing import KEPT, look, polish, thinned
 from .programme import Pace, Programme, Solved
-from .starts import pick_spread
+from .starts import begin_points, briskest, coarse_programme, pick_spread, start_coefficient
 
 Progress = Callable[[str, int, int], None]
 

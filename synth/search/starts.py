@@ -1,4 +1,6 @@
-"""Where a search begins: candidates screened for stability, and found where screening fails.
+"""Starting points of a search: candidates screened for stability, found where screening fails.
+
+    Problem -> guesses, candidates drawn, candidates stabilised -> merit -> starting points
 
 Phase 0 draws a Sobol set over signs and orders of magnitude of the parameters and keeps the
 stable candidates, ranked by cost and broken limits and spread out.  Phase I, where too few
@@ -7,7 +9,7 @@ are stable, moves the least unstable ones left by minimising their spectral absc
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,14 +18,17 @@ from scipy.stats import qmc
 
 from models.basics import FloatArray
 
-from ..question import Problem
+from ..loop import Assessment
+from ..question import Goal, Problem
 from ..structures import pace
-
-Progress = Callable[[str, int, int], None]
+from .nodes import cost_nodes, margin_nodes
+from .programme import Programme
 
 _SPREAD = 0.5  # least distance of two starts, in decades over all parameters
 _LEASH = 1e-3  # price of moving a parameter by a factor of e, squared
 _PHASE_ONE_STEPS = 60  # Nelder-Mead iterations per parameter and start
+_WEIGHTS = (5.0, 1.0)  # of broken limits against the log cost
+_WORST = 20.0  # what one broken limit may add to the merit of a candidate
 
 
 def candidates(problem: Problem, count: int, seed: int) -> FloatArray:
@@ -104,3 +109,90 @@ def stabilise(
         if len(found) == count:
             break
     return found
+
+
+def briskest(problem: Problem, points: Sequence[FloatArray]) -> FloatArray:
+    """Return the point whose loop settles fastest, to tell the sides of the stability boundary."""
+    return min(points, key=problem.abscissa)
+
+
+def start_coefficient(problem: Problem) -> float | None:
+    """Return the drag coefficient that a search begins with [N s/m]."""
+    return None if problem.drag is None else problem.drag.reference
+
+
+def begin_points(
+    problem: Problem, starts: int, seed: int, guesses: Sequence[Sequence[float]]
+) -> list[FloatArray]:
+    """Return stable starting points: guesses, screened candidates, stabilised candidates.
+
+    Guesses that are stable come first, whatever their merit.
+    """
+    order = len(problem.rational.states)
+    points = candidates(problem, 1024 if order <= 12 else 512, seed)
+    given = [np.array(guess, dtype=np.float64) for guess in guesses]
+    first = [guess for guess in given if problem.abscissa(guess) < -1e-9][:starts]
+    if len(given) > len(first):  # phase I may mend them
+        points = np.vstack([*given, points])
+    abscissas = np.array([problem.abscissa(p) for p in points])
+    stable = np.flatnonzero(abscissas < -1e-9)
+    scales = np.array([p.scale for p in problem.law.parameters])
+    if stable.size < starts:
+        found = stabilise(problem, points, np.where(abscissas < 0, np.inf, abscissas), starts)
+        points = np.vstack([points[stable], *[f[None] for f in found]])
+    else:
+        points = points[stable]
+    if not len(points):
+        return first
+    wanted = starts - len(first)
+    orders = [pick_spread(points, merit, scales, wanted) for merit in _merits(problem, points)]
+    # In turns: the quickest to keep the limits, and the most still with limits to mend.
+    turns = dict.fromkeys(i for pair in zip(*orders, strict=True) for i in pair)
+    return [*first, *(points[i] for i in list(turns)[:wanted])]
+
+
+def _merits(problem: Problem, points: FloatArray) -> list[FloatArray]:
+    """Return log cost plus a penalty on broken limits, on nodes that suit the plant alone.
+
+    Two of them, (k,) each: with the rows as they are, and with rows that weigh more.
+    """
+    sample = points[:: max(1, len(points) // 4)][:4]
+    programme = coarse_programme(problem, list(sample), briskest(problem, list(sample)))
+    merits = []
+    for point in points:
+        x = programme.pack(point, start_coefficient(problem))
+        cost, broken = programme.violations(x)
+        # Rows are logarithms as the cost is: a margin broken tenfold outweighs a tenfold gain.
+        penalty = sum(min(_WORST, max(0.0, row)) for row in broken.values())
+        merits.append([cost + weight * penalty for weight in _WEIGHTS])
+    found = np.nan_to_num(np.array(merits, dtype=np.float64), nan=np.inf)
+    return [np.asarray(column) for column in found.T]
+
+
+def coarse_programme(
+    problem: Problem,
+    begins: Sequence[FloatArray],
+    reference: FloatArray,
+    goal: Goal = Goal.COST,
+    **options: Any,
+) -> Programme:
+    """Return a programme on nodes that suit all the starts."""
+    views = [
+        Assessment(
+            problem.plant,
+            problem.law.controller([float(v) for v in begin]),
+            problem.disturbances,
+            drag=problem.drag,
+            coefficient=start_coefficient(problem),
+        )
+        for begin in begins
+    ]
+    return Programme(
+        problem,
+        cost_nodes(problem, views, rtol=1e-4),
+        margin_nodes(problem, [v.poles for v in views[:4]], 40),
+        goal,
+        reference=reference,
+        tolerance=1e-6,
+        **options,
+    )

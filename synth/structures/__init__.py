@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from .drum_speed import DrumSpeedLoop as DrumSpeedLoop
     from .drum_speed import SteadyMotion as SteadyMotion
     from .low_order import LowOrder as LowOrder
-    from .low_order_feedback import LowOrderFeedback as LowOrderFeedback
+    from .low_order import LowOrderFeedback as LowOrderFeedback
     from .lqg import Estimator as Estimator
     from .lqg import Regulator as Regulator
     from .lqg import reduced as reduced
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from .structure import Structure as Structure
     from .structure import pace as pace
     from .winch_diagram import TRANSPARENT as TRANSPARENT
+    from .winch_diagram import WinchLaw as WinchLaw
     from .winch_diagram import WinchStructure as WinchStructure
-    from .winch_law import WinchLaw as WinchLaw
     from .winch_structures import structure_named as structure_named
     from .winch_structures import structure_names as structure_names
 else:

@@ -48,7 +48,7 @@ class Section(ABC):
 
     @abstractmethod
     def response(self, values: Sequence[Any], s: Any) -> Any:
-        """Return the transfer function at s, numbers or a `synth.loop.phasor.Phasor`."""
+        """Return the transfer function at s, numbers or a `synth.loop.Phasor`."""
 
     @abstractmethod
     def characteristic(self, values: Sequence[Any], s: Any) -> Any:

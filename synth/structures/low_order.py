@@ -9,12 +9,13 @@ the order.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import block_diag
+from typing_extensions import override
 
 from models.basics import ComplexArray, FloatArray, InputError, SynthesisError
 from models.plant import LinearPlant
@@ -22,7 +23,16 @@ from models.plant import LinearPlant
 from ..loop import Controller
 from .canonical import BlockForm
 from .lqg import Estimator, Regulator, designs, estimator, projected, reduced, regulator, weighing
-from .structure import Bounds, Law, Parameter, Structure, check_bounds, gain_scales, pace
+from .structure import (
+    PAYLOAD_MEASUREMENTS,
+    Bounds,
+    Law,
+    Parameter,
+    Structure,
+    check_bounds,
+    gain_scales,
+    pace,
+)
 from .whitened import whitened
 
 if TYPE_CHECKING:
@@ -76,11 +86,11 @@ class LowOrder(Structure):
 
     def bind(self, plant: LinearPlant, response_scale: Bounds | None = None) -> Law:
         """Return the law; see `Structure.bind`."""
-        return _LowOrderLaw(plant, self)
+        return LowOrderLaw(plant, self)
 
 
-class _LowOrderLaw(Law):
-    """The structure's law."""
+class LowOrderLaw(Law):
+    """The law of `LowOrder`: parameters of `canonical.BlockForm` and of the direct term."""
 
     def __init__(self, plant: LinearPlant, structure: LowOrder) -> None:
         nu, ny = len(plant.inputs), len(plant.measurements)
@@ -124,6 +134,7 @@ class _LowOrderLaw(Law):
             low = max(low, 1e-6 * scale)
         return Parameter(name=name, scale=float(scale), low=float(low), high=float(high))
 
+    @override
     def response(self, values: Sequence[Any], s: Any) -> list[list[Any]]:
         result = self._form.response(values, s)
         for k, gain in enumerate(values[self._direct]):
@@ -131,14 +142,17 @@ class _LowOrderLaw(Law):
             result[i][j] = result[i][j] + gain
         return result
 
+    @override
     def characteristic(self, values: Sequence[Any], s: Any) -> Any:
         return self._form.characteristic(values, s)
 
+    @override
     def controller(self, values: Sequence[float]) -> Controller:
         A, B, C, D = self._matrices(values)
         names = self._plant.measurements, self._plant.inputs
         return Controller(A=A, B=B, C=C, D=D, measurements=names[0], inputs=names[1])
 
+    @override
     def closed_loop_matrix(self, plant: LinearPlant, values: Sequence[float]) -> FloatArray:
         # The optimiser asks for this at every step: no checks, no objects.
         A, B, C, D = self._matrices(values)
@@ -173,6 +187,7 @@ class _LowOrderLaw(Law):
         direct = controller.D.ravel() if self._structure.proper else np.zeros(0)
         return np.concatenate([self._form.values(A, B, C), direct])
 
+    @override
     def guesses(self, problem: Problem, omega: FloatArray) -> FloatArray:
         """Return LQG designs for the problem's own weights and spectra.
 
@@ -195,6 +210,7 @@ class _LowOrderLaw(Law):
         found = self._family(plant, regulators, filters)
         return self._clipped(np.vstack([found, *fast]))
 
+    @override
     def draw(self, points: FloatArray, omega: FloatArray, yu: ComplexArray) -> FloatArray:
         plant = self._plant.without_delays(_PADE)
         sizes = np.abs(yu) ** 2 + 1e-12 * np.max(np.abs(yu) ** 2, axis=0) + 1e-300
@@ -257,3 +273,59 @@ class _LowOrderLaw(Law):
         low = [p.low for p in self.parameters]
         high = [p.high for p in self.parameters]
         return np.asarray(np.clip(values, low, high), dtype=np.float64)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LowOrderFeedback(Structure):
+    """`LowOrder` on the payload's motion.
+
+    Attributes
+    ----------
+    order
+        Number of states.
+    """
+
+    order: int
+    hears_payload: bool = True
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return f"low-order-{self.order}"
+
+    @property
+    def measurements(self) -> tuple[str, ...]:
+        """Names of what it hears."""
+        return PAYLOAD_MEASUREMENTS
+
+    def bind(self, plant: LinearPlant, response_scale: Bounds | None = None) -> Law:
+        """Return the law; see `Structure.bind`."""
+        return LowOrder(self.order).bind(plant, response_scale)
+
+    @staticmethod
+    def start(law: Law, found: Mapping[str, float], controller: Controller) -> list[float]:
+        """Return the parameters of rolled-off payload feedback, and set the sizes by it.
+
+        Parameters
+        ----------
+        law
+            The law of this structure; its parameters get the sizes that go with the answer.
+        found, controller
+            Parameters and controller of ``payload-feedback-rolloff``, of order two.
+        """
+        assert isinstance(law, LowOrderLaw)
+        corner = found["rolloff.corner"]
+        static = np.abs(controller.D - controller.C @ np.linalg.solve(controller.A, controller.B))
+        size = dict(zip(controller.measurements, static[0], strict=True))
+        sizes = []
+        for p in law.parameters:
+            head, _, rest = p.name.partition("[")
+            block, _, measured = rest.rstrip("]").partition(",")
+            if head.startswith("alpha"):
+                sizes.append(corner if head == "alpha1" else corner**2)
+            else:
+                sizes.append(size[measured] * corner ** int(block.partition(".")[2]))
+        law.parameters = tuple(
+            replace(p, scale=scale) for p, scale in zip(law.parameters, sizes, strict=True)
+        )
+        return [float(v) for v in law.values(controller)]

@@ -57,7 +57,7 @@ class Law(ABC):
     def response(self, values: Sequence[Any], s: Any) -> list[list[Any]]:
         """Return C(s), nu lists of ny entries, for parameter `values`, numbers or symbols.
 
-        `s` is i omega: NumPy complex numbers, or a `synth.loop.phasor.Phasor`.
+        `s` is i omega: NumPy complex numbers, or a `synth.loop.Phasor`.
         """
 
     @abstractmethod

@@ -15,9 +15,8 @@ from models.plant import PlantData, fixed_top_modes
 
 from .blocks import Integral, LeadLag, Notch, RollOff, Section
 from .drum_speed import SteadyMotion
-from .low_order_feedback import LowOrderFeedback as LowOrderFeedback
-from .winch_diagram import TRANSPARENT
-from .winch_diagram import WinchStructure as WinchStructure
+from .low_order import LowOrderFeedback
+from .winch_diagram import TRANSPARENT, WinchStructure
 
 #: What each structure is, for tables and help texts.
 DESCRIPTIONS: Mapping[str, str] = {

@@ -43,7 +43,7 @@ from synth import (
 )
 from synth.limits import Limit
 from synth.loop import Assessment, Controller, disturbances
-from synth.loop.phasor import constant
+from synth.loop.loop import constant
 
 WHITE = {"f": White(1.0), "n": White(0.01)}
 WEIGHTS = {"x": 1.0, "effort": 0.05}

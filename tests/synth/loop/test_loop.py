@@ -23,7 +23,7 @@ from synth.loop import (
     return_differences,
     with_drag,
 )
-from synth.loop.phasor import constant, squared_magnitude
+from synth.loop.loop import constant, squared_magnitude
 
 OMEGA = np.geomspace(0.05, 30.0, 25)
 
