@@ -19,12 +19,13 @@ from models.case import Case
 from models.plant import MEASUREMENTS
 
 from ..loop import Assessment, Margins
+from ..question import assess_gains, pose
 from ..search import Start
+from ..verify import Verification, verify_design
 from .tuning import LimitUse
 
 if TYPE_CHECKING:
     from ..bound import DesignBound
-    from ..verify import Verification
 
 PAYLOAD = "payload.displacement"
 HOOK = "hook.heave"
@@ -115,8 +116,6 @@ class GainDesign:
     @cached_property
     def assessment(self) -> Assessment:
         """The closed loop in numbers: spectra, responses, margins, poles."""
-        from ..question import assess_gains
-
         return assess_gains(self.sea_case, self.gains, masses=self.masses, drag=self.drag)
 
     @property
@@ -136,7 +135,6 @@ class GainDesign:
             If there is no bound.
         """
         from ..bound import bound_beside
-        from ..question import pose
 
         if self.margins is None:
             raise InputError("bound: the loop must be stable")
@@ -152,8 +150,6 @@ class GainDesign:
 
     def verify(self) -> Verification:
         """Check everything that is claimed by code that the optimiser did not use."""
-        from ..verify import verify_design
-
         return verify_design(self)
 
     def __str__(self) -> str:

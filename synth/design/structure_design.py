@@ -20,12 +20,11 @@ from models.case import Case
 from ..loop import Controller, Margins
 from ..question import HOOK, StructureQuestion, pose_structure
 from ..search import Found
-from ..verify import verify_structure
+from ..verify import Verification, verify_structure
 from .tuning import LimitUse, Tuning
 
 if TYPE_CHECKING:
     from ..bound import DesignBound
-    from ..verify import Verification
 
 _SOURCES = {HOOK: "the sea", "mru.error": "the reference unit"}
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,9 +22,7 @@ from ..loop import Assessment, Controller, DragElement, Margins, disturbances
 from ..question import Problem
 from ..search import KEPT, Found, Progress, Start, search
 from ..structures import Structure
-
-if TYPE_CHECKING:
-    from ..verify import Verification
+from ..verify import Verification, verify_tuning
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,14 +103,7 @@ class Tuning:
     found: Found = field(repr=False)
 
     def verify(self) -> Verification:
-        """Check everything that is claimed by code that the optimiser did not use.
-
-        Returns
-        -------
-        synth.verify.verify.Verification
-        """
-        from ..verify import verify_tuning
-
+        """Check everything that is claimed by code that the optimiser did not use."""
         return verify_tuning(self)
 
     def __str__(self) -> str:

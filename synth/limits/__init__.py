@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from .case_limits import loop_limits as loop_limits
     from .case_limits import modelled_bandwidth as modelled_bandwidth
     from .limits import Limit as Limit
+    from .limits import Symbols as Symbols
     from .margin_limits import DelayMargin as DelayMargin
     from .margin_limits import GainMargin as GainMargin
     from .margin_limits import GainMarginDown as GainMarginDown
@@ -21,6 +22,5 @@ if TYPE_CHECKING:
     from .signal_limits import Peak as Peak
     from .signal_limits import Power as Power
     from .signal_limits import Rms as Rms
-    from .symbols import Symbols as Symbols
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

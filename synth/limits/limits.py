@@ -12,16 +12,45 @@ Two kinds: on the loop (`synth.limits.margin_limits`), and on signals
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
 from models.basics import FloatArray
 
 if TYPE_CHECKING:
-    from ..loop import Assessment
-    from .symbols import Symbols
+    from ..loop import Assessment, Phasor
+
+
+class Symbols(Protocol):
+    """The symbols of a programme that a limit's rows are made of."""
+
+    @property
+    def differences(self) -> Sequence[Phasor]:
+        """1 + L of every loop at the margin frequencies."""
+
+    @property
+    def omega(self) -> Any:
+        """The margin frequencies [rad/s] as a CasADi constant."""
+
+    @property
+    def omega_values(self) -> FloatArray:
+        """The same in numbers, (k,)."""
+
+    @property
+    def module_margin(self) -> float:
+        """Radius of the disc about -1 that a limit on the sensitivity keeps clear; 0 without."""
+
+    def response(self, output: str, disturbance: str) -> Phasor:
+        """Return the closed-loop response at the margin frequencies."""
+
+    def moment(self, output: str, order: int) -> Any:
+        """Return the spectral moment m_order of `output`."""
+
+    def peak(self, output: str, duration: float) -> Any:
+        """Return the most probable maximum of `output` in `duration` [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)

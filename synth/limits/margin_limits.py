@@ -12,11 +12,10 @@ from typing_extensions import override
 from models.basics import FloatArray, check_range
 
 from ..loop import Phasor
-from .limits import Limit
+from .limits import Limit, Symbols
 
 if TYPE_CHECKING:
     from ..loop import Assessment
-    from .symbols import Symbols
 
 _RATIO = 1.4  # of the ends of one disc's diameter, where few discs do
 _MOST_DISCS = 12

@@ -15,11 +15,10 @@ from typing_extensions import override
 
 from models.basics import check_range
 
-from .limits import Limit
+from .limits import Limit, Symbols
 
 if TYPE_CHECKING:
     from ..loop import Assessment
-    from .symbols import Symbols
 
 
 @dataclass(frozen=True, kw_only=True)

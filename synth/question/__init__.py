@@ -22,5 +22,6 @@ if TYPE_CHECKING:
     from .structure_question import SampledNoise as SampledNoise
     from .structure_question import StructureQuestion as StructureQuestion
     from .structure_question import pose_structure as pose_structure
+    from .symbols import LoopSymbols as LoopSymbols
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -6,7 +6,7 @@ r"""The nonlinear programme over a family: one set of parameters, many loops.
     \; \text{limits of every scenario } i
 
 with r_i = 1 for the worst case and the best cost J_i* for the worst regret; the mean is
-minimised as it is.  Every scenario brings the symbols (`synth.limits.symbols`), limits and
+minimised as it is.  Every scenario brings the symbols (`synth.question.LoopSymbols`), limits and
 stability guard of a single programme; scenarios on the same loop share its margins and responses.
 """
 
@@ -21,8 +21,7 @@ import numpy as np
 
 from models.basics import FloatArray, Quadrature
 
-from ..limits import Symbols
-from ..question import FamilyProblem, Goal, Objective, Scenario, Values
+from ..question import FamilyProblem, Goal, LoopSymbols, Objective, Scenario, Values
 from .programme import Guard, Pace, Solved, solver_options
 
 _ROOM = 12.0  # how far the logarithms of drags and of the cost may move: e^12
@@ -103,7 +102,7 @@ class FamilyProgramme:
             first = scenarios[group[0]]
             log_drag = x[self._drag_at[group[0]]] if group[0] in self._drag_at else None
             shared = x, _blended(first, searched), log_drag
-            symbols = Symbols(first.problem, where, margins, Goal.COST, shared)
+            symbols = LoopSymbols(first.problem, where, margins, Goal.COST, shared)
             for i in group:
                 seen = symbols if i == group[0] else symbols.under(scenarios[i].problem)
                 for limit in scenarios[i].problem.limits:

@@ -31,8 +31,7 @@ from typing_extensions import override
 
 from models.basics import FloatArray, Quadrature
 
-from ..limits import Symbols
-from ..question import Goal, Problem, Values
+from ..question import Goal, LoopSymbols, Problem, Values
 from .follow import Follower
 
 _ROOM = 12.0  # how far the logarithms of drag, sea and factors may move: e^12
@@ -169,7 +168,7 @@ class Programme:
             many = len(problem.law.parameters) > _MANY
             max_iterations = _MOST_ITERATIONS if many else _ITERATIONS
         self._goal = goal
-        symbols = Symbols(problem, nodes, omega, goal)
+        symbols = LoopSymbols(problem, nodes, omega, goal)
         self._bounds = np.array([limit.bound for limit in problem.limits], dtype=np.float64)
         bounds = ca.MX.sym("bounds", self._bounds.size)
         rows, self._slices, at = [], [], 0

@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -26,6 +26,7 @@ from .lqg import Estimator, Regulator, designs, estimator, projected, reduced, r
 from .structure import (
     PAYLOAD_MEASUREMENTS,
     Bounds,
+    GeneralisedPlant,
     Law,
     Parameter,
     Structure,
@@ -34,10 +35,6 @@ from .structure import (
     pace,
 )
 from .whitened import whitened
-
-if TYPE_CHECKING:
-    from ..question import Problem
-
 
 _PADE = 4  # of the delays, in the designs that candidates are made of
 _SIDE = 12  # so many regulators times so many filters
@@ -188,7 +185,7 @@ class LowOrderLaw(Law):
         return np.concatenate([self._form.values(A, B, C), direct])
 
     @override
-    def guesses(self, problem: Problem, omega: FloatArray) -> FloatArray:
+    def guesses(self, problem: GeneralisedPlant, omega: FloatArray) -> FloatArray:
         """Return LQG designs for the problem's own weights and spectra.
 
         The first is the optimum where the noises are white, every input is weighed and every

@@ -14,19 +14,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from models.basics import ComplexArray, FloatArray, InputError, check_range, pick
 from models.plant import LinearPlant
 
-from ..loop import Controller, closed_loop_matrix
+from ..loop import Controller, Disturbance, closed_loop_matrix
 from .lqg import designs, projected
 from .whitened import whitened
-
-if TYPE_CHECKING:
-    from ..question import Problem
 
 Bounds = Mapping[str, tuple[float, float]]
 
@@ -47,6 +44,22 @@ class Parameter:
     unit: str = ""
 
 
+class GeneralisedPlant(Protocol):
+    """A plant with what shakes it and what is to be small: what guesses are made from."""
+
+    @property
+    def plant(self) -> LinearPlant:
+        """The plant."""
+
+    @property
+    def disturbances(self) -> Sequence[Disturbance]:
+        """What shakes it."""
+
+    @property
+    def minimise(self) -> Mapping[str, float]:
+        """Weights on the variances of its outputs, by name."""
+
+
 class Law(ABC):
     """A structure bound to a plant: what the optimiser sees of it."""
 
@@ -64,7 +77,7 @@ class Law(ABC):
     def controller(self, values: Sequence[float]) -> Controller:
         """Return the controller of numerical parameter `values`."""
 
-    def guesses(self, problem: Problem, omega: FloatArray) -> FloatArray:
+    def guesses(self, problem: GeneralisedPlant, omega: FloatArray) -> FloatArray:
         """Return candidates, (m, number of parameters), that the whole question suggests.
 
         `omega` (k,) are frequencies at which the loop may cross over [rad/s].
@@ -223,7 +236,7 @@ class _GainLaw(Law):
             gain[i, j] = values[k] * self._factors[k]
         return gain
 
-    def guesses(self, problem: Problem, omega: FloatArray) -> FloatArray:
+    def guesses(self, problem: GeneralisedPlant, omega: FloatArray) -> FloatArray:
         """Return state feedback, projected on what is measured.
 
         The best reproduction of u = K x in the mean square of the loop that K makes, exact

@@ -29,7 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.stats import qmc
@@ -40,10 +40,15 @@ from models.plant import LinearPlant, PlantResponse
 from .blocks import LeadTime, Section
 from .diagram import Branch, DiagramLaw, Group, Weight
 from .drum_speed import SteadyMotion
-from .structure import PAYLOAD_MEASUREMENTS, Bounds, Law, Parameter, Structure, gain_scales
-
-if TYPE_CHECKING:
-    from ..question import Problem
+from .structure import (
+    PAYLOAD_MEASUREMENTS,
+    Bounds,
+    GeneralisedPlant,
+    Law,
+    Parameter,
+    Structure,
+    gain_scales,
+)
 
 SAMPLE_TIME = 0.01  # that the drum loop must leave room for [s]
 TRANSPARENT = 500.0  # a roll-off with this corner is hardly there [rad/s]
@@ -288,7 +293,7 @@ class WinchLaw(DiagramLaw):
                 size = _TOP * 10.0 ** (2.0 * (abs(signed) - 1.0)) * abs(inner)
                 row[column] = np.sign(signed) * size / max(abs(through[j]), 1e-12)
 
-    def guesses(self, problem: Problem, omega: FloatArray) -> FloatArray:
+    def guesses(self, problem: GeneralisedPlant, omega: FloatArray) -> FloatArray:
         """Return drum loops whose feed-forward is the best for the question, by least squares.
 
         With everything else given, the payload's motion is linear in the feed-forward's gain and
@@ -311,7 +316,7 @@ class WinchLaw(DiagramLaw):
             self._feed(row, problem, response, weights)
         return self.clipped(drawn)
 
-    def fed(self, values: Sequence[float], problem: Problem) -> list[list[float]]:
+    def fed(self, values: Sequence[float], problem: GeneralisedPlant) -> list[list[float]]:
         """Return parameters with the feed-forward that suits the rest best, if there is one."""
         if not self._structure.heave:
             return []
@@ -321,7 +326,11 @@ class WinchLaw(DiagramLaw):
         return [[float(v) for v in self.clipped(row[None])[0]]]
 
     def _feed(
-        self, row: FloatArray, problem: Problem, response: PlantResponse, weights: FloatArray
+        self,
+        row: FloatArray,
+        problem: GeneralisedPlant,
+        response: PlantResponse,
+        weights: FloatArray,
     ) -> None:
         """Set gain and lead of the feed-forward to the best for the rest of a candidate."""
         gain, lead = self.index("heave.gain"), self.index("heave.lead")

@@ -11,6 +11,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +20,6 @@ import scipy.linalg
 from models.basics import ComplexArray, FloatArray, SolverError
 from models.plant import LinearPlant, PlantResponse, ShapingFilter
 
-from ..loop import Controller
 from .integrals import integrate, panels
 from .winding import Function
 
@@ -32,6 +32,54 @@ def imaginary(omega: npt.ArrayLike) -> ComplexArray:
     return np.asarray(1j * np.asarray(omega, dtype=np.float64), dtype=np.complex128)
 
 
+class ControllerMatrices(Protocol):
+    """A controller x' = A x + B y, u = C x + D y with names for y and u."""
+
+    @property
+    def A(self) -> FloatArray:
+        """State matrix, (n, n)."""
+
+    @property
+    def B(self) -> FloatArray:
+        """From the measurements, (n, ny)."""
+
+    @property
+    def C(self) -> FloatArray:
+        """To the inputs, (nu, n)."""
+
+    @property
+    def D(self) -> FloatArray:
+        """Straight through, (nu, ny)."""
+
+    @property
+    def measurements(self) -> tuple[str, ...]:
+        """Names of y."""
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of u."""
+
+
+class SpectralSource(Protocol):
+    """One disturbance of a loop; `Source` is one."""
+
+    @property
+    def name(self) -> str:
+        """Its name among the plant's disturbances."""
+
+    @property
+    def density(self) -> Callable[[FloatArray], FloatArray]:
+        """One-sided density per rad/s."""
+
+    @property
+    def band(self) -> tuple[float, float] | None:
+        """Band that holds its variance [rad/s]; None is the half line."""
+
+    @property
+    def splits(self) -> tuple[float, ...]:
+        """Kinks of the density [rad/s]."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LawMatrices:
     """A controller's matrices in the order of the plant's measurements and inputs."""
@@ -42,7 +90,7 @@ class LawMatrices:
     D: FloatArray
 
     @classmethod
-    def of(cls, controller: Controller, plant: LinearPlant) -> LawMatrices:
+    def of(cls, controller: ControllerMatrices, plant: LinearPlant) -> LawMatrices:
         """Return a controller's matrices, with zeros for what it does not hear or move."""
         y = [plant.measurements.index(name) for name in controller.measurements]
         u = [plant.inputs.index(name) for name in controller.inputs]
@@ -122,7 +170,7 @@ class Source:
 def moments(
     loop: Loop,
     outputs: Sequence[str],
-    sources: Sequence[Source],
+    sources: Sequence[SpectralSource],
     *,
     orders: Sequence[int] = (0, 2),
     rtol: float = 1e-8,
@@ -251,7 +299,9 @@ def lyapunov_variances(
     return dict(zip(plant.outputs, (float(v) for v in variances), strict=True))
 
 
-def _band(sources: Sequence[Source], marks: ComplexArray) -> tuple[float, float, list[float], bool]:
+def _band(
+    sources: Sequence[SpectralSource], marks: ComplexArray
+) -> tuple[float, float, list[float], bool]:
     """Return the band [rad/s], the kinks in it, and whether to go on to zero and infinity."""
     splits = [w for source in sources for w in source.splits]
     bands = [source.band for source in sources if source.band is not None]

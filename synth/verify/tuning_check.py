@@ -1,4 +1,4 @@
-"""The second look at an answer of `synth.design.tuning`, on any linear plant.
+"""The second look at an answer of `synth.design.tune`, on any linear plant.
 
 Poles with other Pade models, the winding number with exact delays, margins by root finding,
 the cost by other quadrature and, where all disturbances are white, by a Lyapunov equation,
@@ -11,15 +11,14 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.basics import White, one_thread
 from models.plant import LinearPlant
 
-from ..loop import Controller
-from .claims import limit_demand
+from .claims import TuningClaims
+from .demands import limit_demand
 from .nyquist import CurveMargins
 from .recheck import (
     PADE,
@@ -33,12 +32,8 @@ from .recheck import (
     winding_check,
     winding_of_plant,
 )
-from .recompute import LawMatrices, Loop, Source, imaginary, lyapunov_variances, moments
+from .recompute import ControllerMatrices, LawMatrices, Loop, imaginary, lyapunov_variances, moments
 from .verification import Check, Verification, agreement, failure
-
-if TYPE_CHECKING:
-    from ..design import Tuning
-
 
 _DECAY = 1e-10  # of a pole, over the size of the fastest one, to count as stable
 _COST = 1e-6  # cost by another quadrature or a Lyapunov equation
@@ -47,8 +42,8 @@ _SAME = 1e-9  # controller from the parameters against the controller
 
 
 @one_thread()
-def verify_tuning(tuning: Tuning) -> Verification:
-    """Check an answer of `synth.design.tuning` by code that the optimiser did not use.
+def verify_tuning(tuning: TuningClaims) -> Verification:
+    """Check an answer of `synth.design.tune` by code that the optimiser did not use.
 
     Parameters
     ----------
@@ -62,16 +57,16 @@ def verify_tuning(tuning: Tuning) -> Verification:
     """
     if tuning.controller is None:
         return Verification.of([failure("controller", "there is none")], "")
-    view = _View(tuning, tuning.controller)
-    checks = guarded("stability", view.stability)
+    loop = _TunedLoop(tuning, tuning.controller)
+    checks = guarded("stability", loop.stability)
     if not all(check.ok for check in checks):
         return Verification.of(checks, "")
     steps: Mapping[str, Callable[[], list[Check]]] = {
-        "parameters": view.parameters,
-        "margins": view.margins,
-        "cost": view.cost,
-        "coefficient": view.drag,
-        "limits": view.limits,
+        "parameters": loop.parameters,
+        "margins": loop.margins,
+        "cost": loop.cost,
+        "coefficient": loop.drag,
+        "limits": loop.limits,
     }
     for name, step in steps.items():
         checks += guarded(name, step)
@@ -81,11 +76,11 @@ def verify_tuning(tuning: Tuning) -> Verification:
 
 
 @dataclass(frozen=True, eq=False)
-class _View:
+class _TunedLoop:
     """A tuned loop, put together again."""
 
-    tuning: Tuning
-    controller: Controller
+    tuning: TuningClaims
+    controller: ControllerMatrices
 
     @cached_property
     def plant(self) -> LinearPlant:
@@ -121,13 +116,6 @@ class _View:
     @cached_property
     def curve_margins(self) -> CurveMargins:
         return loop_margins(self.loop)
-
-    @cached_property
-    def sources(self) -> list[Source]:
-        return [
-            Source(name=d.name, density=d.density, band=d.band, splits=d.splits)
-            for d in self.tuning.problem.disturbances
-        ]
 
     @cached_property
     def intensities(self) -> dict[str, float] | None:
@@ -228,7 +216,9 @@ class _View:
         self, outputs: Sequence[str], orders: tuple[int, ...]
     ) -> dict[str, tuple[float, ...]]:
         delay = max(self.plant.delays, default=0.0)
-        return moments(self.loop, outputs, self.sources, orders=orders, delay=delay)
+        return moments(
+            self.loop, outputs, self.tuning.problem.disturbances, orders=orders, delay=delay
+        )
 
 
 def _cost(weights: Mapping[str, float], found: Mapping[str, tuple[float, ...]]) -> float:

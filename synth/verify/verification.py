@@ -1,4 +1,4 @@
-"""What a verification says: single checks, each with the claimed and the found figure.
+"""`Verification` and its `Check`s: each claimed figure beside the one found.
 
 `synth.verify.verify` makes these; a `GainDesign` and a `Tuning` hand them to the user.
 """

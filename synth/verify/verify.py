@@ -1,13 +1,13 @@
-"""The last word on a design: everything it claims, computed again by other code.
+"""Verification of a winch's design: everything it claims, computed again by other code.
 
-    GainDesign -> design plant, plant of twice the rope masses, distributed rope -> Verification
+    design -> design plant, plant of twice the rope masses, distributed rope -> Verification
 
 A design is made on a lumped rope with Pade models guarding its stability.  Here it has to stand
 on the exact delay and on more rope than it was designed on: the winding number on the
 distributed rope, eigenvalues on twice the masses, margins by root finding, variances by other
-quadrature, by a Lyapunov equation and on the distributed rope.  Nothing of `synth.loop.assess`,
-`margins`, `loop`, `programme` or `element` is used.  `verify_tuning` does the same for
-`synth.design.tuning` on any linear plant.
+quadrature, by a Lyapunov equation and on the distributed rope.  Nothing of the loop, the limits,
+the question, the search or the design is used.  `verify_tuning` does the same for
+`synth.design.tune` on any linear plant.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,8 +28,10 @@ from models.plant import (
     fit_shaping_filter,
     line_response_at,
 )
+from models.sensing import sensed_plant
 
-from .claims import HOOK, PAYLOAD, VELOCITY, Demand, case_demands
+from .claims import DesignClaims, GainClaims, StructureClaims, TuningClaims
+from .demands import HOOK, PAYLOAD, VELOCITY, Demand, case_demands, limit_demand
 from .nyquist import CurveMargins
 from .recheck import (
     PADE,
@@ -45,13 +46,10 @@ from .recheck import (
     winding_of_plant,
 )
 from .recompute import LawMatrices, Loop, Source, lyapunov_variances, moments
+from .tuning_check import verify_tuning
 from .uncompensated import HeldDrum
 from .verification import Check, Verification, agreement, bounded, failure
 from .winding import count_unstable, open_loop_poles
-
-if TYPE_CHECKING:
-    from ..design import GainDesign
-
 
 _UNDAMPED = 1e-5  # a rope damped less than this has modes without end on the axis
 _DECAY = 1e-7  # slowest decay that counts as stable [1/s]: a time constant of four months
@@ -63,7 +61,7 @@ _ROPE_PER_DECADE = 200  # first points of the contour on a rope with modes that 
 
 
 @one_thread()
-def verify_design(design: GainDesign) -> Verification:
+def verify_design(design: GainClaims) -> Verification:
     """Check the gains of a winch by code that the optimiser did not use.
 
     Parameters
@@ -76,29 +74,61 @@ def verify_design(design: GainDesign) -> Verification:
     Verification
         `ok` only if the loop is stable on every model and every claim was met.
     """
-    view = _View(design)
-    checks = guarded("stability", view.stability)
+    loop = _WinchLoop(design)
+    checks = guarded("stability", loop.stability)
     if not all(check.ok for check in checks):
         return Verification.of(checks, "")
-    checks += guarded("margins", view.margins)
-    checks += guarded("limits", view.limits)
-    checks += guarded("payload_rms", view.spectral)
-    checks += guarded("payload_rms.time", view.time_domain)
-    checks += guarded("rope", view.on_the_rope)
-    checks += guarded("before", view.before)
-    checks += guarded("rope modes", view.rope_modes)
+    checks += guarded("margins", loop.margins)
+    checks += guarded("limits", loop.limits)
+    checks += guarded("payload_rms", loop.spectral)
+    checks += guarded("payload_rms.time", loop.time_domain)
+    checks += guarded("rope", loop.on_the_rope)
+    checks += guarded("before", loop.before)
+    checks += guarded("rope modes", loop.rope_modes)
     praise = (
-        f"verified on {view.yardstick_name}: stable with the exact delay, "
+        f"verified on {loop.yardstick_name}: stable with the exact delay, "
         f"{sum(check.counts for check in checks)} checks passed"
     )
     return Verification.of(checks, praise)
 
 
+@one_thread()
+def verify_structure(design: StructureClaims) -> Verification:
+    """Check a structure's design by code that the optimiser did not use.
+
+    Parameters
+    ----------
+    design
+        The design, with its claims.
+
+    Returns
+    -------
+    Verification
+        `ok` only if the loop is stable on its plant and on one of twice the rope masses, its
+        sensitivity keeps its bound there too, and every claim was met.
+    """
+    tuning = design.tuning()
+    first = verify_tuning(tuning)
+    checks = list(first.checks)
+    if not first.ok and all(check.name != "cost" for check in checks):
+        return first  # not stable on its own plant
+    modal = design.case.rope.lumping != "thesis"
+    more = min(2 * design.masses, MAX_MASSES)
+    if modal and more > design.masses:
+        checks += guarded("rope", lambda: _on_more_rope(design, tuning, more))
+    checks += guarded("claims", lambda: _parts_and_before(design))
+    on = f"and on a rope of {more} masses" if modal else "on the one spring"
+    counted = sum(check.counts for check in checks)
+    return Verification.of(
+        checks, f"verified: stable with the exact delays {on}, {counted} checks passed"
+    )
+
+
 @dataclass(frozen=True, eq=False)
-class _View:
+class _WinchLoop:
     """A design on its plants."""
 
-    design: GainDesign
+    design: GainClaims
 
     @cached_property
     def data(self) -> PlantData:
@@ -110,8 +140,7 @@ class _View:
 
     @cached_property
     def source(self) -> Source:
-        hook = self.hook
-        return Source(name=HOOK, density=hook.density, band=hook.band, splits=hook.splits)
+        return _source(self.hook)
 
     @cached_property
     def plant(self) -> LinearPlant:
@@ -302,13 +331,8 @@ class _View:
         needed = self.design.case.payload.fixed_drag
         if needed is None:
             needed = self.data.quadratic_drag * math.sqrt(8.0 / math.pi * m2)
-        before, hook = math.sqrt(m0), math.sqrt(held.hook_variance())
-        with_drum_held = "[m] with the drum held"
         return [
-            agreement("hook_rms", self.design.hook_rms, hook, _RMS, "[m]"),
-            agreement(
-                "payload_rms_before", self.design.payload_rms_before, before, _RMS, with_drum_held
-            ),
+            *_uncompensated(self.design, held, math.sqrt(m0)),
             agreement("drag_before", drag, needed, TIGHT, "[N s/m]"),
         ]
 
@@ -330,3 +354,60 @@ class _View:
 
 def _agree(name: str, claimed: float, found: float) -> Check:
     return agreement(name, claimed, found, TIGHT)
+
+
+def _source(hook: HookMotion) -> Source:
+    return Source(name=HOOK, density=hook.density, band=hook.band, splits=hook.splits)
+
+
+def _uncompensated(design: DesignClaims, held: HeldDrum, before: float) -> list[Check]:
+    """Return the checks of the hook's motion and of the payload's with the drum held."""
+    hook, note = math.sqrt(held.hook_variance()), "[m] with the drum held"
+    return [
+        agreement("hook_rms", design.hook_rms, hook, _RMS, "[m]"),
+        agreement("payload_rms_before", design.payload_rms_before, before, _RMS, note),
+    ]
+
+
+def _parts_and_before(design: StructureClaims) -> list[Check]:
+    """Return the checks of what a structure's design says besides the answer itself."""
+    fixed = design.case.payload.fixed_drag
+    total = math.sqrt(sum(rms**2 for rms in design.parts.values()))
+    hook = HookMotion.from_case(design.case, warn=False)
+    held = HeldDrum(data=PlantData.from_case(design.case), source=_source(hook))
+    checks = [
+        agreement("parts", design.payload_rms, total, TIGHT, "[m], root of the sum of squares"),
+        *_uncompensated(design, held, math.sqrt(held.moments(design.drag_before)[0])),
+    ]
+    if fixed is not None:
+        checks.append(agreement("drag", design.drag, fixed, TIGHT, "[N s/m], given"))
+    return checks
+
+
+def _on_more_rope(design: StructureClaims, tuning: TuningClaims, masses: int) -> list[Check]:
+    """Return the checks of stability, M_s and rms on other rope masses, drag as designed."""
+    assert tuning.controller is not None
+    plant = sensed_plant(design.case, masses=masses, drag=design.drag)
+    plant = plant.select(measurements=design.measurements)
+    law = LawMatrices.of(tuning.controller, plant)
+    marks = closed_loop_marks(plant, law)
+    on = f"a rope of {masses} masses"
+    checks = [
+        winding_check(winding_of_plant(plant, law, marks), on),
+        pole_check("poles", plant, law, on, _DECAY),
+    ]
+    checks = [replace(check, name=f"rope.{check.name}") for check in checks]
+    if not all(check.ok for check in checks):
+        return checks
+    loop = Loop(plant=plant.response_at, law=law, marks=marks)
+    for limit in tuning.problem.limits:
+        if limit_demand(limit).kind == "max_sensitivity":
+            found = loop_margins(loop).max_sensitivity
+            bound = max(limit.bound, design.limits[limit.name].value)
+            checks.append(bounded(f"rope.{limit.name}", bound, found, _ROPE, f"on {on}"))
+    sources, delay = tuning.problem.disturbances, max(plant.delays, default=0.0)
+    variance = moments(loop, [PAYLOAD], sources, orders=(0,), delay=delay)[PAYLOAD][0]
+    rms = agreement(
+        "rope.payload_rms", design.payload_rms, math.sqrt(variance), _ROPE, f"[m] on {on}"
+    )
+    return [*checks, rms]

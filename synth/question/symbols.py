@@ -1,4 +1,4 @@
-"""The loop in symbols: what the limits and the cost see of a programme."""
+"""The loop in CasADi symbols: what cost and limits of a programme are made of."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from ..loop import (
     numeric_blocks,
     return_differences,
 )
-from ..question import Goal, Problem
+from .problem import Goal, Problem
 
 
-class Symbols:
-    """What the limits see of a programme: symbolic loop, moments and responses.
+class LoopSymbols:
+    """Symbolic loop, moments and responses: the `synth.limits.Symbols` of a programme.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class Symbols:
         self._densities = {d.name: d.density(omega) * weights for d in problem.disturbances}
         self._moments: dict[tuple[str, int], Any] = {}
 
-    def under(self, problem: Problem) -> Symbols:
+    def under(self, problem: Problem) -> LoopSymbols:
         """Return the same loop shaken by the disturbances of another problem."""
         other = copy(self)
         other._problem = problem

@@ -1,0 +1,250 @@
+"""Demands on a design, listed and measured a second time for the verification.
+
+A winch's limits are read from its case again, so that one which got lost on the way into the
+optimiser is missed; those of a `synth.design.tuning` problem are read off its limit objects.  Each
+becomes a `Demand`, and `Demand.measured` says what a recomputed loop makes of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.basics import FloatArray, SolverError, peak_factor, zero_crossing_period
+from models.case import Case
+from models.plant import LinearPlant, PlantData, fixed_top_modes, lump_rope, lumped_modes
+
+from .claims import StatedLimit
+from .nyquist import CurveMargins, largest
+from .recompute import Loop, imaginary
+
+Moments = Mapping[str, tuple[float, ...]]
+
+PAYLOAD = "payload.displacement"
+VELOCITY = "payload.velocity"
+HOOK = "hook.heave"
+
+_TORQUE, _SPEED, _TENSION = "motor.torque", "motor.speed", "rope.tension"
+_POWER = "motor.power.peak"
+_MARGINS = ("max_sensitivity", "gain", "gain_down", "delay")
+_WITH_PERIOD = ("peak", "least", "power")
+_MODELLED = 0.05  # a lumped mode within this share of the exact one counts as modelled
+_KINDS = {  # by class of `synth.limits.margin_limits` and `synth.limits.signal_limits`
+    "MaxSensitivity": "max_sensitivity",
+    "GainMargin": "gain",
+    "GainMarginDown": "gain_down",
+    "DelayMargin": "delay",
+    "LowFrequency": "low_frequency",
+    "RollOff": "roll_off",
+    "Rms": "rms",
+    "Continuous": "continuous",
+    "Peak": "peak",
+    "Least": "least",
+    "Power": "power",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Demand:
+    """One limit.
+
+    Attributes
+    ----------
+    name
+        As in reports.
+    kind
+        A margin (``max_sensitivity``, ``gain``, ``gain_down``, ``delay``), a gain
+        (``low_frequency``, ``roll_off``) or a size (``rms``, ``continuous``, ``peak``,
+        ``least``, ``power``).
+    bound
+        The bound.
+    enforced
+        Whether it binds the design.
+    outputs
+        The signals that it is about.
+    disturbance
+        The other end of a ``low_frequency`` gain.
+    static
+        Value at rest of the (first) signal.
+    frequency
+        Up to which (``low_frequency``) or from which (``roll_off``) it holds [rad/s].
+    duration
+        Exposure time of a peak [s].
+    """
+
+    name: str
+    kind: str
+    bound: float
+    enforced: bool = True
+    outputs: tuple[str, ...] = ()
+    disturbance: str = ""
+    static: float = 0.0
+    frequency: float = math.nan
+    duration: float = math.nan
+
+    @property
+    def at_least(self) -> bool:
+        """Whether the bound is a lower one."""
+        return self.kind in ("gain", "delay", "least")
+
+    @property
+    def orders(self) -> dict[str, tuple[int, ...]]:
+        """Orders of the spectral moments that it needs, by output."""
+        if self.kind in (*_MARGINS, "low_frequency", "roll_off"):
+            return {}
+        return dict.fromkeys(self.outputs, (0, 2) if self.kind in _WITH_PERIOD else (0,))
+
+    def kept(self, value: float, tolerance: float) -> bool:
+        """Return whether a value keeps the limit, to a relative tolerance."""
+        room = tolerance * abs(self.bound)
+        return value >= self.bound - room if self.at_least else value <= self.bound + room
+
+    def measured(self, loop: Loop, margins: CurveMargins, moments: Moments) -> float:
+        """Return what a loop, its margins and its m0 (and m2) make of the limit."""
+        if self.kind in _MARGINS:
+            return float(getattr(margins, self.kind))
+        if self.kind == "low_frequency":
+
+            def drift(omega: FloatArray) -> FloatArray:
+                found = loop.transfer(imaginary(omega), self.outputs, [self.disturbance])
+                return np.asarray(np.abs(found[:, 0, 0]), dtype=np.float64)
+
+            return largest(drift, 1e-4 * self.frequency, self.frequency, loop.marks)
+        if self.kind == "roll_off":
+            loops = [loop.broken(i) for i in range(loop.inputs)]
+
+            def gain(omega: FloatArray) -> FloatArray:
+                s = imaginary(omega)
+                sizes = [np.abs(difference(s) - 1.0) for difference in loops]
+                return np.asarray(np.max(sizes, axis=0), dtype=np.float64)
+
+            end = 100.0 * max(self.frequency, float(np.abs(loop.marks).max(initial=0.0)))
+            return largest(gain, self.frequency, end, loop.marks)
+        sizes = [math.sqrt(moments[name][0]) for name in self.outputs]
+        if self.kind == "rms":
+            return sizes[0]
+        if self.kind == "continuous":
+            return math.hypot(self.static, sizes[0])
+        peaks = [
+            size * peak_factor(zero_crossing_period(*moments[name]), self.duration)
+            for size, name in zip(sizes, self.outputs, strict=True)
+        ]
+        if self.kind == "least":
+            return self.static - peaks[0]
+        # Power: the corner of the box that the peaks of torque and speed span.
+        return (abs(self.static) + peaks[0]) * (peaks[1] if self.kind == "power" else 1.0)
+
+
+def limit_demand(limit: StatedLimit, enforced: bool = True) -> Demand:
+    """Return a limit of `synth.design.tuning` as a demand.
+
+    Raises
+    ------
+    SolverError
+        If there is no independent way to measure that kind.
+    """
+    kind = _KINDS.get(type(limit).__name__)
+    if kind is None:
+        raise SolverError(
+            f"verification: limit {limit.name} is a {type(limit).__name__}, which there is no "
+            "independent measure for"
+        )
+    outputs: tuple[str, ...] = limit.outputs
+    if kind == "low_frequency":
+        outputs = (getattr(limit, "output"),)  # noqa: B009
+    frequency = getattr(limit, "below", getattr(limit, "above", math.nan))
+    return Demand(
+        name=limit.name,
+        kind=kind,
+        bound=limit.bound,
+        enforced=enforced,
+        outputs=outputs,
+        disturbance=getattr(limit, "disturbance", ""),
+        static=getattr(limit, "static", 0.0),
+        frequency=frequency,
+        duration=getattr(limit, "duration", math.nan),
+    )
+
+
+def case_demands(case: Case, data: PlantData, plant: LinearPlant, masses: int) -> dict[str, Demand]:
+    """Return every limit that a case states, by name.
+
+    Parameters
+    ----------
+    case, data
+        The case and its plant's numbers.
+    plant
+        The design's plant, for the static values.
+    masses
+        Its rope masses; the roll-off begins beyond the modes that they hold.
+    """
+    wanted, drive, winch = case.limits, case.winch.drive, case.winch
+    found = [Demand(name="max_sensitivity", kind="max_sensitivity", bound=wanted.max_sensitivity)]
+    for name, kind, bound in (
+        ("gain_margin_up", "gain", wanted.gain_margin_up),
+        ("gain_margin_down", "gain_down", wanted.gain_margin_down),
+        ("delay_margin", "delay", wanted.delay_margin or None),
+    ):
+        if bound is not None:
+            found.append(Demand(name=name, kind=kind, bound=bound))
+    if wanted.low_frequency is not None:
+        found.append(
+            Demand(
+                name="low_frequency",
+                kind="low_frequency",
+                bound=wanted.low_frequency.ratio,
+                outputs=(PAYLOAD,),
+                disturbance=HOOK,
+                frequency=wanted.low_frequency.below,
+            )
+        )
+    above = _first_unmodelled(data, masses)
+    if wanted.roll_off is not None and math.isfinite(above):
+        found.append(
+            Demand(name="roll_off", kind="roll_off", bound=wanted.roll_off, frequency=above)
+        )
+    dc = winch.motor.type == "dc"
+    bounds = {
+        f"{_TORQUE}.peak": drive.torque_peak,
+        f"{_TORQUE}.continuous": drive.torque_continuous,
+        f"{_SPEED}.peak": winch.speed_limit,
+        "motor.voltage.peak": drive.voltage if dc else None,
+        "motor.current.peak": drive.current_peak if dc else None,
+        "motor.current.continuous": drive.current_continuous if dc else None,
+        _POWER: winch.power_limit,
+        f"{_TENSION}.peak": wanted.rope_tension_peak,
+        f"{_TENSION}.least": wanted.minimum_tension,
+    }
+    for name, bound in bounds.items():
+        if bound is None or not math.isfinite(bound):
+            continue
+        signal, _, kind = name.rpartition(".")
+        outputs = (_TORQUE, _SPEED) if name == _POWER else (signal,)
+        found.append(
+            Demand(
+                name=name,
+                kind="power" if name == _POWER else kind,
+                bound=bound,
+                enforced=wanted.drive == "enforce",
+                outputs=outputs,
+                static=float(plant.static[outputs[0]]),
+                duration=wanted.exposure_time,
+            )
+        )
+    return {demand.name: demand for demand in found}
+
+
+def _first_unmodelled(data: PlantData, masses: int) -> float:
+    """Return the first axial mode that a lumped rope does not hold [rad/s]."""
+    if data.lumping == "thesis" or data.mass_per_length == 0.0:
+        return math.inf
+    rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
+    exact = fixed_top_modes(*rope, data.payload_mass, masses + 1)
+    lumped = lumped_modes(lump_rope(masses), *rope, data.payload_mass)
+    for mode, approximate in zip(exact, lumped, strict=False):
+        if abs(approximate / mode - 1.0) > _MODELLED:
+            return float(mode)
+    return float(exact[-1])
