@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from models import Case, load_case
 from models.sensing import Measurement
-from models.simulation import prepare, run_simulation
+from models.simulation import SimulationOptions, prepare, run_simulation
 from mpc.linear import LinearMPC
 from mpc.programme import SoftQP
 from mpc.winch import ProcessNoise, Weights
@@ -137,7 +137,10 @@ def record(sea: str, controller: LinearMPC, *, steps: int, settle: float = 40.0)
 
     # The loop asks its controller once more at the end.
     duration = (first + steps - 1) * controller.sample_time
-    run = run_simulation(prepare(controller.case, Recorder()), seed=_SEED, duration=duration)
+    run = run_simulation(
+        prepare(controller.case, Recorder(), options=SimulationOptions(duration=duration)),
+        seed=_SEED,
+    )
     if run.status != "completed" or len(questions) < steps:
         raise ValueError(f"recording of {sea}: {run.status} after {len(questions)} questions")
     return Recording(

@@ -49,7 +49,7 @@ from mpc_solvers import SOLVERS, version_of
 from mpc_turns import Replay, Task, measure, nothing, timed
 from mpc_wrappers import cvxpy_oracle
 
-from models.simulation import prepare, run_simulation
+from models.simulation import SimulationOptions, prepare, run_simulation
 from mpc.linear import LinearMPC
 from mpc.nonlinear import NonlinearMPC
 
@@ -225,12 +225,13 @@ def minutes_of(sea: str, minutes: float) -> Minutes:
     """Return how long a simulation of so many minutes takes, the controller in it."""
     began, at = clock.perf_counter(), clock.process_time()
     controller = LinearMPC(sea_case(sea), weights=WEIGHTS, horizon=6.0)
-    simulation = prepare(controller.case, controller)
+    options = SimulationOptions(duration=60.0 * minutes)
+    simulation = prepare(controller.case, controller, options=options)
     setup = clock.process_time() - at
     times = []
     for seed in (1, 2, 3):
         began, at = clock.perf_counter(), clock.process_time()
-        run = run_simulation(simulation, seed=seed, duration=60.0 * minutes)
+        run = run_simulation(simulation, seed=seed)
         times.append((clock.process_time() - at, clock.perf_counter() - began))
         if run.status != "completed":
             raise ValueError(f"simulation: {run.status}")

@@ -42,7 +42,7 @@ from models import load_case
 from models.hook import HookMotion
 from models.run import Accumulator, Run
 from models.sensing import Measurement
-from models.simulation import Kernel, Simulation, prepare, run_simulation
+from models.simulation import Kernel, Simulation, SimulationOptions, prepare, run_simulation
 from models.simulation.rows import RowMaker
 from synth.controllers import LinearFeedback
 
@@ -69,7 +69,9 @@ class Question:
         law = dict(zip(("a", "a1", "a2"), self.gains, strict=True)) | {"A": 1.0}
         feedback = LinearFeedback(case, law, sample_time=self.sample_time)
         controller = StepsOnly(feedback) if self.in_python else feedback
-        return prepare(case, controller, masses=self.masses, compiled=compiled)
+        return prepare(
+            case, controller, options=SimulationOptions(masses=self.masses, compiled=compiled)
+        )
 
 
 class StepsOnly:
@@ -192,7 +194,7 @@ def speed_of(question: Question, effort: Effort, *, compiled: bool) -> Speed:
     duration = effort.duration if compiled else min(effort.on_machine, effort.duration)
 
     def run(seed: int) -> Run:
-        return run_simulation(simulation, seed=seed, duration=duration)
+        return run_simulation(simulation.with_options(duration=duration), seed=seed)
 
     run(0)  # whatever is only done once
     times = [timed(partial(run, seed))[0] for seed in range(1, effort.runs + 1)]
@@ -218,7 +220,7 @@ def comparisons(question: Question, effort: Effort, ours: Speed) -> list[Compari
     """Return how fast `solve_ivp` answers a question, against our own whole run and kernel."""
     simulation, seed, duration = question.prepared(), 1, effort.peer_duration
     dt = simulation.loop.sample_time
-    run = run_simulation(simulation, seed=seed, duration=duration, store_step=dt)
+    run = run_simulation(simulation.with_options(duration=duration, store_step=dt), seed=seed)
     payload = run["payload.displacement"]
     peer = Peer(simulation, seed=seed, duration=duration)
     ways: list[tuple[str, bool, Callable[[], Answer]]] = [
@@ -254,7 +256,7 @@ def memory_of(hours: float) -> Memory:
 def simulate_and_tell(hours: float) -> None:
     """Simulate so long on one spring, and print the memory as `memory_of` reads it."""
     imported = largest_memory()
-    run_simulation(SPRING.prepared(), seed=1, duration=3600.0 * hours)
+    run_simulation(SPRING.prepared().with_options(duration=3600.0 * hours), seed=1)
     print(json.dumps({"imported": imported, "peak": largest_memory()}))
 
 

@@ -40,7 +40,7 @@ import stillhook as sh
 from models import HookMotion, build_plant
 from models.basics import spectral_nodes
 from models.plant import DriveLimits
-from models.simulation import prepare, run_simulation
+from models.simulation import SimulationOptions, prepare, run_simulation
 from stillhook.text import AFTER, BEFORE, DRUM, HOOK, REFERENCE
 from synth.loop import closed_loop_poles
 from synth.question import pose
@@ -200,17 +200,15 @@ burst = np.sin(np.pi * np.clip((clock - 30.0) / 10.0, 0.0, 1.0)) ** 2 * np.sin(6
 calm = prepare(
     case,
     controller,
-    scenario=sh.Scenario(name="calm", description="still water", duration=90.0),
-    limits=DriveLimits(torque=TORQUE),
+    sh.Scenario(name="calm", description="still water", duration=90.0),
+    SimulationOptions(limits=DriveLimits(torque=TORQUE), lock_limit=saturation.FALLEN, settle=0.0),
 )
 
 
 def shaken(strength, **options):
     """Return the run in still water after a burst of a strength [m]."""
     hook = sh.RecordMotion.from_arrays(clock, strength * burst, detrend="none", source="burst")
-    return run_simulation(
-        replace(calm, hook=hook), seed=0, lock_limit=saturation.FALLEN, settle=0.0, **options
-    )
+    return run_simulation(replace(calm, hook=hook).with_options(**options))
 
 
 low, high = 0.0, 0.2

@@ -1,6 +1,6 @@
-"""`simulate`: a controller on the nonlinear plant, behind real sensors, in a real sea.
+"""One run of a simulation: a controller on the nonlinear plant, behind real sensors, in a real sea.
 
-    Case, controller, scenario --> Simulation --> rows, chunk by chunk --> recursion --> Run
+    Simulation, seed --> rows, chunk by chunk --> recursion --> Run
 
 The plant is that of the case with everything a design leaves out: quadratic drag, slack rope,
 limits of the drive, dry friction, losses of the gear both ways, the brake.  A controller that is
@@ -17,22 +17,15 @@ from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
 from ..basics import FloatArray, check_range, check_seed
 from ..run import Accumulator, Event, Run, Timings
 from ..sensing import holds_brake
-from .simulation import Simulation, prepare
+from .simulation import Simulation
 from .steppers import stepper_for
-
-if TYPE_CHECKING:
-    from ..case import Case
-    from ..operation import MotionSource, Scenario
-    from ..plant import DriveLimits
-    from ..sensing import Controller
 
 Progress = Callable[[float], None]
 
@@ -40,63 +33,17 @@ CHUNK = 8192  # samples between two looks at trips, Ctrl-C and progress
 STORED = 40_000  # samples that a run keeps unless told otherwise
 
 
-def simulate(
-    case: Case,
-    controller: Controller,
-    *,
-    scenario: Scenario | str | None = None,
-    hook: MotionSource | None = None,
-    duration: float | None = None,
-    seed: int = 0,
-    step: float | None = None,
-    masses: int | None = None,
-    limits: DriveLimits | None = None,
-    parameters: Mapping[str, float] | None = None,
-    settle: float | None = None,
-    store_step: float | None = None,
-    lock_limit: float | None = None,
-    deadline: float | None = None,
-    compiled: bool | None = None,
-    progress: Progress | None = None,
+def run_simulation(
+    simulation: Simulation, *, seed: int = 0, progress: Progress | None = None
 ) -> Run:
-    """Simulate one run.
+    """Run a prepared simulation once.
 
     Parameters
     ----------
-    case
-        Vessel, sea, rope, payload, winch and sensors.
-    controller
-        What makes the drive's commands; it is reset first.
-    scenario
-        What is asked of it, or the name of a scenario; by default to hold station.
-    hook
-        Motion of the hook; by default drawn from the case's sea.
-    duration
-        Length [s]; by default the scenario's own.
+    simulation
+        The simulation.
     seed
         Seed of the sea, the noise and the telemetry, not negative.
-    step
-        Integration step [s]; by default the longest that the plant's fastest mode allows.
-    masses
-        Masses along the rope; by default those of the case.
-    limits
-        Limits of the drive; by default those of the case, `DriveLimits()` for none.
-    parameters
-        Values of plant parameters by name, such as ``{"payload.quadratic_drag": 0.0}``.
-    settle
-        Time from which statistics count [s]; by default the scenario's own, or the 30 s in which
-        the hook's motion grows and ten peak periods of the sea; at most a tenth of the run, but
-        not before a controller that warms up is engaged.
-    store_step
-        Time between stored samples [s]; by default such that at most 40 000 are kept.
-    lock_limit
-        Size of the payload's error beyond which it counts as having lost lock [m]; by default
-        not watched.
-    deadline
-        Wall time that a controller in Python may take for a step [s]; a later command is not
-        used, the one before is held.
-    compiled
-        True: as C; False: in CasADi's virtual machine; None: as C if there is a compiler.
     progress
         Called now and then with the share that is done.
 
@@ -108,52 +55,14 @@ def simulate(
     Raises
     ------
     InputError
-        If an argument is out of range, or the step is too long for the plant.
+        If an option is out of range.
     SolverError
-        If there is no static operating point, or the controller's recursion fails.
+        If the controller's recursion fails.
     """
     began = clock.perf_counter()
-    simulation = prepare(
-        case,
-        controller,
-        scenario=scenario,
-        hook=hook,
-        step=step,
-        masses=masses,
-        limits=limits,
-        parameters=parameters,
-        compiled=compiled,
-    )
-    return run_simulation(
-        simulation,
-        seed=seed,
-        duration=duration,
-        settle=settle,
-        store_step=store_step,
-        lock_limit=lock_limit,
-        deadline=deadline,
-        progress=progress,
-        began=began,
-    )
-
-
-def run_simulation(
-    simulation: Simulation,
-    *,
-    seed: int,
-    duration: float | None = None,
-    settle: float | None = None,
-    store_step: float | None = None,
-    lock_limit: float | None = None,
-    deadline: float | None = None,
-    progress: Progress | None = None,
-    began: float | None = None,
-) -> Run:
-    """Run a prepared simulation with one seed; the arguments are those of `simulate`."""
-    began = clock.perf_counter() if began is None else began
     loop, scenario, case = simulation.loop, simulation.scenario, simulation.case
+    options, wanted, settle = simulation.options, simulation.duration, simulation.options.settle
     owner, dt = "simulation", loop.sample_time
-    wanted = scenario.duration if duration is None else duration
     check_range(owner, "duration", wanted, low=dt, unit="s")
     samples = simulation.samples(wanted)
     if settle is None:
@@ -170,12 +79,12 @@ def run_simulation(
         settle=check_range(owner, "settle", settle, low=0.0, high=wanted, unit="s"),
         units=loop.units,
         levels=levels,
-        lock_limit=lock_limit,
+        lock_limit=options.lock_limit,
         thermal_time=case.winch.motor.thermal_time_constant,
     )
-    store = _Store(dt, samples, store_step)
+    store = _Store(dt, samples, options.store_step)
     rows = simulation.rows(check_seed(owner, seed), wanted)
-    stepper = stepper_for(simulation, deadline)
+    stepper = stepper_for(simulation)
     foresee = getattr(simulation.controller, "foresee", None)
     if foresee is not None:  # a controller with perfect preview, for reference
         foresee(rows.motions[0])

@@ -1,17 +1,17 @@
 """A prepared simulation: everything about a run that does not hang on its seed.
 
-    Case, controller, scenario --> prepare --> Simulation --> run(seed) --> Run
+    Case, controller, scenario, options --> prepare --> Simulation --> run_simulation(seed) --> Run
 
 Preparing solves for rest, chooses the integration step, writes the closed loop as one recursion
 and compiles it; that takes a second or less, and every seed uses it again.
-`models.simulation.simulate` does both in one call.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -51,13 +51,60 @@ _GEAR_TURN = 1.0  # motor speed over which the gear's losses change sides [rad/s
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class SimulationOptions:
+    """How to simulate, and what to keep of it.
+
+    Parameters
+    ----------
+    hook
+        Motion of the hook; by default drawn from the case's sea.
+    duration
+        Length of a run [s]; by default the scenario's own.
+    step
+        Integration step [s]; by default the longest that the plant's fastest mode allows.
+    masses
+        Masses along the rope; by default those of the case.
+    limits
+        Limits of the drive; by default those of the case, `DriveLimits()` for none.
+    parameters
+        Values of plant parameters by name, such as ``{"payload.quadratic_drag": 0.0}``.
+    settle
+        Time from which statistics count [s]; by default the scenario's own, or the 30 s in which
+        the hook's motion grows and ten peak periods of the sea; at most a tenth of the run, but
+        not before a controller that warms up is engaged.
+    store_step
+        Time between stored samples [s]; by default such that at most 40 000 are kept.
+    lock_limit
+        Size of the payload's error beyond which it counts as having lost lock [m]; by default
+        not watched.
+    deadline
+        Wall time that a controller in Python may take for a step [s]; a later command is not
+        used, the one before is held.
+    compiled
+        True: as C; False: in CasADi's virtual machine; None: as C if there is a compiler.
+    """
+
+    hook: MotionSource | None = None
+    duration: float | None = None
+    step: float | None = None
+    masses: int | None = None
+    limits: DriveLimits | None = None
+    parameters: Mapping[str, float] | None = None
+    settle: float | None = None
+    store_step: float | None = None
+    lock_limit: float | None = None
+    deadline: float | None = None
+    compiled: bool | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Simulation:
     """A controller on a plant, ready to run; `prepare` makes it.
 
     Parameters
     ----------
-    case, controller, scenario
-        What is simulated.
+    case, controller, scenario, options
+        What is simulated, and how.
     hook
         Where the hook's motion comes from.
     loop
@@ -76,6 +123,7 @@ class Simulation:
     case: Case
     controller: Controller
     scenario: Scenario
+    options: SimulationOptions
     hook: MotionSource
     loop: ClosedLoop
     kernels: tuple[Kernel, ...]
@@ -104,6 +152,16 @@ class Simulation:
         """
         engaged_at_once = self.scenario.warm_up <= 0.0 and not holds_brake(self.controller)
         return EASE if engaged_at_once else 0.0
+
+    @property
+    def duration(self) -> float:
+        """Length of a run [s]."""
+        asked = self.options.duration
+        return self.scenario.duration if asked is None else asked
+
+    def with_options(self, **changes: Any) -> Simulation:
+        """Return it with other options of its runs: those of the plant were used to prepare it."""
+        return replace(self, options=replace(self.options, **changes))
 
     def rows(self, seed: int, duration: float) -> RowMaker:
         """Return what makes the rows of one run of a duration [s]."""
@@ -186,16 +244,21 @@ class Simulation:
 def prepare(
     case: Case,
     controller: Controller,
-    *,
-    scenario: Scenario | str | None = None,
-    hook: MotionSource | None = None,
-    step: float | None = None,
-    masses: int | None = None,
-    limits: DriveLimits | None = None,
-    parameters: Mapping[str, float] | None = None,
-    compiled: bool | None = None,
+    scenario: Scenario | str = "hold",
+    options: SimulationOptions | None = None,
 ) -> Simulation:
-    """Prepare a simulation; the arguments are those of `simulate`.
+    """Prepare a simulation.
+
+    Parameters
+    ----------
+    case
+        Vessel, sea, rope, payload, winch and sensors.
+    controller
+        What makes the drive's commands; every run resets it.
+    scenario
+        What is asked of it, or the name of a scenario.
+    options
+        How to simulate.
 
     Raises
     ------
@@ -204,15 +267,17 @@ def prepare(
     SolverError
         If there is no static operating point, or C was demanded and there is no compiler.
     """
+    options = options or SimulationOptions()
     if not isinstance(scenario, Scenario):
         from ..operation import scenario_named  # the library of them is only needed by name
 
-        scenario = scenario_named(scenario or "hold", case)
+        scenario = scenario_named(scenario, case)
     case = scenario.case_for(case)
     sample_time = check_range(
         controller.name, "sample_time", controller.sample_time, low=0.0, unit="s", open_low=True
     )
-    limits = DriveLimits.from_case(case) if limits is None else limits
+    limits = DriveLimits.from_case(case) if options.limits is None else options.limits
+    masses = options.masses
     surroundings = scenario.surroundings
     farthest = (
         max(abs(move.distance) for move in scenario.profile.moves)
@@ -223,8 +288,8 @@ def prepare(
     travel = DrumTravel.from_case(case) if travels else None
     plant = build_plant(case, masses, limits=limits, travel=travel, surroundings=surroundings)
     rest = _rest(case, masses, surroundings)
-    values = _parameters(case, plant, parameters or {})
-    choice = _choose_step(plant, rest, values, sample_time, step, surroundings)
+    values = _parameters(case, plant, options.parameters or {})
+    choice = _choose_step(plant, rest, values, sample_time, options.step, surroundings)
     sensors = SensorModel.from_case(case, sample_time, scenario.telemetry_delays)
     recursion = recursion_of(controller)
     loop = build_closed_loop(
@@ -242,9 +307,10 @@ def prepare(
         case=case,
         controller=controller,
         scenario=scenario,
-        hook=SpectrumMotion.from_case(case) if hook is None else hook,
+        options=options,
+        hook=SpectrumMotion.from_case(case) if options.hook is None else options.hook,
         loop=loop,
-        kernels=tuple(Kernel(function, compiled=compiled) for function in functions),
+        kernels=tuple(Kernel(function, compiled=options.compiled) for function in functions),
         sensors=sensors,
         schedule=Schedule(scenario=scenario, sample_time=sample_time),
         trips=trip_limits(case),

@@ -61,9 +61,9 @@ class Stepper(Protocol):
         """
 
 
-def stepper_for(simulation: Simulation, deadline: float | None) -> Stepper:
-    """Return what runs a simulation; `deadline` [s] is for a controller in Python."""
-    return _Fused(simulation) if simulation.fused else _FromPython(simulation, deadline)
+def stepper_for(simulation: Simulation) -> Stepper:
+    """Return what runs a simulation."""
+    return _Fused(simulation) if simulation.fused else _FromPython(simulation)
 
 
 class _Fused:
@@ -96,7 +96,8 @@ class _Fused:
 class _FromPython:
     """The controller is called between the two halves of a sample."""
 
-    def __init__(self, simulation: Simulation, deadline: float | None) -> None:
+    def __init__(self, simulation: Simulation) -> None:
+        deadline = simulation.options.deadline
         if deadline is not None:
             check_range("simulation", "deadline", deadline, low=0.0, unit="s", open_low=True)
         self._measure, self._advance = simulation.kernels

@@ -20,13 +20,13 @@ import numpy as np
 
 from models.basics import FloatArray, InputError
 from models.case import Case
-from models.operation import Motion, SpectrumMotion
+from models.operation import Motion, SpectrumMotion, scenario_named
 from models.run import ERROR, Run
 from models.sensing import holds_brake
-from models.simulation import EASE
+from models.simulation import EASE, Progress, SimulationOptions
 
 from ..controllers import Contender, Law
-from ..runs import TRIPS, Progress, Series
+from ..runs import TRIPS, Series, controller_of
 from .mismatch import Mismatch
 
 TRACED = (
@@ -205,9 +205,7 @@ class Prepared:
         true = question.true(height)
         sea = SpectrumMotion.from_case(true).hook
         self._settle = question.settle
-        self._series = Series.prepare(
-            true,
-            controller,
+        options = SimulationOptions(
             hook=CommonSea(
                 hook=sea, lasting=question.duration, ease=EASE if holds_brake(controller) else 0.0
             ),
@@ -215,6 +213,9 @@ class Prepared:
             settle=question.settle,
             masses=question.masses,
             compiled=question.compiled,
+        )
+        self._series = Series.prepare(
+            true, controller_of(controller, true), scenario_named("hold", true), options
         )
 
     def run(self, seed: int, progress: Progress | None = None) -> Cell:

@@ -14,10 +14,9 @@ import numpy as np
 
 from models.basics import FloatArray, InputError, StillhookError
 from models.operation import SpectrumMotion
-from models.simulation import EASE
+from models.simulation import EASE, Progress
 
 from ..controllers import Contender, Law
-from ..runs import Progress
 from .cell import WINDOW, Cell, CommonSea, Prepared, Question, Trace
 
 _SAMPLE = 0.05  # of the demand, which may bend in any way from one to the next [s]

@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from .runs import TRIPS as TRIPS
     from .runs import Runs as Runs
     from .runs import keep_worst as keep_worst
-    from .series import Progress as Progress
     from .series import Series as Series
+    from .series import controller_of as controller_of
     from .simulation import simulate as simulate
     from .terminal import Ticker as Ticker
     from .terminal import run_progress as run_progress

@@ -1,39 +1,36 @@
-"""`Series`: runs that differ in their seed alone, prepared once for all of them.
+"""Runs that differ in their seed alone, prepared once for all of them (`Series`).
 
     case, controller by name, of a design or of the user's own --> Series --> run(seed)
 
-What `models.simulation.simulate` does for one seed with a controller at hand;
 `stillhook.runs.simulation` and the command line make `Runs` of it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.basics import InputError
 from models.case import Case
-from models.casefile import Quantity as Range
-from models.operation import Scenario, SpectrumMotion, scenario_named
+from models.operation import Scenario, SpectrumMotion
 from models.run import Quantity, Run
 from models.sensing import Controller, holds_brake
-from models.simulation import Simulation, prepare, run_simulation
+from models.simulation import (
+    Progress,
+    Simulation,
+    SimulationOptions,
+    prepare,
+    run_simulation,
+)
 from synth.controllers import LinearFeedback
 from synth.design import GainDesign, Tuning
 
 from ..controllers import controller_by_name
 from .runs import Runs, stays
 from .window import error_of
-
-if TYPE_CHECKING:
-    from models.operation import MotionSource
-    from models.plant import DriveLimits
-
-Progress = Callable[[float], None]
 
 _FEEDBACK_SAMPLE = 0.01  # [s]
 _PROTOCOL = ("name", "sample_time", "reset", "step")
@@ -47,94 +44,44 @@ class Series:
     ----------
     simulation
         The prepared simulation.
-    duration, settle, store_step, lock_limit, deadline
-        As for `models.simulation.simulate.simulate`; None where it chooses.
     """
 
     simulation: Simulation
-    duration: float
-    settle: float | None = None
-    store_step: float | None = None
-    lock_limit: float | None = None
-    deadline: float | None = None
 
     @classmethod
     def prepare(
         cls,
         case: Case,
-        controller: str | GainDesign | Tuning | Controller,
-        *,
-        scenario: str | Scenario = "hold",
-        options: Mapping[str, object] | None = None,
-        hook: MotionSource | None = None,
-        duration: float | str | None = None,
-        design: GainDesign | Tuning | None = None,
-        gains: Mapping[str, float] | None = None,
-        sample_time: float | None = None,
-        step: float | None = None,
-        masses: int | None = None,
-        limits: DriveLimits | None = None,
-        parameters: Mapping[str, float] | None = None,
-        settle: float | None = None,
-        store_step: float | None = None,
-        lock_limit: float | None = None,
-        deadline: float | None = None,
-        compiled: bool | None = None,
+        controller: Controller,
+        scenario: Scenario,
+        options: SimulationOptions,
     ) -> Series:
-        """Prepare; the arguments are those of `simulate`.
+        """Prepare, the controller made for the scenario's own case (`Scenario.case_for`).
 
         Raises
         ------
-        InputError, SynthesisError, SolverError
-            As `simulate`.
+        InputError, SolverError
+            As `models.simulation.prepare`.
         """
-        if isinstance(scenario, str):
-            scenario = scenario_named(scenario, case, **(options or {}))
-        elif options:
-            raise InputError("simulate: options are for a scenario by its name")
-        # A lift in air is another case, with another static command, than the one given.
-        own = scenario.case_for(case)
-        if duration is not None:
-            scenario = replace(scenario, duration=_seconds(duration))
-        lasting = scenario.duration
-        simulation = prepare(
-            case,
-            controller_of(controller, own, design=design, gains=gains, sample_time=sample_time),
-            scenario=scenario,
-            hook=hook,
-            step=step,
-            masses=masses,
-            limits=limits,
-            parameters=parameters,
-            compiled=compiled,
-        )
-        return cls(
-            simulation=simulation,
-            duration=lasting,
-            settle=settle,
-            store_step=store_step,
-            lock_limit=_default_lock_limit(simulation) if lock_limit is None else lock_limit,
-            deadline=deadline,
-        )
+        if options.duration is not None:
+            scenario = replace(scenario, duration=options.duration)
+        simulation = prepare(case, controller, scenario, options)
+        if options.lock_limit is None:
+            simulation = simulation.with_options(lock_limit=_default_lock_limit(simulation))
+        return cls(simulation=simulation)
 
     def run(self, seed: int, progress: Progress | None = None) -> Run:
         """Run with one seed; `progress` is called now and then with the share that is done."""
-        run = run_simulation(
-            self.simulation,
-            seed=seed,
-            duration=self.duration,
-            settle=self.settle,
-            store_step=self.store_step,
-            lock_limit=self.lock_limit,
-            deadline=self.deadline,
-            progress=progress,
-        )
+        run = run_simulation(self.simulation, seed=seed, progress=progress)
         return _with_error_before_touchdown(run)
 
     def runs(self, found: Sequence[Run]) -> Runs:
         """Return runs of this series as one result."""
+        simulation = self.simulation
         return Runs(
-            runs=tuple(found), scenario=self.simulation.scenario, lock_limit=self.lock_limit
+            runs=tuple(found),
+            scenario=simulation.scenario,
+            lock_limit=simulation.options.lock_limit,
         )
 
 
@@ -175,13 +122,6 @@ def controller_of(
             f"own, {controller.sample_time:g} s"
         )
     return controller
-
-
-def _seconds(duration: float | str) -> float:
-    try:
-        return float(Range("time", 0.0, 1e8, open_low=True).read(duration))
-    except InputError as error:
-        raise InputError(f"simulate: duration {error}") from None
 
 
 def _default_lock_limit(simulation: Simulation) -> float | None:

@@ -13,13 +13,15 @@ from typing import TYPE_CHECKING, Literal
 
 from models.basics import InputError, check_range, check_seed, one_thread
 from models.case import Case
-from models.operation import Scenario
+from models.casefile import Quantity
+from models.operation import Scenario, scenario_named
 from models.run import Run
 from models.sensing import Controller
+from models.simulation import Progress, SimulationOptions
 from synth.design import GainDesign, Tuning
 
 from .runs import Runs, keep_worst
-from .series import Progress, Series
+from .series import Series, controller_of
 
 if TYPE_CHECKING:
     from models.operation import MotionSource
@@ -75,7 +77,7 @@ def simulate(
     sample_time
         Of a controller by name or of a design [s]; by default its own.
     step, masses, limits, parameters, settle, store_step, deadline, compiled
-        As for `models.simulation.simulate.simulate`.
+        See `models.simulation.SimulationOptions`.
     lock_limit
         Size of the payload's error beyond which it counts as having lost lock [m]; by default
         the significant height of the hook's motion in the case's sea, where the payload is to
@@ -110,25 +112,34 @@ def simulate(
     numbers = _seeds_of(seeds)
     if traces not in ("all", "worst"):
         raise InputError(f"simulate: traces must be one of all, worst; got {traces!r}")
+    if isinstance(scenario, str):
+        scenario = scenario_named(scenario, case, **(options or {}))
+    elif options:
+        raise InputError("simulate: options are for a scenario by its name")
     series = Series.prepare(
         case,
-        controller,
-        scenario=scenario,
-        options=options,
-        hook=hook,
-        duration=duration,
-        design=design,
-        gains=gains,
-        sample_time=sample_time,
-        step=step,
-        masses=masses,
-        limits=limits,
-        parameters=parameters,
-        settle=settle,
-        store_step=store_step,
-        lock_limit=lock_limit,
-        deadline=deadline,
-        compiled=compiled,
+        # A lift in air is another case, with another static command, than the one given.
+        controller_of(
+            controller,
+            scenario.case_for(case),
+            design=design,
+            gains=gains,
+            sample_time=sample_time,
+        ),
+        scenario,
+        SimulationOptions(
+            hook=hook,
+            duration=None if duration is None else _seconds(duration),
+            step=step,
+            masses=masses,
+            limits=limits,
+            parameters=parameters,
+            settle=settle,
+            store_step=store_step,
+            lock_limit=lock_limit,
+            deadline=deadline,
+            compiled=compiled,
+        ),
     )
     found: list[Run] = []
     for done, seed in enumerate(numbers):
@@ -158,6 +169,13 @@ def _seeds_of(seeds: int | Sequence[int]) -> tuple[int, ...]:
     if not found or len(set(found)) != len(found):
         raise InputError(f"simulate: seeds must be distinct whole numbers, got {list(found)}")
     return found
+
+
+def _seconds(duration: float | str) -> float:
+    try:
+        return float(Quantity("time", 0.0, 1e8, open_low=True).read(duration))
+    except InputError as error:
+        raise InputError(f"simulate: duration {error}") from None
 
 
 def _part(progress: Progress, done: int, total: int) -> Progress:

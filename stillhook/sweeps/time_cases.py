@@ -23,8 +23,9 @@ from models.case import Case
 from models.operation import scenario_named, with_faults
 from models.run import Run
 from models.sensing import Controller
+from models.simulation import Progress, SimulationOptions
 
-from ..runs import Progress, Series
+from ..runs import Series
 from .pilots import Pilot
 from .time_metrics import numbers_of, status_of
 from .trim import Shift, shift_between, static_of, trimmed
@@ -186,11 +187,13 @@ class TimeBench:
         series = Series.prepare(
             case,
             controller,
-            scenario=with_faults(scenario, task.faults, case, question.duration),
-            duration=question.duration,
-            settle=question.settle,
-            masses=question.masses,
-            compiled=question.compiled,
+            with_faults(scenario, task.faults, case, question.duration),
+            SimulationOptions(
+                duration=question.duration,
+                settle=question.settle,
+                masses=question.masses,
+                compiled=question.compiled,
+            ),
         )
         run = series.run(task.seed, progress)
         if run.status == "interrupted":

@@ -53,7 +53,7 @@ def payloads(question, peers, duration=40.0):
     """Return the peer, and what our simulation finds for the payload."""
     prepared = question.prepared()
     step = prepared.loop.sample_time
-    run = run_simulation(prepared, seed=3, duration=duration, store_step=step)
+    run = run_simulation(prepared.with_options(duration=duration, store_step=step), seed=3)
     return peers.Peer(prepared, seed=3, duration=duration), run["payload.displacement"]
 
 
@@ -169,7 +169,7 @@ def test_memory_is_that_of_a_process_of_its_own(results, words):
 
 @pytest.mark.parametrize("at", range(4))
 def test_every_question_is_one_of_a_loop_that_holds(at, simulation):
-    run = run_simulation(simulation.QUESTIONS[at].prepared(), seed=1, duration=200.0)
+    run = run_simulation(simulation.QUESTIONS[at].prepared().with_options(duration=200.0), seed=1)
     assert run.status == "completed"
     assert run["engaged"][-1] == 1.0
     assert run["drive.saturated"][len(run.time) // 2 :].mean() < 0.01

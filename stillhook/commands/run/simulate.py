@@ -20,6 +20,7 @@ from ...runs import (
     Runs,
     Series,
     Ticker,
+    controller_of,
     headline_of,
     keep_worst,
     run_progress,
@@ -168,17 +169,15 @@ def _prepared(asked: Asked, name: str, tune: Callable[[float], None]) -> Series:
         from mpc.winch import tune_weights
 
         case = asked.scenario.case_for(asked.case)
-        tune_weights(case, sample_time=asked.rest["sample_time"] or 0.05, progress=tune)
-    return Series.prepare(
-        asked.case,
+        tune_weights(case, sample_time=asked.sample_time or 0.05, progress=tune)
+    controller = controller_of(
         name,
-        scenario=asked.scenario,
-        hook=asked.hook,
-        duration=asked.duration,
+        asked.scenario.case_for(asked.case),
         design=asked.design if feedback else None,
         gains=asked.gains if feedback else None,
-        **asked.rest,
+        sample_time=asked.sample_time,
     )
+    return Series.prepare(asked.case, controller, asked.scenario, asked.how)
 
 
 def _finish(
@@ -189,7 +188,7 @@ def _finish(
     tick: Ticker,
     total: float,
 ) -> None:
-    hook = "the case's own sea" if asked.hook is None else asked.hook.description
+    hook = "the case's own sea" if asked.how.hook is None else asked.how.hook.description
     design = asked.design
     question = {
         "controllers": list(asked.controllers),

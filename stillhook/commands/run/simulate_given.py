@@ -17,6 +17,7 @@ from ..given import given_case, parse_gains
 if TYPE_CHECKING:
     from models import Case
     from models.operation import MotionSource, Scenario
+    from models.simulation import SimulationOptions
     from synth.design import GainDesign
 
 _MANY = 10_000  # seeds: more than anybody wants on purpose
@@ -66,12 +67,12 @@ class Asked:
         Whether all were asked for, so that one that the case does not allow may be left out.
     seeds, duration
         Seeds of the runs, and their length [s].
-    hook
-        The hook's motion; None for the case's own sea.
     gains, design
         Of the feedback, if given.
-    rest
-        What else `Series.prepare` is told.
+    sample_time
+        Of the controllers [s]; None: their own.
+    how
+        How to simulate.
     """
 
     case: Case
@@ -80,10 +81,10 @@ class Asked:
     every: bool
     seeds: range
     duration: float
-    hook: MotionSource | None
     gains: Mapping[str, float] | None
     design: GainDesign | None
-    rest: Mapping[str, Any]
+    sample_time: float | None
+    how: SimulationOptions
 
 
 def asked_of(arguments: argparse.Namespace) -> Asked:
@@ -95,11 +96,12 @@ def asked_of(arguments: argparse.Namespace) -> Asked:
         If any of it is wrong.
     """
     from models.operation import scenario_named
+    from models.simulation import SimulationOptions
 
     check_range("simulate", "--seeds", arguments.seeds, low=1, high=_MANY)
     check_range("simulate", "--first-seed", arguments.first_seed, low=0)
     names = parse_controllers(arguments.controller)
-    given = {name: _quantity(arguments, name) for name in _QUANTITIES}
+    given: dict[str, Any] = {name: _quantity(arguments, name) for name in _QUANTITIES}
     options = parse_options(arguments.options)
     gains = None if arguments.gains is None else parse_gains(arguments.gains)
     case = given_case(arguments)
@@ -109,9 +111,9 @@ def asked_of(arguments: argparse.Namespace) -> Asked:
             "simulate", "--hours", arguments.hours, low=0.0, high=1e4, open_low=True
         )
     hook = _hook(arguments)
-    lasting = given.pop("duration")
+    lasting, sample_time = given.pop("duration"), given.pop("sample_time")
     if lasting is None:
-        lasting = _fitting(scenario.duration, hook, given["sample_time"])
+        lasting = _fitting(scenario.duration, hook, sample_time)
     first = arguments.first_seed
     return Asked(
         case=case,
@@ -120,10 +122,16 @@ def asked_of(arguments: argparse.Namespace) -> Asked:
         every=arguments.controller == "all",
         seeds=range(first, first + arguments.seeds),
         duration=lasting,
-        hook=hook,
         gains=gains,
         design=_design(arguments, case),
-        rest={**given, "masses": arguments.masses, "compiled": arguments.compiled},
+        sample_time=sample_time,
+        how=SimulationOptions(
+            hook=hook,
+            duration=lasting,
+            masses=arguments.masses,
+            compiled=arguments.compiled,
+            **given,
+        ),
     )
 
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from one_run import simulate
 
 from models import InputError, load_case
 from models.operation import Scenario, scenario_named
 from models.operation.excitation import StillMotion
 from models.operation.profile import Move, Profile
 from models.plant import DrumTravel
-from models.simulation.simulate import simulate
 from synth.controllers import LinearFeedback
 
 CRANE = {"A": 1.0, "a": 16.03, "a1": 44.47, "a2": 6.41}

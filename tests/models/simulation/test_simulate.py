@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from one_run import simulate
 
 from models import Case, InputError, PhysicsWarning, build_plant, load_case
 from models.operation import Scenario, SineMotion
@@ -22,7 +23,6 @@ from models.run import Run
 from models.sensing import Measurement
 from models.sensing.control import MEASURED
 from models.simulation import Simulation, prepare, run_simulation
-from models.simulation.simulate import simulate
 from synth.controllers import BrakeOn, LinearFeedback
 
 THESIS = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
@@ -98,19 +98,17 @@ def test_c_and_the_virtual_machine_give_the_same_trajectory(
 
 def test_a_run_is_a_function_of_its_seed() -> None:
     case = crane(**{"sensors.telemetry.dropout": 0.05, "sensors.telemetry.jitter": 0.02})
-    simulation = prepare(case, feedback(case, CRANE, 0.05))
-    first, again, other = (
-        run_simulation(simulation, seed=seed, duration=60.0) for seed in (4, 4, 5)
-    )
+    simulation = prepare(case, feedback(case, CRANE, 0.05)).with_options(duration=60.0)
+    first, again, other = (run_simulation(simulation, seed=seed) for seed in (4, 4, 5))
     np.testing.assert_array_equal(first.values, again.values)
     assert not np.array_equal(first.values, other.values)
 
 
 def test_a_longer_run_begins_like_a_shorter_one() -> None:
     case = thesis()
-    simulation = prepare(case, feedback(case, THESIS, 0.005))
-    short = run_simulation(simulation, seed=1, duration=60.0, store_step=0.005)
-    long = run_simulation(simulation, seed=1, duration=120.0, store_step=0.005)
+    simulation = prepare(case, feedback(case, THESIS, 0.005)).with_options(store_step=0.005)
+    short = run_simulation(simulation.with_options(duration=60.0), seed=1)
+    long = run_simulation(simulation.with_options(duration=120.0), seed=1)
     np.testing.assert_array_equal(long.values[: len(short.values)], short.values)
 
 
@@ -411,7 +409,7 @@ def test_a_day_needs_little_memory() -> None:
     case = thesis()
     simulation = prepare(case, feedback(case, THESIS, 0.1))
     tracemalloc.start()
-    run = run_simulation(simulation, seed=1, duration=86400.0)
+    run = run_simulation(simulation.with_options(duration=86400.0), seed=1)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert run.completed
@@ -456,7 +454,8 @@ def test_the_measurements_have_the_order_that_controllers_expect() -> None:
 
 
 def _runs(simulation: Simulation, seeds: range, duration: float) -> list[Run]:
-    return [run_simulation(simulation, seed=seed, duration=duration) for seed in seeds]
+    simulation = simulation.with_options(duration=duration)
+    return [run_simulation(simulation, seed=seed) for seed in seeds]
 
 
 def test_a_prepared_simulation_is_used_for_many_seeds_without_change() -> None:

@@ -16,7 +16,7 @@ import pytest
 
 from models import Case, HookMotion, build_plant, load_case
 from models.plant import DriveLimits
-from models.simulation import prepare, run_simulation
+from models.simulation import SimulationOptions, prepare, run_simulation
 from synth import evaluate_gains
 from synth.controllers import LinearFeedback
 from synth.structures import sampled_loop
@@ -96,6 +96,13 @@ def _rms(rows: dict[str, np.ndarray], hook: HookMotion, omega: np.ndarray) -> di
     }
 
 
+def unlimited(parameters: dict[str, float]) -> SimulationOptions:
+    """Return a drive without limits, and plant parameters by name."""
+    return SimulationOptions(
+        duration=DURATION, settle=60.0, limits=DriveLimits(), parameters=parameters
+    )
+
+
 @pytest.mark.ci
 @pytest.mark.parametrize("name", CASES)
 def test_simulated_variance_is_within_three_standard_errors_of_the_spectral_value(
@@ -108,14 +115,14 @@ def test_simulated_variance_is_within_three_standard_errors_of_the_spectral_valu
     if "winch.gear_switching" in build_plant(case).parameters:
         linear["winch.gear_switching"] = 0.0  # the mean of the gear's two losses, as the design
     controller = LinearFeedback(case, gains, sample_time=sample_time)
-    simulation = prepare(case, controller, limits=DriveLimits(), parameters=linear)
+    simulation = prepare(case, controller, options=unlimited(linear))
     expected = sampled_rms(case, controller, drag)
     designed = continuous_rms(case, gains, sample_time, drag)
     for signal in ("payload.displacement", "motor.speed", "rope.tension"):
         assert expected[signal] == pytest.approx(designed[signal], rel=2e-3), signal
     found: dict[str, list[float]] = {signal: [] for signal in expected}
     for seed in range(SEEDS):
-        run = run_simulation(simulation, seed=seed, duration=DURATION, settle=60.0)
+        run = run_simulation(simulation, seed=seed)
         for signal in expected:
             found[signal].append(run.statistics[signal].standard_deviation ** 2)
     for signal, variances in found.items():
@@ -141,10 +148,8 @@ def test_stochastic_drag_predicts_the_rms_that_quadratic_drag_leaves(height: flo
         },
     }.items():
         controller = LinearFeedback(case, CRANE, sample_time=0.02)
-        simulation = prepare(case, controller, limits=DriveLimits(), parameters=parameters)
-        runs = [
-            run_simulation(simulation, seed=s, duration=DURATION, settle=60.0) for s in range(6)
-        ]
+        simulation = prepare(case, controller, options=unlimited(parameters))
+        runs = [run_simulation(simulation, seed=s) for s in range(6)]
         variances = [r.statistics["payload.displacement"].standard_deviation ** 2 for r in runs]
         rms[name] = math.sqrt(np.mean(variances))
     assert rms["quadratic"] == pytest.approx(rms["linear"], rel=0.03)

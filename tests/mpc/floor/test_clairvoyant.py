@@ -7,11 +7,11 @@ from pathlib import Path
 import cvxpy as cp
 import numpy as np
 import pytest
+from one_run import simulate
 
 import stillhook as sh
 from models.operation import Motion, SineMotion, SpectrumMotion
 from models.plant import DriveLimits
-from models.simulation.simulate import simulate
 from mpc.floor import Clairvoyant, clairvoyant
 from mpc.floor.certificate import certify, rollout
 from mpc.floor.plant import record_plant

@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from one_run import simulate
 
 import stillhook as sh
 from models.operation import Motion, SpectrumMotion
-from models.simulation.simulate import simulate
 from mpc.floor import Clairvoyant, clairvoyant
 from mpc.floor.nlp import Refinement, refine
 
