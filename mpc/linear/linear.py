@@ -65,7 +65,7 @@ class LinearMPC(WinchMPC):
     * omega, F, u: motor speed [rad/s], tension at the drum [N], drive command
     * tau_0, tau(omega): torque at rest; peak torque, or less at the power limit and where the
       motor's thermal budget is used up [N m]
-    * rho: weight on the input [m2/(N m)2]; P, N_zeta: value function (`mpc.winch.regulation`)
+    * rho: weight on the input [m2/(N m)2]; P, N_zeta: value function (`mpc.programme.regulator`)
 
     A, B and Gamma are those of a rope that is stiffer than the estimator's (`mpc.winch.planning`),
     so that a saturated loop stays stable on loads and ropes that are not as in the case.

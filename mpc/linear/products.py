@@ -16,8 +16,9 @@ import numpy as np
 
 from models.basics import FloatArray, read_only
 
+from ..programme import Condensed
 from ..winch import PredictionModel
-from .condensed import WATCHED, Condensed, path_of_sea, sea_at_end
+from .winch_programme import WATCHED, path_of_sea, sea_at_end
 
 if TYPE_CHECKING:
     from ..forecast import Forecast
@@ -99,11 +100,10 @@ class Products:
         for k, name in enumerate(names):
             if name == "tension":
                 free[k, model.constants_at.start + 3] = 1.0
-        end = winch.size + 2 * (p.steps + 1)
         speed_known = np.zeros((nb, model.size))
-        speed_known[:, : winch.size] = p.speeds[:, : winch.size]
-        speed_known[:, model.sea_at] = p.speeds[:, winch.size : end] @ to_path
-        speed_known[:, constants] = p.speeds[:, end : end + 2]
+        speed_known[:, : winch.size] = p.speeds[:, p.horizon.state]
+        speed_known[:, model.sea_at] = p.speeds[:, p.horizon.path] @ to_path
+        speed_known[:, constants] = p.speeds[:, p.horizon.constants]
         # A load that is to be elsewhere, or to move: everything is counted from there, but the
         # limits on speed and command are not.
         moved_free = p.rows_state @ winch.moved

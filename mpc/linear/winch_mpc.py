@@ -29,7 +29,7 @@ from models.sensing import Measurement
 from models.sensing.control import MEASURED as HEARD
 
 from ..forecast import AdaptiveAR, PerfectPreview
-from ..programme import SoftQP, Solved, kkt_residual
+from ..programme import Condensed, SoftQP, Solved, default_blocking, kkt_residual
 from ..winch import (
     Estimator,
     PredictionModel,
@@ -40,9 +40,9 @@ from ..winch import (
     tune_weights,
     with_noise,
 )
-from .condensed import Condensed, condense, default_blocking
 from .drive_window import DriveWindow, TorqueBudget
 from .products import Products
+from .winch_programme import winch_programme
 
 if TYPE_CHECKING:
     from models.operation import Motion
@@ -116,7 +116,7 @@ class WinchMPC(ABC):
         T = check_range(_OWNER, "sample_time", sample_time, low=0.0, unit="s", open_low=True)
         if horizon is None:
             horizon = _PREVIEWED if predictor == "preview" else _HORIZON
-        blocks = default_blocking(horizon, T) if blocking is None else tuple(blocking)
+        blocks = default_blocking(_OWNER, horizon, T) if blocking is None else tuple(blocking)
         if not blocks or min(blocks) < 1:
             raise InputError(
                 f"{_OWNER}: blocking must be whole numbers of at least 1, got {blocks}"
@@ -187,7 +187,7 @@ class WinchMPC(ABC):
 
     def _condense(self, model: PredictionModel) -> Condensed:
         """Return the programme of the controller's cost, blocks and limits on a model."""
-        return condense(model, self.regulator, self._blocks, tuple(self.soft_limits))
+        return winch_programme(model, self.regulator, self._blocks, tuple(self.soft_limits))
 
     def _products(self, model: PredictionModel, programme: Condensed) -> Products:
         return Products.of(

@@ -192,7 +192,7 @@ class NonlinearMPC(WinchMPC):
         self._low = np.concatenate([products.low, -np.ones(powers)])
         self._high = np.concatenate([products.high, np.ones(powers)])
         self._ends = path_of_sea(self.model, 1)
-        self._starts = np.cumsum((0, *p.blocks[:-1])).astype(np.float64)
+        self._starts = np.array(p.horizon.starts, dtype=np.float64)
         self._rows = np.vstack([products.rows, np.zeros((powers, len(p.blocks)))])
         # Where a plan has left all sense, its slopes are not to be trusted with the solver.
         reach = [_reach(name, self.model.winch.rest_tension) for name in self.stage.arguments]

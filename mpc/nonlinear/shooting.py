@@ -23,7 +23,7 @@ not grow with the masses of the rope.  J is block diagonal, G block lower triang
 force acts on what comes after it.
 
 The cost is a sum of squares, so that its Gauss-Newton Hessian is that of the linearised
-outputs; with the forces' slope zero, all is that of `mpc.linear.condensed`.
+outputs; with the forces' slope zero, all is that of `mpc.programme.condensed`.
 """
 
 from __future__ import annotations
@@ -37,8 +37,9 @@ from scipy.linalg.blas import dtrsm
 
 from models.basics import FloatArray, read_only
 
-from ..linear import Condensed, Products, path_of_sea, sea_at_end
-from ..winch import PredictionModel, Regulator
+from ..linear import Products, path_of_sea, sea_at_end
+from ..programme import Condensed, LQRegulator
+from ..winch import PredictionModel
 from .responses import forced_response, linear_response
 from .stage import Stage
 
@@ -110,7 +111,7 @@ class Shooting:
     def __init__(
         self,
         model: PredictionModel,
-        weights: Regulator,
+        weights: LQRegulator,
         programme: Condensed,
         products: Products,
         stage: Stage,
@@ -127,11 +128,11 @@ class Shooting:
         parts = [slice(a, b) for a, b in itertools.pairwise(ends)]
         self.payload, self.end, self.speeds, self.rows = parts
         self.rest = read_only(np.tile(stage.rest, self.nodes))
-        y, o = linear_response(model, p, stage)
-        G, Theta = forced_response(model, p, stage, products.scale)
+        y, o = linear_response(p, stage)
+        G, Theta = forced_response(p, stage, products.scale)
 
         # What is known comes as chi, and as a path if that is not of chi's own sea.
-        path, constants = slice(n, n + 2 * (N + 1)), slice(n + 2 * (N + 1), n + 2 * (N + 1) + 2)
+        path, constants = p.horizon.path, p.horizon.constants
         both, size = np.vstack([y, o]), model.size
         of = slice(model.constants_at.start, model.constants_at.start + 2)
         chi = np.zeros((len(both), size))

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from .prediction import prediction_model as prediction_model
     from .prediction import with_noise as with_noise
     from .process_noise import ProcessNoise as ProcessNoise
-    from .regulation import Regulator as Regulator
     from .regulation import regulator as regulator
     from .sampled import SampledWinch as SampledWinch
     from .weights import Weights as Weights

@@ -15,13 +15,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from models.basics import FloatArray, read_only
 from models.plant import MEASUREMENTS
 from models.sensing import MEASURED, Measurement
 from models.sensing.control import MEASURED as HEARD
 
+from ..programme import corrected, kalman_gain
 from .doubling import riccati
 from .prediction import PredictionModel, constant_scales
 
@@ -208,7 +208,7 @@ class Estimator:
         """Return the gain without the measurements whose bits are set."""
         if mask not in self._gains:
             there = np.array([not mask >> k & 1 for k in range(len(MEASURED))])
-            self._gains[mask] = kalman_gain(self.model, self._P, there)
+            self._gains[mask] = kalman_gain(self.model.C, self.model.R, self._P, there)
         return self._gains[mask]
 
 
@@ -229,27 +229,6 @@ def kalman_covariance(model: PredictionModel) -> FloatArray:
     return read_only(P * np.outer(s, s))
 
 
-def kalman_gain(model: PredictionModel, P: FloatArray, there: npt.NDArray[np.bool_]) -> FloatArray:
-    """Return the gain of those measurements that are there; zero columns of the others.
-
-    Parameters
-    ----------
-    model
-        The prediction model.
-    P
-        Covariance of the prediction, (n, n).
-    there
-        (ny,).
-    """
-    gain = np.zeros((model.size, len(there)))
-    if there.any():
-        error = np.sqrt(model.R[there])
-        C = model.C[there] / error[:, None]
-        innovation = C @ P @ C.T + np.eye(len(C))
-        gain[:, there] = np.linalg.solve(innovation, C @ P).T / error
-    return gain
-
-
 def _first_gains(model: PredictionModel, P: FloatArray) -> list[FloatArray]:
     """Return the gains after a start at which the constants are not known, (k, n, ny)."""
     winch = model.winch
@@ -259,12 +238,9 @@ def _first_gains(model: PredictionModel, P: FloatArray) -> list[FloatArray]:
     # A load of another weight hangs lower: the winch's state is not known any better at first.
     moved = winch.moved[:, 0]
     P[: winch.size, : winch.size] += (_LOWER**2) * np.outer(moved, moved)
-    there = np.ones(len(model.R), dtype=np.bool_)
     added, gains = model.G @ model.G.T, []
     for _ in range(round(_STARTING / winch.sample_time)):
-        gain = kalman_gain(model, P, there)
+        gain = kalman_gain(model.C, model.R, P)
         gains.append(gain)
-        kept = np.eye(model.size) - gain @ model.C
-        P = kept @ P @ kept.T + (gain * model.R) @ gain.T
-        P = model.A @ P @ model.A.T + added
+        P = model.A @ corrected(P, model.C, model.R, gain) @ model.A.T + added
     return gains

@@ -17,7 +17,8 @@ and a slow
   there it is the tension that is off);
 * what telemetry and reference unit have on their way: earlier values of what they show.
 
-`mpc.winch.estimator` makes a Kalman filter of it, `mpc.linear.condensed` the quadratic programme.
+`mpc.winch.estimator` makes a Kalman filter of it, `mpc.linear.winch_programme` the quadratic
+programme.
 """
 
 from __future__ import annotations

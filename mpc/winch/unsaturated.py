@@ -20,10 +20,11 @@ import numpy.typing as npt
 
 from models.basics import ComplexArray, FloatArray, read_only
 
+from ..programme import LQRegulator, kalman_gain
 from .doubling import lyapunov
-from .estimator import kalman_covariance, kalman_gain
+from .estimator import kalman_covariance
 from .prediction import PredictionModel
-from .regulation import Regulator
+from .regulation import feedback_row
 
 _NODES = 160
 _LOWEST = 1e-3  # [rad/s]
@@ -42,7 +43,7 @@ class Unsaturated:
     """
 
     model: PredictionModel
-    regulator: Regulator
+    regulator: LQRegulator
 
     @cached_property
     def covariance(self) -> FloatArray:
@@ -52,8 +53,7 @@ class Unsaturated:
     @cached_property
     def gain(self) -> FloatArray:
         """The filter's gain, (n, ny)."""
-        there = np.ones(len(self.model.R), dtype=np.bool_)
-        return read_only(kalman_gain(self.model, self.covariance, there))
+        return read_only(kalman_gain(self.model.C, self.model.R, self.covariance))
 
     @cached_property
     def controller(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -63,7 +63,7 @@ class Unsaturated:
     def _throttled(self, share: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return that of a drive which gives a share of the torque asked for, and says so."""
         model, winch = self.model, self.model.winch
-        row = share * self.regulator.feedback(model)
+        row = share * feedback_row(self.regulator, model)
         ahead = model.A - model.B @ row[None, :]
         command = -row / winch.gain
         command[: winch.size] += winch.back * winch.speed
@@ -117,7 +117,7 @@ class Unsaturated:
         if at == "torque":
             kept = _reached(true)
             A, B = true.A[np.ix_(kept, kept)], true.B[kept]
-            row = -self.regulator.feedback(model)
+            row = -feedback_row(self.regulator, model)
             held = np.eye(model.size) - self.gain @ model.C
             Cc, Dc = (row @ held)[None, :], (row @ self.gain)[None, :]
         through = C @ np.linalg.solve(_pencil(A, z), np.broadcast_to(B, (z.size, *B.shape)))

@@ -17,8 +17,8 @@ from models.sensing import Measurement
 from models.sensing.control import MEASURED
 from models.simulation import prepare
 from mpc.linear import WATCHED, LinearMPC, path_of_sea, sea_at_end
-from mpc.linear.condensed import default_blocking
-from mpc.programme import SoftQP, kkt_residual
+from mpc.programme import SoftQP, default_blocking, kkt_residual
+from mpc.winch.regulation import feedback_row
 
 _NAN = float("nan")
 
@@ -120,7 +120,7 @@ def test_without_active_limits_it_is_the_linear_quadratic_regulator(name):
         solved = controller.qp.solve(*question)
         if (solved.multipliers != 0.0).any():
             continue
-        wanted = -float(controller.regulator.feedback(controller.model) @ chi)
+        wanted = -float(feedback_row(controller.regulator, controller.model) @ chi)
         assert solved.v[0] * controller.programme.unit == pytest.approx(wanted, rel=1e-6, abs=1e-6)
         break
     else:
@@ -217,12 +217,12 @@ def test_cold_and_warm_starts_agree():
 
 def test_blocks_grow_and_fill_the_horizon():
     for horizon in (0.2, 1.0, 3.0, 6.0, 8.0, 10.0, 20.0):
-        blocks = default_blocking(horizon, 0.05)
+        blocks = default_blocking("test", horizon, 0.05)
         assert sum(blocks) == round(horizon / 0.05)
         assert blocks[0] == 1
-    assert len(default_blocking(8.0, 0.05)) < 35
+    assert len(default_blocking("test", 8.0, 0.05)) < 35
     with pytest.raises(sh.InputError, match=r"horizon must be in \[0.2, 100\] s, got 0.1"):
-        default_blocking(0.1, 0.05)
+        default_blocking("test", 0.1, 0.05)
 
 
 def test_the_path_tells_the_state_of_the_sea_at_its_end():

@@ -19,6 +19,7 @@ from mpc.winch import (
     regulator,
     with_noise,
 )
+from mpc.winch.regulation import feedback_row
 from mpc.winch.unsaturated import Unsaturated, _plant
 from mpc.winch.weights import OFF
 
@@ -77,7 +78,7 @@ def sensitivity_on(loop: Unsaturated, plant: PredictionModel, omega: np.ndarray)
     kept = np.r_[np.arange(n), np.arange(plant.constants_at.stop, plant.size)]
     A, B, C = plant.A[np.ix_(kept, kept)], plant.B[kept], plant.C[:, kept]
     Ac, Bc, _, _ = loop.controller
-    row = -loop.regulator.feedback(believed)
+    row = -feedback_row(loop.regulator, believed)
     held = np.eye(believed.size) - loop.gain @ believed.C
     Cc, Dc = (row @ held)[None, :], (row @ loop.gain)[None, :]
     found = []

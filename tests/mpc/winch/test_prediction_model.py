@@ -13,11 +13,12 @@ from models import SolverError
 from models.hook import HookMotion
 from models.plant import build_plant
 from models.sensing import MEASURED
-from mpc.programme import hermite_hold, noisy_hold, root_of
+from mpc.programme import hermite_hold, kalman_gain, noisy_hold, root_of
 from mpc.winch import plan_model, prediction_model, regulator, tune_weights, with_noise
 from mpc.winch.doubling import lyapunov, riccati
-from mpc.winch.estimator import kalman_covariance, kalman_gain
+from mpc.winch.estimator import kalman_covariance
 from mpc.winch.prediction import CONSTANTS
+from mpc.winch.regulation import feedback_row
 from mpc.winch.sampled import sampled_winch
 from mpc.winch.unsaturated import Unsaturated
 from mpc.winch.weights import OFF, saturates
@@ -163,7 +164,7 @@ def test_filter_covariance_solves_its_equation_and_missing_signals_make_it_worse
     model = with_noise(prediction_model(case_of(name)), WEIGHTS[name].noise)
     P = kalman_covariance(model)
     everything = np.ones(len(model.R), dtype=bool)
-    gain = kalman_gain(model, P, everything)
+    gain = kalman_gain(model.C, model.R, P, everything)
     left = np.eye(model.size) - gain @ model.C
     kept = left @ P @ left.T + (gain * model.R) @ gain.T
     again = model.A @ kept @ model.A.T + model.G @ model.G.T
@@ -172,9 +173,9 @@ def test_filter_covariance_solves_its_equation_and_missing_signals_make_it_worse
     assert np.abs(np.linalg.eigvals(model.A - model.A @ gain @ model.C)).max() < 1.0
     without = everything.copy()
     without[3:5] = False
-    lesser = P - kalman_gain(model, P, without) @ model.C @ P
+    lesser = P - kalman_gain(model.C, model.R, P, without) @ model.C @ P
     assert model.hook[0] @ lesser @ model.hook[0] >= model.hook[0] @ kept @ model.hook[0]
-    assert not kalman_gain(model, P, without)[:, 3:5].any()
+    assert not kalman_gain(model.C, model.R, P, without)[:, 3:5].any()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -235,7 +236,7 @@ def test_payload_in_the_modelled_sea_agrees_with_a_long_simulation_of_the_model(
     model = with_noise(truth, WEIGHTS["thesis-1975"].noise)
     loop = Unsaturated(model=model, regulator=regulator(model, 0.3))
     rng = np.random.default_rng(5)
-    row = loop.regulator.feedback(model)
+    row = feedback_row(loop.regulator, model)
     chi, ahead, found = np.zeros(truth.size), np.zeros(model.size), []
     roots = np.sqrt(truth.R)
     G = np.array(truth.G)
