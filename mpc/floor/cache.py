@@ -1,4 +1,4 @@
-"""A drawer for solved records: what was solved once is not solved again.
+"""Cache on disk of solved records, by the question that they answer.
 
 Only the solver's answer is kept.  Whoever takes it out derives every number from it anew, its
 certificate included, so that an entry that is corrupt, foreign or out of date is found out and

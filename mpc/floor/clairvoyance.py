@@ -1,4 +1,4 @@
-r"""The best that anyone could have done: `clairvoyant`, the floor under every controller.
+r"""The floor under every controller on a record that is known beforehand: `clairvoyant`.
 
     case, hook record --> record plant --> quadratic programme --> Clairvoyant
 

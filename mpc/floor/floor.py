@@ -1,4 +1,4 @@
-"""What a clairvoyant found: `Clairvoyant`, every number worked out from a solver's answer.
+"""The clairvoyant optimum of a record, `Clairvoyant`, worked out from a solver's answer.
 
     RecordProblem, RecordSolution --> `floor_of` --> Clairvoyant
 

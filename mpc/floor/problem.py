@@ -1,4 +1,4 @@
-"""A plant, a record of the hook and what counts; and what a solver said of it.
+"""The problem of a whole record, `RecordProblem`, and its solution, `RecordSolution`.
 
     RecordPlant, hook record --> RecordProblem --> `mpc.floor.qp` --> RecordSolution
 

@@ -1,4 +1,8 @@
-"""Forecasts of the hook's motion."""
+"""Forecasts of the hook's motion from what the reference unit has shown.
+
+Heave and heave rate come in, one sample after the other; mean and standard deviation of the motion
+over the next seconds go out.  A predictor learns the record on line or, for reference, has read it.
+"""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-r"""The hook's motion foretold from the record alone: an autoregression fitted on line.
+r"""Autoregression fitted on line to the record alone, as a predictor: `AdaptiveAR`.
 
 No spectrum, no vessel, no model of the unit: what was shown over the last half minute is
 regressed on what came after it.  It adapts as the sea changes, and it is what a user without

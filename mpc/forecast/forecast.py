@@ -1,4 +1,4 @@
-"""What a predictor of the hook's motion gives: mean and standard deviation over the leads.
+"""Forecasts of the hook's motion, mean and standard deviation over the leads, and `Predictor`.
 
     MRU --> Predictor.update --> Predictor.forecast --> Forecast --> QP
 

@@ -1,4 +1,4 @@
-"""Perfect preview: a predictor that has read the future, for reference only.
+"""Perfect preview, the predictor that has read the future, for reference only.
 
 It shows what prediction costs: the same controller with this one and with `AdaptiveAR` differs
 by the forecast alone.  Nothing of the kind exists on board.

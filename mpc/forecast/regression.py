@@ -1,4 +1,4 @@
-r"""The regression behind `AdaptiveAR`: what was shown, on what came after it, with forgetting.
+r"""Regression with forgetting of what came on what was shown before it, for `AdaptiveAR`.
 
 Regressors are pairs of heave and heave rate (times the spacing, so that both are lengths) at
 coarse lags a spacing apart and at a few recent ones.  Knots of the forecast are 0, half and one

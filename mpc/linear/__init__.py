@@ -1,4 +1,9 @@
-"""Predictive control with the linear plant, as one quadratic programme a sample."""
+"""Predictive control with the linear plant, as one quadratic programme a sample.
+
+A case comes in, a controller with the `step` protocol goes out: what the sensors show becomes an
+estimate, this with a forecast the gradient of a programme, and its first move a drive command.
+`WinchMPC` is what linear and nonlinear control share.
+"""
 
 from typing import TYPE_CHECKING
 

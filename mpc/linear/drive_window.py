@@ -1,4 +1,4 @@
-"""What torque the drive can give, now and over the horizon, as bounds on the moves.
+"""Bounds on the moves from the drive's torque, power, voltage and temperature: `DriveWindow`.
 
     motor speeds, thermal budget --> lowest and highest torque of each move
 

@@ -1,6 +1,6 @@
-r"""Linear model predictive control: the whole controller, one step a sample.
+r"""Linear model predictive control of the winch, one quadratic programme a sample: `LinearMPC`.
 
-    m --> Estimator --> chi --> one matrix product --> gradient, bounds --> QP --> torque --> u
+    m --> WinchEstimator --> chi --> one matrix product --> gradient, bounds --> QP --> torque --> u
 
 `LinearMPC` is a controller for the simulator (`models.sensing.control.Controller`): it hears what
 the sensors show, and commands the drive.
@@ -38,7 +38,7 @@ class LinearMPC(WinchMPC):
     r"""A predictive controller of the linear winch within the limits of its drive.
 
     At every sample k, with the estimate chi of winch x, constants c and sea from
-    `mpc.winch.estimator.Estimator`,
+    `mpc.winch.estimator.WinchEstimator`,
 
     .. math::
 

@@ -1,4 +1,4 @@
-"""Every product of a step that does not change, made once: what keeps a step short.
+"""Products of a step that do not change, made once: `Products`.
 
     chi --> [A chi; gradient; free response of the rows] in one matrix product
 

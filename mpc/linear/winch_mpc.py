@@ -1,7 +1,7 @@
 """The recipe that linear and nonlinear predictive control of the winch share: `WinchMPC`.
 
     case --> model, weights, regulator, estimator, limits          once
-    m --> Estimator --> chi ; set point, forecast, thermal cap      every sample
+    m --> WinchEstimator --> chi ; set point, forecast, thermal cap      every sample
     question --> QP --> first move, or that of the last good plan   every sample
 
 What the two put to the solver, and what command they make of its answer, is their own.
@@ -29,11 +29,11 @@ from models.sensing import Measurement
 from models.sensing.control import MEASURED as HEARD
 
 from ..forecast import AdaptiveAR, PerfectPreview
-from ..programme import Condensed, SoftQP, Solved, default_blocking, kkt_residual
+from ..programme import Condensed, QPSolution, SoftQP, default_blocking, kkt_residual
 from ..winch import (
-    Estimator,
     PredictionModel,
     Weights,
+    WinchEstimator,
     plan_model,
     prediction_model,
     regulator,
@@ -133,7 +133,7 @@ class WinchMPC(ABC):
         believed = with_noise(prediction_model(case, sample_time=T, masses=masses), weights.noise)
         self.model = plan_model(believed, weights.stiffness)
         self.regulator = regulator(self.model, weights.torque)
-        self.estimator = Estimator(believed)
+        self.estimator = WinchEstimator(believed)
         limits = DriveLimits.from_case(case) if limits is None else limits
         self.soft_limits = _soft_limits(self.model, limits, least, excursion)
         self._blocks = tuple(int(b) for b in blocks)
@@ -179,7 +179,7 @@ class WinchMPC(ABC):
             ("steps", "iterations", "late", "shifted", "safe", "unproved"), 0
         )
         self.question: tuple[FloatArray, FloatArray, FloatArray] | None = None
-        self.solved: Solved | None = None
+        self.solved: QPSolution | None = None
 
     @abstractmethod
     def step(self, measurement: Measurement, time: float) -> float:

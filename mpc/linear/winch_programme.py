@@ -1,4 +1,4 @@
-r"""The condensed programme of the winch: what it predicts, what it limits, what lies beyond.
+r"""The condensed programme of the winch: its horizon, limited signals, and the sea beyond.
 
     PredictionModel, LQRegulator, blocks --> Horizon --> `mpc.programme.condensed` --> Condensed
 

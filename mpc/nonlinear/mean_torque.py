@@ -1,4 +1,4 @@
-r"""Torque over a sample instead of torque at its start: what a drive at its limit really gives.
+r"""Mean torque of a sample as the move, in place of the torque at its start.
 
 A command is held over a sample, and so the torque falls while the motor speeds up: of a DC motor by
 its back-EMF, of a speed regulator by its gain.  A plan that keeps the torque *at the start* of

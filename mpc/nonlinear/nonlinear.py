@@ -1,7 +1,7 @@
 r"""Nonlinear model predictive control: a Gauss-Newton step a sample, in the place of a linear QP.
 
-    last plan --> Shooting.linearise --> H, rows                           preparation
-    m --> Estimator --> chi --> Shooting.free --> gradient, bounds --> QP --> u      feedback
+    last plan --> Shooting.linearise --> H, rows                                preparation
+    m --> WinchEstimator --> chi --> Shooting.free --> gradient, bounds --> QP --> u   feedback
 
 `NonlinearMPC` differs from `LinearMPC` in its model of the winch alone: cost, limits, estimator and
 the path of the hook are those of `WinchMPC`.
@@ -28,7 +28,7 @@ from ..linear import WinchMPC, path_of_sea
 from ..winch import Weights
 from .mean_torque import start_torque
 from .responses import with_drift
-from .shooting import Known, Prepared, Shooting
+from .shooting import Known, Linearisation, Shooting
 from .stage import make_stage
 
 if TYPE_CHECKING:
@@ -338,7 +338,7 @@ class NonlinearMPC(WinchMPC):
         """Linearise and condense at arguments, moves and speeds of the plan."""
         if math.isfinite(float(self.plan.sum())):
             np.clip(self.plan, *self._sane, out=self.plan)
-            self._prepared: Prepared = self.shooting.linearise(self.plan, exact=exact)
+            self._prepared: Linearisation = self.shooting.linearise(self.plan, exact=exact)
             if self._condensed():
                 return
         # A plan that is beyond all numbers is forgotten.

@@ -1,4 +1,4 @@
-r"""What the linear winch lacks, as forces: drag, slack, losses, layers of the drum.
+r"""Forces that the linear winch lacks: drag, slack rope, losses, layers of the drum.
 
 Each force acts through one column on the state's derivative and depends on a few linear functions
 of the state, its arguments.  At rest every force is zero and so is its effect.

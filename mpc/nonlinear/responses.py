@@ -1,4 +1,4 @@
-"""What the horizon shows of state, path, moves and forces, as matrices: made once.
+"""Responses over the horizon to state, path, moves and forces, as matrices that are made once.
 
 Arguments are those of the forces (`mpc.nonlinear.stage`), outputs what cost and limits need: the
 payload at samples 1 .. N - 1, the state at the end, the motor's speed at the start of each block,

@@ -1,7 +1,7 @@
 r"""Multiple shooting of the nonlinear winch over the horizon, and its Gauss-Newton condensing.
 
-    arguments y of the last plan --> linearise --> Prepared: H, rows      (before the measurement)
-    chi --> known --> Prepared.free --> gradient, free response           (after it)
+    arguments y of the last plan --> linearise --> Linearisation: H, rows  (before the measurement)
+    chi --> known --> Shooting.free --> gradient, free response            (after it)
 
 What is nonlinear are the forces n at K nodes, phi of the arguments y there; all else is linear in
 them, in the moves v and in what is known (`mpc.nonlinear.stage`):
@@ -59,8 +59,8 @@ class Known:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Prepared:
-    """A linearisation, ready for what is known: `Shooting.linearise` makes it.
+class Linearisation:
+    """The horizon linearised about a plan, ready for what is known; `Shooting.linearise` makes it.
 
     Attributes
     ----------
@@ -199,7 +199,7 @@ class Shooting:
         o = known.o - self._relative @ reference
         return Known(known.y, o, known.beyond, known.weight)
 
-    def linearise(self, y: FloatArray, *, exact: bool = False) -> Prepared:
+    def linearise(self, y: FloatArray, *, exact: bool = False) -> Linearisation:
         """Return the linearisation at arguments (K my,).
 
         Unless it is to be exact, springs far from slack count as linear: it saves most of the time
@@ -230,7 +230,7 @@ class Shooting:
         outputs = self._O + Theta @ forced
         p, end = outputs[self.payload], outputs[self.end]
         H = (2.0 / self.programme.cost) * (p.T @ p + end.T @ (self._P @ end)) + self._bend
-        return Prepared(
+        return Linearisation(
             H=0.5 * (H + H.T),
             outputs=outputs,
             moved=self._Y,
@@ -242,7 +242,9 @@ class Shooting:
             o=held[K * my :],
         )
 
-    def free(self, prepared: Prepared, known: Known) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def free(
+        self, prepared: Linearisation, known: Known
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return gradient (nb,), outputs (no,) and active forces (na,) at moves of zero."""
         n = prepared.solve(prepared.offset + prepared.solve.times(known.y + prepared.y))
         o = known.o + prepared.o + prepared.acting[1] @ n
@@ -252,7 +254,7 @@ class Shooting:
         return (2.0 / self.programme.cost) * gradient, o, n
 
     def arguments(
-        self, prepared: Prepared, known: Known, n: FloatArray, v: FloatArray
+        self, prepared: Linearisation, known: Known, n: FloatArray, v: FloatArray
     ) -> FloatArray:
         """Return the arguments (K my,) of moves v, with the free active forces n."""
         acting = prepared.acting[0] @ (n + prepared.forced @ v)

@@ -1,4 +1,4 @@
-r"""One sample of the nonlinear winch: the linear part exact, what is nonlinear as forces beside it.
+r"""One sample of the nonlinear winch, `Stage`: the exact linear part, and forces beside it.
 
 .. math::
 

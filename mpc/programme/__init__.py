@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from .kalman import corrected as corrected
     from .kalman import end_of_record as end_of_record
     from .kalman import kalman_gain as kalman_gain
+    from .qp import QPSolution as QPSolution
     from .qp import SoftQP as SoftQP
-    from .qp import Solved as Solved
     from .qp import kkt_residual as kkt_residual
     from .regulator import LQRegulator as LQRegulator
     from .regulator import lq_regulator as lq_regulator

@@ -1,4 +1,4 @@
-r"""The prediction over the horizon as matrices: every state eliminated, the moves blocked.
+r"""The condensed quadratic programme: every state of the horizon eliminated, the moves blocked.
 
 .. math::
 

@@ -1,4 +1,4 @@
-r"""Gain and covariance of a Kalman filter: what to make of measurements with white errors.
+r"""Gain and covariance of a Kalman filter, for measurements with white errors.
 
     x+ = A x + noise of covariance Q,    y = C x + errors of variances R
 

@@ -1,4 +1,4 @@
-r"""One quadratic programme after another, each a little different from the last: DAQP, kept warm.
+r"""Quadratic programmes with soft rows, each a little different from the last: DAQP, kept warm.
 
 .. math::
 
@@ -29,7 +29,7 @@ _SOFT = 8  # DAQP's bit of a soft row
 
 
 @dataclass(frozen=True, slots=True)
-class Solved:
+class QPSolution:
     """An answer: moves v (n,), a multiplier for each bound, iterations, and whether it is one."""
 
     v: FloatArray
@@ -129,15 +129,15 @@ class SoftQP:
             return False
         return True
 
-    def solve(self, f: FloatArray, lower: FloatArray, upper: FloatArray) -> Solved:
+    def solve(self, f: FloatArray, lower: FloatArray, upper: FloatArray) -> QPSolution:
         """Solve for a gradient (n,) and bounds on moves, hard and soft rows, finite or +-1e20."""
         self._model.update(f=f, bupper=upper, blower=lower)
         v, _, flag, info = self._model.solve()
-        return Solved(v, info["lam"], info["iterations"], flag > 0, flag)
+        return QPSolution(v, info["lam"], info["iterations"], flag > 0, flag)
 
 
 def kkt_residual(
-    qp: SoftQP, f: FloatArray, lower: FloatArray, upper: FloatArray, solved: Solved
+    qp: SoftQP, f: FloatArray, lower: FloatArray, upper: FloatArray, solved: QPSolution
 ) -> float:
     """Return the largest violation of the optimality conditions, by other arithmetic.
 

@@ -1,11 +1,15 @@
-"""The winch as predictive control sees it: model, estimator, weights."""
+"""The winch as predictive control sees it: sampled model, estimator, regulator, weights.
+
+A case comes in; out go the model of winch, sea and sensors' errors in one state, the Kalman filter
+and the regulator that stand on it, and the weights with which both stay robust.
+"""
 
 from typing import TYPE_CHECKING
 
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .estimator import Estimator as Estimator
+    from .estimator import WinchEstimator as WinchEstimator
     from .planning import plan_model as plan_model
     from .prediction import PredictionModel as PredictionModel
     from .prediction import prediction_model as prediction_model

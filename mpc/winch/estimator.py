@@ -1,6 +1,6 @@
-r"""A Kalman filter of winch, sea and sensors' errors, for what the sensors show and no more.
+r"""Kalman filter of winch, sea and sensors' errors, for any set of signals: `WinchEstimator`.
 
-    m[k], u applied over the last sample --> Estimator.update --> chi[k]
+    m[k], u applied over the last sample --> WinchEstimator.update --> chi[k]
 
 Steady-state gain of the prediction model's Riccati equation (Anderson and Moore, *Optimal
 Filtering*, 1979, sec. 4.4); before it, for some seconds, the gains of a filter that does not yet
@@ -40,7 +40,7 @@ _HUGE = 1e12
 _LATER = 1e-3  # of a sample: an age that is no other than usual
 
 
-class Estimator:
+class WinchEstimator:
     """The filter's state, and what moves it.
 
     Parameters

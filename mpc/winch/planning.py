@@ -1,4 +1,4 @@
-r"""The model that plans are made on: the winch of the estimator, its rope stiffer than it is.
+r"""The planning model: the estimator's winch on a rope that is stiffer than it is.
 
     PredictionModel, stiffness --> plan_model --> PredictionModel of the regulator and the programme
 

@@ -1,4 +1,4 @@
-r"""The world as a predictive controller sees it: winch, sea and sensors' errors in one state.
+r"""The prediction model: winch, sea and sensors' errors in one state.
 
     chi[k+1] = A chi + B d + G n        n: white, covariance one
     y[k]     = C chi + v                v: white, covariance R

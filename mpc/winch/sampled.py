@@ -1,4 +1,4 @@
-r"""The winch and its rope, sampled: what a predictive controller can do, and what it does.
+r"""The sampled model of winch and rope, with the torque as its input: `SampledWinch`.
 
     x[k+1] = A x + B d + from_hook [z, z', z+, z+'] + from_constants c
 

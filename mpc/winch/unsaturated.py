@@ -1,4 +1,4 @@
-r"""The loop of a predictive controller that is not at its limits: stable, and how robust.
+r"""The linear loop of a predictive controller away from its limits: poles, margins, rms.
 
     sensors y --> Kalman filter --> regulator --> u --> drive, winch, rope --> y
                                               (broken here)

@@ -1,4 +1,4 @@
-r"""How much to trust the model, and what torque may cost: tuned for a case.
+r"""Weight of the regulator and noise of the filter, tuned for a case: `tune_weights`.
 
 The regulator has one free number, the weight on the input; the filter has four: how much noise it
 reckons with in force, torque, rope and sensors. They are chosen so that the mean square of the
