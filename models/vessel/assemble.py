@@ -74,6 +74,11 @@ def text_of(owner: str, data: bytes) -> str:
         return data.decode("latin-1")
 
 
+def decoded(value: object) -> str:
+    """Return a text that HDF5 may hold as bytes."""
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
 def numbers(owner: str, line: int, words: Sequence[str]) -> list[float]:
     """Return words as finite numbers; Fortran's 1.0D+00 is one too.
 

@@ -18,7 +18,7 @@ for phases relative to the wave's crest, trough, zero up-crossing and zero down-
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -226,6 +226,3 @@ def one_of(owner: str, name: str, value: object, choices: Sequence[str]) -> str:
         if text == choice.lower():
             return choice
     raise InputError(f"{owner}: {name} must be one of {', '.join(choices)}; got {value!r}")
-
-
-WaveNumber = Callable[[npt.ArrayLike], FloatArray]

@@ -23,7 +23,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline
 
 from ...basics import (
     GRAVITY,
@@ -119,6 +118,8 @@ class Hydrodynamics:
         InputError
             If a frequency lies outside the table.
         """
+        from scipy.interpolate import CubicSpline  # here: whoever reads RAOs needs none of it
+
         wanted = np.atleast_1d(check_ascending("hydrodynamics", "omega", np.asarray(omega)))
         low, high = float(self.omega[0]), float(self.omega[-1])
         slack = 1e-9 * high

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...basics import GRAVITY, FloatArray, InputError
+from ..assemble import decoded
 from ..raos import MODES
 
 LARGEST = 20_000_000
@@ -125,7 +126,7 @@ class CapytaineData:
         """Return the degrees of freedom along an axis."""
         if axis not in self._dataset.coords:
             raise InputError(f"{self.owner}: there is no coordinate {axis}: {self.names()}")
-        found = tuple(_text(v) for v in np.atleast_1d(self._dataset[axis].values))
+        found = tuple(decoded(v) for v in np.atleast_1d(self._dataset[axis].values))
         if len(set(found)) != len(found):
             raise InputError(f"{self.owner}: {axis} names a degree of freedom twice: {found}")
         return found
@@ -195,7 +196,7 @@ class CapytaineData:
 
     def _paired(self, name: str, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return complex numbers from pairs along the last axis."""
-        labels = [_text(v) for v in np.atleast_1d(self._dataset["complex"].values)]
+        labels = [decoded(v) for v in np.atleast_1d(self._dataset["complex"].values)]
         if sorted(labels) != ["im", "re"] or values.dtype.kind not in "fiu":
             raise InputError(f"{self.owner}: {name} must be pairs of re and im, got {labels}")
         real, imaginary = labels.index("re"), labels.index("im")
@@ -272,10 +273,6 @@ def _opened(owner: str, data: bytes) -> Any:
     except Exception as error:
         words = " ".join(str(error).split())[:160]
         raise InputError(f"{owner}: this NetCDF cannot be read: {words}") from error
-
-
-def _text(value: Any) -> str:
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
 def _listed(names: Any) -> str:

@@ -18,20 +18,20 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ...basics import ComplexArray, FloatArray, InputError, check_finite, check_hdf5, check_range
-from ..assemble import finished, read_bytes
+from ...basics import ComplexArray, FloatArray, InputError, check_finite, check_range
+from ..assemble import finished
 from ..hull import FloatingBody, Hydrodynamics, centre_of_mass, solved_motions
 from ..raos import MODES, VesselRaos
-from .capytaine_dataset import CapytaineData
-from .capytaine_parts import kept_rows, places, square_matrix, turned_headings, wave_force
+from .capytaine_dataset import CapytaineData, mode_of
 
 Point = tuple[float, float, float]
 
 _ROLL = MODES.index("roll")
 
 
-def read_capytaine(
-    path: str | Path,
+def parse_capytaine(
+    owner: str,
+    data: bytes,
     *,
     roll_damping: float | None = None,
     body: int | str | None = None,
@@ -45,8 +45,9 @@ def read_capytaine(
 
     Parameters
     ----------
-    path
-        The file.
+    owner, data
+        The file's path, for messages, and its bytes; if they are HDF5, known to be readable by
+        :func:`models.basics.hdf5_check.check_hdf5`.
     roll_damping
         Damping of roll beyond that of the waves it makes, over the critical [-].  Given, the
         motions are computed anew even if the file has them.
@@ -70,33 +71,30 @@ def read_capytaine(
     InputError
         If the file is not one of Capytaine's, is damaged, or lacks what it takes.
     """
-    owner = str(path)
     body = None if body is None else str(body)
     if roll_damping is not None:
         check_range(owner, "roll_damping", roll_damping, low=0.0, high=1.0)
-    content = read_bytes(path)
-    check_hdf5(path)
-    data = CapytaineData(owner, content, chosen={"water_depth": depth, "forward_speed": speed})
-    notes = [f"written by Capytaine {data.version}: time factor e^(-i omega t), conjugated"]
-    moving = data.number("forward_speed") or 0.0
-    point = _origin(data, origin, notes)
-    stored = next((name for name in ("RAO", "rao") if data.has(name)), None)
+    file = CapytaineData(owner, data, chosen={"water_depth": depth, "forward_speed": speed})
+    notes = [f"written by Capytaine {file.version}: time factor e^(-i omega t), conjugated"]
+    moving = file.number("forward_speed") or 0.0
+    point = _origin(file, origin, notes)
+    stored = next((name for name in ("RAO", "rao") if file.has(name)), None)
     if moving != 0.0 and (stored is None or roll_damping is not None):
         raise InputError(
             f"{owner}: motions at forward speed ({moving:g} m/s) are read where the file has them "
             "(a variable RAO), not computed from coefficients"
         )
     if stored is not None and roll_damping is None:
-        omega, heading, values = _stored(data, stored, body, notes)
+        omega, heading, values = _stored(file, stored, body, notes)
     else:
         omega, heading, values = _computed(
-            data, body, roll_damping, inertia, stiffness, point, notes
+            file, body, roll_damping, inertia, stiffness, point, notes
         )
     order = np.argsort(heading)
-    water = data.number("water_depth")
+    water = file.number("water_depth")
     return finished(
         VesselRaos(
-            name=Path(path).stem,
+            name=Path(owner).stem,
             omega=omega,
             heading=heading[order],
             values=values[:, order],
@@ -120,15 +118,15 @@ def _stored(
     except InputError:
         axis = "influenced_dof"
     dofs = data.dofs(axis)
-    place = places(data, dofs, body)
+    place = _places(data, dofs, body)
     values = data.table(name, ("frequency", "wave_direction", axis), dofs)
-    order = kept_rows(data, values)
+    order = _kept_rows(data, values)
     found = np.zeros((order.size, values.shape[1], 6), dtype=np.complex128)
     for mode, column in place.items():
         found[:, :, MODES.index(mode)] = values[order][:, :, column]
     _tell_missing(place, notes)
     notes.append(f"the RAO as the file has it ({name})")
-    heading, first = turned_headings(data)
+    heading, first = _turned_headings(data)
     return data.omega[order], heading, np.conj(found[:, first])
 
 
@@ -149,17 +147,17 @@ def _computed(
             f"file has {data.names()}"
         )
     dofs = data.dofs()
-    place = places(data, dofs, body)
+    place = _places(data, dofs, body)
     square = ("influenced_dof", "radiating_dof")
     added = data.table("added_mass", ("frequency", *square), dofs)
     damping = data.table("radiation_damping", ("frequency", *square), dofs)
-    force = wave_force(data, dofs)
-    order = kept_rows(data, force, added, damping)
-    heading, first = turned_headings(data)
+    force = _wave_force(data, dofs)
+    order = _kept_rows(data, force, added, damping)
+    heading, first = _turned_headings(data)
     omega, force = data.omega[order], np.conj(force[order][:, first])
     added, damping = added[order].real, damping[order].real
-    mass = square_matrix(data, "inertia_matrix", inertia, "inertia", dofs, place)
-    spring = square_matrix(data, "hydrostatic_stiffness", stiffness, "stiffness", dofs, place)
+    mass = _square_matrix(data, "inertia_matrix", inertia, "inertia", dofs, place)
+    spring = _square_matrix(data, "hydrostatic_stiffness", stiffness, "stiffness", dofs, place)
     columns = [place.get(mode) for mode in MODES]
     share = 0.0 if roll_damping is None else roll_damping
     if len(dofs) > len(place) or None in columns:
@@ -269,3 +267,101 @@ def _tell_missing(place: dict[str, int], notes: list[str]) -> None:
     missing = [mode for mode in MODES if mode not in place]
     if missing:
         notes.append(f"the file has no {', '.join(missing)}: taken as held")
+
+
+def _places(data: CapytaineData, dofs: tuple[str, ...], body: str | None) -> dict[str, int]:
+    """Return where each motion of the body stands."""
+    bodies: dict[str, dict[str, int]] = {}
+    for column, dof in enumerate(dofs):
+        name, mode = mode_of(dof)
+        if mode is None:
+            continue
+        if mode in bodies.setdefault(name, {}):
+            raise InputError(f"{data.owner}: {mode} is there twice: {', '.join(dofs)}")
+        bodies[name][mode] = column
+    if not bodies:
+        raise InputError(
+            f"{data.owner}: none of the degrees of freedom is one of {', '.join(MODES)}: "
+            f"{', '.join(dofs)}"
+        )
+    if body is None:
+        if len(bodies) > 1:
+            raise InputError(f"{data.owner}: say which body: {', '.join(bodies)}")
+        return next(iter(bodies.values()))
+    if body not in bodies and not (len(bodies) == 1 and "" in bodies):
+        raise InputError(f"{data.owner}: body must be one of {', '.join(bodies)}, got {body!r}")
+    return bodies.get(body, bodies.get("", {}))
+
+
+def _kept_rows(data: CapytaineData, *tables: npt.NDArray[np.generic]) -> npt.NDArray[np.intp]:
+    """Return the rows to keep, ascending: frequencies 0 and infinity make no waves."""
+    finite = np.isfinite(data.omega) & (data.omega > 0.0)
+    if np.any(np.isnan(data.omega)) or np.any(data.omega < 0.0):
+        raise InputError(f"{data.owner}: frequencies must be at least 0 rad/s, got {data.omega}")
+    for table in tables:
+        whole = np.isfinite(table).reshape(table.shape[0], -1).all(axis=1)
+        bad = np.flatnonzero(finite & ~whole)
+        if bad.size:
+            raise InputError(
+                f"{data.owner}: there are numbers that are not finite at "
+                f"{data.omega[bad[0]]:g} rad/s"
+            )
+    keep = np.flatnonzero(finite)
+    order = keep[np.argsort(data.omega[keep], kind="stable")]
+    if order.size < 2:
+        raise InputError(f"{data.owner}: at least 2 frequencies are needed, got {order.size}")
+    return order
+
+
+def _turned_headings(data: CapytaineData) -> tuple[FloatArray, npt.NDArray[np.intp]]:
+    """Return headings in [0, 2 pi), and where each stands in the file; one that is twice, once."""
+    turned = np.mod(data.headings(), 2.0 * math.pi)
+    turned = np.where(2.0 * math.pi - turned < 1e-7, 0.0, turned)
+    _, first = np.unique(np.round(turned, 7), return_index=True)
+    return turned[first], first
+
+
+def _wave_force(data: CapytaineData, dofs: tuple[str, ...]) -> ComplexArray:
+    """Return the wave force (k, h, n), in the file's convention."""
+    axes = ("frequency", "wave_direction", "influenced_dof")
+    if data.has("excitation_force"):
+        return data.table("excitation_force", axes, dofs).astype(np.complex128)
+    parts = ("diffraction_force", "Froude_Krylov_force")
+    missing = [n for n in parts if not data.has(n)]
+    if missing:
+        raise InputError(
+            f"{data.owner}: the motions cannot be computed: {' and '.join(missing)} missing, and "
+            f"no excitation_force; the file has {data.names()}"
+        )
+    return np.asarray(sum(data.table(n, axes, dofs) for n in parts), dtype=np.complex128)
+
+
+def _square_matrix(
+    data: CapytaineData,
+    name: str,
+    given: npt.ArrayLike | None,
+    argument: str,
+    dofs: tuple[str, ...],
+    place: dict[str, int],
+) -> FloatArray:
+    """Return mass or stiffness over all degrees of freedom, from the caller or the file."""
+    if given is not None:
+        six = check_finite(data.owner, argument, given)
+        if six.shape != (6, 6) or len(place) != len(dofs):
+            raise InputError(
+                f"{data.owner}: {argument} must be 6 by 6, for a file of one rigid body; got "
+                f"{six.shape} and {len(dofs)} degrees of freedom"
+            )
+        modes = sorted(place, key=lambda mode: place[mode])
+        index = [MODES.index(mode) for mode in modes]
+        return np.asarray(six[np.ix_(index, index)])
+    if not data.has(name):
+        raise InputError(
+            f"{data.owner}: the motions cannot be computed: the file has neither a RAO nor the "
+            f"variable {name}; give it as {argument}=, or add it with Capytaine's "
+            "assemble_dataset of a body with a centre of mass"
+        )
+    found = data.table(name, ("influenced_dof", "radiating_dof"), dofs)
+    if not np.all(np.isfinite(found)):
+        raise InputError(f"{data.owner}: {name} must be finite numbers")
+    return np.asarray(found.real, dtype=np.float64)

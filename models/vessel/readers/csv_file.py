@@ -55,15 +55,13 @@ def looks_like_csv(text: str) -> bool:
     return False
 
 
-def parse_csv(owner: str, text: str, *, name: str | None = None) -> VesselRaos:
+def parse_csv(owner: str, text: str) -> VesselRaos:
     """Return the table of a CSV file.
 
     Parameters
     ----------
     owner, text
         The file's path, for messages, and what is in it.
-    name
-        What the vessel is called; if left out, the name in the file.
 
     Raises
     ------
@@ -98,7 +96,7 @@ def parse_csv(owner: str, text: str, *, name: str | None = None) -> VesselRaos:
         found.append(f"no columns for {', '.join(missing)}: taken as zero")
     own = told.get("convention format", "") == FORMAT
     raos = VesselRaos(
-        name=name or told.get("name", "vessel"), omega=w, heading=b, values=table,
+        name=told.get("name", "vessel"), omega=w, heading=b, values=table,
         origin=(origin[0], origin[1], origin[2]), phase_origin=(zero[0], zero[1]), depth=depth,
         speed=_figure(owner, "speed", told, 0.0), source=told.get("source", "") or owner,
         notes=tuple(notes) if own and convention == Convention() else (*notes, *found),
@@ -110,16 +108,10 @@ def parse_csv(owner: str, text: str, *, name: str | None = None) -> VesselRaos:
     return raos if own and symmetry is None else finished(raos, symmetry=symmetry)
 
 
-def csv_text(raos: VesselRaos, *, complex_numbers: bool = True) -> str:
+def csv_text(raos: VesselRaos) -> str:
     """Return a table as the text of a CSV file, in the project's convention.
 
-    Parameters
-    ----------
-    raos
-        What to write.
-    complex_numbers
-        Real and imaginary parts, which read back to the last digit; else amplitudes and phases
-        [deg], which a person reads.
+    Real and imaginary parts, which read back to the last digit.
     """
     out = io.StringIO()
     out.write(f"# format: {FORMAT}\n")
@@ -135,17 +127,12 @@ def csv_text(raos: VesselRaos, *, complex_numbers: bool = True) -> str:
     ]
     for key, value in about:
         out.write(f"# {key}: {' '.join(str(value).split())}\n")
-    parts = ("real", "imag") if complex_numbers else ("amplitude", "phase")
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(
-        ["omega [rad/s]", "heading [deg]", *(f"{m}_{part}" for m in MODES for part in parts)]
-    )
-    amplitude, phase, values = Convention().table(raos.values, np.ones(raos.values.shape[:2]))
-    first, second = (values.real, values.imag) if complex_numbers else (amplitude, phase)
-    degrees = Convention().headings_deg(raos.heading)
-    for j, heading in enumerate(degrees):
+    parts = [f"{mode}_{part}" for mode in MODES for part in ("real", "imag")]
+    writer.writerow(["omega [rad/s]", "heading [deg]", *parts])
+    for j, heading in enumerate(Convention().headings_deg(raos.heading)):
         for i, omega in enumerate(raos.omega):
-            cells = np.column_stack([first[i, j], second[i, j]]).ravel()
+            cells = raos.values[i, j].view(np.float64)
             writer.writerow([repr(float(v)) for v in (omega, heading, *cells)])
     return out.getvalue()
 

@@ -10,13 +10,14 @@ is still one.  Whatever a reader trips over comes out as an
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from importlib.resources import files as resources
+from inspect import signature
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ...basics import (
     InputError,
@@ -30,28 +31,60 @@ from ..assemble import finished, read_bytes, text_of
 from ..convention import one_of
 from ..raos import VesselRaos
 from ..symmetry import SYMMETRIES
+from .capytaine_file import parse_capytaine
+from .csv_file import csv_text, looks_like_csv, parse_csv
 from .long_waves import check_long_waves
+from .mss import parse_mss
+from .netcdf_file import is_ours, parse_netcdf, write_netcdf
+from .orcaflex import looks_like_orcaflex, parse_orcaflex
+from .shipx import looks_like_shipx, parse_shipx
+from .wamit import looks_like_wamit, parse_wamit
 
-FORMATS = {
-    "csv": "the project's CSV, or one of your own with the same columns",
-    "netcdf": "the project's NetCDF",
-    "wamit": "WAMIT .4, also written by HAMS, NEMOH converters and others",
-    "orcaflex": "OrcaFlex text file (.yml) with a vessel type",
-    "capytaine": "Capytaine NetCDF",
-    "mss": "MATLAB .mat with a vessel of the Marine Systems Simulator",
-    "shipx": "ShipX/Veres .re1",
+
+@dataclass(frozen=True, kw_only=True)
+class Reader:
+    """A format of RAO files, and the function that reads it.
+
+    Attributes
+    ----------
+    about
+        What such a file is.
+    parse
+        From the file's path, for messages, and its contents to the table.  Its keyword-only
+        arguments are what a user may say about such a file.
+    text
+        Whether the contents are text.
+    """
+
+    about: str
+    parse: Callable[..., VesselRaos]
+    text: bool = True
+
+    @property
+    def options(self) -> list[str]:
+        """What a user may say about such a file, in alphabetic order."""
+        every = signature(self.parse).parameters.values()
+        return sorted(p.name for p in every if p.kind is p.KEYWORD_ONLY)
+
+
+FORMATS: Mapping[str, Reader] = {
+    "csv": Reader(
+        about="the project's CSV, or one of your own with the same columns", parse=parse_csv
+    ),
+    "netcdf": Reader(about="the project's NetCDF", parse=parse_netcdf, text=False),
+    "wamit": Reader(
+        about="WAMIT .4, also written by HAMS, NEMOH converters and others", parse=parse_wamit
+    ),
+    "orcaflex": Reader(about="OrcaFlex text file (.yml) with a vessel type", parse=parse_orcaflex),
+    "capytaine": Reader(about="Capytaine NetCDF", parse=parse_capytaine, text=False),
+    "mss": Reader(
+        about="MATLAB .mat with a vessel of the Marine Systems Simulator",
+        parse=parse_mss,
+        text=False,
+    ),
+    "shipx": Reader(about="ShipX/Veres .re1", parse=parse_shipx),
 }
-"""The formats that are read, and what they are."""
-
-_OPTIONS = {
-    "csv": set(),
-    "netcdf": set(),
-    "wamit": {"body", "length", "depth", "origin", "waves"},
-    "orcaflex": {"vessel_type", "draught", "depth"},
-    "capytaine": {"body", "depth", "speed", "origin", "roll_damping", "inertia", "stiffness"},
-    "mss": {"speed", "origin"},
-    "shipx": {"speed"},
-}  # type: dict[str, set[str]]
+"""The formats that are read."""
 
 _BUNDLED = {
     "osv-83m": "offshore support vessel, 83 m, from our own hull lines by Capytaine",
@@ -61,56 +94,13 @@ _HDF5 = b"\x89HDF"
 _LARGEST = 1e4  # m/m or rad/m: no vessel moves so
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Options:
-    """What a user may say about a file; each format knows some of it."""
-
-    speed: float | None = None
-    body: int | str | None = None
-    length: float | None = None
-    depth: float | None = None
-    origin: Sequence[float] | None = None
-    vessel_type: str | None = None
-    draught: str | None = None
-    roll_damping: float | None = None
-    inertia: npt.ArrayLike | None = None
-    stiffness: npt.ArrayLike | None = None
-    waves: str | None = None
-
-    def given(self, owner: str, kind: str) -> dict[str, object]:
-        """Return those that were given, checked against the format."""
-        found = {key: value for key, value in vars(self).items() if value is not None}
-        strange = sorted(set(found) - _OPTIONS[kind])
-        if strange:
-            knows = ", ".join(sorted(_OPTIONS[kind])) or "none"
-            raise InputError(
-                f"{owner}: {strange[0]} says nothing about a {kind} file (its options: {knows})"
-            )
-        if "origin" in found:
-            point = check_finite(owner, "origin", list(self.origin or ()))
-            if point.shape != (3,):
-                raise InputError(f"{owner}: origin must be 3 numbers [m], got {self.origin!r}")
-            found["origin"] = tuple(float(x) for x in point)
-        return found
-
-
 def read_raos(
     path: str | Path,
     *,
     file_format: str | None = None,
-    speed: float | None = None,
-    body: int | str | None = None,
-    length: float | None = None,
-    depth: float | None = None,
-    origin: Sequence[float] | None = None,
-    vessel_type: str | None = None,
-    draught: str | None = None,
-    roll_damping: float | None = None,
-    inertia: npt.ArrayLike | None = None,
-    stiffness: npt.ArrayLike | None = None,
-    waves: str | None = None,
     symmetry: str | None = None,
     check: bool = True,
+    **options: Any,
 ) -> VesselRaos:
     """Read the RAOs of a vessel.
 
@@ -120,31 +110,27 @@ def read_raos(
         A file, or the name of a bundled vessel such as `osv-83m`.
     file_format
         One of :data:`FORMATS`; if left out, the contents tell.
-    speed
-        Which forward speed of the file [m/s] (MSS, ShipX, Capytaine).
-    body
-        Which body of the file (WAMIT: a number from 1; Capytaine: a name).
-    length
-        WAMIT's ULEN [m], 1 m if left out.
-    depth
-        Water depth [m], where the file does not tell (WAMIT, OrcaFlex) or has several (Capytaine).
-    origin
-        The point whose motions these are [m], where the file does not tell (WAMIT, MSS,
-        Capytaine).
-    vessel_type, draught
-        Their names, where an OrcaFlex file has several.
-    roll_damping
-        Damping of roll to add, over the critical [-] (Capytaine).
-    inertia, stiffness
-        Mass and hydrostatic stiffness (6, 6), where a Capytaine file has none.
-    waves
-        Whether the first column of a WAMIT file is the `period` or the `frequency`; if left out,
-        the heave of long waves tells.
     symmetry
         One of :data:`models.vessel.symmetry.SYMMETRIES`, to fill in headings where neither the
         file nor the table tells.
     check
         Whether a table that contradicts the limits of long waves is refused.
+    options
+        What the file leaves open; each format knows some of these:
+
+        - speed: which forward speed of the file [m/s] (MSS, ShipX, Capytaine).
+        - body: which body of the file (WAMIT: a number from 1; Capytaine: a name).
+        - length: WAMIT's ULEN [m], 1 m if left out.
+        - depth: water depth [m], where the file does not tell (WAMIT, OrcaFlex) or has several
+          (Capytaine).
+        - origin: the point whose motions these are (3,) [m], where the file does not tell (WAMIT,
+          MSS, Capytaine).
+        - vessel_type, draught: their names, where an OrcaFlex file has several.
+        - roll_damping: damping of roll to add, over the critical [-] (Capytaine).
+        - inertia, stiffness: mass and hydrostatic stiffness (6, 6), where a Capytaine file has
+          none.
+        - waves: whether the first column of a WAMIT file is the `period` or the `frequency`; if
+          left out, the heave of long waves tells.
 
     Returns
     -------
@@ -162,11 +148,6 @@ def read_raos(
     PhysicsWarning
         If the motions in long waves are not those of a free-floating vessel, unexplained.
     """
-    options = _Options(
-        speed=speed, body=body, length=length, depth=depth, origin=origin,
-        vessel_type=vessel_type, draught=draught, roll_damping=roll_damping, inertia=inertia,
-        stiffness=stiffness, waves=waves,
-    )  # fmt: skip
     place = _place(path)
     owner = str(path)
     data = read_bytes(place)
@@ -178,10 +159,12 @@ def read_raos(
     kind = ""
     try:
         kind = file_format_of(owner, data) if file_format is None else file_format
-        given = options.given(owner, kind)
+        reader = FORMATS[kind]
+        given = _given(owner, kind, options)
+        content = text_of(owner, data) if reader.text else data
         # Numbers of a damaged file may overflow; what is not finite is refused with its place.
         with np.errstate(all="ignore"):
-            raos = _read(owner, place, data, kind, given)
+            raos = reader.parse(owner, content, **given)
             if symmetry is not None:
                 raos = finished(raos, symmetry=one_of(owner, "symmetry", symmetry, SYMMETRIES))
             largest = float(np.abs(raos.values).max())
@@ -189,9 +172,8 @@ def read_raos(
         raise
     except Exception as error:  # whatever a library makes of a damaged file
         what = f"{type(error).__name__}, {' '.join(str(error).split())[:160]}"
-        raise InputError(
-            f"{owner}: cannot be read as {FORMATS.get(kind, 'a RAO file')}: {what}"
-        ) from error
+        about = FORMATS[kind].about if kind else "a RAO file"
+        raise InputError(f"{owner}: cannot be read as {about}: {what}") from error
     if largest > _LARGEST:
         raise InputError(
             f"{owner}: RAOs must be at most {_LARGEST:g} m/m or rad/m, got {largest:.3g}"
@@ -209,12 +191,8 @@ def write_raos(path: str | Path, raos: VesselRaos) -> Path:
     """
     place = Path(path)
     if place.suffix.lower() == ".csv":
-        from .csv_file import csv_text
-
         return write_text_atomically(place, csv_text(raos))
     if place.suffix.lower() == ".nc":
-        from .netcdf_file import write_netcdf
-
         return write_netcdf(place, raos)
     raise InputError(f"{place}: the name of a RAO file must end in .csv or .nc")
 
@@ -232,12 +210,6 @@ def file_format_of(owner: str, data: bytes) -> str:
     InputError
         If they are none of them.
     """
-    from .csv_file import looks_like_csv
-    from .netcdf_file import is_ours
-    from .orcaflex import looks_like_orcaflex
-    from .shipx import looks_like_shipx
-    from .wamit import looks_like_wamit
-
     head = data[:8]
     if head.startswith(_HDF5):
         return "netcdf" if is_ours(owner, data) else "capytaine"
@@ -267,38 +239,25 @@ def file_format_of(owner: str, data: bytes) -> str:
     )
 
 
-def _read(owner: str, place: Path, data: bytes, kind: str, given: dict[str, object]) -> VesselRaos:
-    """Let the reader of a format read; what it may raise is anything."""
-    # The options were checked against the format; their types are the readers' to refuse.
-    options: dict[str, object] = given
-    if kind == "netcdf":
-        from .netcdf_file import parse_netcdf
+def _given(owner: str, kind: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options that were given, if the format knows them all.
 
-        return parse_netcdf(owner, data)
-    if kind == "capytaine":
-        from .capytaine_file import read_capytaine
-
-        return read_capytaine(place, **options)  # type: ignore[arg-type]
-    if kind == "mss":
-        from .mss import parse_mss
-
-        return parse_mss(owner, data, **options)  # type: ignore[arg-type]
-    text = text_of(owner, data)
-    if kind == "csv":
-        from .csv_file import parse_csv
-
-        return parse_csv(owner, text)
-    if kind == "orcaflex":
-        from .orcaflex import parse_orcaflex
-
-        return parse_orcaflex(owner, text, **options)  # type: ignore[arg-type]
-    if kind == "shipx":
-        from .shipx import parse_shipx
-
-        return parse_shipx(owner, text, **options)  # type: ignore[arg-type]
-    from .wamit import parse_wamit
-
-    return parse_wamit(owner, text, name=place.stem, **options)  # type: ignore[arg-type]
+    Their types are the reader's to refuse, but for a point, which several readers take.
+    """
+    found = {key: value for key, value in options.items() if value is not None}
+    knows = FORMATS[kind].options
+    strange = sorted(set(found) - set(knows))
+    if strange:
+        raise InputError(
+            f"{owner}: {strange[0]} says nothing about a {kind} file "
+            f"(its options: {', '.join(knows) or 'none'})"
+        )
+    if "origin" in found:
+        point = check_finite(owner, "origin", list(found["origin"]))
+        if point.shape != (3,):
+            raise InputError(f"{owner}: origin must be 3 numbers [m], got {found['origin']!r}")
+        found["origin"] = tuple(point.tolist())
+    return found
 
 
 def _checked(owner: str, raos: VesselRaos) -> VesselRaos:

@@ -37,7 +37,6 @@ def parse_mss(
     owner: str,
     data: bytes,
     *,
-    name: str | None = None,
     speed: float | None = None,
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> VesselRaos:
@@ -47,8 +46,6 @@ def parse_mss(
     ----------
     owner, data
         The file's path, for messages, and its bytes.
-    name
-        What the vessel is called; if left out, the name in the file.
     speed
         Which speed of the file [m/s]; the lowest if left out.
     origin
@@ -88,7 +85,7 @@ def parse_mss(
         notes.append(f"speed {chosen:g} m/s of {', '.join(f'{v:g}' for v in np.sort(speeds))} m/s")
     return finished(
         VesselRaos(
-            name=name or _name(vessel), omega=rows[0], heading=rows[1], values=rows[2],
+            name=_name(vessel), omega=rows[0], heading=rows[1], values=rows[2],
             origin=origin, phase_origin=origin[:2], speed=chosen, source=owner, notes=tuple(notes),
         )
     )  # fmt: skip

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...basics import InputError, check_range, replace_atomically
+from ..assemble import decoded
 from ..raos import MODES, VesselRaos
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def write_netcdf(path: str | Path, raos: VesselRaos) -> Path:
     return replace_atomically(path, lambda place: data.to_netcdf(place, engine="h5netcdf"))
 
 
-def parse_netcdf(owner: str, data: bytes, *, name: str | None = None) -> VesselRaos:
+def parse_netcdf(owner: str, data: bytes) -> VesselRaos:
     """Return the table of a file that :func:`write_netcdf` made.
 
     It is read as the HDF5 file that it is, without the layers that label data sets: they are slow
@@ -82,8 +83,6 @@ def parse_netcdf(owner: str, data: bytes, *, name: str | None = None) -> VesselR
     ----------
     owner, data
         The file's path, for messages, and its bytes.
-    name
-        What the vessel is called; if left out, the name in the file.
 
     Raises
     ------
@@ -96,8 +95,8 @@ def parse_netcdf(owner: str, data: bytes, *, name: str | None = None) -> VesselR
         with h5py.File(io.BytesIO(data), "r") as file:
             attrs = {key: file.attrs[key] for key in file.attrs}
             columns = {key: np.asarray(file[key][()]) for key in _VARIABLES}
-        modes = [_text(mode) for mode in columns["mode"].ravel()]
-        if _text(attrs.get("format", "")) != FORMAT or modes != list(MODES):
+        modes = [decoded(mode) for mode in columns["mode"].ravel()]
+        if decoded(attrs.get("format", "")) != FORMAT or modes != list(MODES):
             raise InputError(f"{owner}: this is no NetCDF file of RAOs that Stillhook wrote")
         real, imag = (
             np.asarray(columns[key], dtype=np.float64) for key in ("rao_real", "rao_imag")
@@ -105,7 +104,7 @@ def parse_netcdf(owner: str, data: bytes, *, name: str | None = None) -> VesselR
         x, y, z = np.ravel(attrs["origin"]).tolist()
         px, py = np.ravel(attrs["phase_origin"]).tolist()
         return VesselRaos(
-            name=name or _text(attrs["name"]),
+            name=decoded(attrs["name"]),
             omega=np.asarray(columns["omega"], dtype=np.float64),
             heading=np.asarray(columns["heading"], dtype=np.float64),
             values=real + 1j * imag,
@@ -113,8 +112,8 @@ def parse_netcdf(owner: str, data: bytes, *, name: str | None = None) -> VesselR
             phase_origin=(px, py),
             depth=float(np.ravel(attrs["depth"])[0]),
             speed=check_range(owner, "speed", np.ravel(attrs["speed"])[0]),
-            source=_text(attrs["source"]),
-            notes=tuple(str(note) for note in json.loads(_text(attrs["notes"]))),
+            source=decoded(attrs["source"]),
+            notes=tuple(str(note) for note in json.loads(decoded(attrs["notes"]))),
         )
     except InputError:
         raise
@@ -136,14 +135,10 @@ def is_ours(owner: str, data: bytes) -> bool:
 
     try:
         with h5py.File(io.BytesIO(data), "r") as found:
-            told = _text(found.attrs.get("format", ""))
+            told = decoded(found.attrs.get("format", ""))
     except Exception as error:  # h5py raises nearly anything on a damaged file
         raise InputError(
             f"{owner}: cannot be opened as NetCDF/HDF5: {' '.join(str(error).split())[:120]}; is "
             "the file cut off?"
         ) from error
     return told == FORMAT
-
-
-def _text(value: object) -> str:
-    return value.decode(errors="replace") if isinstance(value, bytes) else str(value)

@@ -43,11 +43,10 @@ def looks_like_orcaflex(text: str) -> bool:
 def parse_orcaflex(
     owner: str,
     text: str,
+    kind: str = "displacement",
     *,
-    name: str | None = None,
     vessel_type: str | None = None,
     draught: str | None = None,
-    kind: str = "displacement",
     depth: float = math.inf,
 ) -> VesselRaos:
     """Return the RAOs of one draught of one vessel type.
@@ -56,12 +55,10 @@ def parse_orcaflex(
     ----------
     owner, text
         The file's path, for messages, and what is in it.
-    name
-        What the vessel is called; if left out, the name of the vessel type.
-    vessel_type, draught
-        Their names in the file; if left out, the first that has RAOs.
     kind
         `displacement`; or `load` for the wave loads, whose `values` are then N/m and N m/m.
+    vessel_type, draught
+        Their names in the file; if left out, the first that has RAOs.
     depth
         Water depth for which they hold [m]; the vessel type does not tell.
 
@@ -94,7 +91,7 @@ def parse_orcaflex(
         rest = ", ".join(f"{v.get('Name')!r} {d.get('Name')!r}" for v, d, _ in found[1:4])
         notes.append(f"other RAOs in the file: {rest}{', ..' if len(found) > 4 else ''}")
     raos = VesselRaos(
-        name=name or title, omega=omega, heading=heading, values=values, origin=origin,
+        name=title, omega=omega, heading=heading, values=values, origin=origin,
         phase_origin=zero[:2], depth=depth, source=owner, notes=tuple(notes),
     )  # fmt: skip
     return finished(raos, symmetry=symmetry)

@@ -66,17 +66,13 @@ class _Lines:
         return numbers(self.owner, self.at, words[:count])
 
 
-def parse_shipx(
-    owner: str, text: str, *, name: str | None = None, speed: float | None = None
-) -> VesselRaos:
+def parse_shipx(owner: str, text: str, *, speed: float | None = None) -> VesselRaos:
     """Return the motions at one speed.
 
     Parameters
     ----------
     owner, text
         The file's path, for messages, and what is in it.
-    name
-        What the vessel is called; if left out, the name in the file.
     speed
         Which speed of the file [m/s]; the lowest if left out.
 
@@ -151,7 +147,7 @@ def parse_shipx(
     ship = head[2].partition(":")[2].strip()
     return finished(
         VesselRaos(
-            name=name or ship or "vessel", omega=w, heading=b, values=values, origin=origin,
+            name=ship or "vessel", omega=w, heading=b, values=values, origin=origin,
             phase_origin=origin[:2], speed=chosen, source=owner, notes=tuple(notes),
         )
     )  # fmt: skip

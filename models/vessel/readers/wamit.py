@@ -17,6 +17,7 @@ Each line says everything twice, which tells a file that was cut, shuffled or ed
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -49,7 +50,6 @@ def parse_wamit(
     owner: str,
     text: str,
     *,
-    name: str,
     body: int | None = None,
     length: float | None = None,
     waves: str | None = None,
@@ -60,8 +60,8 @@ def parse_wamit(
 
     Parameters
     ----------
-    owner, text, name
-        The file's path, for messages; what is in it; what the vessel is called.
+    owner, text
+        The file's path, for messages, and what is in it; the vessel is called after it.
     body
         Which body, from 1; must be given if there are several.
     length
@@ -118,8 +118,8 @@ def parse_wamit(
     )
     return finished(
         VesselRaos(
-            name=name, omega=w, heading=b, values=found, origin=origin, phase_origin=origin[:2],
-            depth=depth, source=owner, notes=tuple(notes),
+            name=Path(owner).stem, omega=w, heading=b, values=found, origin=origin,
+            phase_origin=origin[:2], depth=depth, source=owner, notes=tuple(notes),
         )
     )  # fmt: skip
 
