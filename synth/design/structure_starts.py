@@ -19,7 +19,7 @@ import numpy as np
 from ..loop import Assessment
 from ..question import Problem, StructureQuestion, pose_structure
 from ..search import KEPT, Found, Progress, Solved, polish, search
-from ..structures import TRANSPARENT, Law, LowOrderFeedback, WinchLaw
+from ..structures import TRANSPARENT, LowOrderFeedback, ParametrisedController, WinchLaw
 from .tuning import Tuning, tuning_of
 
 _FEW = 4  # starts of a structure within another
@@ -105,7 +105,7 @@ def _answer(posed: StructureQuestion, starts: int, seed: int, progress: Progress
     return tuning_of(problem, search(problem, starts + len(guesses), seed, guesses, progress))
 
 
-def as_values(law: Law, known: Mapping[str, float]) -> list[float]:
+def as_values(law: ParametrisedController, known: Mapping[str, float]) -> list[float]:
     """Return a law's parameters where some are known by name and the others do nothing."""
     full = {**_NEUTRAL, **known}
     values = [full.get(p.name, p.scale) for p in law.parameters]

@@ -14,7 +14,7 @@ from models.plant import LinearPlant
 
 from ..limits import Limit
 from ..loop import Disturbance, DragElement, with_drag
-from ..structures import Law
+from ..structures import ParametrisedController
 
 Values = Sequence[float] | FloatArray
 
@@ -37,7 +37,7 @@ class Problem:
     """The question: plant, law, what shakes it, what is minimised, what limits it."""
 
     plant: LinearPlant
-    law: Law
+    law: ParametrisedController
     disturbances: tuple[Disturbance, ...]
     minimise: dict[str, float]
     limits: tuple[Limit, ...]

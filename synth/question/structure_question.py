@@ -22,7 +22,7 @@ from models.sensing import SAMPLE_TIME, sensed_plant, sensed_spectra
 
 from ..limits import Limit, LowFrequency, drive_limits
 from ..loop import disturbances
-from ..structures import Law, LowOrderFeedback, WinchStructure, structure_named
+from ..structures import LowOrderFeedback, ParametrisedController, WinchStructure, structure_named
 from .problem import Problem
 from .question import HOOK, PAYLOAD, Question, pose, with_masses
 
@@ -93,7 +93,7 @@ class StructureQuestion:
     reported: tuple[Limit, ...]
 
     @cached_property
-    def law(self) -> Law:
+    def law(self) -> ParametrisedController:
         """The structure, bound to the plant."""
         return self.structure.bind(self.plant)
 

@@ -19,7 +19,7 @@ from models.plant import LinearPlant
 
 from ..loop import Disturbance, disturbances
 from ..question import HOOK, PAYLOAD, Problem, Question, Scenario, pose
-from ..structures import Law, Structure
+from ..structures import ParametrisedController, Structure
 from .family import Family, Member
 from .plant_stack import PlantStack, numbers_of, stacked_members
 
@@ -58,7 +58,7 @@ class FamilyPlants:
         return self.question(self.family.nominal()[0])
 
     @cached_property
-    def law(self) -> Law:
+    def law(self) -> ParametrisedController:
         """The controller's law, bound to the nominal plant."""
         if not self._sensed:
             return self.nominal.structure.bind(self.nominal.plant)

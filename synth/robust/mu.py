@@ -21,7 +21,7 @@ import numpy as np
 from models.basics import InputError, check_range, one_thread
 
 from ..loop import Controller, Margins, closed_loop_poles
-from ..structures import Law
+from ..structures import ParametrisedController
 from ..verify import LawMatrices, winding_of_plant
 from .mu_doubts import Doubt, doubts_of
 from .mu_plant import UncertainLoop, uncertain_loop
@@ -240,7 +240,9 @@ def robustness(
     )
 
 
-def _parts(design: GainDesign | StructureDesign) -> tuple[Controller, Law, Sequence[float]]:
+def _parts(
+    design: GainDesign | StructureDesign,
+) -> tuple[Controller, ParametrisedController, Sequence[float]]:
     """Return controller, law and parameters of a design."""
     from ..design import StructureDesign
     from ..question import pose

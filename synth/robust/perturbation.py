@@ -28,7 +28,7 @@ from models.basics import ComplexArray, FloatArray, InputError
 from models.plant import LinearPlant
 
 from ..loop import closed_loop_poles, frequency_grid, refine_minima
-from ..structures import Law
+from ..structures import ParametrisedController
 
 _AFFINE = 1e-9  # relative size of what would not be affine
 _PADE = 6
@@ -69,7 +69,10 @@ class GainRadius:
 
 
 def gain_radius(
-    plant: LinearPlant, law: Law, values: Sequence[float], names: Sequence[str] | None = None
+    plant: LinearPlant,
+    law: ParametrisedController,
+    values: Sequence[float],
+    names: Sequence[str] | None = None,
 ) -> GainRadius:
     """Return how much the gains of a stable loop may be off.
 
@@ -131,7 +134,11 @@ class _Curve:
     """The rows A d = b of a loop along the frequency axis."""
 
     def __init__(
-        self, plant: LinearPlant, law: Law, values: FloatArray, index: Sequence[int]
+        self,
+        plant: LinearPlant,
+        law: ParametrisedController,
+        values: FloatArray,
+        index: Sequence[int],
     ) -> None:
         self._plant, self._law, self._values, self._index = plant, law, values, tuple(index)
         self.count = len(self._index)
@@ -159,7 +166,9 @@ class _Curve:
         return _solution(columns[0], complex(b[0]), box=box)
 
 
-def _answer(law: Law, values: FloatArray, s: ComplexArray, heard: ComplexArray) -> ComplexArray:
+def _answer(
+    law: ParametrisedController, values: FloatArray, s: ComplexArray, heard: ComplexArray
+) -> ComplexArray:
     """Return C P_yu = -L, (k,)."""
     entries = law.response([float(v) for v in values], s)[0]
     total = np.zeros(s.size, dtype=np.complex128)
@@ -169,7 +178,7 @@ def _answer(law: Law, values: FloatArray, s: ComplexArray, heard: ComplexArray) 
 
 
 def _is_affine(
-    law: Law, values: FloatArray, index: int | Sequence[int], poles: ComplexArray
+    law: ParametrisedController, values: FloatArray, index: int | Sequence[int], poles: ComplexArray
 ) -> bool:
     """Return whether the controller is affine in some parameters, moved all at once."""
     at = np.abs(poles)

@@ -24,7 +24,7 @@ from models.sensing import sensed_plant, sensed_spectra
 from ..design import GainDesign, StructureDesign
 from ..loop import Assessment, Controller, Disturbance, DragElement, disturbances
 from ..question import HOOK, SampledNoise, pose
-from ..structures import Law
+from ..structures import ParametrisedController
 from .differences import derivative
 from .fields import numbers_of
 
@@ -49,7 +49,7 @@ class Answers:
 
     case: Case
     masses: int
-    law: Law
+    law: ParametrisedController
     names: tuple[str, ...]
     values: tuple[float, ...]
     units: Mapping[str, str]

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from .sampled_controller import tracking_gain as tracking_gain
     from .sampling import SampledLoop as SampledLoop
     from .sampling import sampled_loop as sampled_loop
-    from .structure import Law as Law
     from .structure import Parameter as Parameter
+    from .structure import ParametrisedController as ParametrisedController
     from .structure import PayloadFeedback as PayloadFeedback
     from .structure import StaticGain as StaticGain
     from .structure import Structure as Structure

@@ -26,7 +26,7 @@ from models.plant import LinearPlant
 
 from ..loop import Controller
 from .blocks import Matrices, Section, series
-from .structure import Bounds, Law, Parameter, check_bounds
+from .structure import Bounds, Parameter, ParametrisedController, check_bounds
 
 #: From the parameters by name to the weight of a measurement; sums and products only.
 Weight = Callable[[Mapping[str, Any]], Any]
@@ -48,7 +48,7 @@ class Group:
     sections: tuple[Section, ...] = ()
 
 
-class DiagramLaw(Law):
+class DiagramLaw(ParametrisedController):
     """The law of a diagram with one command.
 
     Parameters

@@ -27,8 +27,8 @@ from .structure import (
     PAYLOAD_MEASUREMENTS,
     Bounds,
     GeneralisedPlant,
-    Law,
     Parameter,
+    ParametrisedController,
     Structure,
     check_bounds,
     gain_scales,
@@ -81,12 +81,12 @@ class LowOrder(Structure):
         object.__setattr__(self, "stable", stable)
         object.__setattr__(self, "bounds", dict(bounds or {}))
 
-    def bind(self, plant: LinearPlant, response_scale: Bounds | None = None) -> Law:
+    def bind(self, plant: LinearPlant) -> ParametrisedController:
         """Return the law; see `Structure.bind`."""
         return LowOrderLaw(plant, self)
 
 
-class LowOrderLaw(Law):
+class LowOrderLaw(ParametrisedController):
     """The law of `LowOrder`: parameters of `canonical.BlockForm` and of the direct term."""
 
     def __init__(self, plant: LinearPlant, structure: LowOrder) -> None:
@@ -295,12 +295,14 @@ class LowOrderFeedback(Structure):
         """Names of what it hears."""
         return PAYLOAD_MEASUREMENTS
 
-    def bind(self, plant: LinearPlant, response_scale: Bounds | None = None) -> Law:
+    def bind(self, plant: LinearPlant) -> ParametrisedController:
         """Return the law; see `Structure.bind`."""
-        return LowOrder(self.order).bind(plant, response_scale)
+        return LowOrder(self.order).bind(plant)
 
     @staticmethod
-    def start(law: Law, found: Mapping[str, float], controller: Controller) -> list[float]:
+    def start(
+        law: ParametrisedController, found: Mapping[str, float], controller: Controller
+    ) -> list[float]:
         """Return the parameters of rolled-off payload feedback, and set the sizes by it.
 
         Parameters

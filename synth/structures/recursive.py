@@ -24,12 +24,12 @@ from models.sensing import Measurement, Recursion
 from models.sensing.control import MEASURED
 
 Signals = Mapping[str, ca.SX]
-Law = Callable[[ca.SX, Signals], tuple[ca.SX, ca.SX]]
+RecursiveLaw = Callable[[ca.SX, Signals], tuple[ca.SX, ca.SX]]
 
 _SHORTEST, _LONGEST = 1e-4, 10.0  # sample times [s]
 
 
-def make_recursion(initial: npt.ArrayLike, law: Law) -> Recursion:
+def make_recursion(initial: npt.ArrayLike, law: RecursiveLaw) -> Recursion:
     """Return the recursion of a law.
 
     Parameters
@@ -136,7 +136,9 @@ class RecursiveController:
         for name, value in fields.items():
             object.__setattr__(self, name, value)
 
-    def _adopt(self, name: str, sample_time: float, initial: npt.ArrayLike, law: Law) -> None:
+    def _adopt(
+        self, name: str, sample_time: float, initial: npt.ArrayLike, law: RecursiveLaw
+    ) -> None:
         """Set the fields of this class; the last thing that such an `__init__` does."""
         checked_sample_time(name, sample_time)
         self._set(name=name, sample_time=float(sample_time))

@@ -1,8 +1,9 @@
 """Controller structures: from a handful of named parameters to a controller.
 
-A structure says which controllers are searched.  Bound to a plant it becomes a `Law`, which
-knows its parameters (names, sizes, bounds), its response C(s, p) (for numbers and for
-symbols alike) and its state-space form, and proposes candidates to start a search from.
+A structure says which controllers are searched.  Bound to a plant it becomes a
+`ParametrisedController`, which knows its parameters (names, sizes, bounds), its response C(s, p)
+(for numbers and for symbols alike) and its state-space form, and proposes candidates to start a
+search from.
 
 Signs: u = +C y.  The thesis's feedback E_a = -A (a P'' + a_1 P' + a_2 P) is
 C = -A [a, a_1, a_2].
@@ -60,7 +61,7 @@ class GeneralisedPlant(Protocol):
         """Weights on the variances of its outputs, by name."""
 
 
-class Law(ABC):
+class ParametrisedController(ABC):
     """A structure bound to a plant: what the optimiser sees of it."""
 
     parameters: tuple[Parameter, ...]
@@ -110,7 +111,7 @@ class Structure(ABC):
     """A family of controllers; `bind` fits it to a plant."""
 
     @abstractmethod
-    def bind(self, plant: LinearPlant, response_scale: Bounds | None = None) -> Law:
+    def bind(self, plant: LinearPlant) -> ParametrisedController:
         """Return the law for `plant`.
 
         Raises
@@ -136,7 +137,7 @@ class StaticGain(Structure):
     mask: tuple[tuple[bool, ...], ...] | None = None
     bounds: Bounds = field(default_factory=dict)
 
-    def bind(self, plant: LinearPlant, response_scale: Bounds | None = None) -> Law:
+    def bind(self, plant: LinearPlant) -> ParametrisedController:
         """Return the law; see `Structure.bind`."""
         nu, ny = len(plant.inputs), len(plant.measurements)
         mask = np.ones((nu, ny), dtype=bool) if self.mask is None else np.array(self.mask)
@@ -166,7 +167,7 @@ class PayloadFeedback(Structure):
     measurements: tuple[str, str, str] = PAYLOAD_MEASUREMENTS
     bounds: Bounds = field(default_factory=dict)
 
-    def bind(self, plant: LinearPlant, response_scale: Bounds | None = None) -> Law:
+    def bind(self, plant: LinearPlant) -> ParametrisedController:
         """Return the law; see `Structure.bind`."""
         check_range("PayloadFeedback", "amplifier", self.amplifier, low=0.0, open_low=True)
         if len(plant.inputs) != 1:
@@ -183,7 +184,7 @@ class PayloadFeedback(Structure):
         )
 
 
-class _GainLaw(Law):
+class _GainLaw(ParametrisedController):
     """Entries of a gain matrix, each a parameter times a fixed factor."""
 
     def __init__(

@@ -44,8 +44,8 @@ from .structure import (
     PAYLOAD_MEASUREMENTS,
     Bounds,
     GeneralisedPlant,
-    Law,
     Parameter,
+    ParametrisedController,
     Structure,
     gain_scales,
 )
@@ -116,7 +116,7 @@ class WinchStructure(Structure):
             *((_TENSION,) if self.tension is not None else ()),
         )
 
-    def bind(self, plant: LinearPlant, response_scale: Bounds | None = None) -> Law:
+    def bind(self, plant: LinearPlant) -> ParametrisedController:
         """Return the law; see `Structure.bind`."""
         pick(self.name, "measurement", plant.measurements, self.measurements)
         if len(plant.inputs) != 1:

@@ -13,7 +13,7 @@ from synth import PayloadFeedback, StaticGain, Structure
 from synth.loop import Controller, closed_loop_poles
 from synth.question import pose
 from synth.robust import gain_radius
-from synth.structures import Law, Parameter
+from synth.structures import Parameter, ParametrisedController
 
 GAINS = (50.0, 100.0, 100.0)
 
@@ -109,12 +109,12 @@ def test_an_unknown_gain_is_named():
 class _Filtered(Structure):
     """u = g y/(1 + T s): affine in g, not in T."""
 
-    def bind(self, plant, response_scale=None):
-        del plant, response_scale
+    def bind(self, plant):
+        del plant
         return _FilteredLaw()
 
 
-class _FilteredLaw(Law):
+class _FilteredLaw(ParametrisedController):
     parameters = (Parameter(name="g", scale=1.0), Parameter(name="T", scale=1.0))
     dimensions = 2
 

@@ -25,7 +25,7 @@ from models.plant import LinearPlant
 from synth.loop import Controller, Disturbance, Phasor, disturbances
 from synth.question import Problem
 from synth.search.starts import candidates, crossover_grid
-from synth.structures import Law, LowOrder, reduced, weighing
+from synth.structures import LowOrder, ParametrisedController, reduced, weighing
 from synth.structures.lqg import designs, lqg, regulator
 from synth.structures.whitened import whitened
 
@@ -44,12 +44,14 @@ def any_plant(nu: int, ny: int) -> LinearPlant:
     )
 
 
-def any_values(law: Law, seed: int = 9) -> FloatArray:
+def any_values(law: ParametrisedController, seed: int = 9) -> FloatArray:
     scales = np.array([p.scale for p in law.parameters])
     return np.asarray(np.random.default_rng(seed).normal(size=scales.size) * scales)
 
 
-def problem(plant: LinearPlant, law: Law, minimise: dict[str, float], **noises: White) -> Problem:
+def problem(
+    plant: LinearPlant, law: ParametrisedController, minimise: dict[str, float], **noises: White
+) -> Problem:
     return Problem(
         plant=plant,
         law=law,

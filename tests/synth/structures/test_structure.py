@@ -16,11 +16,13 @@ from models.plant import LinearPlant
 from synth.loop import Phasor, closed_loop_matrix, disturbances
 from synth.question import Problem
 from synth.search.starts import candidates, crossover_grid, pick_spread, stabilise
-from synth.structures import Law, PayloadFeedback, StaticGain
+from synth.structures import ParametrisedController, PayloadFeedback, StaticGain
 from synth.structures.structure import gain_scales
 
 
-def problem(plant: LinearPlant, law: Law, minimise: dict[str, float] | None = None) -> Problem:
+def problem(
+    plant: LinearPlant, law: ParametrisedController, minimise: dict[str, float] | None = None
+) -> Problem:
     white = {name: White(1.0) for name in plant.independent_disturbances}
     return Problem(
         plant=plant,
