@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from .limits import DelayMargin as DelayMargin
     from .limits import GainMargin as GainMargin
     from .limits import GainMarginDown as GainMarginDown
-    from .limits import Least as Least
     from .limits import Limit as Limit
     from .limits import LowFrequency as LowFrequency
     from .limits import MaxSensitivity as MaxSensitivity
+    from .limits import Minimum as Minimum
     from .limits import Peak as Peak
     from .limits import Power as Power
     from .limits import Rms as Rms

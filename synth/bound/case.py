@@ -30,7 +30,7 @@ from models.hook import HookMotion
 from models.plant import LinearPlant, PlantData
 from models.sensing import MEASURED, sensed_plant, sensed_spectra
 
-from ..limits import Continuous, Least, Limit, Peak, Rms
+from ..limits import Continuous, Limit, Minimum, Peak, Rms
 from ..loop import Controller, closed_loop_poles, disturbances
 from ..question import PAYLOAD, pose
 from ..verify import LawMatrices, Loop, moments
@@ -146,10 +146,10 @@ def rms_limits(
             room = limit.bound
         elif isinstance(limit, Continuous):
             room = math.sqrt(max(limit.bound**2 - limit.static**2, 0.0))
-        elif isinstance(limit, Peak | Least):
+        elif isinstance(limit, Peak | Minimum):
             period = periods.get(limit.output, longest)
             k = math.sqrt(2.0 * math.log(max(limit.duration / period, math.e**0.5)))
-            least = isinstance(limit, Least)
+            least = isinstance(limit, Minimum)
             room = (limit.static - limit.bound if least else limit.bound - abs(limit.static)) / k
         else:
             continue

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .margin_limits import MaxSensitivity as MaxSensitivity
     from .margin_limits import RollOff as RollOff
     from .signal_limits import Continuous as Continuous
-    from .signal_limits import Least as Least
+    from .signal_limits import Minimum as Minimum
     from .signal_limits import Peak as Peak
     from .signal_limits import Power as Power
     from .signal_limits import Rms as Rms

@@ -19,7 +19,7 @@ from .margin_limits import (
     MaxSensitivity,
     RollOff,
 )
-from .signal_limits import Continuous, Least, Peak, Power
+from .signal_limits import Continuous, Minimum, Peak, Power
 
 PAYLOAD = "payload.displacement"
 HOOK = "hook.heave"
@@ -103,7 +103,7 @@ def drive_limits(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
     peak("rope.tension", wanted.rope_tension_peak)
     if wanted.minimum_tension is not None:
         limits.append(
-            Least(
+            Minimum(
                 bound=wanted.minimum_tension,
                 output="rope.tension",
                 static=static["rope.tension"],

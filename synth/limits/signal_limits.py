@@ -87,7 +87,7 @@ class Peak(Limit):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Least(Limit):
+class Minimum(Limit):
     """static - k sigma of `output` at least `bound` in `duration` [s]: a rope that stays taut."""
 
     output: str

@@ -17,7 +17,7 @@ from models.basics import FloatArray, InputError, check_range, parse_quantity
 from models.case import Case
 from models.plant import LinearPlant
 
-from ..limits import PAYLOAD, Continuous, Least, Limit, Peak, Rms, drive_limits
+from ..limits import PAYLOAD, Continuous, Limit, Minimum, Peak, Rms, drive_limits
 
 _BROKEN = 10.0  # excess of what is broken beyond measure
 _LABELS = {
@@ -119,7 +119,7 @@ class Criterion:
         if self.limit is None:
             return np.where(stationary, -1.0, 1.0)
         value = _measure(self.limit, moments)
-        if isinstance(self.limit, Least):
+        if isinstance(self.limit, Minimum):
             raw = (self.limit.bound - value) / abs(self.limit.static)
         else:
             raw = value / self.limit.bound - 1.0
@@ -202,9 +202,9 @@ def case_criteria(case: Case, plant: LinearPlant) -> tuple[Criterion, ...]:
     """
     # A load at rest that breaks a limit is no error here: the limiting H_s is then zero.
     limits = list(drive_limits(case.replace({"limits.drive": "report"}), plant))
-    if not any(isinstance(limit, Least) for limit in limits):
+    if not any(isinstance(limit, Minimum) for limit in limits):
         limits.append(
-            Least(
+            Minimum(
                 bound=0.0,
                 output="rope.tension",
                 static=plant.static["rope.tension"],

@@ -21,7 +21,7 @@ from synth.bound.bound import lqg_bound
 from synth.bound.case import rms_limits
 from synth.bound.dual import Dual, shaped
 from synth.design import evaluate_gains, tune
-from synth.limits import Continuous, Least, Peak, Power, Rms
+from synth.limits import Continuous, Minimum, Peak, Power, Rms
 from synth.loop import Controller
 from synth.structures import StaticGain, reduced
 
@@ -313,7 +313,7 @@ def test_limits_on_peaks_as_rms() -> None:
     limits = [
         Peak(bound=10.0, output="a", static=-4.0, duration=10800.0),
         Continuous(bound=5.0, output="a", static=4.0),
-        Least(bound=1.0, output="b", static=9.0, duration=10800.0),
+        Minimum(bound=1.0, output="b", static=9.0, duration=10800.0),
         Power(bound=1.0, torque="a", speed="b"),
     ]
     k = np.sqrt(2.0 * np.log(10800.0 / 12.0))
