@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from .controller import closed_loop_poles as closed_loop_poles
     from .disturbance import Disturbance as Disturbance
     from .disturbance import disturbances as disturbances
-    from .loop import Blocks as Blocks
     from .loop import DragElement as DragElement
     from .loop import Phasor as Phasor
+    from .loop import PlantBlocks as PlantBlocks
     from .loop import close_scalar as close_scalar
     from .loop import closed_loop as closed_loop
     from .loop import determinant as determinant

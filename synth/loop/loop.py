@@ -111,7 +111,7 @@ def squared_magnitude(value: Complex) -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Blocks:
+class PlantBlocks:
     """A plant's response at the nodes, as nested lists of vectors over the nodes."""
 
     zw: Matrix
@@ -130,7 +130,7 @@ class Blocks:
         return self.disturbances.index(disturbance)
 
 
-def numeric_blocks(response: PlantResponse, *, symbolic: bool = False) -> Blocks:
+def numeric_blocks(response: PlantResponse, *, symbolic: bool = False) -> PlantBlocks:
     """Return the blocks of a response, as NumPy vectors or as CasADi constants."""
 
     def nested(block: npt.NDArray[np.complex128]) -> Matrix:
@@ -138,7 +138,7 @@ def numeric_blocks(response: PlantResponse, *, symbolic: bool = False) -> Blocks
         make = constant if symbolic else np.asarray
         return [[make(block[:, i, j]) for j in range(columns)] for i in range(rows)]
 
-    return Blocks(
+    return PlantBlocks(
         zw=nested(response.zw),
         zu=nested(response.zu),
         yw=nested(response.yw),
@@ -149,7 +149,7 @@ def numeric_blocks(response: PlantResponse, *, symbolic: bool = False) -> Blocks
 
 
 def closed_loop(
-    blocks: Blocks, law: Matrix, wanted: Sequence[tuple[str, str]]
+    blocks: PlantBlocks, law: Matrix, wanted: Sequence[tuple[str, str]]
 ) -> Mapping[tuple[str, str], Complex]:
     """Return the closed-loop responses of the wanted (output, disturbance) pairs."""
     difference = _difference(blocks, law)
@@ -166,7 +166,7 @@ def closed_loop(
     return result
 
 
-def return_differences(blocks: Blocks, law: Matrix) -> list[Complex]:
+def return_differences(blocks: PlantBlocks, law: Matrix) -> list[Complex]:
     """Return 1 + L_i for each loop i broken at its input with all other loops closed."""
     difference = _difference(blocks, law)
     count = len(difference)
@@ -179,7 +179,7 @@ def return_differences(blocks: Blocks, law: Matrix) -> list[Complex]:
     return result
 
 
-def determinant(blocks: Blocks, law: Matrix) -> Complex:
+def determinant(blocks: PlantBlocks, law: Matrix) -> Complex:
     """Return det(I - C yu): closed-loop over open-loop characteristic function."""
     rows = [list(line) for line in _difference(blocks, law)]
     result: Complex = rows[0][0]
@@ -192,7 +192,7 @@ def determinant(blocks: Blocks, law: Matrix) -> Complex:
     return result
 
 
-def close_scalar(blocks: Blocks, output: str, disturbance: str, gain: Any) -> Blocks:
+def close_scalar(blocks: PlantBlocks, output: str, disturbance: str, gain: Any) -> PlantBlocks:
     """Return the blocks with `disturbance` = ... + gain * `output` closed around the plant.
 
     This is how an equivalent linear element (drag: force = -C velocity) enters with a
@@ -210,7 +210,7 @@ def close_scalar(blocks: Blocks, output: str, disturbance: str, gain: Any) -> Bl
             for i, line in enumerate(block)
         ]
 
-    return Blocks(
+    return PlantBlocks(
         zw=updated(blocks.zw, to_z, blocks.zw[v]),
         zu=updated(blocks.zu, to_z, blocks.zu[v]),
         yw=updated(blocks.yw, to_y, blocks.zw[v]),
@@ -220,7 +220,7 @@ def close_scalar(blocks: Blocks, output: str, disturbance: str, gain: Any) -> Bl
     )
 
 
-def _difference(blocks: Blocks, law: Matrix) -> Matrix:
+def _difference(blocks: PlantBlocks, law: Matrix) -> Matrix:
     """Return I - C yu."""
     columns = range(len(law))
     return [

@@ -12,8 +12,8 @@ import numpy as np
 from models.basics import FloatArray, Quadrature
 
 from ..loop import (
-    Blocks,
     Phasor,
+    PlantBlocks,
     close_scalar,
     closed_loop,
     determinant,
@@ -148,13 +148,13 @@ class LoopSymbols:
         )
         return 1e-6 - _as_vector(here, 1).re / float(np.real(np.atleast_1d(there))[0])
 
-    def _blocks_at(self, s: complex) -> Blocks:
+    def _blocks_at(self, s: complex) -> PlantBlocks:
         return self._with_drag(numeric_blocks(self._problem.plant.response_at([s]), symbolic=True))
 
-    def _blocks(self, omega: FloatArray) -> Blocks:
+    def _blocks(self, omega: FloatArray) -> PlantBlocks:
         return self._with_drag(numeric_blocks(self._problem.plant.response(omega), symbolic=True))
 
-    def _with_drag(self, blocks: Blocks) -> Blocks:
+    def _with_drag(self, blocks: PlantBlocks) -> PlantBlocks:
         drag = self._problem.drag
         if drag is None:
             return blocks

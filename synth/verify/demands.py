@@ -42,7 +42,7 @@ _KINDS = {  # by class of `synth.limits.margin_limits` and `synth.limits.signal_
     "Rms": "rms",
     "Continuous": "continuous",
     "Peak": "peak",
-    "Least": "least",
+    "Minimum": "least",
     "Power": "power",
 }
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from models.plant import LinearPlant
 from synth.loop import (
-    Blocks,
     Controller,
     DragElement,
     Phasor,
+    PlantBlocks,
     close_scalar,
     closed_loop,
     closed_loop_matrix,
@@ -168,7 +168,7 @@ def test_delays_turn_the_loop_gain_and_nothing_else() -> None:
     )
     law = rows(random_controller(plant).response_at(1j * OMEGA))
 
-    def loop(blocks: Blocks) -> ComplexArray:
+    def loop(blocks: PlantBlocks) -> ComplexArray:
         return np.asarray(return_differences(blocks, law)[0]) - 1.0
 
     turned = loop(numeric_blocks(plant.response(OMEGA))) * np.exp(-0.4j * OMEGA)
