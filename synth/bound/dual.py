@@ -29,7 +29,7 @@ from scipy.optimize import minimize
 from models.basics import FloatArray, InputError, SolverError, solve_lyapunov, solve_riccati
 from models.plant import LinearPlant, ShapingFilter
 
-from ..structures import Estimator, Regulator, weighing
+from ..structures import LqgEstimator, Regulator, weighing
 
 
 def with_input_outputs(plant: LinearPlant, names: Sequence[str]) -> LinearPlant:
@@ -191,7 +191,7 @@ class Dual:
                 )
 
     @cached_property
-    def estimator(self) -> Estimator:
+    def estimator(self) -> LqgEstimator:
         """The Kalman filter, the same for all multipliers."""
         E, F = self.plant.E, self.plant.F
         V = F @ F.T
@@ -202,7 +202,7 @@ class Dual:
                 "bound: the filter's Riccati equation has no stabilising solution: every "
                 "measurement needs white noise, and every undamped mode something that shakes it"
             ) from error
-        return Estimator(gain=-found.gain.T, V=V, Y=found.X)
+        return LqgEstimator(gain=-found.gain.T, V=V, Y=found.X)
 
     def at(self, multipliers: FloatArray) -> DualPoint:
         """Return the LQG optimum for multipliers, (m,).

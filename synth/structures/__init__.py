@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from .drum_speed import SteadyMotion as SteadyMotion
     from .low_order import LowOrder as LowOrder
     from .low_order import LowOrderFeedback as LowOrderFeedback
-    from .lqg import Estimator as Estimator
+    from .lqg import LqgEstimator as LqgEstimator
     from .lqg import Regulator as Regulator
     from .lqg import reduced as reduced
     from .lqg import weighing as weighing

@@ -22,7 +22,16 @@ from models.plant import LinearPlant
 
 from ..loop import Controller
 from .canonical import BlockForm
-from .lqg import Estimator, Regulator, designs, estimator, projected, reduced, regulator, weighing
+from .lqg import (
+    LqgEstimator,
+    Regulator,
+    designs,
+    estimator,
+    projected,
+    reduced,
+    regulator,
+    weighing,
+)
 from .structure import (
     PAYLOAD_MEASUREMENTS,
     Bounds,
@@ -253,7 +262,7 @@ class LowOrderLaw(ParametrisedController):
         )
 
     def _family(
-        self, plant: LinearPlant, regulators: Sequence[Regulator], filters: Sequence[Estimator]
+        self, plant: LinearPlant, regulators: Sequence[Regulator], filters: Sequence[LqgEstimator]
     ) -> FloatArray:
         """Return the parameters of every regulator with every filter, equal ranks first."""
         pairs = sorted(

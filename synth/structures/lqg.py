@@ -40,7 +40,7 @@ class Regulator:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Estimator:
+class LqgEstimator:
     """Kalman filter for the noise intensity V on y: `gain`, (n, ny), and error covariance Y."""
 
     gain: FloatArray
@@ -55,7 +55,7 @@ class LQG:
     controller: Controller
     cost: float
     regulator: Regulator
-    estimator: Estimator
+    estimator: LqgEstimator
 
 
 def lqg(plant: LinearPlant, *, minimise: Mapping[str, float], spectrum: Mapping[str, White]) -> LQG:
@@ -121,7 +121,7 @@ def regulator(plant: LinearPlant, Q: FloatArray, R: FloatArray, S: FloatArray) -
     return Regulator(gain=gain, R=R, X=X)
 
 
-def estimator(plant: LinearPlant, W: FloatArray, V: FloatArray, U: FloatArray) -> Estimator:
+def estimator(plant: LinearPlant, W: FloatArray, V: FloatArray, U: FloatArray) -> LqgEstimator:
     """Return the filter for noises of intensity W on x', V on y, and U between the two.
 
     Raises
@@ -130,7 +130,7 @@ def estimator(plant: LinearPlant, W: FloatArray, V: FloatArray, U: FloatArray) -
         If V is singular or the Riccati equation has no stabilising solution.
     """
     Y, gain = _riccati("estimator", plant.A.T, plant.C.T, W, V, U)
-    return Estimator(gain=-gain.T, V=V, Y=Y)
+    return LqgEstimator(gain=-gain.T, V=V, Y=Y)
 
 
 def state_covariance(plant: LinearPlant, feedback: Regulator) -> FloatArray:
@@ -154,7 +154,9 @@ def projected(plant: LinearPlant, feedback: Regulator, mask: BoolArray) -> Float
     return gain
 
 
-def reduced(plant: LinearPlant, feedback: Regulator, kalman: Estimator, order: int) -> Controller:
+def reduced(
+    plant: LinearPlant, feedback: Regulator, kalman: LqgEstimator, order: int
+) -> Controller:
     """Return the controller of a regulator and a filter, truncated to at most `order` states.
 
     In the loop that the state feedback makes, white innovations drive the state estimate, and
@@ -192,7 +194,7 @@ def weighing(
 
 def designs(
     plant: LinearPlant, minimise: Mapping[str, float], omega: FloatArray, count: int = 7
-) -> tuple[list[Regulator], list[Estimator]]:
+) -> tuple[list[Regulator], list[LqgEstimator]]:
     """Return regulators and filters for a problem and for harder versions of it.
 
     Parameters
