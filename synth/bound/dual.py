@@ -29,7 +29,7 @@ from scipy.optimize import minimize
 from models.basics import FloatArray, InputError, SolverError, solve_lyapunov, solve_riccati
 from models.plant import LinearPlant, ShapingFilter
 
-from ..structures import LqgEstimator, Regulator, weighing
+from ..structures import LqgEstimator, LqgRegulator, weighing
 
 
 def with_input_outputs(plant: LinearPlant, names: Sequence[str]) -> LinearPlant:
@@ -136,7 +136,7 @@ class DualPoint:
     """
 
     multipliers: FloatArray
-    regulator: Regulator
+    regulator: LqgRegulator
     cost: float
     variances: FloatArray
 
@@ -227,7 +227,7 @@ class Dual:
         variances += np.sum((plant.Cz @ kalman.Y) * plant.Cz, axis=1)
         return DualPoint(
             multipliers=multipliers,
-            regulator=Regulator(gain=K, R=R, X=found.X),
+            regulator=LqgRegulator(gain=K, R=R, X=found.X),
             cost=float(cost),
             variances=np.asarray(variances, dtype=np.float64),
         )

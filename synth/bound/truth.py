@@ -34,7 +34,7 @@ from models.basics import ComplexArray, FloatArray
 from models.plant import LinearPlant, PlantResponse, ShapingFilter
 
 from ..loop import Disturbance
-from ..structures import LqgEstimator, Regulator
+from ..structures import LqgEstimator, LqgRegulator
 from ..verify import panels
 from .dual import Dual, DualPoint
 from .spectral_factor import SpectralFactor
@@ -70,7 +70,7 @@ def frequencies(
     return np.concatenate([[low], omega, 1.0 / v]), np.concatenate([[low], weights, beyond])
 
 
-def lqg_poles(plant: LinearPlant, feedback: Regulator, kalman: LqgEstimator) -> ComplexArray:
+def lqg_poles(plant: LinearPlant, feedback: LqgRegulator, kalman: LqgEstimator) -> ComplexArray:
     """Return the poles of an LQG loop [1/s]: those of the state feedback and of the filter."""
     return np.concatenate(
         [
@@ -81,7 +81,7 @@ def lqg_poles(plant: LinearPlant, feedback: Regulator, kalman: LqgEstimator) -> 
 
 
 def optimal_response(
-    plant: LinearPlant, feedback: Regulator, kalman: LqgEstimator, omega: FloatArray
+    plant: LinearPlant, feedback: LqgRegulator, kalman: LqgEstimator, omega: FloatArray
 ) -> ComplexArray:
     """Return X, (k, nu, ny), of an LQG loop: from noise on the measurements to the inputs.
 

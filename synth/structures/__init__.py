@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from .low_order import LowOrder as LowOrder
     from .low_order import LowOrderFeedback as LowOrderFeedback
     from .lqg import LqgEstimator as LqgEstimator
-    from .lqg import Regulator as Regulator
+    from .lqg import LqgRegulator as LqgRegulator
     from .lqg import reduced as reduced
     from .lqg import weighing as weighing
     from .recursive import RecursiveController as RecursiveController

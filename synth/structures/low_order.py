@@ -24,7 +24,7 @@ from ..loop import Controller
 from .canonical import BlockForm
 from .lqg import (
     LqgEstimator,
-    Regulator,
+    LqgRegulator,
     designs,
     estimator,
     projected,
@@ -262,7 +262,10 @@ class LowOrderLaw(ParametrisedController):
         )
 
     def _family(
-        self, plant: LinearPlant, regulators: Sequence[Regulator], filters: Sequence[LqgEstimator]
+        self,
+        plant: LinearPlant,
+        regulators: Sequence[LqgRegulator],
+        filters: Sequence[LqgEstimator],
     ) -> FloatArray:
         """Return the parameters of every regulator with every filter, equal ranks first."""
         pairs = sorted(

@@ -31,7 +31,7 @@ from ..loop import Controller
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Regulator:
+class LqgRegulator:
     """State feedback u = `gain` x, (nu, n), from the weights R on u, and its Riccati solution X."""
 
     gain: FloatArray
@@ -54,7 +54,7 @@ class LQG:
 
     controller: Controller
     cost: float
-    regulator: Regulator
+    regulator: LqgRegulator
     estimator: LqgEstimator
 
 
@@ -109,7 +109,7 @@ def lqg(plant: LinearPlant, *, minimise: Mapping[str, float], spectrum: Mapping[
     )
 
 
-def regulator(plant: LinearPlant, Q: FloatArray, R: FloatArray, S: FloatArray) -> Regulator:
+def regulator(plant: LinearPlant, Q: FloatArray, R: FloatArray, S: FloatArray) -> LqgRegulator:
     """Return the state feedback that minimises E[x'Qx + 2 x'Su + u'Ru].
 
     Raises
@@ -118,7 +118,7 @@ def regulator(plant: LinearPlant, Q: FloatArray, R: FloatArray, S: FloatArray) -
         If R is singular or the Riccati equation has no stabilising solution.
     """
     X, gain = _riccati("regulator", plant.A, plant.B, Q, R, S)
-    return Regulator(gain=gain, R=R, X=X)
+    return LqgRegulator(gain=gain, R=R, X=X)
 
 
 def estimator(plant: LinearPlant, W: FloatArray, V: FloatArray, U: FloatArray) -> LqgEstimator:
@@ -133,13 +133,13 @@ def estimator(plant: LinearPlant, W: FloatArray, V: FloatArray, U: FloatArray) -
     return LqgEstimator(gain=-gain.T, V=V, Y=Y)
 
 
-def state_covariance(plant: LinearPlant, feedback: Regulator) -> FloatArray:
+def state_covariance(plant: LinearPlant, feedback: LqgRegulator) -> FloatArray:
     """Return the covariance of the state, (n, n), under u = K x and white noises of intensity 1."""
     covariance = solve_continuous_lyapunov(plant.A + plant.B @ feedback.gain, -plant.E @ plant.E.T)
     return np.asarray(0.5 * (covariance + covariance.T))
 
 
-def projected(plant: LinearPlant, feedback: Regulator, mask: BoolArray) -> FloatArray:
+def projected(plant: LinearPlant, feedback: LqgRegulator, mask: BoolArray) -> FloatArray:
     """Return the gain on what is measured, (nu, ny), that comes closest to a state feedback.
 
     Closest in the mean square of u in the loop that the state feedback makes, with the entries
@@ -155,7 +155,7 @@ def projected(plant: LinearPlant, feedback: Regulator, mask: BoolArray) -> Float
 
 
 def reduced(
-    plant: LinearPlant, feedback: Regulator, kalman: LqgEstimator, order: int
+    plant: LinearPlant, feedback: LqgRegulator, kalman: LqgEstimator, order: int
 ) -> Controller:
     """Return the controller of a regulator and a filter, truncated to at most `order` states.
 
@@ -194,7 +194,7 @@ def weighing(
 
 def designs(
     plant: LinearPlant, minimise: Mapping[str, float], omega: FloatArray, count: int = 7
-) -> tuple[list[Regulator], list[LqgEstimator]]:
+) -> tuple[list[LqgRegulator], list[LqgEstimator]]:
     """Return regulators and filters for a problem and for harder versions of it.
 
     Parameters
