@@ -5,7 +5,7 @@ three times, for the optimiser (`response`, numbers or symbols), for the guard o
 (`characteristic`, the monic denominator) and for everything that runs or checks the controller
 (`matrices`, a state-space form).
 
-* `RollOff`: w^2 / (s^2 + 2 z w s + w^2), static gain 1
+* `RollOffFilter`: w^2 / (s^2 + 2 z w s + w^2), static gain 1
 * `LeadLag`: (1 + s/w_z) / (1 + s/w_p), static gain 1
 * `Notch`: (s^2 + 2 b d w s + w^2) / (s^2 + 2 b w s + w^2), static gain 1
 * `Integral`: (s + w) / s, static gain infinite
@@ -76,7 +76,7 @@ class Section(ABC):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RollOff(Section):
+class RollOffFilter(Section):
     """Second-order low-pass w^2 / (s^2 + 2 z w s + w^2).
 
     Parameters

@@ -13,7 +13,7 @@ from models.basics import pick
 from models.case import Case
 from models.plant import PlantData, fixed_top_modes
 
-from .blocks import Integral, LeadLag, Notch, RollOff, Section
+from .blocks import Integral, LeadLag, Notch, RollOffFilter, Section
 from .drum_speed import SteadyMotion
 from .low_order import LowOrderFeedback
 from .winch_diagram import TRANSPARENT, WinchStructure
@@ -66,15 +66,15 @@ def structure_named(name: str, case: Case) -> WinchStructure | LowOrderFeedback:
     corner = (1.0, TRANSPARENT)
     sections: dict[str, tuple[Section, ...]] = {
         "": (),
-        "-rolloff": (RollOff(name="rolloff", corner=corner),),
+        "-rolloff": (RollOffFilter(name="rolloff", corner=corner),),
         "-lead": (LeadLag(name="lead", zero=(0.05, 100.0), pole=(0.5, 200.0)),),
         "-notch": (
             Notch(name="notch", frequency=(0.5 * modes[1], 2.0 * modes[1])),
-            RollOff(name="rolloff", corner=corner),
+            RollOffFilter(name="rolloff", corner=corner),
         ),
         "-integral": (
             Integral(name="integral", corner=(0.002, 0.5)),
-            RollOff(name="rolloff", corner=corner),
+            RollOffFilter(name="rolloff", corner=corner),
         ),
     }
     payload = name != "feed-forward" and name != "constant-tension"

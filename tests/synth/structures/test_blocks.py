@@ -9,10 +9,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synth.loop import Phasor
-from synth.structures.blocks import Integral, LeadLag, LeadTime, Notch, RollOff, Section, series
+from synth.structures.blocks import (
+    Integral,
+    LeadLag,
+    LeadTime,
+    Notch,
+    RollOffFilter,
+    Section,
+    series,
+)
 
 SECTIONS: dict[str, Section] = {
-    "roll-off": RollOff(name="f", corner=(0.5, 50.0)),
+    "roll-off": RollOffFilter(name="f", corner=(0.5, 50.0)),
     "lead-lag": LeadLag(name="f", zero=(0.1, 30.0), pole=(0.1, 60.0)),
     "notch": Notch(name="f", frequency=(1.0, 20.0)),
     "integral": Integral(name="f", corner=(0.01, 1.0)),
@@ -62,7 +70,7 @@ def test_symbols_and_numbers_agree(name: str) -> None:
 
 
 def test_textbook_values() -> None:
-    at_corner = RollOff(name="f", corner=(1.0, 10.0)).response([4.0, 0.5], np.array([4.0j]))
+    at_corner = RollOffFilter(name="f", corner=(1.0, 10.0)).response([4.0, 0.5], np.array([4.0j]))
     assert at_corner == pytest.approx([-1.0j])  # 1/(2 i z)
     at_notch = Notch(name="f", frequency=(1.0, 10.0)).response([7.0, 0.3, 0.1], np.array([7.0j]))
     assert at_notch == pytest.approx([0.1])
