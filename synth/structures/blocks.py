@@ -30,7 +30,7 @@ Range = tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Section(ABC):
+class FilterSection(ABC):
     """A transfer function with parameters.
 
     Parameters
@@ -76,7 +76,7 @@ class Section(ABC):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RollOffFilter(Section):
+class RollOffFilter(FilterSection):
     """Second-order low-pass w^2 / (s^2 + 2 z w s + w^2).
 
     Parameters
@@ -113,7 +113,7 @@ class RollOffFilter(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LeadLag(Section):
+class LeadLag(FilterSection):
     """First-order lead or lag (1 + s/w_z) / (1 + s/w_p).
 
     Parameters
@@ -155,7 +155,7 @@ class LeadLag(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Notch(Section):
+class Notch(FilterSection):
     """Notch (s^2 + 2 b d w s + w^2) / (s^2 + 2 b w s + w^2).
 
     Parameters
@@ -196,7 +196,7 @@ class Notch(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Integral(Section):
+class Integral(FilterSection):
     """Integral action (s + w) / s.
 
     Parameters
@@ -229,7 +229,7 @@ class Integral(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LeadTime(Section):
+class LeadTime(FilterSection):
     """What a signal will be a lead time ahead, as far as its bandwidth goes.
 
     (1 + tau s) / (1 + s/w): the extrapolation x + tau x' behind a low-pass.

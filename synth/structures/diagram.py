@@ -25,7 +25,7 @@ from models.basics import ComplexArray, FloatArray, pick
 from models.plant import LinearPlant
 
 from ..loop import Controller
-from .blocks import Matrices, Section, series
+from .blocks import FilterSection, Matrices, series
 from .structure import Bounds, Parameter, ParametrisedController, check_bounds
 
 #: From the parameters by name to the weight of a measurement; sums and products only.
@@ -37,7 +37,7 @@ class Branch:
     """A weighted sum of measurements behind filter sections."""
 
     weights: Mapping[str, Weight]
-    sections: tuple[Section, ...] = ()
+    sections: tuple[FilterSection, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +45,7 @@ class Group:
     """A sum of branches behind filter sections that they share."""
 
     branches: tuple[Branch, ...]
-    sections: tuple[Section, ...] = ()
+    sections: tuple[FilterSection, ...] = ()
 
 
 class DiagramLaw(ParametrisedController):
@@ -72,7 +72,7 @@ class DiagramLaw(ParametrisedController):
     ) -> None:
         self._plant = plant
         self._groups = tuple(groups)
-        sections: dict[str, Section] = {}
+        sections: dict[str, FilterSection] = {}
         for group in self._groups:
             for section in (*group.sections, *(s for b in group.branches for s in b.sections)):
                 sections[section.name] = section
@@ -110,7 +110,7 @@ class DiagramLaw(ParametrisedController):
         return [row]
 
     def _chain(
-        self, sections: Sequence[Section], values: Sequence[Any], s: Any, start: Any = None
+        self, sections: Sequence[FilterSection], values: Sequence[Any], s: Any, start: Any = None
     ) -> Any:
         for section in sections:
             step = section.response(values[self._slices[section.name]], s)
@@ -160,7 +160,7 @@ class DiagramLaw(ParametrisedController):
         return self._behind(_parallel(parts), group.sections, values)
 
     def _behind(
-        self, matrices: Matrices, sections: Sequence[Section], values: Sequence[float]
+        self, matrices: Matrices, sections: Sequence[FilterSection], values: Sequence[float]
     ) -> Matrices:
         for section in sections:
             own = [float(v) for v in values[self._slices[section.name]]]

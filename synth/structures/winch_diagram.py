@@ -37,7 +37,7 @@ from scipy.stats import qmc
 from models.basics import ComplexArray, FloatArray, InputError, check_range, pick
 from models.plant import LinearPlant, PlantResponse
 
-from .blocks import LeadTime, Section
+from .blocks import FilterSection, LeadTime
 from .diagram import Branch, DiagramLaw, Group, Weight
 from .drum_speed import SteadyMotion
 from .structure import (
@@ -93,7 +93,7 @@ class WinchStructure(Structure):
     regulated: bool = False
     amplifier: float = 1.0
     pace: float = 1.0
-    filters: tuple[Section, ...] = ()
+    filters: tuple[FilterSection, ...] = ()
     hears_payload: bool = True
     drum: bool = False
     heave: bool = False

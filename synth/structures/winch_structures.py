@@ -13,7 +13,7 @@ from models.basics import pick
 from models.case import Case
 from models.plant import PlantData, fixed_top_modes
 
-from .blocks import Integral, LeadLag, Notch, RollOffFilter, Section
+from .blocks import FilterSection, Integral, LeadLag, Notch, RollOffFilter
 from .drum_speed import SteadyMotion
 from .low_order import LowOrderFeedback
 from .winch_diagram import TRANSPARENT, WinchStructure
@@ -64,7 +64,7 @@ def structure_named(name: str, case: Case) -> WinchStructure | LowOrderFeedback:
     )
     feedback = name.removeprefix("payload-feedback") if name.startswith("payload") else None
     corner = (1.0, TRANSPARENT)
-    sections: dict[str, tuple[Section, ...]] = {
+    sections: dict[str, tuple[FilterSection, ...]] = {
         "": (),
         "-rolloff": (RollOffFilter(name="rolloff", corner=corner),),
         "-lead": (LeadLag(name="lead", zero=(0.05, 100.0), pole=(0.5, 200.0)),),

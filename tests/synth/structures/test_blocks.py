@@ -10,16 +10,16 @@ from hypothesis import strategies as st
 
 from synth.loop import Phasor
 from synth.structures.blocks import (
+    FilterSection,
     Integral,
     LeadLag,
     LeadTime,
     Notch,
     RollOffFilter,
-    Section,
     series,
 )
 
-SECTIONS: dict[str, Section] = {
+SECTIONS: dict[str, FilterSection] = {
     "roll-off": RollOffFilter(name="f", corner=(0.5, 50.0)),
     "lead-lag": LeadLag(name="f", zero=(0.1, 30.0), pole=(0.1, 60.0)),
     "notch": Notch(name="f", frequency=(1.0, 20.0)),
@@ -29,7 +29,7 @@ SECTIONS: dict[str, Section] = {
 OMEGA = np.geomspace(0.03, 300.0, 9)
 
 
-def values_of(section: Section, share: float) -> list[float]:
+def values_of(section: FilterSection, share: float) -> list[float]:
     points = np.full((1, len(section.parameters)), share)
     return [float(v) for v in section.guess(points)[0]]
 
