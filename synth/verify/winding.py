@@ -42,7 +42,7 @@ _PER_DECADE = 40
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Trace:
+class PhaseTrace:
     """A complex function along a path, on points close enough to follow its phase.
 
     Attributes
@@ -104,7 +104,7 @@ def trace(
     start: npt.ArrayLike,
     *,
     loop_floor: float | None = None,
-) -> Trace:
+) -> PhaseTrace:
     """Follow a function along a path, on as many points as its phase needs.
 
     Parameters
@@ -124,7 +124,7 @@ def trace(
     confirmed = np.zeros(t.size - 1, dtype=np.bool_)
     while True:
         if not np.all(np.isfinite(values)) or np.any(values == 0.0):
-            return Trace(t=t, values=values, turn=np.nan, failure="a pole lies on the contour")
+            return PhaseTrace(t=t, values=values, turn=np.nan, failure="a pole lies on the contour")
         smooth = _smooth(values)
         if loop_floor is not None:
             small = np.maximum(np.abs(values[1:] - 1.0), np.abs(values[:-1] - 1.0)) < loop_floor
@@ -132,15 +132,15 @@ def trace(
         cut = np.flatnonzero(~(smooth & confirmed))
         if not cut.size:
             steps = np.angle(values[1:] / values[:-1])
-            return Trace(t=t, values=values, turn=float(steps.sum()))
+            return PhaseTrace(t=t, values=values, turn=float(steps.sum()))
         width = np.abs(path(t[cut + 1]) - path(t[cut]))
         if np.any((width < 1e-13 * np.abs(path(t[cut]))) & ~smooth[cut]):
             where = complex(path(t[cut[[int(np.argmin(width))]]])[0])
             text = f"a pole lies on the contour at s = {where:.6g} 1/s"
-            return Trace(t=t, values=values, turn=np.nan, failure=text)
+            return PhaseTrace(t=t, values=values, turn=np.nan, failure=text)
         if t.size + cut.size > _MOST_POINTS:
             text = f"the phase cannot be followed with {_MOST_POINTS} points"
-            return Trace(t=t, values=values, turn=np.nan, failure=text)
+            return PhaseTrace(t=t, values=values, turn=np.nan, failure=text)
         middle = 0.5 * (t[cut] + t[cut + 1])
         # Both halves of an interval that looked smooth are its proof, if they are smooth too.
         confirmed[cut] = smooth[cut]
