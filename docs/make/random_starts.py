@@ -34,7 +34,7 @@ from models import PhysicsWarning, load_case
 from models.basics import one_thread
 from synth.loop import closed_loop_poles, with_drag
 from synth.question import Problem, pose
-from synth.search import Solved, briskest, coarse_programme
+from synth.search import Solution, briskest, coarse_programme
 from synth.search.starts import crossover_grid, start_coefficient
 from synth.verify import LawMatrices, winding_of_plant
 
@@ -90,7 +90,7 @@ def drawn(problem: Problem, count: int, seed: int) -> tuple[list[FloatArray], in
     return found, total
 
 
-def unstable_poles(problem: Problem, solved: Solved) -> int:
+def unstable_poles(problem: Problem, solved: Solution) -> int:
     """Return the unstable poles of an answer's loop by its winding number, delays exact."""
     plant = problem.plant
     if problem.drag is not None and solved.coefficient is not None:

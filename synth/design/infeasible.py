@@ -15,7 +15,7 @@ import numpy as np
 from models.basics import FloatArray
 
 from ..question import Goal, Problem, Question
-from ..search import Solved, briskest, coarse_programme, polish, view_of
+from ..search import Solution, briskest, coarse_programme, polish, view_of
 from .tuning import Tuning
 
 Progress = Callable[[str, int, int], None]
@@ -82,10 +82,10 @@ def shortfall(
     )
 
 
-def _largest_sea(problem: Problem, free: Tuning) -> Solved | None:
+def _largest_sea(problem: Problem, free: Tuning) -> Solution | None:
     begins = _begins(free)
     programme = coarse_programme(problem, begins, briskest(problem, begins), Goal.SEA)
-    found: list[Solved] = []
+    found: list[Solution] = []
     for begin in begins:
         for guess in (0.0, -1.5, -4.0):  # from the sea asked for down to a fiftieth of it
             coefficient = free.coefficient
@@ -103,13 +103,13 @@ def _largest_sea(problem: Problem, free: Tuning) -> Solved | None:
 
 
 def _required(
-    problem: Problem, free: Tuning, best: Solved, binding: Sequence[str]
+    problem: Problem, free: Tuning, best: Solution, binding: Sequence[str]
 ) -> dict[str, float]:
     """Return the least bounds of the binding limits for which the sea asked for is feasible."""
     begins = [*_begins(free), best.values]
     reference = briskest(problem, begins)
     programme = coarse_programme(problem, begins, reference, Goal.RELAX, relaxed=binding)
-    found: list[Solved] = []
+    found: list[Solution] = []
     for begin in begins:
         for guess in (0.0, 1.0, 3.0):
             solved = programme.solve(programme.pack(begin, free.coefficient, guess))
@@ -127,7 +127,7 @@ def _required(
     return {name: value for name, (lim, value) in values.items() if lim.use(value) > 1.0}
 
 
-def _binding(problem: Problem, solved: Solved) -> list[str]:
+def _binding(problem: Problem, solved: Solution) -> list[str]:
     """Return the drive limits that are used up at the largest sea, the dearest first.
 
     Not by their multipliers alone: of two limits that say nearly the same (torque and current

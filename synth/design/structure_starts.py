@@ -18,7 +18,7 @@ import numpy as np
 
 from ..loop import Assessment
 from ..question import Problem, StructureQuestion, pose_structure
-from ..search import KEPT, Found, Progress, Solved, polish, search
+from ..search import KEPT, Found, Progress, Solution, polish, search
 from ..structures import TRANSPARENT, LowOrderFeedback, ParametrisedController, WinchLaw
 from .tuning import Tuning, tuning_of
 
@@ -131,7 +131,7 @@ def no_worse(problem: Problem, found: Found, starts: Sequence[Sequence[float]]) 
     return found
 
 
-def _as_it_is(problem: Problem, values: Sequence[float]) -> Solved | None:
+def _as_it_is(problem: Problem, values: Sequence[float]) -> Solution | None:
     """Return a known point as an answer; None if it is unstable or breaks a limit."""
     controller = problem.law.controller(values)
     if not problem.stable(values):
@@ -143,7 +143,7 @@ def _as_it_is(problem: Problem, values: Sequence[float]) -> Solved | None:
     if any(limit.use(limit.measure(view)) > 1.0 + KEPT for limit in problem.limits):
         return None
     variance = sum(weight * view.sigma(name) ** 2 for name, weight in problem.minimise.items())
-    return Solved(
+    return Solution(
         values=np.array(values, dtype=np.float64),
         coefficient=coefficient,
         # A hair dearer than it is, so that a solve which arrives at the same point counts.

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .polishing import view_of as view_of
     from .programme import Pace as Pace
     from .programme import Programme as Programme
-    from .programme import Solved as Solved
+    from .programme import Solution as Solution
     from .starts import begin_points as begin_points
     from .starts import briskest as briskest
     from .starts import coarse_programme as coarse_programme

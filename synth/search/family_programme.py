@@ -22,7 +22,7 @@ import numpy as np
 from models.basics import FloatArray, Quadrature
 
 from ..question import FamilyProblem, Goal, LoopSymbols, Objective, Scenario, Values
-from .programme import Guard, Pace, Solved, solver_options
+from .programme import Guard, Pace, Solution, solver_options
 
 _ROOM = 12.0  # how far the logarithms of drags and of the cost may move: e^12
 
@@ -46,9 +46,9 @@ class FamilySolved:
     message: str
     iterations: int
 
-    def of(self, index: int, scenario: Scenario) -> Solved:
+    def of(self, index: int, scenario: Scenario) -> Solution:
         """Return the answer as the one of a single scenario."""
-        return Solved(
+        return Solution(
             values=scenario.values(self.values),
             coefficient=self.coefficients[index],
             objective=float(np.log(self.costs[index])),

@@ -20,7 +20,7 @@ from ..loop import Assessment
 from ..question import Goal, Problem
 from .nodes import cost_nodes, margin_nodes
 from .polishing import KEPT, look, polish, thinned
-from .programme import Pace, Programme, Solved
+from .programme import Pace, Programme, Solution
 from .starts import begin_points, briskest, coarse_programme, pick_spread, start_coefficient
 
 Progress = Callable[[str, int, int], None]
@@ -57,7 +57,7 @@ class Found:
     stable was found at all.  `reference` are parameters of a briskly stable loop.
     """
 
-    solved: Solved | None
+    solved: Solution | None
     view: Assessment | None
     excess: float
     starts: tuple[Start, ...] = ()
@@ -123,7 +123,7 @@ def _from(
     tell = progress or (lambda stage, done, total: None)
     programme = coarse_programme(problem, begins[:wanted], reference)
     records: list[Start] = []
-    solves: list[Solved] = []
+    solves: list[Solution] = []
     count = len(begins) if wanted is None else min(wanted, len(begins))
     for k, begin in enumerate(begins):
         if k >= count and any(np.isfinite(record.cost) for record in records):
@@ -162,7 +162,7 @@ def _from(
     return _polished(problem, first, reference, tuple(records), tell)
 
 
-def _once_more(programme: Programme, records: list[Start], solves: list[Solved]) -> None:
+def _once_more(programme: Programme, records: list[Start], solves: list[Solution]) -> None:
     """Go on from where starts gave up, if they were on the way to something better.
 
     The guard, or a restoration that failed, ends a solve at a stable point; from there another
@@ -193,7 +193,7 @@ def _once_more(programme: Programme, records: list[Start], solves: list[Solved])
 
 def _polished(
     problem: Problem,
-    first: Sequence[Solved],
+    first: Sequence[Solution],
     reference: FloatArray,
     records: tuple[Start, ...],
     tell: Progress,
@@ -201,7 +201,7 @@ def _polished(
     """Return the best of the distinct answers after polishing."""
     pairs = _second_pass(problem, _distinct(first), reference)
     distinct = _distinct(list(pairs))
-    best: tuple[Solved, Assessment, float] | None = None
+    best: tuple[Solution, Assessment, float] | None = None
     origin = pairs[distinct[0]]
     for k, solved in enumerate(distinct):
         tell("polish", k, len(distinct))
@@ -225,8 +225,8 @@ def _polished(
 
 
 def _second_pass(
-    problem: Problem, first: Sequence[Solved], reference: FloatArray
-) -> dict[Solved, Solved]:
+    problem: Problem, first: Sequence[Solution], reference: FloatArray
+) -> dict[Solution, Solution]:
     """Return the answers again with nodes where any of them leaked through a limit.
 
     Each stays in its basin if the limits can be kept there, else it may move freely.  Each
@@ -241,7 +241,7 @@ def _second_pass(
         reference=reference,
         tolerance=1e-7,
     )
-    sound: dict[Solved, Solved] = {}
+    sound: dict[Solution, Solution] = {}
     for old in first:
         start = programme.pack(old.values, old.coefficient)
         for reach, pace in ((_BASIN, Pace.NEAR), (None, Pace.FAR)):
@@ -254,7 +254,7 @@ def _second_pass(
 
 def least_violation(
     problem: Problem, begins: Sequence[FloatArray], reference: FloatArray
-) -> Solved:
+) -> Solution:
     """Return the stable answer that breaks the limits least, for limits that exclude each other."""
     programme = coarse_programme(problem, begins, reference, Goal.FEASIBLE)
     found = []
@@ -266,7 +266,7 @@ def least_violation(
             found.append(solved)
     if found:
         return min(found, key=lambda s: s.objective)
-    return Solved(
+    return Solution(
         values=begins[0],
         coefficient=start_coefficient(problem),
         objective=np.inf,
@@ -278,9 +278,9 @@ def least_violation(
     )
 
 
-def _distinct(solved: Sequence[Solved]) -> list[Solved]:
+def _distinct(solved: Sequence[Solution]) -> list[Solution]:
     """Return the best few answers whose costs differ."""
-    chosen: list[Solved] = []
+    chosen: list[Solution] = []
     for item in sorted(solved, key=lambda s: s.objective):
         if all(abs(item.objective - other.objective) > _AGREE for other in chosen):
             chosen.append(item)

@@ -16,7 +16,7 @@ from models.basics import FloatArray
 from ..loop import Assessment
 from ..question import Goal, Problem
 from .nodes import cost_nodes, margin_nodes
-from .programme import Pace, Programme, Solved
+from .programme import Pace, Programme, Solution
 
 KEPT = 1e-5  # a limit counts as kept up to this relative excess
 _MOST_CRITICAL = 300  # frequencies that one look adds
@@ -32,11 +32,11 @@ _SETTLED = 2e-5  # change of the log cost below which the exchange has settled
 
 def polish(
     problem: Problem,
-    solved: Solved,
+    solved: Solution,
     reference: FloatArray,
     goal: Goal = Goal.COST,
     relaxed: Sequence[str] = (),
-) -> tuple[Solved, Assessment, float]:
+) -> tuple[Solution, Assessment, float]:
     """Return a solution on refined nodes: exchange until no limit is broken between them.
 
     Also returned: the look at it, and the largest relative excess over a limit.
@@ -92,7 +92,7 @@ def _any_pace(
     tighten: Mapping[str, float],
     *,
     follow: bool,
-) -> Solved | None:
+) -> Solution | None:
     """Return an answer near the start, by whichever pace of the solver gets there."""
     if follow and excess < _CLOSE:
         near = programme.follow(start, None, tighten)
@@ -111,11 +111,11 @@ def _any_pace(
 
 def _tightened(
     problem: Problem,
-    answer: tuple[Solved, Assessment, float],
+    answer: tuple[Solution, Assessment, float],
     programme: Programme,
     goal: Goal,
     relaxed: Sequence[str],
-) -> tuple[Solved, Assessment, float]:
+) -> tuple[Solution, Assessment, float]:
     """Return an answer that keeps the limits, from one that breaks them by a hair.
 
     Where the exchange does not settle, the bounds are tightened by what they were broken by;
@@ -140,7 +140,7 @@ def _tightened(
     return answer
 
 
-def view_of(problem: Problem, solved: Solved, amplitude: float = 1.0) -> Assessment:
+def view_of(problem: Problem, solved: Solution, amplitude: float = 1.0) -> Assessment:
     """Return a solution in numbers, the disturbances' amplitudes times `amplitude`."""
     return Assessment(
         problem.plant,
@@ -152,7 +152,7 @@ def view_of(problem: Problem, solved: Solved, amplitude: float = 1.0) -> Assessm
 
 
 def look(
-    problem: Problem, solved: Solved, goal: Goal = Goal.COST, relaxed: Sequence[str] = ()
+    problem: Problem, solved: Solution, goal: Goal = Goal.COST, relaxed: Sequence[str] = ()
 ) -> tuple[Assessment, float]:
     """Return a solution in numbers, and its largest relative excess over a limit."""
     view = view_of(problem, solved, float(np.exp(solved.extra)) if goal is Goal.SEA else 1.0)

@@ -130,7 +130,7 @@ class Pace(Enum):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Solved:
+class Solution:
     """What a solve returned; nothing in it is verified yet.
 
     `prices` is d log(cost) / d log(bound) by limit (the envelope theorem), for the goal COST.
@@ -258,7 +258,7 @@ class Programme:
         reach: float | None = None,
         tighten: Mapping[str, float] | None = None,
         pace: Pace = Pace.FAR,
-    ) -> Solved:
+    ) -> Solution:
         """Return IPOPT's answer from a start.
 
         Parameters
@@ -298,9 +298,9 @@ class Programme:
     def follow(
         self,
         start: FloatArray,
-        near: Solved | None = None,
+        near: Solution | None = None,
         tighten: Mapping[str, float] | None = None,
-    ) -> Solved | None:
+    ) -> Solution | None:
         """Return the answer near a start in a few steps, None if there is none so near.
 
         Parameters
@@ -354,10 +354,10 @@ class Programme:
         converged: bool,
         message: str,
         iterations: int,
-    ) -> Solved:
+    ) -> Solution:
         count = len(self.problem.law.parameters)
         drag = self.problem.drag is not None
-        return Solved(
+        return Solution(
             values=x[:count] * np.array([p.scale for p in self.problem.law.parameters]),
             coefficient=float(np.exp(x[count])) if drag else None,
             objective=objective,

@@ -33,7 +33,7 @@ from ..question import PAYLOAD, Goal, Problem, StructureQuestion, pose_structure
 from ..search import (
     Pace,
     Programme,
-    Solved,
+    Solution,
     begin_points,
     cost_nodes,
     look,
@@ -107,7 +107,7 @@ class Answer:
     """
 
     problem: Problem
-    solved: Solved
+    solved: Solution
     view: Assessment
     excess: float
     nodes: Quadrature
@@ -265,7 +265,7 @@ def _arrived(
 ) -> Answer | None:
     view = _looked(problem, begin, coefficient)
     held = near.held if near is not None else np.zeros(0)
-    solved: Solved | None = None
+    solved: Solution | None = None
     best: Answer | None = None
     for k in range(rounds):
         nodes = cost_nodes(problem, [view], rtol=_RTOL)
@@ -311,7 +311,7 @@ def _fewer(view: Assessment, problem: Problem, held: FloatArray) -> FloatArray:
     return np.union1d(recent, thinned(extremes))
 
 
-def _solved(programme: _Priced, start: FloatArray, *, first: bool) -> Solved | None:
+def _solved(programme: _Priced, start: FloatArray, *, first: bool) -> Solution | None:
     for pace in (Pace.FAR, Pace.NEAR) if first else (Pace.NEAR, Pace.FAR):
         solved = programme.solve(start, pace=pace)
         if solved.converged and programme.problem.stable(solved.values, solved.coefficient):
@@ -320,7 +320,7 @@ def _solved(programme: _Priced, start: FloatArray, *, first: bool) -> Solved | N
 
 
 def _looked(problem: Problem, values: FloatArray, coefficient: float | None) -> Assessment:
-    solved = Solved(
+    solved = Solution(
         values=values,
         coefficient=coefficient,
         objective=0.0,

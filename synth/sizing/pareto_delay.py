@@ -14,7 +14,7 @@ from models.basics import FloatArray, SynthesisError
 from models.case import Case
 
 from ..question import Problem, pose
-from ..search import KEPT, Solved, polish, search
+from ..search import KEPT, Solution, polish, search
 from .pareto_point import ParetoPoint, point_of
 
 Progress = Callable[[str, int, int], None]
@@ -31,8 +31,8 @@ def delay_points(
     problems = [pose(case.replace({"sensors.telemetry.delay": float(d)})).problem for d in delays]
     guesses = [[case.gains.a, case.gains.a1, case.gains.a2]] if case.gains is not None else []
     tell = progress or (lambda stage, done, total: None)
-    best: list[tuple[Solved, float] | None] = [None] * count
-    begins: list[tuple[int, Solved, FloatArray]] = []
+    best: list[tuple[Solution, float] | None] = [None] * count
+    begins: list[tuple[int, Solution, FloatArray]] = []
     for n, k in enumerate((0, count // 2, count - 1)):
         tell("ends of the front", n, 3)
         found = search(problems[k], _STARTS, seed, guesses)
@@ -54,9 +54,9 @@ def delay_points(
 
 def _along(
     problems: Sequence[Problem],
-    best: list[tuple[Solved, float] | None],
+    best: list[tuple[Solution, float] | None],
     order: Sequence[int],
-    solved: Solved,
+    solved: Solution,
     reference: FloatArray,
 ) -> None:
     """Go on from delay to delay until another walk has been there with a better answer."""
@@ -72,7 +72,9 @@ def _along(
         solved = again
 
 
-def _keep(best: list[tuple[Solved, float] | None], index: int, solved: Solved, e: float) -> bool:
+def _keep(
+    best: list[tuple[Solution, float] | None], index: int, solved: Solution, e: float
+) -> bool:
     known = best[index]
     if known is not None and known[0].objective <= solved.objective + _SAME:
         return False

@@ -16,7 +16,7 @@ from models.basics import FloatArray
 
 from ..loop import Assessment
 from ..question import Problem
-from ..search import KEPT, Pace, Programme, Solved, polish, thinned, view_of
+from ..search import KEPT, Pace, Programme, Solution, polish, thinned, view_of
 from .pareto_point import ParetoPoint, point_of
 from .pareto_walk import Walk, local_programme, with_bound
 
@@ -54,7 +54,7 @@ class _Stretch:
         self._own: dict[int, Problem] = {
             i: with_bound(walk.problem, walk.name, float(walk.bounds[i])) for i in indices
         }
-        self._solved: dict[int, Solved] = {}
+        self._solved: dict[int, Solution] = {}
         for i in indices:
             solved = walk.best[i]
             assert solved is not None
@@ -101,7 +101,7 @@ class _Stretch:
 
     def _solve_again(self, left: Sequence[int], programme: Programme) -> None:
         walk = self._walk
-        last: Solved | None = None
+        last: Solution | None = None
         for i in left:
             hairs = self._hairs[i]
             tighten = {**hairs, walk.name: walk.steps[i] + hairs.get(walk.name, 0.0)}
@@ -115,7 +115,7 @@ class _Stretch:
                 if pace is not None:
                     again = programme.solve(x, tighten=tighten, pace=pace)
 
-    def _sound(self, solved: Solved) -> bool:
+    def _sound(self, solved: Solution) -> bool:
         problem = self._walk.problem
         return solved.converged and problem.stable(solved.values, solved.coefficient)
 

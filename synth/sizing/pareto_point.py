@@ -12,7 +12,7 @@ from models.basics import SolverError
 from ..design import tuning_of
 from ..loop import Assessment
 from ..question import PAYLOAD, Problem
-from ..search import KEPT, Found, Solved, view_of
+from ..search import KEPT, Found, Solution, view_of
 from ..verify import Verification
 
 
@@ -44,7 +44,7 @@ class ParetoPoint:
     torque_rms: float
     price: float
     excess: float
-    solved: Solved
+    solved: Solution
     problem: Problem
 
     @property
@@ -64,7 +64,7 @@ def point_of(
     problem: Problem,
     name: str,
     bound: float,
-    solved: Solved,
+    solved: Solution,
     view: Assessment | None = None,
     made_with: float | None = None,
 ) -> ParetoPoint:

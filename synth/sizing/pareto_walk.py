@@ -22,7 +22,7 @@ from models.basics import FloatArray
 
 from ..loop import Assessment
 from ..question import Problem
-from ..search import Pace, Programme, Solved, cost_nodes, margin_nodes, thinned, view_of
+from ..search import Pace, Programme, Solution, cost_nodes, margin_nodes, thinned, view_of
 
 Progress = Callable[[str, int, int], None]
 Place = tuple[float, FloatArray]  # a step, and the programme's vector there
@@ -47,7 +47,7 @@ class Walk:
     def __init__(self, problem: Problem, name: str, bounds: FloatArray) -> None:
         self.problem, self.name, self.bounds = problem, name, bounds
         self.begins: list[tuple[int, FloatArray, float | None]] = []
-        self.best: list[Solved | None] = [None] * len(bounds)
+        self.best: list[Solution | None] = [None] * len(bounds)
         limit = next(lim for lim in problem.limits if lim.name == name)
         self.bound = limit.bound  # that the programme is made with
         # As `Programme.solve` takes it: a bound relative to the one it was made with.
@@ -104,7 +104,7 @@ class Walk:
     def _along(self, order: Sequence[int], x: FloatArray) -> None:
         """Go on from bound to bound until another walk has been there with a better answer."""
         before: tuple[float, FloatArray] | None = None
-        last: Solved | None = None
+        last: Solution | None = None
         for n, i in enumerate(order):
             here = (self.steps[order[n - 1]], x) if n > 0 else None
             solved = self._reached(before, here or (self.steps[i], x), self.steps[i], last)
@@ -120,8 +120,8 @@ class Walk:
             x, last = self.programme.pack(solved.values, solved.coefficient), solved
 
     def _reached(
-        self, before: Place | None, here: Place, step: float, last: Solved | None
-    ) -> Solved | None:
+        self, before: Place | None, here: Place, step: float, last: Solution | None
+    ) -> Solution | None:
         """Return an answer at a step from where a walk stands, in smaller steps if it must be."""
         for parts in _PARTS:
             at, behind, solved = here, before, last
@@ -139,8 +139,8 @@ class Walk:
         return None
 
     def _solved(
-        self, x: FloatArray, ahead: FloatArray, step: float, last: Solved | None
-    ) -> Solved | None:
+        self, x: FloatArray, ahead: FloatArray, step: float, last: Solution | None
+    ) -> Solution | None:
         """Return a stable answer at a step that does not leak between the nodes, if any."""
         own = with_bound(self.problem, self.name, self._bound(step))
         loop = [limit for limit in own.limits if not limit.drive]
@@ -166,8 +166,8 @@ class Walk:
         return float(self.bound * (1.0 + (step if self._at_least else -step)))
 
     def _answer(
-        self, x: FloatArray, ahead: FloatArray, last: Solved | None, tighten: dict[str, float]
-    ) -> Solved | None:
+        self, x: FloatArray, ahead: FloatArray, last: Solution | None, tighten: dict[str, float]
+    ) -> Solution | None:
         """Return a stable answer on the nodes, by the quickest way that leads to one."""
         programme, stable = self.programme, self.problem.stable
         if last is not None:
@@ -181,7 +181,7 @@ class Walk:
                 return solved
         return None
 
-    def _leaking(self, solved: Solved, own: Problem, step: float) -> Assessment | None:
+    def _leaking(self, solved: Solution, own: Problem, step: float) -> Assessment | None:
         """Return a look at an answer that leaks through a limit, None if it does not."""
         x = self._dense.pack(solved.values, solved.coefficient)
         rows = self._dense.violations(x, {self.name: step})[1]
