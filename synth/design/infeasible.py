@@ -14,7 +14,7 @@ import numpy as np
 
 from models.basics import FloatArray
 
-from ..question import Goal, Problem, Question
+from ..question import DesignQuestion, Goal, Problem
 from ..search import Solution, briskest, coarse_programme, polish, view_of
 from .tuning import Tuning
 
@@ -48,7 +48,7 @@ class Shortfall:
 
 
 def shortfall(
-    question: Question, free: Tuning, progress: Progress | None = None
+    question: DesignQuestion, free: Tuning, progress: Progress | None = None
 ) -> Shortfall | None:
     """Return the largest feasible sea and what is missing, or None if no sea is feasible.
 

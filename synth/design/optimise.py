@@ -18,7 +18,7 @@ from models.basics import InputError, check_range, one_thread
 from models.case import Case
 
 from ..loop import Assessment
-from ..question import Question, pose, with_masses
+from ..question import DesignQuestion, pose, with_masses
 from ..search import resume, search
 from .design import PAYLOAD, GainDesign
 from .infeasible import Shortfall, shortfall
@@ -113,7 +113,7 @@ def evaluate_gains(case: Case, gains: Mapping[str, float]) -> GainDesign:
 
 
 def _best_possible(
-    question: Question, starts: int, seed: int, progress: Progress | None
+    question: DesignQuestion, starts: int, seed: int, progress: Progress | None
 ) -> GainDesign:
     """Return the best design in the largest feasible sea, for a drive that is too small."""
     case = question.case
@@ -152,7 +152,7 @@ def _best_possible(
     return replace(_verified(question, design, progress), ok=False)
 
 
-def _too_small(question: Question, found: Shortfall, height: float) -> str:
+def _too_small(question: DesignQuestion, found: Shortfall, height: float) -> str:
     names = {limit.name: limit for limit in question.limits}
     asked = question.case.sea.significant_height
     text = (
@@ -170,7 +170,7 @@ def _number(value: float) -> str:
     return f"{value:.4g}" if abs(value) < 1e4 else f"{value:,.0f}".replace(",", " ")
 
 
-def _design(question: Question, tuning: Tuning, status: str) -> GainDesign:
+def _design(question: DesignQuestion, tuning: Tuning, status: str) -> GainDesign:
     if tuning.assessment is None:
         return _unstable(question, {"A": question.amplifier, "a": 0.0, "a1": 0.0, "a2": 0.0}, 0.0)
     gains = {"A": question.amplifier, **tuning.parameters}
@@ -180,7 +180,9 @@ def _design(question: Question, tuning: Tuning, status: str) -> GainDesign:
     return replace(design, starts=tuning.starts, agreed=tuning.agreed)
 
 
-def _uses(question: Question, view: Assessment, prices: Mapping[str, float]) -> dict[str, LimitUse]:
+def _uses(
+    question: DesignQuestion, view: Assessment, prices: Mapping[str, float]
+) -> dict[str, LimitUse]:
     return {
         **limit_uses(question.limits, view, prices),
         **limit_uses(question.reported, view, prices, enforced=False),
@@ -188,7 +190,7 @@ def _uses(question: Question, view: Assessment, prices: Mapping[str, float]) -> 
 
 
 def _record(
-    question: Question,
+    question: DesignQuestion,
     gains: Mapping[str, float],
     view: Assessment,
     uses: Mapping[str, LimitUse],
@@ -214,7 +216,7 @@ def _record(
     )
 
 
-def _unstable(question: Question, gains: Mapping[str, float], growth: float) -> GainDesign:
+def _unstable(question: DesignQuestion, gains: Mapping[str, float], growth: float) -> GainDesign:
     status = (
         f"unstable: grows by a factor e every {1.0 / growth:.3g} s"
         if growth > 0.0
@@ -237,7 +239,9 @@ def _unstable(question: Question, gains: Mapping[str, float], growth: float) -> 
     )
 
 
-def _verified(question: Question, design: GainDesign, progress: Progress | None) -> GainDesign:
+def _verified(
+    question: DesignQuestion, design: GainDesign, progress: Progress | None
+) -> GainDesign:
     """Return the design with its independent check; one that fails it is not ok."""
     if progress is not None:
         progress("verify", 0, 1)
@@ -252,13 +256,15 @@ def _verified(question: Question, design: GainDesign, progress: Progress | None)
     return replace(design, ok=design.ok and checked.ok, status=status, verification=checked)
 
 
-def _growth(question: Question, gains: Mapping[str, float], drag: float | None = None) -> float:
+def _growth(
+    question: DesignQuestion, gains: Mapping[str, float], drag: float | None = None
+) -> float:
     """Return the largest growth rate of the loop [1/s], by default with the drag before."""
     coefficient = question.drag_before if drag is None else drag
     return float(question.assess(gains, coefficient).poles.real.max())
 
 
-def _in_small_motion(question: Question, gains: Mapping[str, float]) -> str:
+def _in_small_motion(question: DesignQuestion, gains: Mapping[str, float]) -> str:
     """Return a remark if the loop needs its drag to be stable, else nothing.
 
     Quadratic drag vanishes in small motion: such a loop swings by itself, at the amplitude
@@ -269,7 +275,7 @@ def _in_small_motion(question: Question, gains: Mapping[str, float]) -> str:
     return "; without drag, in small motion, the loop is unstable and swings by itself"
 
 
-def _guesses(question: Question) -> Sequence[Sequence[float]]:
+def _guesses(question: DesignQuestion) -> Sequence[Sequence[float]]:
     gains = question.case.gains
     return [] if gains is None else [[gains.a, gains.a1, gains.a2]]
 
@@ -286,13 +292,13 @@ def _complete(case: Case, gains: Mapping[str, float]) -> dict[str, float]:
     return {name: check_range("gains", name, values[name]) for name in ("A", "a", "a1", "a2")}
 
 
-def _masses_wanted(question: Question, tuning: Tuning) -> int:
+def _masses_wanted(question: DesignQuestion, tuning: Tuning) -> int:
     if tuning.assessment is None or not tuning.assessment.stable:
         return question.masses
     return _masses_for(question, tuning.assessment)
 
 
-def _masses_for(question: Question, view: Assessment) -> int:
+def _masses_for(question: DesignQuestion, view: Assessment) -> int:
     """Return the rope masses that the loop's crossover asks for, where the case leaves it open."""
     from models.plant import masses_for_bandwidth
 

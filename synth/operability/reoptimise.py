@@ -19,7 +19,7 @@ from models.case import Case
 
 from ..design import GainDesign, shortfall, tuning_of
 from ..limits import Limit
-from ..question import Question, pose
+from ..question import DesignQuestion, pose
 from ..search import search
 from .columns import SeaColumn
 from .contour import Contour
@@ -104,7 +104,7 @@ def _best(
     return None if found is None else {"A": question.amplifier, **found.values}
 
 
-def _question(case: Case, masses: int) -> Question:
+def _question(case: Case, masses: int) -> DesignQuestion:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PhysicsWarning)
         return pose(case, masses)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .problem import Values as Values
     from .question import HOOK as HOOK
     from .question import PAYLOAD as PAYLOAD
-    from .question import Question as Question
+    from .question import DesignQuestion as DesignQuestion
     from .question import assess_gains as assess_gains
     from .question import locked_response as locked_response
     from .question import pose as pose

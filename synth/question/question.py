@@ -37,7 +37,7 @@ HOOK = "hook.heave"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Question:
+class DesignQuestion:
     """A case as synthesis sees it.
 
     Attributes
@@ -99,7 +99,7 @@ class Question:
         )
 
 
-def pose(case: Case, masses: int | None = None) -> Question:
+def pose(case: Case, masses: int | None = None) -> DesignQuestion:
     """Return the question of a case.
 
     Parameters
@@ -124,7 +124,7 @@ def pose(case: Case, masses: int | None = None) -> Question:
     drive = drive_limits(case, plant)
     enforced = case.limits.drive == "enforce"
     amplifier = case.gains.A if case.gains is not None else 1.0
-    return Question(
+    return DesignQuestion(
         case=case,
         data=data,
         hook=hook,
@@ -230,7 +230,7 @@ def _bounds(case: Case, amplifier: float) -> dict[str, tuple[float, float]]:
     }
 
 
-def with_masses(question: Question, masses: int) -> Question:
+def with_masses(question: DesignQuestion, masses: int) -> DesignQuestion:
     """Return the question on another number of rope masses."""
     model = build_plant(question.data, masses)
     return replace(

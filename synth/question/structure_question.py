@@ -24,7 +24,7 @@ from ..limits import Limit, LowFrequency, drive_limits
 from ..loop import disturbances
 from ..structures import LowOrderFeedback, ParametrisedController, WinchStructure, structure_named
 from .problem import Problem
-from .question import HOOK, PAYLOAD, Question, pose, with_masses
+from .question import HOOK, PAYLOAD, DesignQuestion, pose, with_masses
 
 _LATE = 0.2  # delay beyond which the guard's model of it needs a higher order [s]
 _HIGH_ORDER = 12
@@ -84,7 +84,7 @@ class StructureQuestion:
         Limits of the loop, limits of the drive, and limits that are reported only.
     """
 
-    question: Question
+    question: DesignQuestion
     structure: WinchStructure | LowOrderFeedback
     plant: LinearPlant
     spectra: Mapping[str, Any]

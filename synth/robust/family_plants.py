@@ -18,7 +18,7 @@ from models.basics import FloatArray, Quadrature, spectral_nodes
 from models.plant import LinearPlant
 
 from ..loop import Disturbance, disturbances
-from ..question import HOOK, PAYLOAD, Problem, Question, Scenario, pose
+from ..question import HOOK, PAYLOAD, DesignQuestion, Problem, Scenario, pose
 from ..structures import ParametrisedController, Structure
 from .family import Family, Member
 from .plant_stack import PlantStack, numbers_of, stacked_members
@@ -47,13 +47,13 @@ class FamilyPlants:
         masses: int | None = None,
     ) -> None:
         self.family, self.structure, self.masses = family, structure, masses
-        self._questions: dict[Member, Question] = {}
+        self._questions: dict[Member, DesignQuestion] = {}
         self._scenarios: dict[Member, Scenario] = {}
         self._plants: dict[tuple[object, ...], LinearPlant] = {}
         self._sensed = structure != PAYLOAD_FEEDBACK
 
     @cached_property
-    def nominal(self) -> Question:
+    def nominal(self) -> DesignQuestion:
         """The question of the nominal member in the first sea."""
         return self.question(self.family.nominal()[0])
 
@@ -86,7 +86,7 @@ class FamilyPlants:
         """Return the same family on plants of more rope masses."""
         return FamilyPlants(self.family, self.structure, masses)
 
-    def question(self, member: Member) -> Question:
+    def question(self, member: Member) -> DesignQuestion:
         """Return the question of a member."""
         if member not in self._questions:
             self._questions[member] = pose(self.family.case_at(member), self.masses)

@@ -20,7 +20,7 @@ from models.spread import LogNormal, Samples, Spread, Uniform
 from synth import GainDesign, evaluate_gains
 from synth.design import optimise_structure
 from synth.loop import Assessment
-from synth.question import Question, pose
+from synth.question import DesignQuestion, pose
 from synth.sweeps import (
     METRICS,
     FrequencyEngine,
@@ -87,7 +87,7 @@ def alone(engine: FrequencyEngine, row: FloatArray, drag: float | None = None) -
 
 
 @cache
-def posed(engine: FrequencyEngine, row: tuple[float, ...]) -> Question:
+def posed(engine: FrequencyEngine, row: tuple[float, ...]) -> DesignQuestion:
     return pose(engine.spread.case_at(row), engine.design.masses)
 
 
