@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
+    from .family_problem import FamilyMember as FamilyMember
     from .family_problem import FamilyProblem as FamilyProblem
     from .family_problem import Objective as Objective
-    from .family_problem import Scenario as Scenario
     from .problem import Goal as Goal
     from .problem import Problem as Problem
     from .problem import Values as Values

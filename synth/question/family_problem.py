@@ -49,7 +49,7 @@ class Objective(Enum):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Scenario:
+class FamilyMember:
     """One loop of a family.
 
     Attributes
@@ -101,7 +101,7 @@ class FamilyProblem:
         If there is no scenario, no weight, or the numbers of parameters disagree.
     """
 
-    scenarios: tuple[Scenario, ...]
+    scenarios: tuple[FamilyMember, ...]
     objective: Objective = Objective.WORST
     parameters: tuple[Parameter, ...] = ()
 
@@ -141,7 +141,7 @@ class FamilyProblem:
             found.setdefault(key if problem.drag is None else (i,), []).append(i)
         return tuple(tuple(members) for members in found.values())
 
-    def with_scenarios(self, scenarios: Sequence[Scenario]) -> FamilyProblem:
+    def with_scenarios(self, scenarios: Sequence[FamilyMember]) -> FamilyProblem:
         """Return the same problem over other scenarios."""
         return FamilyProblem(
             scenarios=tuple(scenarios), objective=self.objective, parameters=self.parameters
