@@ -26,7 +26,7 @@ from models.basics import Quadrature, spectral_nodes
 from models.hook import HookMotion
 from models.plant import LinearPlant
 from synth.limits import Limit, LowFrequency, MaxSensitivity
-from synth.loop import Assessment, Controller, DragElement, disturbances
+from synth.loop import Assessment, DragElement, LinearController, disturbances
 from synth.structures import PayloadFeedback
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ class Task:
         gain = [[-float(gains[law.index(name)]) for name in self.plant.measurements]]
         loop = Assessment(
             self.plant,
-            Controller.static(gain, self.plant.measurements, self.plant.inputs),
+            LinearController.static(gain, self.plant.measurements, self.plant.inputs),
             disturbances({HOOK: self.hook}, self.plant.independent_disturbances),
             drag=self.drag,
         )

@@ -43,7 +43,7 @@ import stillhook as sh
 from models import HookMotion, PlantData, build_plant, fixed_top_modes
 from models.basics import spectral_nodes
 from stillhook.text import AFTER, BEFORE, DRUM, HOOK, REFERENCE
-from synth.loop import Controller, closed_loop_poles
+from synth.loop import LinearController, closed_loop_poles
 from synth.question import locked_response, pose
 
 sys.path.insert(0, str(Path.cwd().parent / "docs" / "make"))
@@ -289,7 +289,7 @@ table(["10 % more of", "payload rms [mm]", "M_s", "delay margin [ms]"], rows)
 
 # %%
 names = ("payload.acceleration", "payload.velocity", "payload.displacement")
-thesis_law = Controller.static(
+thesis_law = LinearController.static(
     [[-gains["A"] * gains[k] for k in ("a", "a1", "a2")]], names, ("drive.command",)
 )
 closed = with_feedback(question.plant, thesis_law)

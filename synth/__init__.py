@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from .limits import Rms as Rms
     from .limits import RollOff as RollOff
     from .loop import Assessment as Assessment
-    from .loop import Controller as Controller
     from .loop import DragElement as DragElement
+    from .loop import LinearController as LinearController
     from .loop import Margins as Margins
     from .loop import closed_loop_poles as closed_loop_poles
     from .structures import LowOrder as LowOrder

@@ -19,7 +19,7 @@ from typing import Any
 
 from models.case import Case
 from synth.design import GainDesign, StructureDesign, Tuning
-from synth.loop import Controller
+from synth.loop import LinearController
 
 EAGER = "-eager"
 """Ending of the designs that ignore the drive's limits."""
@@ -60,7 +60,7 @@ class Law:
         return self.kind != "none"
 
     @property
-    def law(self) -> Mapping[str, float] | Controller:
+    def law(self) -> Mapping[str, float] | LinearController:
         """What `LinearFeedback` takes: gains, or a controller in state space."""
         if self.kind == "gains":
             return dict(self.values)
@@ -69,7 +69,7 @@ class Law:
         import numpy as np
 
         shapes = {"A": (n, n), "B": (n, ny), "C": (nu, n), "D": (nu, ny)}
-        return Controller(
+        return LinearController(
             **{k: np.reshape(np.array(self.values[k], float), s) for k, s in shapes.items()},
             measurements=tuple(self.values["measurements"]),
             inputs=tuple(self.values["inputs"]),

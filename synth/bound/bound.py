@@ -22,7 +22,7 @@ import numpy as np
 from models.basics import FloatArray, InputError, White, check_range, one_thread, pick
 from models.plant import LinearPlant, ShapingFilter
 
-from ..loop import Controller, Disturbance, disturbances
+from ..loop import Disturbance, LinearController, disturbances
 from ..structures import reduced
 from .dual import Dual, DualPoint, shaped, with_input_outputs
 from .spectral_factor import SpectralFactor, spectral_factor
@@ -80,7 +80,7 @@ class Bound:
     gap: float
     missed: float
     fits: Mapping[str, float]
-    controller: Controller
+    controller: LinearController
     pade: int
     assumptions: tuple[str, ...]
     point: DualPoint = field(repr=False)

@@ -31,7 +31,7 @@ from models.plant import LinearPlant, PlantData
 from models.sensing import MEASURED, sensed_plant, sensed_spectra
 
 from ..limits import Continuous, Limit, Minimum, Peak, Rms
-from ..loop import Controller, closed_loop_poles, disturbances
+from ..loop import LinearController, closed_loop_poles, disturbances
 from ..question import PAYLOAD, pose
 from ..verify import LawMatrices, Loop, moments
 from .bound import Bound, lqg_bound
@@ -281,7 +281,7 @@ class DesignBound:
 def bound_beside(
     case: Case,
     hook: HookMotion,
-    controller: Controller,
+    controller: LinearController,
     *,
     masses: int,
     drag: float,
@@ -379,7 +379,10 @@ def exact_sensors(case: Case, measurements: Sequence[str] = MEASURED) -> tuple[s
 
 
 def _rms(
-    plant: LinearPlant, controller: Controller, spectra: Mapping[str, Any], signals: Sequence[str]
+    plant: LinearPlant,
+    controller: LinearController,
+    spectra: Mapping[str, Any],
+    signals: Sequence[str],
 ) -> dict[str, float]:
     """Return the rms of signals in the design's loop."""
     plant = plant.select(measurements=controller.measurements)
@@ -399,7 +402,7 @@ def _rms(
     return {name: math.sqrt(value[0]) for name, value in found.items()}
 
 
-def _proper(controller: Controller) -> Controller:
+def _proper(controller: LinearController) -> LinearController:
     """Return a controller behind a first-order low-pass, if it has a direct path."""
     if not np.any(controller.D):
         return controller

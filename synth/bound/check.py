@@ -13,7 +13,7 @@ import numpy as np
 
 from models.basics import FloatArray, SynthesisError, one_thread
 
-from ..loop import Controller, Disturbance, closed_loop_poles
+from ..loop import Disturbance, LinearController, closed_loop_poles
 from ..verify import (
     LawMatrices,
     Loop,
@@ -92,7 +92,7 @@ def verify_bound(bound: Bound) -> Verification:
 
 
 @one_thread()
-def weighted_rms(bound: Bound, controller: Controller) -> float:
+def weighted_rms(bound: Bound, controller: LinearController) -> float:
     """Return the root of the weighted variance of another controller on a bound's terms.
 
     Raises
@@ -104,7 +104,7 @@ def weighted_rms(bound: Bound, controller: Controller) -> float:
     law = LawMatrices.of(controller, bound.plant)
     poles = closed_loop_poles(
         model,
-        Controller(
+        LinearController(
             A=law.A,
             B=law.B,
             C=law.C,

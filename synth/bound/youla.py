@@ -41,7 +41,7 @@ from models.basics import (
 )
 from models.plant import LinearPlant
 
-from ..loop import Assessment, Controller, Margins, closed_loop_poles
+from ..loop import Assessment, LinearController, Margins, closed_loop_poles
 from ..verify import (
     Check,
     LawMatrices,
@@ -134,11 +134,11 @@ def compressed(
 
 def realised(
     plant: LinearPlant, K: FloatArray, L: FloatArray, Aq: FloatArray, Bq: FloatArray, Cq: FloatArray
-) -> Controller:
+) -> LinearController:
     """Return the observer with Q as one controller."""
     A, B, C, D = plant.A, plant.B, plant.C, plant.D
     seen = C + D @ K
-    return Controller(
+    return LinearController(
         A=np.block([[A + B @ K - L @ seen, (B - L @ D) @ Cq], [-Bq @ seen, Aq - Bq @ D @ Cq]]),
         B=np.vstack([L, Bq]),
         C=np.hstack([K, Cq]),
@@ -186,9 +186,9 @@ class YoulaDesign:
     max_sensitivity: float
     margins: Margins
     functions: int
-    controller: Controller
+    controller: LinearController
 
-    def reduced(self, order: int) -> Controller:
+    def reduced(self, order: int) -> LinearController:
         """Return the controller truncated to at most `order` states.
 
         The states of least weight in the closed loop are dropped: reached as the disturbances
@@ -198,7 +198,7 @@ class YoulaDesign:
         heard, reached = self._gramians
         left, right = balanced_truncation(heard, reached, order)
         given = self.controller
-        return Controller(
+        return LinearController(
             A=left @ given.A @ right,
             B=left @ given.B,
             C=given.C @ right,
@@ -226,7 +226,7 @@ class YoulaDesign:
         heard = solve_lyapunov(A.T, rows.T @ rows)
         return heard[n:, n:], reached[n:, n:]
 
-    def lowest(self, *, within: float = 0.1, most: int = 20) -> Controller:
+    def lowest(self, *, within: float = 0.1, most: int = 20) -> LinearController:
         """Return the controller of lowest order that is stable and loses at most a share `within`.
 
         Raises

@@ -43,7 +43,7 @@ from models.case import Case
 from models.plant import MEAN_LOSSES, build_plant
 
 from ..design import GainDesign
-from ..loop import Controller
+from ..loop import LinearController
 from ..structures import (
     Matrices,
     RecursiveController,
@@ -105,7 +105,7 @@ class LinearFeedback(RecursiveController):
     """
 
     case: Case
-    controller: Controller
+    controller: LinearController
     anti_windup: bool
     method: str
     hold_for: float
@@ -114,7 +114,7 @@ class LinearFeedback(RecursiveController):
     def __init__(
         self,
         case: Case,
-        law: Mapping[str, float] | Controller,
+        law: Mapping[str, float] | LinearController,
         *,
         sample_time: float = 0.01,
         anti_windup: bool = True,
@@ -127,7 +127,7 @@ class LinearFeedback(RecursiveController):
         checked_sample_time(_OWNER, sample_time)
         plant = build_plant(case)
         point, late = plant.operating_point(MEAN_LOSSES), case.sensors.telemetry.delay
-        controller = law if isinstance(law, Controller) else _from_gains(case, law)
+        controller = law if isinstance(law, LinearController) else _from_gains(case, law)
         _check_signals(controller)
         hold = late + 1.0 if hold_for is None else hold_for
         check_range(_OWNER, "hold_for", hold, low=0.0, unit="s")
@@ -193,7 +193,7 @@ class LinearFeedback(RecursiveController):
         InputError
             If a `Tuning` comes without a case or has no controller; otherwise as the class.
         """
-        law: Mapping[str, float] | Controller
+        law: Mapping[str, float] | LinearController
         if isinstance(design, GainDesign):
             law, case = design.gains, design.case if case is None else case
         else:
@@ -237,7 +237,7 @@ class LinearFeedback(RecursiveController):
         return ca.vertcat(*rows)
 
 
-def _from_gains(case: Case, gains: Mapping[str, float]) -> Controller:
+def _from_gains(case: Case, gains: Mapping[str, float]) -> LinearController:
     """Return u = -A (a P'' + a1 P' + a2 P)."""
     unknown = set(gains) - {"A", "a", "a1", "a2"}
     if unknown or not {"a", "a1", "a2"} <= set(gains):
@@ -247,10 +247,10 @@ def _from_gains(case: Case, gains: Mapping[str, float]) -> Controller:
     own = case.gains.A if case.gains is not None else 1.0
     values = {name: check_range("gains", name, v) for name, v in {"A": own, **gains}.items()}
     products = [-values["A"] * values[name] for name in ("a", "a1", "a2")]
-    return Controller.static([products], PAYLOAD, ("drive.command",))
+    return LinearController.static([products], PAYLOAD, ("drive.command",))
 
 
-def _check_signals(controller: Controller) -> None:
+def _check_signals(controller: LinearController) -> None:
     if len(controller.inputs) != 1:
         raise InputError(
             f"{_OWNER}: the controller must have one input, the drive's command, got "

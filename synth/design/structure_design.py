@@ -17,7 +17,7 @@ import numpy as np
 from models.basics import InputError
 from models.case import Case
 
-from ..loop import Controller, Margins
+from ..loop import LinearController, Margins
 from ..question import HOOK, StructureQuestion, pose_structure
 from ..search import Found
 from ..verify import Verification, verify_structure
@@ -90,7 +90,7 @@ class StructureDesign:
         return pose_structure(self.case, self.structure, self.masses)
 
     @property
-    def controller(self) -> Controller:
+    def controller(self) -> LinearController:
         """The controller in state space, u = +C y, as `LinearFeedback` takes it.
 
         Raises

@@ -18,7 +18,7 @@ from models.basics import InputError, check_range, one_thread
 from models.plant import LinearPlant
 
 from ..limits import Limit
-from ..loop import Assessment, Controller, DragElement, Margins, disturbances
+from ..loop import Assessment, DragElement, LinearController, Margins, disturbances
 from ..question import Problem
 from ..search import KEPT, Found, Progress, Start, search
 from ..structures import Structure
@@ -93,7 +93,7 @@ class Tuning:
     status: str
     cost: float
     parameters: Mapping[str, float]
-    controller: Controller | None
+    controller: LinearController | None
     margins: Margins | None
     limits: Mapping[str, LimitUse]
     starts: tuple[Start, ...] = ()

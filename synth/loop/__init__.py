@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from .assess import Assessment as Assessment
     from .assess import frequency_grid as frequency_grid
     from .assess import integration_band as integration_band
-    from .controller import Controller as Controller
+    from .controller import LinearController as LinearController
     from .controller import closed_loop_matrix as closed_loop_matrix
     from .controller import closed_loop_poles as closed_loop_poles
     from .disturbance import Disturbance as Disturbance

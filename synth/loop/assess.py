@@ -22,7 +22,7 @@ from models.basics import (
 )
 from models.plant import LinearPlant, consistent_drag
 
-from .controller import Controller, closed_loop_poles
+from .controller import LinearController, closed_loop_poles
 from .disturbance import Disturbance
 from .loop import DragElement, closed_loop, numeric_blocks, return_differences, with_drag
 from .margins import Margins, loop_margins, refine_minima, worst_margins
@@ -52,7 +52,7 @@ class Assessment:
     def __init__(
         self,
         plant: LinearPlant,
-        controller: Controller,
+        controller: LinearController,
         disturbances: Sequence[Disturbance],
         *,
         drag: DragElement | None = None,
@@ -283,7 +283,7 @@ def integration_band(
 
 def consistent_coefficient(
     plant: LinearPlant,
-    controller: Controller,
+    controller: LinearController,
     disturbances: Sequence[Disturbance],
     drag: DragElement,
 ) -> float:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Controller:
+class LinearController:
     """A controller x' = A x + B y, u = C x + D y.
 
     Parameters
@@ -57,11 +57,11 @@ class Controller:
     @staticmethod
     def static(
         gain: npt.ArrayLike, measurements: Sequence[str], inputs: Sequence[str]
-    ) -> Controller:
+    ) -> LinearController:
         """Return the controller u = gain y, gain of shape (nu, ny)."""
         D = np.asarray(gain, dtype=np.float64)
         nu, ny = D.shape
-        return Controller(
+        return LinearController(
             A=np.zeros((0, 0)),
             B=np.zeros((0, ny)),
             C=np.zeros((nu, 0)),
@@ -97,7 +97,7 @@ class Controller:
         )
 
 
-def closed_loop_matrix(plant: LinearPlant, controller: Controller) -> FloatArray:
+def closed_loop_matrix(plant: LinearPlant, controller: LinearController) -> FloatArray:
     """Return the state matrix of plant and controller in a loop, (n + nk, n + nk).
 
     Delays of the plant are ignored: replace them first (`LinearPlant.without_delays`).
@@ -116,6 +116,6 @@ def closed_loop_matrix(plant: LinearPlant, controller: Controller) -> FloatArray
     )
 
 
-def closed_loop_poles(plant: LinearPlant, controller: Controller) -> ComplexArray:
+def closed_loop_poles(plant: LinearPlant, controller: LinearController) -> ComplexArray:
     """Return the poles of the closed loop [1/s]; delays are ignored."""
     return np.asarray(np.linalg.eigvals(closed_loop_matrix(plant, controller)), dtype=np.complex128)

@@ -13,7 +13,7 @@ from models.case import Case
 from models.plant import LinearPlant, PlantData
 
 from ..design import GainDesign, StructureDesign
-from ..loop import Controller, Disturbance, DragElement
+from ..loop import Disturbance, DragElement, LinearController
 from ..question import HOOK, PAYLOAD, pose, pose_structure
 from .criteria import STABILITY, Criterion, case_criteria, outputs_of
 from .systems import VELOCITY, HeldSystem, LoopSystem, PerfectSystem, System
@@ -87,7 +87,7 @@ def pose_operability(
         question = pose(reported, source.masses if same and not isinstance(source, Case) else None)
         loop_plant: LinearPlant = question.plant
         noises: tuple[Disturbance, ...] = ()
-        loop_parts: tuple[LinearPlant, Controller, DragElement | None] | None = None
+        loop_parts: tuple[LinearPlant, LinearController, DragElement | None] | None = None
         if isinstance(source, GainDesign):
             if source.margins is None:
                 raise InputError("operability: the design has no stabilising gains")

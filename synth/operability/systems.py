@@ -21,7 +21,14 @@ from models.basics import ComplexArray, FloatArray, Quadrature
 from models.plant import LinearPlant, PlantData, fixed_top_modes, rope_transfers
 from models.rig import MRU
 
-from ..loop import Assessment, Controller, Disturbance, DragElement, closed_loop, numeric_blocks
+from ..loop import (
+    Assessment,
+    Disturbance,
+    DragElement,
+    LinearController,
+    closed_loop,
+    numeric_blocks,
+)
 from ..question import HOOK, PAYLOAD
 from .responses import DragResponses
 
@@ -145,7 +152,7 @@ class LoopSystem(System):
     """
 
     plant: LinearPlant
-    controller: Controller
+    controller: LinearController
     drag: DragElement | None
 
     @override

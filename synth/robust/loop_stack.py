@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from models.basics import ComplexArray, FloatArray, Quadrature, peak_factor
 
-from ..loop import Controller
+from ..loop import LinearController
 from ..verify import LawMatrices
 from .plant_stack import PlantStack
 
@@ -44,7 +44,7 @@ class LoopStack:
         u = +C y, the same for all.
     """
 
-    def __init__(self, plants: PlantStack, controller: Controller) -> None:
+    def __init__(self, plants: PlantStack, controller: LinearController) -> None:
         self.plants = plants
         bare = plants.without_delays()
         law = LawMatrices.of(controller, plants.like)
@@ -184,7 +184,7 @@ class StackView:
 
 def consistent_stack(
     plants: PlantStack,
-    controller: Controller,
+    controller: LinearController,
     nodes: Quadrature,
     densities: Mapping[str, FloatArray],
     start: float,

@@ -20,7 +20,7 @@ import numpy as np
 
 from models.basics import InputError, check_range, one_thread
 
-from ..loop import Controller, Margins, closed_loop_poles
+from ..loop import LinearController, Margins, closed_loop_poles
 from ..structures import ParametrisedController
 from ..verify import LawMatrices, winding_of_plant
 from .mu_doubts import Doubt, doubts_of
@@ -242,7 +242,7 @@ def robustness(
 
 def _parts(
     design: GainDesign | StructureDesign,
-) -> tuple[Controller, ParametrisedController, Sequence[float]]:
+) -> tuple[LinearController, ParametrisedController, Sequence[float]]:
     """Return controller, law and parameters of a design."""
     from ..design import StructureDesign
     from ..question import pose

@@ -30,7 +30,7 @@ from models.basics import ComplexArray, FloatArray, InputError
 from models.case import Case
 from models.plant import LinearPlant
 
-from ..loop import Controller
+from ..loop import LinearController
 from ..verify import LawMatrices
 from .mu_doubts import DELAYS, Doubt, plant_of
 from .mu_structured_value import Block
@@ -63,7 +63,7 @@ class UncertainLoop:
     case: Case
     masses: int
     drag: float
-    controller: Controller
+    controller: LinearController
     doubts: tuple[Doubt, ...]
     plant: LinearPlant
     sizes: tuple[int, ...]
@@ -167,7 +167,7 @@ class UncertainLoop:
 
 def uncertain_loop(
     case: Case,
-    controller: Controller,
+    controller: LinearController,
     doubts: Sequence[Doubt],
     *,
     masses: int,

@@ -11,7 +11,7 @@ from models.basics import InputError
 from models.case import Case
 
 from ..design import LimitUse
-from ..loop import Controller
+from ..loop import LinearController
 from ..question import Objective
 from .family import Family, Member
 from .family_plants import PAYLOAD_FEEDBACK, FamilyPlants
@@ -104,7 +104,7 @@ class RobustDesign:
     ok: bool
     status: str
     parameters: Mapping[str, float]
-    controller: Controller | None
+    controller: LinearController | None
     scenarios: tuple[ScenarioResult, ...]
     added: int
     check: DrawCheck | None

@@ -28,7 +28,7 @@ from models.basics import ComplexArray, FloatArray, InputError, check_range
 from models.case import Case
 from models.plant import LinearPlant, build_plant
 
-from ..loop import Controller, Margins, closed_loop_poles, frequency_grid, loop_margins
+from ..loop import LinearController, Margins, closed_loop_poles, frequency_grid, loop_margins
 
 _OWNER = "torque loop"
 
@@ -54,7 +54,7 @@ class TorqueLoop:
     """
 
     plant: LinearPlant
-    law: Controller
+    law: LinearController
     limit: float
     static: float
     quadratic: float
@@ -64,7 +64,7 @@ class TorqueLoop:
     def from_case(
         cls,
         case: Case,
-        law: Controller,
+        law: LinearController,
         *,
         limit: float | None = None,
         masses: int | None = None,

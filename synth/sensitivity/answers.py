@@ -22,7 +22,7 @@ from models.plant import PlantData, build_plant
 from models.sensing import sensed_plant, sensed_spectra
 
 from ..design import GainDesign, StructureDesign
-from ..loop import Assessment, Controller, Disturbance, DragElement, disturbances
+from ..loop import Assessment, Disturbance, DragElement, LinearController, disturbances
 from ..question import HOOK, SampledNoise, pose
 from ..structures import ParametrisedController
 from .differences import derivative
@@ -129,7 +129,7 @@ class Answers:
         except SolverError:
             return None  # no drag agrees: unstable with any
 
-    def controller(self, values: list[float]) -> Controller:
+    def controller(self, values: list[float]) -> LinearController:
         """Return the controller of some values."""
         return self.law.controller(values)
 

@@ -29,7 +29,7 @@ import numpy as np
 from models.basics import ComplexArray, FloatArray
 from models.plant import LinearPlant
 
-from ..loop import Controller, Disturbance
+from ..loop import Disturbance, LinearController
 from .slopes import BLOCKS, MatrixSlope
 
 
@@ -78,7 +78,7 @@ class Gradient:
 class _Loop:
     """Closed-loop vectors at points s, (k, ...)."""
 
-    def __init__(self, plant: LinearPlant, controller: Controller, s: ComplexArray) -> None:
+    def __init__(self, plant: LinearPlant, controller: LinearController, s: ComplexArray) -> None:
         n = len(plant.states)
         self.plant, self.s = plant, s
         self.pencil = s[:, None, None] * np.eye(n) - plant.A
@@ -114,7 +114,7 @@ class _Loop:
 
 def variance_gradient(
     plant: LinearPlant,
-    controller: Controller,
+    controller: LinearController,
     disturbances: Sequence[Disturbance],
     output: str,
     omega: FloatArray,
@@ -162,7 +162,9 @@ def variance_gradient(
     )
 
 
-def sensitivity_gradient(plant: LinearPlant, controller: Controller, omega: float) -> Gradient:
+def sensitivity_gradient(
+    plant: LinearPlant, controller: LinearController, omega: float
+) -> Gradient:
     """Return the gradient of ln M_s, the sensitivity having its peak at `omega` [rad/s]."""
     s = np.array([1j * omega], dtype=np.complex128)
     loop = _Loop(plant, controller, s)

@@ -24,7 +24,7 @@ import numpy.typing as npt
 from models.basics import ComplexArray, FloatArray, pick
 from models.plant import LinearPlant
 
-from ..loop import Controller
+from ..loop import LinearController
 from .blocks import FilterSection, Matrices, series
 from .structure import Bounds, Parameter, ParametrisedController, check_bounds
 
@@ -127,14 +127,14 @@ class DiagramLaw(ParametrisedController):
                 result = step if isinstance(result, float) else result * step
         return result
 
-    def controller(self, values: Sequence[float]) -> Controller:
+    def controller(self, values: Sequence[float]) -> LinearController:
         """Return the controller in state space; measurements that are not heard are left out."""
         A, B, C, D = self.matrices(values)
         heard = [self._columns[name] for name in self.heard]
         unheard = np.zeros((len(A), len(self._plant.measurements)))
         through = np.zeros((1, len(self._plant.measurements)))
         unheard[:, heard], through[:, heard] = B, D
-        return Controller(
+        return LinearController(
             A=A,
             B=unheard,
             C=C,

@@ -20,7 +20,7 @@ from typing_extensions import override
 from models.basics import ComplexArray, FloatArray, InputError, SynthesisError
 from models.plant import LinearPlant
 
-from ..loop import Controller
+from ..loop import LinearController
 from .canonical import BlockForm
 from .lqg import (
     LqgEstimator,
@@ -153,10 +153,10 @@ class LowOrderLaw(ParametrisedController):
         return self._form.characteristic(values, s)
 
     @override
-    def controller(self, values: Sequence[float]) -> Controller:
+    def controller(self, values: Sequence[float]) -> LinearController:
         A, B, C, D = self._matrices(values)
         names = self._plant.measurements, self._plant.inputs
-        return Controller(A=A, B=B, C=C, D=D, measurements=names[0], inputs=names[1])
+        return LinearController(A=A, B=B, C=C, D=D, measurements=names[0], inputs=names[1])
 
     @override
     def closed_loop_matrix(self, plant: LinearPlant, values: Sequence[float]) -> FloatArray:
@@ -182,7 +182,7 @@ class LowOrderLaw(ParametrisedController):
         D.flat[: numbers[self._direct].size] = numbers[self._direct]
         return *self._form.matrices(numbers), D
 
-    def values(self, controller: Controller) -> FloatArray:
+    def values(self, controller: LinearController) -> FloatArray:
         """Return the parameters of a controller, whose order may be lower than the law's."""
         missing = self._structure.order - len(controller.A)
         A, B, C = controller.A, controller.B, controller.C
@@ -212,7 +212,7 @@ class LowOrderLaw(ParametrisedController):
         ]
         if self._structure.proper:
             names = plant.measurements, plant.inputs
-            fast += [self.values(Controller.static(gain, *names)) for gain in gains]
+            fast += [self.values(LinearController.static(gain, *names)) for gain in gains]
         found = self._family(plant, regulators, filters)
         return self._clipped(np.vstack([found, *fast]))
 
@@ -247,12 +247,12 @@ class LowOrderLaw(ParametrisedController):
         near = known[rows % len(known)]
         return self._clipped(np.vstack([known, near * np.exp(reach * signed)]))
 
-    def _swift(self, gain: FloatArray, pole: float) -> Controller:
+    def _swift(self, gain: FloatArray, pole: float) -> LinearController:
         """Return the most important directions of a static gain behind poles near -`pole`."""
         left, sizes, right = np.linalg.svd(gain, full_matrices=False)
         keep = min(self._structure.order, len(sizes))
         poles = pole * (1.0 + 0.3 * np.arange(keep))
-        return Controller(
+        return LinearController(
             A=-np.diag(poles),
             B=(poles * sizes[:keep])[:, None] * right[:keep],
             C=left[:, :keep],
@@ -313,7 +313,7 @@ class LowOrderFeedback(Structure):
 
     @staticmethod
     def start(
-        law: ParametrisedController, found: Mapping[str, float], controller: Controller
+        law: ParametrisedController, found: Mapping[str, float], controller: LinearController
     ) -> list[float]:
         """Return the parameters of rolled-off payload feedback, and set the sizes by it.
 

@@ -27,7 +27,7 @@ from models.basics import (
 )
 from models.plant import LinearPlant
 
-from ..loop import Controller
+from ..loop import LinearController
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,7 +52,7 @@ class LqgEstimator:
 class LQG:
     """The optimal controller of full order; `cost` is the root of the weighted variance."""
 
-    controller: Controller
+    controller: LinearController
     cost: float
     regulator: LqgRegulator
     estimator: LqgEstimator
@@ -156,7 +156,7 @@ def projected(plant: LinearPlant, feedback: LqgRegulator, mask: BoolArray) -> Fl
 
 def reduced(
     plant: LinearPlant, feedback: LqgRegulator, kalman: LqgEstimator, order: int
-) -> Controller:
+) -> LinearController:
     """Return the controller of a regulator and a filter, truncated to at most `order` states.
 
     In the loop that the state feedback makes, white innovations drive the state estimate, and
@@ -175,7 +175,7 @@ def reduced(
             np.asarray(heard, float), np.asarray(reached, float), order
         )
         A, B, C = left @ A @ right, left @ B, C @ right
-    return Controller(
+    return LinearController(
         A=A,
         B=B,
         C=C,

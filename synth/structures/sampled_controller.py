@@ -13,7 +13,7 @@ import scipy.linalg
 from models.basics import FloatArray, InputError, SynthesisError, check_range, pick
 from models.plant import zero_order_hold
 
-from ..loop import Controller
+from ..loop import LinearController
 
 Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
@@ -23,7 +23,7 @@ _SLOWEST = 0.5  # frequencies above which a controller's gains are compared [rad
 
 
 def sampled(
-    controller: Controller,
+    controller: LinearController,
     sample_time: float,
     *,
     method: str = "tustin",
@@ -85,7 +85,7 @@ def low_pass_matrices(n: int, bandwidth: float | None, sample_time: float) -> Ma
     omega = check_range(_OWNER, "filter_bandwidth", bandwidth, low=0.0, unit="rad/s", open_low=True)
     names = tuple(f"y{i}" for i in range(n))
     one = np.eye(n)
-    low_pass = Controller(
+    low_pass = LinearController(
         A=-omega * one, B=omega * one, C=one, D=0.0 * one, measurements=names, inputs=names
     )
     return sampled(low_pass, sample_time)

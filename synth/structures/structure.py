@@ -22,7 +22,7 @@ import numpy as np
 from models.basics import ComplexArray, FloatArray, InputError, check_range, pick
 from models.plant import LinearPlant
 
-from ..loop import Controller, Disturbance, closed_loop_matrix
+from ..loop import Disturbance, LinearController, closed_loop_matrix
 from .lqg import designs, projected
 from .whitened import whitened
 
@@ -75,7 +75,7 @@ class ParametrisedController(ABC):
         """
 
     @abstractmethod
-    def controller(self, values: Sequence[float]) -> Controller:
+    def controller(self, values: Sequence[float]) -> LinearController:
         """Return the controller of numerical parameter `values`."""
 
     def guesses(self, problem: GeneralisedPlant, omega: FloatArray) -> FloatArray:
@@ -220,9 +220,9 @@ class _GainLaw(ParametrisedController):
             gain[i][j] = values[k] * float(self._factors[k])
         return gain
 
-    def controller(self, values: Sequence[float]) -> Controller:
+    def controller(self, values: Sequence[float]) -> LinearController:
         gain = self._gain(values)
-        return Controller.static(gain, self._plant.measurements, self._plant.inputs)
+        return LinearController.static(gain, self._plant.measurements, self._plant.inputs)
 
     def closed_loop_matrix(self, plant: LinearPlant, values: Sequence[float]) -> FloatArray:
         # The optimiser asks for this at every step: no checks, no objects.

@@ -23,7 +23,7 @@ from time_response import Sine, Step, time_response
 from models import HookMotion, build_plant, load_case
 from models.basics import spectral_nodes
 from synth.design import evaluate_gains
-from synth.loop import Controller, closed_loop_poles
+from synth.loop import LinearController, closed_loop_poles
 from synth.question import pose
 
 PAYLOAD, HAUL, HOOK = "payload.displacement", "drum.haul", "hook.heave"
@@ -68,7 +68,7 @@ def closed(question):
     plant = question.plant
     A, a, a1, a2 = (THESIS_GAINS[name] for name in ("A", "a", "a1", "a2"))
     return with_feedback(
-        plant, Controller.static(-A * np.array([[a, a1, a2]]), MEASURED, plant.inputs)
+        plant, LinearController.static(-A * np.array([[a, a1, a2]]), MEASURED, plant.inputs)
     )
 
 
@@ -281,7 +281,7 @@ def test_final_value_of_a_step_of_z_is_zero(closed, question):
     assert abs(run[PAYLOAD][-1]) < 1e-6
     assert run[HAUL][-1] == pytest.approx(-1.0, abs=1e-6)  # the drum has hauled it all in
     # Without displacement gain the motion that is left is not zero: no integrator acts on it.
-    law = Controller.static([[-1e4, -2e4, 0.0]], MEASURED, question.plant.inputs)
+    law = LinearController.static([[-1e4, -2e4, 0.0]], MEASURED, question.plant.inputs)
     drift = time_response(
         with_feedback(question.plant, law), {HOOK: Step()}, duration=600.0, step=1.0
     )
@@ -367,7 +367,7 @@ def test_rope_tension(question, loop, hook, case):
 def test_unstable_on_a_rope_with_axial_modes(case, masses, growth):
     # The growth rates found since are for masses at the lower end of each piece, no damping.
     data = replace(THESIS, masses=masses, lumping="thesis")
-    law = Controller.static([[-1e4, -2e4, -2e4]], MEASURED, ("drive.command",))
+    law = LinearController.static([[-1e4, -2e4, -2e4]], MEASURED, ("drive.command",))
     plant = build_plant(data).linearise(drag=case.payload.fixed_drag)
     assert closed_loop_poles(plant, law).real.max() == pytest.approx(growth, abs=0.05)
     # Both lumpings go to the same limit, 4.66 1/s.

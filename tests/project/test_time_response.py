@@ -13,10 +13,10 @@ from time_response import Sine, Step, time_response
 
 from models.basics import InputError
 from models.plant import LinearPlant, build_plant
-from synth.loop import Controller, closed_loop_poles
+from synth.loop import LinearController, closed_loop_poles
 
 PAYLOAD = ("payload.acceleration", "payload.velocity", "payload.displacement")
-THESIS_CONTROLLER = Controller.static(THESIS_FEEDBACK, PAYLOAD, ("drive.command",))
+THESIS_CONTROLLER = LinearController.static(THESIS_FEEDBACK, PAYLOAD, ("drive.command",))
 
 
 def oscillator(omega: float = 2.0, zeta: float = 0.1) -> LinearPlant:
@@ -85,7 +85,7 @@ def test_a_closed_loop_against_python_control():
     import control
 
     plant = build_plant(replace(MODERN, delay=0.0)).linearise(drag=5e3)
-    law = Controller(
+    law = LinearController(
         A=np.array([[-4.0]]),
         B=np.array([[0.0, 1.0, 0.0]]),
         C=np.array([[-3.0]]),
@@ -138,8 +138,8 @@ def test_commands_add_to_the_feedback():
 
 def test_a_feedback_may_use_some_signals_only():
     plant = build_plant(THESIS).linearise(drag=THESIS_DRAG)
-    one = Controller.static([[-2e4]], PAYLOAD[2:], ("drive.command",))
-    all_three = Controller.static([[0.0, 0.0, -2e4]], PAYLOAD, ("drive.command",))
+    one = LinearController.static([[-2e4]], PAYLOAD[2:], ("drive.command",))
+    all_three = LinearController.static([[0.0, 0.0, -2e4]], PAYLOAD, ("drive.command",))
     np.testing.assert_allclose(with_feedback(plant, one).A, with_feedback(plant, all_three).A)
 
 
@@ -162,4 +162,4 @@ def test_bad_input():
         A=np.zeros((0, 0)), B=np.zeros((0, 1)), E=np.zeros((0, 0)), C=np.zeros((1, 0)), D=[[1.0]]
     )
     with pytest.raises(InputError, match="not well posed"):
-        with_feedback(wire, Controller.static([[1.0]], ("y1",), ("u1",)))
+        with_feedback(wire, LinearController.static([[1.0]], ("y1",), ("u1",)))

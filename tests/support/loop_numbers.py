@@ -15,7 +15,7 @@ import scipy.linalg
 
 from models.basics import White
 from models.plant import LinearPlant
-from synth.loop import Controller
+from synth.loop import LinearController
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -104,7 +104,7 @@ def with_full_state(plant: LinearPlant) -> LinearPlant:
 
 
 def closed_matrices(
-    plant: LinearPlant, controller: Controller
+    plant: LinearPlant, controller: LinearController
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """A, E, C, F of the closed loop from w to z, without delays.
 
@@ -132,7 +132,7 @@ def closed_matrices(
 
 
 def lyapunov_variances(
-    plant: LinearPlant, controller: Controller, spectrum: Mapping[str, White]
+    plant: LinearPlant, controller: LinearController, spectrum: Mapping[str, White]
 ) -> dict[str, float]:
     """Variances of all outputs under white noises; infinite where the loop is unstable."""
     A, E, C, F = closed_matrices(plant, controller)
@@ -150,7 +150,7 @@ def lyapunov_variances(
 
 def lyapunov_cost(
     plant: LinearPlant,
-    controller: Controller,
+    controller: LinearController,
     spectrum: Mapping[str, White],
     minimise: Mapping[str, float],
 ) -> float:
@@ -160,7 +160,7 @@ def lyapunov_cost(
 
 
 def loop_response(
-    plant: LinearPlant, controller: Controller, broken: int = 0
+    plant: LinearPlant, controller: LinearController, broken: int = 0
 ) -> Callable[[FloatArray], ComplexArray]:
     """The loop gain L at one input, all other loops closed, delays exact."""
 
@@ -184,15 +184,15 @@ def loop_response(
     return loop
 
 
-def dense_grid(plant: LinearPlant, controller: Controller, count: int = 6000) -> FloatArray:
+def dense_grid(plant: LinearPlant, controller: LinearController, count: int = 6000) -> FloatArray:
     """Frequencies from far below to far above the closed loop's poles [rad/s]."""
     sizes = np.abs(np.linalg.eigvals(closed_matrices(plant, controller)[0]))
     return np.geomspace(1e-3 * sizes.min(), 1e2 * sizes.max(), count)
 
 
-def stable_with(plant: LinearPlant, controller: Controller, factor: float) -> bool:
+def stable_with(plant: LinearPlant, controller: LinearController, factor: float) -> bool:
     """Whether the loop is stable with its gain times `factor`, delays dropped."""
-    scaled = Controller(
+    scaled = LinearController(
         A=controller.A,
         B=controller.B,
         C=factor * controller.C,

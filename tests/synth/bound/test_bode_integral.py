@@ -10,7 +10,7 @@ from models.basics import InputError
 from models.plant import LinearPlant
 from models.sea import SeaSpectrum
 from synth.bound.bode_integral import bode_estimate, bode_integral, least_sensitivity
-from synth.loop import Assessment, Controller, disturbances, loop_margins
+from synth.loop import Assessment, LinearController, disturbances, loop_margins
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -54,7 +54,7 @@ def test_estimate_of_a_loop_is_one_line() -> None:
     )
     sea = SeaSpectrum(kind="jonswap", significant_height=2.0, peak_period=9.0)
     sources = disturbances({"hook": sea}, ("hook",))
-    view = Assessment(plant, Controller.static([[-1.2]], ("y1",), ("u1",)), sources)
+    view = Assessment(plant, LinearController.static([[-1.2]], ("y1",), ("u1",)), sources)
     assert view.stable
     found = bode_estimate(view)
     assert 0.0 < found.least < found.achieved < found.max_sensitivity

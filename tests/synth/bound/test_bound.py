@@ -22,7 +22,7 @@ from synth.bound.case import rms_limits
 from synth.bound.dual import Dual, shaped
 from synth.design import evaluate_gains, tune
 from synth.limits import Continuous, Minimum, Peak, Power, Rms
-from synth.loop import Controller
+from synth.loop import LinearController
 from synth.structures import StaticGain, reduced
 
 FloatArray = npt.NDArray[np.float64]
@@ -304,7 +304,7 @@ def test_questions_without_an_answer_are_refused() -> None:
 
 
 def test_an_unstable_controller_is_refused(late: Bound) -> None:
-    gain = Controller.static([[50.0, 0.0]], ("place", "speed"), ("command",))
+    gain = LinearController.static([[50.0, 0.0]], ("place", "speed"), ("command",))
     with pytest.raises(SynthesisError, match="loop is unstable"):
         weighted_rms(late, gain)
 

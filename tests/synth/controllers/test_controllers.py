@@ -27,7 +27,7 @@ from synth.controllers import (
     VelocityFeedForward,
     controller_named,
 )
-from synth.loop import Controller as StateSpace
+from synth.loop import LinearController as StateSpace
 from synth.structures import RecursiveController
 from synth.structures.recursive import at_rest
 

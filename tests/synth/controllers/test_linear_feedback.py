@@ -17,14 +17,14 @@ from models.plant import MEAN_LOSSES, build_plant
 from models.sensing import Measurement
 from synth import LowOrder, MaxSensitivity, White, evaluate_gains, tune
 from synth.controllers import LinearFeedback
-from synth.loop import Controller
+from synth.loop import LinearController
 from synth.structures import sampled, sampled_loop, tracking_gain
 
 PAYLOAD = ("payload.acceleration", "payload.velocity", "payload.displacement")
 COMMAND = ("drive.command",)
 GAINS = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
 LIGHT = {"A": 1.0, "a": 2.0, "a1": 3.0, "a2": 4.0}
-INTEGRAL = Controller(  # u = -2 P' - 3 P - 1.5 int P
+INTEGRAL = LinearController(  # u = -2 P' - 3 P - 1.5 int P
     A=[[0.0]],
     B=[[0.0, 0.0, 1.0]],
     C=[[-1.5]],
@@ -34,9 +34,9 @@ INTEGRAL = Controller(  # u = -2 P' - 3 P - 1.5 int P
 )
 
 
-def random_controller(n: int, seed: int, ny: int = 2) -> Controller:
+def random_controller(n: int, seed: int, ny: int = 2) -> LinearController:
     random = np.random.default_rng(seed)
-    return Controller(
+    return LinearController(
         A=2.0 * random.standard_normal((n, n)) - 2.0 * np.eye(n),
         B=random.standard_normal((n, ny)),
         C=random.standard_normal((1, n)),
@@ -181,7 +181,7 @@ def test_with_anti_windup_a_saturated_loop_comes_back_sooner() -> None:
     # A payload 0.5 m too low, and a drive that may turn slowly only: the integral has far too
     # long to grow.
     case = load_case("subsea-crane")
-    strong = Controller(
+    strong = LinearController(
         A=[[0.0]],
         B=[[0.0, 0.0, 1.0]],
         C=[[-20.0]],
@@ -223,7 +223,7 @@ def test_tracking_holds_every_state_while_the_drive_has_its_way(
 
 def test_tracking_holds_an_integrator_and_an_unstable_controller() -> None:
     for pole in (0.0, 0.5):
-        c = Controller(
+        c = LinearController(
             A=[[pole]], B=[[1.0]], C=[[-1.0]], D=[[-2.0]], measurements=("payload.velocity",),
             inputs=COMMAND,
         )  # fmt: skip
@@ -234,7 +234,7 @@ def test_tracking_holds_an_integrator_and_an_unstable_controller() -> None:
 
 
 def test_a_lasting_state_that_is_not_seen_cannot_be_held() -> None:
-    hidden = Controller(
+    hidden = LinearController(
         A=[[0.0, 0.0], [0.0, -1.0]],
         B=[[1.0], [1.0]],
         C=[[0.0, 1.0]],
@@ -261,7 +261,9 @@ def test_old_values_fade_out() -> None:
 
 def test_signals_of_the_winch_may_be_heard_about_their_rest() -> None:
     case = load_case("thesis-1975")
-    c = Controller.static([[1e-4, 3.0, 7.0]], ("rope.tension", "motor.speed", "drum.haul"), COMMAND)
+    c = LinearController.static(
+        [[1e-4, 3.0, 7.0]], ("rope.tension", "motor.speed", "drum.haul"), COMMAND
+    )
     law, point = LinearFeedback(case, c), build_plant(case).operating_point(MEAN_LOSSES)
     speed = law.motor.per_rope_speed
     m = seen(
@@ -327,17 +329,17 @@ def test_a_tuned_low_order_controller_is_as_good_sampled_as_it_is_designed() -> 
         (INTEGRAL, {"prewarp": 400.0}, r"prewarp must be in \(0, 314\.159\) rad/s, got 400"),
         (INTEGRAL, {"prewarp": 1.0, "method": "zoh"}, "prewarp is for the method 'tustin' only"),
         (
-            Controller.static([[1.0]], ("hook.heave",), COMMAND),
+            LinearController.static([[1.0]], ("hook.heave",), COMMAND),
             {},
             "no measurement 'hook.heave'; there are: payload.acceleration, ",
         ),
         (
-            Controller.static([[1.0], [1.0]], ("drum.haul",), ("one", "two")),
+            LinearController.static([[1.0], [1.0]], ("drum.haul",), ("one", "two")),
             {},
             "must have one input, the drive's command, got one, two",
         ),
         (
-            Controller(
+            LinearController(
                 A=[[200.0]], B=[[1.0]], C=[[1.0]], D=[[0.0]],
                 measurements=("drum.haul",), inputs=COMMAND,
             ),

@@ -24,7 +24,7 @@ from scipy.optimize import brentq, differential_evolution, minimize
 from models.basics import InputError
 from models.plant import LinearPlant
 from synth import LowOrder, MaxSensitivity, Rms, StaticGain, White, tune
-from synth.loop import Controller
+from synth.loop import LinearController
 from synth.structures import ParametrisedController
 from synth.structures.low_order import _LowOrderLaw
 from synth.structures.lqg import lqg
@@ -179,7 +179,7 @@ def test_helicopters_two_gains_are_the_best_of_a_grid() -> None:
 
     def cost(gains):
         K = np.reshape(gains, (2, 1))
-        controller = Controller.static(K, HELICOPTER.measurements, HELICOPTER.inputs)
+        controller = LinearController.static(K, HELICOPTER.measurements, HELICOPTER.inputs)
         return lyapunov_cost(HELICOPTER, controller, spectrum, minimise)
 
     sizes = np.concatenate([-np.geomspace(0.03, 30.0, 12), np.geomspace(0.03, 30.0, 12)])
@@ -224,7 +224,7 @@ def test_better_of_two_separate_stable_regions_is_found(A, B, C, best, second) -
     spectrum, minimise = white_everywhere(plant), dict.fromkeys(plant.outputs, 1.0)
 
     def cost(gains):
-        controller = Controller.static([gains], plant.measurements, plant.inputs)
+        controller = LinearController.static([gains], plant.measurements, plant.inputs)
         return lyapunov_cost(plant, controller, spectrum, minimise)
 
     # Both are local optima, and unstable loops lie between them.

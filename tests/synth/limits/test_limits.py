@@ -42,7 +42,7 @@ from synth import (
     tune,
 )
 from synth.limits import Limit
-from synth.loop import Assessment, Controller, disturbances
+from synth.loop import Assessment, LinearController, disturbances
 from synth.loop.loop import constant
 
 WHITE = {"f": White(1.0), "n": White(0.01)}
@@ -88,12 +88,12 @@ MASS_QUESTION = {"spectrum": WHITE, "minimise": WEIGHTS, "starts": 6}
 # -------------------------------------------------- measures by other means
 
 
-def sensitivity_peak(plant: LinearPlant, controller: Controller) -> float:
+def sensitivity_peak(plant: LinearPlant, controller: LinearController) -> float:
     grid = dense_grid(plant, controller)
     return float(np.abs(1.0 / (1.0 + loop_response(plant, controller)(grid))).max())
 
 
-def gain_reserve(plant: LinearPlant, controller: Controller, towards: float) -> float:
+def gain_reserve(plant: LinearPlant, controller: LinearController, towards: float) -> float:
     """The gain factor, seen from 1 `towards` a factor, at which the loop stops being stable."""
     plant = plant.without_delays(10)
     factors = np.geomspace(1.0, towards, 400)
@@ -110,7 +110,7 @@ def gain_reserve(plant: LinearPlant, controller: Controller, towards: float) -> 
     return float(inside)
 
 
-def delay_reserve(plant: LinearPlant, controller: Controller) -> float:
+def delay_reserve(plant: LinearPlant, controller: LinearController) -> float:
     """The least delay that turns L into -1, from crossovers on a dense grid."""
     grid, loop = dense_grid(plant, controller, 20000), loop_response(plant, controller)
     size = np.abs(loop(grid))
@@ -120,13 +120,13 @@ def delay_reserve(plant: LinearPlant, controller: Controller) -> float:
     return float((np.mod(np.angle(-loop(omega)), 2.0 * np.pi) / omega).min())
 
 
-def sigma(plant: LinearPlant, controller: Controller, output: str) -> float:
+def sigma(plant: LinearPlant, controller: LinearController, output: str) -> float:
     noises = {name: noise for name, noise in WHITE.items() if name in plant.disturbances}
     noises |= {"n1": White(0.01)} if "n1" in plant.disturbances else {}
     return float(np.sqrt(lyapunov_variances(plant, controller, noises)[output]))
 
 
-def peak(plant: LinearPlant, controller: Controller, output: str, duration: float) -> float:
+def peak(plant: LinearPlant, controller: LinearController, output: str, duration: float) -> float:
     """Most probable maximum, with the rate's variance from the state equations."""
     A, E, C, _ = closed_matrices(plant, controller)
     covariance = solve_continuous_lyapunov(A, -E @ E.T)
@@ -136,7 +136,7 @@ def peak(plant: LinearPlant, controller: Controller, output: str, duration: floa
     return float(np.sqrt(2.0 * np.log(duration / period) * m0))
 
 
-Measure = Callable[[LinearPlant, Controller], float]
+Measure = Callable[[LinearPlant, LinearController], float]
 HOUR = 3600.0
 
 # Plant, structure and question; the limit and a bound at which it binds; its measure by
@@ -462,7 +462,10 @@ def test_use_is_one_at_the_bound_and_grows_beyond_it() -> None:
 
 
 def test_least_and_peak_are_mirror_images() -> None:
-    plant, controller = servo(), Controller.static([[-8.0, -5.0, -1.0]], ("x", "v", "m"), ("u",))
+    plant, controller = (
+        servo(),
+        LinearController.static([[-8.0, -5.0, -1.0]], ("x", "v", "m"), ("u",)),
+    )
     view = Assessment(plant, controller, disturbances({"f": White(1.0)}, ("f",)))
     up = Peak(output="m", static=3.0, bound=1.0, duration=HOUR).measure(view)
     down = Least(output="m", static=3.0, bound=1.0, duration=HOUR).measure(view)

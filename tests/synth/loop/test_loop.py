@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from models.plant import LinearPlant
 from synth.loop import (
-    Controller,
     DragElement,
+    LinearController,
     Phasor,
     PlantBlocks,
     close_scalar,
@@ -44,10 +44,10 @@ def random_plant(nu: int = 2, ny: int = 3, seed: int = 3) -> LinearPlant:
     )
 
 
-def random_controller(plant: LinearPlant, order: int = 2, seed: int = 5) -> Controller:
+def random_controller(plant: LinearPlant, order: int = 2, seed: int = 5) -> LinearController:
     rng = np.random.default_rng(seed)
     nu, ny = len(plant.inputs), len(plant.measurements)
-    return Controller(
+    return LinearController(
         A=rng.normal(size=(order, order)) - 2.0 * np.eye(order),
         B=rng.normal(size=(order, ny)),
         C=rng.normal(size=(nu, order)),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from loop_numbers import loop_response, stable_with, two_carts
 
-from synth.loop import Controller, Margins, loop_margins, refine_minima
+from synth.loop import LinearController, Margins, loop_margins, refine_minima
 from synth.loop.margins import worst_margins
 
 GRID = np.geomspace(1e-4, 1e4, 1500)
@@ -169,7 +169,7 @@ def test_several_loops_report_the_worst_of_each() -> None:
 
 def test_margins_of_a_plant_bound_the_gain_at_which_it_goes_unstable() -> None:
     plant = two_carts()
-    controller = Controller(
+    controller = LinearController(
         A=[[-6.0, 1.0], [-12.0, 0.0]],
         B=[[-12.0], [-15.0]],
         C=[[1.0, 0.0]],

@@ -18,7 +18,7 @@ from models.basics import InputError
 from models.plant import LinearPlant
 from stillhook.cli import main
 from stillhook.commands.design.margins import parse_off
-from synth.loop import Controller, closed_loop_poles
+from synth.loop import LinearController, closed_loop_poles
 from synth.robust import robustness
 from synth.robust.mu_doubts import Doubt, doubts_of
 from synth.robust.mu_plant import UncertainLoop, uncertain_loop
@@ -58,7 +58,7 @@ def cubic(gain: float) -> UncertainLoop:
         case=load_case("thesis-1975"),
         masses=1,
         drag=0.0,
-        controller=Controller.static([[-gain]], ["y"], ["u"]),
+        controller=LinearController.static([[-gain]], ["y"], ["u"]),
         doubts=(Doubt(path="d1", nominal=0.0, half=1.0), Doubt(path="d2", nominal=0.0, half=1.0)),
         plant=plant,
         sizes=(1, 1),
@@ -167,7 +167,7 @@ def test_form_is_the_plant_and_its_determinant_the_loop() -> None:
 def test_form_holds_on_a_rope_with_every_sensor() -> None:
     case = load_case("subsea-crane")
     names = ["payload.velocity", "mru.heave_rate", "rope.tension"]
-    controller = Controller.static([[10.0, 1.0, 1e-5]], names, ["drive.command"])
+    controller = LinearController.static([[10.0, 1.0, 1e-5]], names, ["drive.command"])
     ranges = {"payload.mass": 0.3, "stiffness": 0.2, "winch.motor.inertia": 0.3, "drag": 1.0}
     loop = uncertain_loop(
         case, controller, doubts_of(case, 6e3, ranges), masses=4, drag=6e3, seed=1

@@ -10,7 +10,7 @@ from loop_numbers import double_integrator, integrator, two_carts, with_full_sta
 from models import load_case
 from models.basics import InputError
 from synth import PayloadFeedback, StaticGain, Structure
-from synth.loop import Controller, closed_loop_poles
+from synth.loop import LinearController, closed_loop_poles
 from synth.question import pose
 from synth.robust import gain_radius
 from synth.structures import Parameter, ParametrisedController
@@ -123,7 +123,7 @@ class _FilteredLaw(ParametrisedController):
 
     def controller(self, values):
         g, T = values
-        return Controller(
+        return LinearController(
             A=[[-1.0 / T]],
             B=[[1.0]],
             C=[[g / T]],

@@ -13,7 +13,7 @@ from models import load_case
 from models.basics import InputError
 from stillhook.cli import main
 from synth import MaxSensitivity, StaticGain, White
-from synth.loop import Controller, disturbances
+from synth.loop import LinearController, disturbances
 from synth.question import FamilyMember, FamilyProblem, Objective, Problem
 from synth.robust import Family, optimise_robust
 from synth.robust.robust import tune_family
@@ -45,7 +45,7 @@ def costs_of(gains) -> np.ndarray:
     found = []
     for stiffness in STIFFNESS:
         plant = with_full_state(oscillator(stiffness))
-        controller = Controller.static([list(gains)], plant.measurements, plant.inputs)
+        controller = LinearController.static([list(gains)], plant.measurements, plant.inputs)
         noise = dict.fromkeys(plant.independent_disturbances, White(1.0))
         try:
             found.append(lyapunov_cost(plant, controller, noise, WEIGHTS))

@@ -18,7 +18,7 @@ import stillhook as sh
 from models import build_plant
 from models.plant import DriveLimits
 from models.simulation import prepare, run_simulation
-from synth.loop import Controller, closed_loop_poles
+from synth.loop import LinearController, closed_loop_poles
 from synth.saturation.describing import bias_for, gaussian_response, sine_response
 from synth.saturation.limit_cycles import clipped_harmonics, limit_cycles
 from synth.saturation.torque_loop import TorqueLoop
@@ -195,7 +195,7 @@ def test_torque_loop_refuses(case, law):
 
 
 def test_a_law_that_does_not_hear_the_place_has_no_offset(case):
-    damping = Controller.static([[-100.0]], ["payload.velocity"], ["drive.command"])
+    damping = LinearController.static([[-100.0]], ["payload.velocity"], ["drive.command"])
     assert math.isnan(TorqueLoop.from_case(case, damping).offset(1e4))
 
 

@@ -22,7 +22,7 @@ from scipy.stats import qmc
 
 from models.basics import InputError, SynthesisError, White
 from models.plant import LinearPlant
-from synth.loop import Controller, Disturbance, Phasor, disturbances
+from synth.loop import Disturbance, LinearController, Phasor, disturbances
 from synth.question import Problem
 from synth.search.starts import candidates, crossover_grid
 from synth.structures import LowOrder, ParametrisedController, reduced, weighing
@@ -124,7 +124,7 @@ def test_any_controller_has_parameters(order: int, nu: int, ny: int) -> None:
     law = LowOrder(order, proper=True).bind(plant)
     rng = np.random.default_rng(order + nu)
     for seed in range(5):
-        controller = Controller(
+        controller = LinearController(
             A=rng.normal(size=(order, order)) + (seed - 2.0) * np.eye(order),
             B=rng.normal(size=(order, ny)),
             C=rng.normal(size=(nu, order)),
@@ -141,7 +141,7 @@ def test_any_controller_has_parameters(order: int, nu: int, ny: int) -> None:
 def test_repeated_pole_is_pulled_apart_no_further_than_needed(repeated: FloatArray) -> None:
     plant = any_plant(1, 1)
     law = LowOrder(2).bind(plant)
-    controller = Controller(
+    controller = LinearController(
         A=repeated,
         B=[[1.0], [2.0]],
         C=[[3.0, 1.0]],
@@ -157,7 +157,7 @@ def test_repeated_pole_is_pulled_apart_no_further_than_needed(repeated: FloatArr
 def test_controller_of_lower_order_is_padded_without_a_change() -> None:
     plant = any_plant(2, 1)
     law = LowOrder(5).bind(plant)
-    controller = Controller(
+    controller = LinearController(
         A=[[-1.0, 2.0], [-2.0, -1.0]],
         B=[[1.0], [0.5]],
         C=[[1.0, 2.0], [0.3, -1.0]],
@@ -174,7 +174,7 @@ def test_controller_of_lower_order_is_padded_without_a_change() -> None:
 def test_two_channels_apart_are_an_ordinary_point() -> None:
     plant = any_plant(2, 2)
     law = LowOrder(4).bind(plant)
-    controller = Controller(
+    controller = LinearController(
         A=[[-1, 3, 0, 0], [-3, -1, 0, 0], [0, 0, -2, 1], [0, 0, -1, -2]],
         B=[[1, 0], [2, 0], [0, 1], [0, 3]],
         C=[[1, 1, 0, 0], [0, 0, 2, 1]],
@@ -301,7 +301,7 @@ def test_lqg_with_cross_terms_is_stationary() -> None:
     rng = np.random.default_rng(0)
     best = design.controller
     for _ in range(40):
-        other = Controller(
+        other = LinearController(
             A=best.A + 1e-3 * rng.normal(size=best.A.shape),
             B=best.B + 1e-3 * rng.normal(size=best.B.shape),
             C=best.C + 1e-3 * rng.normal(size=best.C.shape),
@@ -417,7 +417,7 @@ def test_whitened_spectrum_keeps_peak_and_variance() -> None:
     shaken = whitened(plant, (base, *disturbances({"force": White(3.0)}, ("base", "force"))))
     assert shaken.disturbances == ("base", "force")
     assert not shaken.rates
-    still = Controller.static([[0.0]], shaken.measurements, shaken.inputs)
+    still = LinearController.static([[0.0]], shaken.measurements, shaken.inputs)
     found = lyapunov_variances(shaken, still, {"base": White(1.0), "force": White(1.0)})
     assert found["base"] == pytest.approx(variance, rel=0.01)
     assert found["x"] == pytest.approx(1.5, rel=1e-9)

@@ -10,7 +10,7 @@ from models import load_case
 from models.basics import InputError
 from models.plant import build_plant
 from synth.controllers import ConstantTension, LinearFeedback, VelocityFeedForward
-from synth.loop import Controller, closed_loop_matrix
+from synth.loop import LinearController, closed_loop_matrix
 from synth.structures import DrumSpeedLoop, sampled_loop
 
 DRAG = 3e4  # so much that transients end within the run [N s/m]
@@ -31,7 +31,7 @@ def test_answer_to_a_swell_is_that_of_a_run_in_time(name: str, kind: str) -> Non
     elif kind == "feedback":  # with a state, behind telemetry that is late on one of the cases
         thesis = name == "thesis-1975"
         gain = np.array([[-3000.0, -3000.0, -800.0] if thesis else [-30.0, -60.0, -60.0]])
-        lag = Controller(
+        lag = LinearController(
             A=[[-2.0]],
             B=[[0.0, 0.0, 2.0]],
             C=gain[:, 2:],
@@ -69,7 +69,7 @@ def test_a_reference_is_followed_as_in_a_run_in_time() -> None:
 def test_fast_sampling_comes_to_the_continuous_loop_in_first_order() -> None:
     case, omega = load_case("thesis-1975"), np.array([0.3, 0.8, 2.0])
     plant = build_plant(case)
-    feedback = Controller.static([[-1e4, -2e4, -2e4]], PAYLOAD, ("drive.command",))
+    feedback = LinearController.static([[-1e4, -2e4, -2e4]], PAYLOAD, ("drive.command",))
     # The continuous closed loop by its own matrices: P over Z from (s - A)^-1 E.
     lin = plant.linearise(drag=1187.2)
     closed = closed_loop_matrix(lin, feedback)
@@ -96,7 +96,7 @@ def test_poles_are_those_of_the_continuous_loop_mapped_by_the_exponential() -> N
     law = LinearFeedback(case, GAINS, sample_time=T)
     poles = sampled_loop(case, build_plant(case), law.recursion, T, drag=1187.2).poles()
     lin = build_plant(case).linearise(drag=1187.2)
-    feedback = Controller.static([[-1e4, -2e4, -2e4]], PAYLOAD, ("drive.command",))
+    feedback = LinearController.static([[-1e4, -2e4, -2e4]], PAYLOAD, ("drive.command",))
     for s in np.linalg.eigvals(closed_loop_matrix(lin, feedback)):
         assert np.abs(poles - np.exp(s * T)).min() < 0.03 * abs(s * T)
 
