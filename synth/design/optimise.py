@@ -1,6 +1,6 @@
 """Optimise the gains of a case, or say what given gains do: the top of `synth`.
 
-    Case -> Question -> tune -> (too hard? largest sea, what it would take) -> GainDesign
+    Case -> DesignQuestion -> tune -> (too hard? largest sea, what it would take) -> GainDesign
 
 A case that cannot be met is the norm, not the exception: then the design is the best one in
 the largest sea that can, and the status names the limit that breaks first and what it would

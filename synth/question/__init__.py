@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .family_problem import FamilyMember as FamilyMember
+    from .family_problem import FamilyLoop as FamilyLoop
     from .family_problem import FamilyProblem as FamilyProblem
     from .family_problem import Objective as Objective
     from .problem import Goal as Goal

@@ -1,6 +1,6 @@
 """Several loops with one set of parameters: the problem of robust and of scheduled design.
 
-    plants x seas -> Scenario, Scenario, ... -> FamilyProblem -> FamilyProgramme -> search
+    plants x seas -> FamilyLoop, FamilyLoop, ... -> FamilyProblem -> FamilyProgramme -> search
 
 A scenario is a `Problem` of its own, with its occurrence and, for the regret, the best cost
 that gains of its own would reach.  The parameters that are searched for are the same for all;
@@ -49,7 +49,7 @@ class Objective(Enum):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class FamilyMember:
+class FamilyLoop:
     """One loop of a family.
 
     Attributes
@@ -101,7 +101,7 @@ class FamilyProblem:
         If there is no scenario, no weight, or the numbers of parameters disagree.
     """
 
-    scenarios: tuple[FamilyMember, ...]
+    scenarios: tuple[FamilyLoop, ...]
     objective: Objective = Objective.WORST
     parameters: tuple[Parameter, ...] = ()
 
@@ -141,7 +141,7 @@ class FamilyProblem:
             found.setdefault(key if problem.drag is None else (i,), []).append(i)
         return tuple(tuple(members) for members in found.values())
 
-    def with_scenarios(self, scenarios: Sequence[FamilyMember]) -> FamilyProblem:
+    def with_scenarios(self, scenarios: Sequence[FamilyLoop]) -> FamilyProblem:
         """Return the same problem over other scenarios."""
         return FamilyProblem(
             scenarios=tuple(scenarios), objective=self.objective, parameters=self.parameters

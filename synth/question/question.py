@@ -1,6 +1,6 @@
 """From a case to the question that `synth.design.tuning` answers.
 
-    Case -> hook motion, plant at N rope masses, drag, limits -> Question -> Problem
+    Case -> hook motion, plant at N rope masses, drag, limits -> DesignQuestion -> Problem
 
 Everything that synthesis takes from a case is taken here: which limits there are and whether
 they bind, what the drag is before compensation, how many rope masses the plant has.

@@ -1,6 +1,6 @@
 """The plants of a family as synthesis sees them: from a member to its scenario.
 
-    Family + structure -> FamilyPlants -> Scenario of a member, PlantStack of many
+    Family + structure -> FamilyPlants -> FamilyLoop of a member, PlantStack of many
 
 The controller is one: its law is bound to the family's nominal plant and used around every
 member.  Members that differ in nothing but the sea share their plant where drag is fixed.
@@ -18,7 +18,7 @@ from models.basics import FloatArray, Quadrature, spectral_nodes
 from models.plant import LinearPlant
 
 from ..loop import Disturbance, disturbances
-from ..question import HOOK, PAYLOAD, DesignQuestion, FamilyMember, Problem, pose
+from ..question import HOOK, PAYLOAD, DesignQuestion, FamilyLoop, Problem, pose
 from ..structures import ParametrisedController, Structure
 from .family import Family, Member
 from .plant_stack import PlantStack, numbers_of, stacked_members
@@ -48,7 +48,7 @@ class FamilyPlants:
     ) -> None:
         self.family, self.structure, self.masses = family, structure, masses
         self._questions: dict[Member, DesignQuestion] = {}
-        self._scenarios: dict[Member, FamilyMember] = {}
+        self._scenarios: dict[Member, FamilyLoop] = {}
         self._plants: dict[tuple[object, ...], LinearPlant] = {}
         self._sensed = structure != PAYLOAD_FEEDBACK
 
@@ -92,7 +92,7 @@ class FamilyPlants:
             self._questions[member] = pose(self.family.case_at(member), self.masses)
         return self._questions[member]
 
-    def scenario(self, member: Member) -> FamilyMember:
+    def scenario(self, member: Member) -> FamilyLoop:
         """Return the scenario of a member, its weight the sea's occurrence."""
         if member not in self._scenarios:
             question = self.question(member)
@@ -105,7 +105,7 @@ class FamilyPlants:
                 limits=question.limits,
                 drag=question.drag,
             )
-            self._scenarios[member] = FamilyMember(
+            self._scenarios[member] = FamilyLoop(
                 name=self.family.name_of(member),
                 problem=problem,
                 weight=float(self.family.occurrence[member.sea]),

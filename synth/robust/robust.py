@@ -19,7 +19,7 @@ from models.basics import FloatArray, InputError, check_range, one_thread
 from models.case import Case
 from models.plant import masses_for_bandwidth
 
-from ..question import FamilyMember, FamilyProblem, Objective
+from ..question import FamilyLoop, FamilyProblem, Objective
 from ..search import KEPT, FamilyFound, search, search_family
 from ..structures import Structure
 from .family import Family, Member
@@ -41,7 +41,7 @@ _BEST_STARTS = 6  # of the search for the best gains of one scenario alone
 
 @one_thread()
 def tune_family(
-    scenarios: Sequence[FamilyMember],
+    scenarios: Sequence[FamilyLoop],
     *,
     objective: str | Objective = "worst",
     starts: int = 8,
@@ -54,10 +54,10 @@ def tune_family(
     Parameters
     ----------
     scenarios
-        Problems with laws of the same parameters, `synth.question.family_problem.FamilyMember`.
+        Problems with laws of the same parameters, `synth.question.family_problem.FamilyLoop`.
     objective
         ``worst`` cost, ``mean`` (root of the weighted mean square) or ``regret`` (worst ratio
-        of cost to `FamilyMember.best`).
+        of cost to `FamilyLoop.best`).
     starts, seed
         Size and seed of the multi-start search.
     guesses
@@ -197,7 +197,7 @@ def _problem(
     return FamilyProblem(scenarios=tuple(scenarios), objective=objective)
 
 
-def _best_of(scenario: FamilyMember, plants: FamilyPlants, seed: int) -> float:
+def _best_of(scenario: FamilyLoop, plants: FamilyPlants, seed: int) -> float:
     """Return the least payload rms that gains of its own reach in a scenario [m]."""
     found = search(scenario.problem, _BEST_STARTS, seed, plants.guesses)
     if found.solved is None or found.view is None or found.excess > KEPT:

@@ -23,7 +23,7 @@ from models.basics import FloatArray, InputError, check_range, one_thread
 from models.case import Case
 
 from ..design import tuning_of
-from ..question import FamilyMember, FamilyProblem, Objective
+from ..question import FamilyLoop, FamilyProblem, Objective
 from ..search import KEPT, FamilyFound, Found, search, search_family
 from .family import Family, Member
 from .family_plants import FamilyPlants
@@ -276,7 +276,7 @@ class _Work:
         """Return whether other code confirms the loop at one length."""
         from ..search import view_of
 
-        scenario: FamilyMember = self.plants.scenario(self.members[index])
+        scenario: FamilyLoop = self.plants.scenario(self.members[index])
         own = self.own[index]
         assert own is not None
         assert own.solved is not None

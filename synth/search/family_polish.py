@@ -14,7 +14,7 @@ from models.basics import FloatArray
 
 from ..limits import Limit
 from ..loop import Assessment, Disturbance
-from ..question import FamilyMember, FamilyProblem, Problem
+from ..question import FamilyLoop, FamilyProblem, Problem
 from .family_programme import FamilyProgramme, FamilySolved
 from .nodes import cost_nodes, margin_nodes
 from .polishing import KEPT, thinned, view_of
@@ -98,7 +98,7 @@ def own_limits(family: FamilyProblem) -> Iterator[tuple[int, Limit]]:
                     yield i, limit
 
 
-def view_from(scenario: FamilyMember, searched: FloatArray) -> Assessment:
+def view_from(scenario: FamilyLoop, searched: FloatArray) -> Assessment:
     """Return a scenario's loop in numbers, drag as its plant holds it."""
     problem = scenario.problem
     return Assessment(

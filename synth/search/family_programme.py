@@ -21,7 +21,7 @@ import numpy as np
 
 from models.basics import FloatArray, Quadrature
 
-from ..question import FamilyMember, FamilyProblem, Goal, LoopSymbols, Objective, Values
+from ..question import FamilyLoop, FamilyProblem, Goal, LoopSymbols, Objective, Values
 from .programme import Guard, Pace, Solution, solver_options
 
 _ROOM = 12.0  # how far the logarithms of drags and of the cost may move: e^12
@@ -46,7 +46,7 @@ class FamilySolved:
     message: str
     iterations: int
 
-    def of(self, index: int, scenario: FamilyMember) -> Solution:
+    def of(self, index: int, scenario: FamilyLoop) -> Solution:
         """Return the answer as the one of a single scenario."""
         return Solution(
             values=scenario.values(self.values),
@@ -235,7 +235,7 @@ class FamilyProgramme:
         )
 
 
-def _blended(scenario: FamilyMember, searched: Sequence[Any]) -> list[Any]:
+def _blended(scenario: FamilyLoop, searched: Sequence[Any]) -> list[Any]:
     """Return a scenario's own parameters, in symbols."""
     if scenario.blend is None:
         return list(searched)

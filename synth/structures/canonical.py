@@ -31,7 +31,7 @@ _FAINT = 1e-6  # least share of a mode that a fixed row must hear
 
 
 @dataclass(frozen=True, kw_only=True)
-class Block:
+class CanonicalBlock:
     """Where the numbers of one block stand among the parameters, and which row of C is fixed."""
 
     size: int
@@ -46,13 +46,13 @@ class BlockForm:
 
     def __init__(self, order: int, nu: int, ny: int) -> None:
         self.order, self.nu, self.ny = order, nu, ny
-        self.blocks: list[Block] = []
+        self.blocks: list[CanonicalBlock] = []
         at = 0
         for k in range((order + 1) // 2):
             size = min(2, order - 2 * k)
             ends = np.cumsum([at, size, size * ny, (nu - 1) * size]).tolist()
             alpha, B, C = (slice(a, b) for a, b in itertools.pairwise(ends))
-            self.blocks.append(Block(size=size, row=k % nu, alpha=alpha, B=B, C=C))
+            self.blocks.append(CanonicalBlock(size=size, row=k % nu, alpha=alpha, B=B, C=C))
             at = ends[-1]
         self.count = at  #: of the numbers
 
@@ -135,7 +135,7 @@ class BlockForm:
 
 
 def _fill(
-    result: FloatArray, block: Block, poles: ComplexArray, B: ComplexArray, C: ComplexArray
+    result: FloatArray, block: CanonicalBlock, poles: ComplexArray, B: ComplexArray, C: ComplexArray
 ) -> None:
     """Write one block's numbers: its modes in observable canonical form."""
     fixed, size = C[block.row].copy(), np.linalg.norm(C, axis=0)

@@ -14,7 +14,7 @@ from models.basics import InputError
 from stillhook.cli import main
 from synth import MaxSensitivity, StaticGain, White
 from synth.loop import LinearController, disturbances
-from synth.question import FamilyMember, FamilyProblem, Objective, Problem
+from synth.question import FamilyLoop, FamilyProblem, Objective, Problem
 from synth.robust import Family, optimise_robust
 from synth.robust.robust import tune_family
 from synth.robust.worst_case import exact_figures
@@ -23,8 +23,8 @@ WEIGHTS = {"x": 1.0, "effort": 1e-2}
 STIFFNESS = (1.0, 4.0, 9.0)
 
 
-def scenarios(limits=(), weights=(1.0, 1.0, 1.0)) -> list[FamilyMember]:
-    found: list[FamilyMember] = []
+def scenarios(limits=(), weights=(1.0, 1.0, 1.0)) -> list[FamilyLoop]:
+    found: list[FamilyLoop] = []
     law = None
     for stiffness, weight in zip(STIFFNESS, weights, strict=True):
         plant = with_full_state(oscillator(stiffness))
@@ -37,7 +37,7 @@ def scenarios(limits=(), weights=(1.0, 1.0, 1.0)) -> list[FamilyMember]:
             minimise=WEIGHTS,
             limits=tuple(limits),
         )
-        found.append(FamilyMember(name=f"k = {stiffness}", problem=problem, weight=weight))
+        found.append(FamilyLoop(name=f"k = {stiffness}", problem=problem, weight=weight))
     return found
 
 
