@@ -26,7 +26,7 @@ from models.plant import LinearPlant
 from synth import LowOrder, MaxSensitivity, Rms, StaticGain, White, tune
 from synth.loop import LinearController
 from synth.structures import ParametrisedController
-from synth.structures.low_order import _LowOrderLaw
+from synth.structures.low_order import LowOrderLaw
 from synth.structures.lqg import lqg
 
 WHITE = {"f": White(1.0), "n": White(0.01)}
@@ -132,7 +132,7 @@ def test_controller_of_the_plants_order_is_the_lqg_optimum(
 
 def test_lqg_optimum_is_found_without_being_told(monkeypatch) -> None:
     # The first guess is the answer; from elsewhere the search must get there too.
-    monkeypatch.setattr(_LowOrderLaw, "guesses", ParametrisedController.guesses)
+    monkeypatch.setattr(LowOrderLaw, "guesses", ParametrisedController.guesses)
     plant, spectrum, minimise = cart_problem(1)
     best = lqg(plant, minimise=minimise, spectrum=spectrum).cost
     found = tune(plant, LowOrder(4), spectrum=spectrum, minimise=minimise, starts=6)

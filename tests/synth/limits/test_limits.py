@@ -29,10 +29,10 @@ from synth import (
     DelayMargin,
     GainMargin,
     GainMarginDown,
-    Least,
     LowFrequency,
     LowOrder,
     MaxSensitivity,
+    Minimum,
     Peak,
     Power,
     Rms,
@@ -237,7 +237,7 @@ BINDING = {
         servo(),
         StaticGain(),
         SERVO_QUESTION,
-        lambda bound: Least(output="m", static=10.0, bound=bound, duration=HOUR),
+        lambda bound: Minimum(output="m", static=10.0, bound=bound, duration=HOUR),
         2.9,
         lambda p, c: 10.0 - peak(p, c, "m", HOUR),
         1e-4,
@@ -450,7 +450,7 @@ def test_use_is_one_at_the_bound_and_grows_beyond_it() -> None:
         (Rms(output="x", bound=3.0), 3.0, 4.0),
         (Peak(output="x", bound=3.0), 3.0, 4.0),
         (Continuous(output="x", bound=3.0), 3.0, 4.0),
-        (Least(output="x", static=10.0, bound=2.0), 2.0, 1.0),
+        (Minimum(output="x", static=10.0, bound=2.0), 2.0, 1.0),
     ]
     for limit, at, beyond in cases:
         assert limit.use(at) == pytest.approx(1.0)
@@ -458,7 +458,7 @@ def test_use_is_one_at_the_bound_and_grows_beyond_it() -> None:
         assert limit.use(at + 0.5 * (at - beyond)) < 1.0
     assert GainMargin(bound=2.0).use(np.inf) == 0.0
     assert GainMargin(bound=2.0).use(0.0) == np.inf
-    assert Least(output="x", static=1.0, bound=2.0).use(0.5) == np.inf
+    assert Minimum(output="x", static=1.0, bound=2.0).use(0.5) == np.inf
 
 
 def test_least_and_peak_are_mirror_images() -> None:
@@ -468,7 +468,7 @@ def test_least_and_peak_are_mirror_images() -> None:
     )
     view = Assessment(plant, controller, disturbances({"f": White(1.0)}, ("f",)))
     up = Peak(output="m", static=3.0, bound=1.0, duration=HOUR).measure(view)
-    down = Least(output="m", static=3.0, bound=1.0, duration=HOUR).measure(view)
+    down = Minimum(output="m", static=3.0, bound=1.0, duration=HOUR).measure(view)
     assert up - 3.0 == pytest.approx(3.0 - down, rel=1e-12)
     assert up - 3.0 == pytest.approx(peak(plant, controller, "m", HOUR), rel=1e-6)
 
