@@ -35,6 +35,8 @@ import scipy.linalg
 from models.basics import FloatArray, InputError, read_only
 from models.plant import MEAN_LOSSES, SPEED_BAND, DriveLimits, Plant, build_plant
 
+from ..winch import command_law
+
 if TYPE_CHECKING:
     from models.case import Case
     from models.plant import LinearPlant
@@ -213,7 +215,7 @@ def record_plant(
     if lag >= 0:
         scale[lag] = peak / data.torque_constant
     # command = demand/gain + feedback . state, whatever the motor
-    gain, slope = _command_law(plant)
+    gain, slope = command_law(plant)
     regulated = np.zeros(n)
     regulated[names.index("motor.speed")] = slope * per_haul
     A = linear.A[np.ix_(keep, keep)] * scale / scale[:, None]
@@ -261,14 +263,6 @@ def record_plant(
         needed=needed,
         drag=drag,
     )
-
-
-def _command_law(plant: Plant) -> tuple[float, float]:
-    """Return (demand per command [N m], command per motor speed at constant demand)."""
-    data = plant.data
-    if data.motor == "dc":
-        return data.torque_constant / data.resistance, data.back_emf_constant
-    return (data.speed_gain, 1.0) if data.speed_gain > 0.0 else (1.0, 0.0)
 
 
 def _sampled(

@@ -9,6 +9,7 @@ wherever no limit binds.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -46,17 +47,26 @@ class RecordProblem:
     minimum_tension: float
     start: FloatArray | None
 
-    def __post_init__(self) -> None:
-        """Work out the motion that holds the payload still."""
-        x, inputs = self.plant.still(self.heave, self.rate, self.acceleration)
-        r = x[:-1] @ self.plant.Phi.T + inputs @ self.plant.Gamma.T - x[1:]
-        object.__setattr__(self, "still", x)
-        object.__setattr__(self, "still_inputs", inputs)
-        object.__setattr__(self, "residue", r + self.plant.hook_terms(self.heave, self.rate))
+    @cached_property
+    def _held(self) -> tuple[FloatArray, FloatArray]:
+        return self.plant.still(self.heave, self.rate, self.acceleration)
 
-    still: FloatArray = None  # type: ignore[assignment]
-    still_inputs: FloatArray = None  # type: ignore[assignment]
-    residue: FloatArray = None  # type: ignore[assignment]
+    @property
+    def still(self) -> FloatArray:
+        """States that hold the payload still, as well as one can, (N+1, n)."""
+        return self._held[0]
+
+    @property
+    def still_inputs(self) -> FloatArray:
+        """Their inputs, (N, m)."""
+        return self._held[1]
+
+    @cached_property
+    def residue(self) -> FloatArray:
+        """What they miss of the plant's motion over each sample, (N, n)."""
+        x, inputs = self._held
+        r = x[:-1] @ self.plant.Phi.T + inputs @ self.plant.Gamma.T - x[1:]
+        return np.asarray(r + self.plant.hook_terms(self.heave, self.rate))
 
     @property
     def samples(self) -> int:
@@ -88,7 +98,7 @@ class RecordProblem:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordSolution:
-    """What a solver said.
+    """A solver's answer, by samples.
 
     Parameters
     ----------

@@ -33,6 +33,7 @@ from models.basics import FloatArray, InputError, SolverError, check_range, read
 from models.plant import zero_order_hold
 from models.simulation import Kernel
 
+from ..programme import hermite_within
 from ..winch import SampledWinch
 from .mean_torque import Drift, mean_torque
 from .nonlinear_forces import ForceLaw, force_law
@@ -253,7 +254,7 @@ def _sampled(winch: SampledWinch, law: ForceLaw, drift: Drift, M: int) -> dict[s
         C[here] = rows @ (over + winch.back * np.outer(added[:, 0], winch.speed))
         D[here] = rows @ added[:, 0] / winch.gain
         C_constants[here] = rows @ np.column_stack([added[:, 1], added[:, 0] / winch.gain])
-        moved, hook = _within(plant.A, motion, T, at)
+        moved, hook = hermite_within(plant.A, motion, T, at)
         C_hook[here] = rows @ moved + felt @ hook
         for k in range(i):
             own[here, k * m : (k + 1) * m] = rows @ pushed(at - (k + 1) * h, h)
@@ -272,24 +273,3 @@ def _sampled(winch: SampledWinch, law: ForceLaw, drift: Drift, M: int) -> dict[s
         "C_constants": C_constants,
         "own": own,
     }
-
-
-def _within(A: FloatArray, E: FloatArray, T: float, at: float) -> tuple[FloatArray, FloatArray]:
-    """Return (effect on x, hook's z and z') at a time within a sample, (n, 4) and (2, 4).
-
-    As `mpc.programme.holds.hermite_hold`, which is for the end of the sample.
-    """
-    n = len(A)
-    chain = np.zeros((n + 4, n + 4))
-    chain[:n, :n], chain[:n, n : n + 2] = A, E
-    chain[n, n + 1] = chain[n + 1, n + 2] = chain[n + 2, n + 3] = 1.0
-    start = np.array(
-        [
-            [1.0, 0.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0, 0.0],
-            [-6.0 / T**2, -4.0 / T, 6.0 / T**2, -2.0 / T],
-            [12.0 / T**3, 6.0 / T**2, -12.0 / T**3, 6.0 / T**2],
-        ]
-    )
-    moved = scipy.linalg.expm(chain * at)[:, n:] @ start
-    return moved[:n], moved[n : n + 2]

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .condensed import Condensed as Condensed
     from .condensed import condense as condense
     from .holds import hermite_hold as hermite_hold
+    from .holds import hermite_within as hermite_within
     from .holds import noisy_hold as noisy_hold
     from .holds import root_of as root_of
     from .horizon import Horizon as Horizon

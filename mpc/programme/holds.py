@@ -29,6 +29,16 @@ def hermite_hold(A: FloatArray, E: FloatArray, dt: float) -> FloatArray:
     dt
         Sample time [s].
     """
+    return hermite_within(A, E, dt, dt)[0]
+
+
+def hermite_within(
+    A: FloatArray, E: FloatArray, dt: float, at: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the effect on x, and z and z' themselves, at a time within the sample.
+
+    (n, 4) and (2, 4), with the arguments of `hermite_hold` and the time since the sample's start.
+    """
     n, T = len(A), dt
     chain = np.zeros((n + 4, n + 4))
     chain[:n, :n] = A
@@ -43,7 +53,8 @@ def hermite_hold(A: FloatArray, E: FloatArray, dt: float) -> FloatArray:
             [12.0 / T**3, 6.0 / T**2, -12.0 / T**3, 6.0 / T**2],
         ]
     )
-    return np.asarray(scipy.linalg.expm(chain * T)[:n, n:] @ ends)
+    moved = scipy.linalg.expm(chain * at)[:, n:] @ ends
+    return np.asarray(moved[:n]), np.asarray(moved[n : n + 2])
 
 
 def noisy_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:

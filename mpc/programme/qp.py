@@ -36,7 +36,6 @@ class QPSolution:
     multipliers: FloatArray
     iterations: int
     ok: bool
-    flag: int
 
 
 class SoftQP:
@@ -133,7 +132,7 @@ class SoftQP:
         """Solve for a gradient (n,) and bounds on moves, hard and soft rows, finite or +-1e20."""
         self._model.update(f=f, bupper=upper, blower=lower)
         v, _, flag, info = self._model.solve()
-        return QPSolution(v, info["lam"], info["iterations"], flag > 0, flag)
+        return QPSolution(v, info["lam"], info["iterations"], flag > 0)
 
 
 def kkt_residual(

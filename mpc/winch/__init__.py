@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .process_noise import ProcessNoise as ProcessNoise
     from .regulation import regulator as regulator
     from .sampled import SampledWinch as SampledWinch
+    from .sampled import command_law as command_law
     from .weights import Weights as Weights
     from .weights import tune_weights as tune_weights
 else:

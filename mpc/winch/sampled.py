@@ -200,7 +200,7 @@ def sampled_winch(
     plant = sensed_plant(data, masses=count, drag=coefficient, sensors=case.sensors)
     symbolic = build_plant(data, count)
     rest = symbolic.operating_point(MEAN_LOSSES)
-    gain, back = _drive(symbolic)
+    gain, back = command_law(symbolic)
     known = {name: k for k, name in enumerate(plant.disturbances)}
     hook = [known["hook.heave"], known["hook.heave_rate"]]
     rows = {name: k for k, name in enumerate(plant.outputs)}
@@ -235,8 +235,8 @@ def sampled_winch(
     )
 
 
-def _drive(plant: Plant) -> tuple[float, float]:
-    """Return torque per command, and command per speed."""
+def command_law(plant: Plant) -> tuple[float, float]:
+    """Return the drive's torque per command, and the command per motor speed at constant torque."""
     data = plant.data
     if data.motor == "dc":
         return data.torque_constant / data.resistance, data.back_emf_constant
