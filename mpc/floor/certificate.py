@@ -118,6 +118,8 @@ def certify(problem: RecordProblem, solution: RecordSolution) -> Certificate:
     adjoint[N] = on_state[N]
     for k in range(N - 1, -1, -1):
         adjoint[k] = on_state[k] + plant.Phi.T @ adjoint[k + 1]
+    # Dynamics and stationarity in the states now hold to rounding, whatever the solver returned;
+    # an answer that is not optimal shows in the inputs and the first state alone.
     pushed = adjoint[1:] @ plant.Gamma
     residual = on_input + pushed
     scale = float(np.abs(pushed).max(initial=RHO))
@@ -126,6 +128,8 @@ def certify(problem: RecordProblem, solution: RecordSolution) -> Certificate:
         first = adjoint[0] + RHO_START * solution.start
         dual = max(dual, float(np.abs(first).max()))
         square += float(first @ first) * RHO / RHO_START
+    # Minimising the Lagrangian over what is left gains at most the squared residual over twice the
+    # curvature, and that is at least RHO.
     lower = cost - loss - 0.5 * square / RHO
     # no input within the limits can be larger than that: demand of one, and at full speed
     largest = 1.0 + np.abs(problem.still_inputs + plant.static_demand)

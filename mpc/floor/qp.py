@@ -91,6 +91,7 @@ class _Assembly:
     def __init__(self, problem: RecordProblem, length: int) -> None:
         self._problem, plant = problem, problem.plant
         N, n, m = problem.samples, len(plant.states), plant.inputs
+        # Equal blocks share their matrices, so that assembling takes a few products of arrays.
         whole = (N - 1) // length  # the last block alone holds the last sample's cost
         self._groups: list[_Group] = []
         offset = rows = 0
@@ -118,6 +119,8 @@ class _Assembly:
                 w[:, -1] = 0.0  # counted by the next block
             row = np.einsum("i,jiv->jv", problem.plant.payload, g.maps)
             P = np.einsum("bj,ju,jv->buv", w, row, row, optimize=True)
+            # Fast modes of the rope hardly move the payload: without RHO the solver would have
+            # no reason to prefer a quiet input, and no positive definite blocks.
             P[:, range(self._n, P.shape[1]), range(self._n, P.shape[1])] += RHO
             if g.first == 0:
                 P[0, range(self._n), range(self._n)] += RHO_START
@@ -155,6 +158,7 @@ class _Assembly:
             start = g.offset + width * np.arange(g.blocks, dtype=np.int64)
             end = g.offset + g.blocks * width
             following = np.append(start[1:], end)
+            # After the last block nothing follows: the end of a record is free.
             if at == len(self._groups) - 1:
                 start, following = start[:-1], following[:-1]
             if len(start):

@@ -216,6 +216,8 @@ class LinearMPC(WinchMPC):
             low, high = self._window.within(
                 low, high, self._asked - winch.rest_torque, self._at_most
             )
+        # The bounds at speeds of the last plan make a convex programme of one that is not: torque
+        # times speed is limited, and the plan changes little from sample to sample.
         question = products.question(gradient, free, low, high, self._rates)
         move = self._solve(question, began)
         if self.solved is not None:
@@ -223,6 +225,8 @@ class LinearMPC(WinchMPC):
             self._changes[:-1] = (self._speeds[1:] - self._speeds[:-1]) / self._lengths
         if move is None:
             move = self._otherwise(speed)
+        # At the edge of its window the drive is asked for more than its peak, so that it holds it
+        # though the speed rises over the sample; the estimator is told so at the next one.
         if leaning:
             torque, self._kept = self._window.asked(
                 move, float(low[0]), float(high[0]), float(self._changes[0])

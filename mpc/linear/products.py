@@ -79,6 +79,8 @@ class Products:
         """
         over = (model if believed is None else believed).A
         p, winch, nb = programme, model.winch, len(programme.blocks)
+        # A violation of one per cent is to cost the same whatever is limited: rows in units of
+        # their larger bound.
         names = [WATCHED[k] for k in p.kind]
         bounds = np.array([limits[name] for name in names]).reshape(len(names), 2)
         size = np.where(np.isfinite(bounds), np.abs(bounds), 0.0).max(axis=1, initial=0.0)
@@ -97,6 +99,8 @@ class Products:
         else:
             gradient[:, model.sea_at] = p.from_path @ to_path + p.from_end @ ahead
             free[:, model.sea_at] = p.rows_path @ to_path
+        # A heavier load has stretched the rope before the payload's zero was set: what the tension
+        # then has over the case's is its estimated bias (`mpc.winch.prediction`).
         for k, name in enumerate(names):
             if name == "tension":
                 free[k, model.constants_at.start + 3] = 1.0

@@ -130,6 +130,7 @@ class WinchMPC(ABC):
             if predictor == "preview":  # who knows the future may know the rope
                 weights = replace(weights, stiffness=1.0)
         self.case, self.sample_time, self.weights = case, T, weights
+        # Two models: the estimator believes the case, and plans are made on a stiffer rope.
         believed = with_noise(prediction_model(case, sample_time=T, masses=masses), weights.noise)
         self.model = plan_model(believed, weights.stiffness)
         self.regulator = regulator(self.model, weights.torque)
@@ -140,6 +141,8 @@ class WinchMPC(ABC):
         self._of = np.repeat(np.arange(len(blocks)), self._blocks)  # block of each sample
         self.predictor, word = _predictor(case, predictor, T, self.horizon)
         self.name = word if name is None else name
+        # A path that comes from outside tells where the sea is at its end, if it is known how well
+        # the estimator knows it at the start.
         self._sea_covariance = None if self.predictor is None else self.estimator.sea_covariance
         unit = case.winch.drive.torque_peak
         self._window = DriveWindow(self.model.winch, limits, len(blocks), unit)
@@ -225,6 +228,7 @@ class WinchMPC(ABC):
     ) -> float | None:
         """Return the first move of the answer, None if there is none that is good."""
         self.question, self.solved = question, None
+        # A number that is not finite can only come from the estimate, which has to begin again.
         if not all(math.isfinite(float(part.sum())) for part in question):
             self.estimator.reset()
             return None
@@ -235,6 +239,7 @@ class WinchMPC(ABC):
             return None
         if self._prove and kkt_residual(self.qp, *question, solved) > _PROVED:
             self._counts["unproved"] += 1
+        # The drive needs its command by then: what comes later is not used.
         if clock.perf_counter() - began > self._deadline:
             self._counts["late"] += 1
             return None

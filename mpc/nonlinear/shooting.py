@@ -207,6 +207,8 @@ class Shooting:
         """
         K, my = self.nodes, self._my
         n, J = self.stage.forces(y.reshape(K, my))
+        # Each active force costs a column of G, an equation and a row of the Hessian's factors.
+        # Drag has a slope at every node; a spring has one only where it is about to go slack.
         rare = np.zeros(0, dtype=np.int64)
         if self._rare:
             steep = np.abs(J[:, self._rare, :]).max(axis=2).ravel() > (0.0 if exact else _FAINT)
@@ -227,7 +229,9 @@ class Shooting:
         active = np.concatenate([always, rare]) if rare.size else always
         offset = flat[active] - solve.times(y)
         forced = solve(solve.sloped(self._Y, self._Y_by))
+        # Moves act by themselves (O v) and through the forces that they change (Theta n).
         outputs = self._O + Theta @ forced
+        # Gauss-Newton: a sum of squares of outputs, the forces' curvature left out.
         p, end = outputs[self.payload], outputs[self.end]
         H = (2.0 / self.programme.cost) * (p.T @ p + end.T @ (self._P @ end)) + self._bend
         return Linearisation(
@@ -270,6 +274,11 @@ class _Solver:
     """(I - J G) n = b for the active forces: those always there, then the slack springs."""
 
     def __init__(self, shooting: Shooting, J: FloatArray, rare: IntArray) -> None:
+        # In blocks, the forces that are always there first and the slack springs last,
+        #     [ M      right  ] [first]   [b_1]
+        #     [ below  corner ] [last ] = [b_2] ,
+        # M is block lower triangular (a force acts on what comes after it) and solved in place; the
+        # springs that are slack are few, and their Schur complement is small.
         s, self._J, self._rare = shooting, J, rare
         self._s = s
         K, ma = s.nodes, len(s._always)

@@ -62,12 +62,14 @@ class WinchEstimator:
     def __init__(self, model: PredictionModel) -> None:
         self.model = model
         self._P = kalman_covariance(model)
+        # By what is missing: of the 2^8 sets of signals a few occur, each for many samples.
         self._gains: dict[int, FloatArray] = {}
         self._all = self._gain(0)
         self._first = _first_gains(model, self._P)
         self._C = np.ascontiguousarray(model.C)
         self._A = np.ascontiguousarray(model.A)
         self._B = np.ascontiguousarray(model.B[:, 0])
+        # Telemetry that is later or earlier than usual is compared with what was on its way then.
         delays = dict(zip(MEASURED, model.winch.plant.delays, strict=True))
         self._usual = delays[MEASUREMENTS[0]]
         self._slack = _LATER * model.winch.sample_time
@@ -77,7 +79,9 @@ class WinchEstimator:
         self._force, self._velocity = np.zeros(model.size), np.zeros(model.size)
         self._force[: model.winch.size] = model.winch.from_constants[:, 0]
         self._velocity[: model.winch.size] = model.winch.velocity
-        # Where that force is felt: on its way up, and in what arrives now.
+        # The accelerometer feels a force at once, so that it is in what telemetry takes in at this
+        # sample (`_sent`, still on its way) and, with a delay below a sample, in a part of what
+        # arrives now (`_felt`).
         self._sent, self._felt = np.zeros(model.size), np.zeros(len(MEASURED))
         for k, name in enumerate(MEASUREMENTS):
             now = model.winch.force_felt[k]
@@ -141,6 +145,8 @@ class WinchEstimator:
         shown = measurement.values
         winch = self.model.winch
         ahead = self._ahead
+        # What A chi lacks: the input, which is known only now that the drive has told of it, and
+        # the drag.  At the first sample there was no input, and the load is taken to be at rest.
         if self._begun:
             speed = float(shown[_SPEED])
             if not math.isfinite(applied):
@@ -155,6 +161,8 @@ class WinchEstimator:
             before, after = self._drag, winch.extra_drag(float(self._velocity @ ahead))
             ahead = ahead + self._force * (0.5 * (before + after)) + self._sent * before
         self._begun = True
+        # Age and validity of the telemetry come with it: old values are used as such, and a flag
+        # that says "not valid" takes a signal out before its number is looked at.
         y = shown[_AT] - self._rest
         missing = 0 if shown[_FRESH] > 0.5 else _NO_TELEMETRY
         if shown[_UNIT] <= 0.5:
@@ -165,6 +173,7 @@ class WinchEstimator:
             late = float(shown[_AGE]) - self._usual
             if late > self._slack or late < -self._slack:
                 error = y - self._late(float(shown[_AGE])) @ ahead
+            # Everything is there, as nearly always: one product, no mask.
             gain = self._all
             if self._samples < len(self._first):
                 gain = self._first[self._samples]
@@ -234,6 +243,8 @@ def _first_gains(model: PredictionModel, P: FloatArray) -> list[FloatArray]:
     winch = model.winch
     at = np.arange(model.constants_at.start, model.constants_at.stop)
     P = np.array(P)
+    # The steady covariance holds that the constants are known but for their slow drift: a load of
+    # another weight would be learnt as slowly.
     P[at, at] += (np.array(_AT_FIRST) * constant_scales(model)) ** 2
     # A load of another weight hangs lower: the winch's state is not known any better at first.
     moved = winch.moved[:, 0]

@@ -233,7 +233,7 @@ def _search(
         try:
             loop = Unsaturated(model=believed, regulator=regulator(planned, float(weight)))
             rms: tuple[float, ...] = ()
-            for plant in (*others, model):  # those that are off fall first
+            for plant in (*others, model):  # most candidates fail on one that is off: those first
                 rms = (loop.payload_rms_under(plant), *rms)
                 if not math.isfinite(rms[0]):
                     return None
@@ -269,7 +269,9 @@ def _search(
         over = max(0.0, math.log(weights.max_sensitivity / limit))
         over += max(0.0, math.log(peak / (_OTHERS * limit)))
         grows = max(0.0, growth - _STEADY)
+        # Logarithms, so that a share of the rms counts the same in every sea.
         value = math.log(_mean(weights.payload_rms) / heave) + _PENALTY * over + _GROWS * grows
+        # Where the motor saturates the loop's rms says little, and the forecast decides.
         value += math.log(weights.forecast_error / heave)
         if over == grows == 0.0 and value < best[0]:
             best = (value, weights)
