@@ -6,10 +6,9 @@ documentation.
 
 from __future__ import annotations
 
-import csv
 import dataclasses
-import io
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -215,19 +214,11 @@ def report(results: Results, *, plain_text: bool = False) -> str:
     return "\n\n".join(parts)
 
 
-def table_of(found: Sequence[Timing]) -> str:
-    """Return timings as comma-separated values."""
+def rows_of(found: Sequence[Timing]) -> list[dict[str, object]]:
+    """Return timings as rows of text by column."""
     names = [field.name for field in dataclasses.fields(Timing)]
-    target = io.StringIO()
-    writer = csv.writer(target, lineterminator="\n")
-    writer.writerow(names)
-    for one in found:
-        row = []
-        for name in names:
-            value = getattr(one, name)
-            row.append(f"{value:.5g}" if isinstance(value, float) else value)
-        writer.writerow(row)
-    return target.getvalue()
+    told = ({name: getattr(one, name) for name in names} for one in found)
+    return [{k: f"{v:.5g}" if isinstance(v, float) else v for k, v in row.items()} for row in told]
 
 
 def solver_figure(solvers: Sequence[Timing], sea: str, moves: int) -> str:
@@ -267,9 +258,13 @@ def write_files(docs: Path, results: Results) -> None:
     page = docs / "performance.md"
     text = page.read_text(encoding="utf-8")
     page.write_text(between(text, report(results)), encoding="utf-8")
-    (docs / "data" / "mpc_solvers.csv").write_text(table_of(results.solvers), encoding="utf-8")
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs" / "make"))
+    from stored import write_rows
+
+    names = [field.name for field in dataclasses.fields(Timing)]
     steps = (*results.steps, *results.nonlinear)
-    (docs / "data" / "mpc_steps.csv").write_text(table_of(steps), encoding="utf-8")
+    for name, found in (("mpc_solvers.csv", results.solvers), ("mpc_steps.csv", steps)):
+        write_rows(docs / "data" / name, names, rows_of(found))
     fewest = min((one.moves for one in results.solvers if one.sea == "rough"), default=0)
     drawn = solver_figure(results.solvers, "rough", fewest)
     (docs / "images" / "mpc-speed.svg").write_text(drawn, encoding="utf-8")

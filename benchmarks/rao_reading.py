@@ -99,11 +99,14 @@ def using(raos: VesselRaos, repeats: int) -> None:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0], allow_abbrev=False)
     parser.add_argument("files", nargs="*")
     parser.add_argument("--repeats", type=int, default=9)
+    parser.add_argument("--quick", action="store_true", help="each read twice")
     parser.add_argument("--picture", metavar="FILE", help="draw the bundled vessel (.svg, .png)")
     given = parser.parse_args(argv)
+    if given.quick:
+        given.repeats = 2
     warnings.simplefilter("ignore", PhysicsWarning)
     vessel = read_raos("osv-83m")
     with tempfile.TemporaryDirectory() as folder:

@@ -13,7 +13,6 @@ import os
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import argparse
-import csv
 import subprocess
 import sys
 import tempfile
@@ -90,9 +89,10 @@ def one(path: str) -> None:
 
 def main() -> int:
     """Measure, print, write; return 1 if a file takes too long."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--one", help=argparse.SUPPRESS)
-    parser.add_argument("--out", default=str(ROOT / "docs" / "data" / "sea_reading.csv"))
+    parser.add_argument("--quick", action="store_true", help="two files only")
+    parser.add_argument("--write", action="store_true", help="renew docs/data/sea_reading.csv")
     arguments = parser.parse_args()
     if arguments.one:
         one(arguments.one)
@@ -100,7 +100,12 @@ def main() -> int:
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         files = [REAL / name for name in NAMES if (REAL / name).exists()]
-        files += [year_of_a_buoy(Path(folder)), year_of_a_hindcast(Path(folder))]
+        files = files[:2] if arguments.quick else files
+        files += (
+            []
+            if arguments.quick
+            else [year_of_a_buoy(Path(folder)), year_of_a_hindcast(Path(folder))]
+        )
         for path in files:
             count, form, first, later = measure(path)
             size = path.stat().st_size / 1e6
@@ -108,10 +113,13 @@ def main() -> int:
             print(
                 "{:24} {:24} {:>6} MB {:6} records  first {:>5} s  then {:>6} s".format(*rows[-1])
             )
-    with open(arguments.out, "w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("file", "format", "size_mb", "records", "first_s", "later_s"))
-        writer.writerows(rows)
+    if arguments.write and not arguments.quick:
+        sys.path.insert(0, str(ROOT / "docs" / "make"))
+        from stored import write_rows
+
+        columns = ("file", "format", "size_mb", "records", "first_s", "later_s")
+        told = (dict(zip(columns, row, strict=True)) for row in rows)
+        write_rows(ROOT / "docs" / "data" / "sea_reading.csv", columns, told)
     return int(any(float(row[-1]) > LIMIT for row in rows))
 
 

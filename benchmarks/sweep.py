@@ -19,7 +19,6 @@ os.environ["OMP_NUM_THREADS"] = "1"
 os.environ["MKL_NUM_THREADS"] = "1"
 
 import argparse
-import csv
 import platform
 import statistics
 import sys
@@ -47,7 +46,8 @@ from synth.sweeps.frequency import frequency_chunks
 
 FloatArray = npt.NDArray[np.float64]
 
-PAGE = Path(__file__).parents[1] / "docs" / "sweeps.md"
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "sweeps.md"
 DATA = PAGE.parent / "data" / "sweep.csv"
 IMAGES = PAGE.parent / "images"
 BEGIN, END = "<!-- benchmark: begin -->", "<!-- benchmark: end -->"
@@ -266,11 +266,12 @@ def plain(value: float) -> str:
 
 def write(rows: list[Row], figures: dict[str, float]) -> None:
     """Write the CSV file, and the table into the page."""
-    with DATA.open("w", encoding="utf-8", newline="") as file:
-        out = csv.writer(file, lineterminator="\n")
-        out.writerow(["what", "cases", "runs", "median [s]", "per case [us]"])
-        for r in rows:
-            out.writerow([r.what, r.cases, r.runs, f"{r.seconds:.4g}", f"{r.each:.4g}"])
+    sys.path.insert(0, str(ROOT / "docs" / "make"))
+    from stored import write_rows
+
+    columns = ("what", "cases", "runs", "median [s]", "per case [us]")
+    told = ((r.what, r.cases, r.runs, f"{r.seconds:.4g}", f"{r.each:.4g}") for r in rows)
+    write_rows(DATA, columns, (dict(zip(columns, one, strict=True)) for one in told))
     table = [
         "| what | cases | processor time [s] | per case [us] |",
         "| --- | ---: | ---: | ---: |",

@@ -22,7 +22,6 @@ os.environ["OMP_NUM_THREADS"] = "1"
 os.environ["MKL_NUM_THREADS"] = "1"
 
 import argparse
-import csv
 import statistics
 import sys
 import tempfile
@@ -295,25 +294,26 @@ def tables(rows: list[Row]) -> dict[str, list[list[str]]]:
 
 
 def write_data(rows: list[Row]) -> None:
-    with DATA.open("w", newline="", encoding="utf-8") as file:
-        file.write(
-            "# Written by benchmarks/sweep_workers.py. Times in s, of cost processor times.\n"
-        )
-        writer = csv.DictWriter(file, list(asdict(rows[0])), lineterminator="\n")
-        writer.writeheader()
-        for row in rows:
-            values = asdict(row)
-            writer.writerow(
-                {k: f"{v:.6g}" if isinstance(v, float) else v for k, v in values.items()}
-            )
+    sys.path.insert(0, str(ROOT / "docs" / "make"))
+    from stored import write_rows
+
+    told = [
+        {k: f"{v:.6g}" if isinstance(v, float) else v for k, v in asdict(row).items()}
+        for row in rows
+    ]
+    write_rows(DATA, list(told[0]), told, "Times in s, of cost processor times.")
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition(":")[0])
     parser.add_argument("--cases", type=int, default=64, help="computing cases (default: 64)")
+    parser.add_argument("--quick", action="store_true", help="few cases, nothing is written")
     parser.add_argument("--write", action="store_true", help="write data and docs/scaling.md")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
+    if arguments.quick:
+        print(plain(tables(costs(2))["cost"]))
+        return 0
     rows = [*costs(max(4, arguments.cases // 8)), *overheads(), *workers(arguments.cases)]
     found = tables(rows)
     for table in found.values():

@@ -11,13 +11,13 @@ stay as they are.  Writes `docs/data/comparison.csv`, a row for each run, and pr
 
 from __future__ import annotations
 
-import argparse
-import csv
 import datetime
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from stored import docs_folder, read_rows, study_parser, write_rows
 
 import stillhook as sh
 from stillhook.comparison.cell import Cell
@@ -118,10 +118,10 @@ def rows_of(part: Part, cells: Iterable[Cell]) -> list[dict[str, str]]:
     return found
 
 
-def write(rows: Iterable[Mapping[str, str]]) -> None:
+def write(rows: Iterable[Mapping[str, str]], path: Path = CSV) -> None:
     """Write the data file, with those of its rows that are not told anew."""
     kept: dict[tuple[str, ...], Mapping[str, str]] = {}
-    for row in [*(load() if CSV.exists() else ()), *rows]:
+    for row in [*(load(path) if path.exists() else ()), *rows]:
         kept[tuple(row[k] for k in KEY)] = row
 
     def place(row: Mapping[str, str]) -> tuple[object, ...]:
@@ -129,17 +129,12 @@ def write(rows: Iterable[Mapping[str, str]]) -> None:
         first = (CASES.index(row["case"]), float(row["noise"]), row["mismatch"])
         return (*first, who, float(row["height"]), int(row["seed"]))
 
-    with CSV.open("w", encoding="utf-8", newline="") as file:
-        file.write("# Written by docs/make/comparison.py. SI units; a row for each run.\n")
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(sorted(kept.values(), key=place))
+    write_rows(path, COLUMNS, sorted(kept.values(), key=place), "SI units; a row for each run.")
 
 
-def load() -> list[dict[str, str]]:
+def load(path: Path = CSV) -> list[dict[str, str]]:
     """Return the rows of the data file."""
-    with CSV.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+    return read_rows(path)
 
 
 def some(
@@ -280,12 +275,21 @@ TABLES = {"study": table, "floor": floor_table, "mismatch": mismatch_table, "cal
 
 def main(argv: Sequence[str] | None = None) -> None:
     """Run the study, write its data and print the tables."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser = study_parser(__doc__)
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "comparison")
     parser.add_argument("--only", default=",".join(PARTS))
     parser.add_argument("--until", help="time of day after which no other part is begun")
     parser.add_argument("--jobs", type=int)
     given = parser.parse_args(argv)
+    path = docs_folder(given.quick) / "data" / CSV.name
+    if given.quick:
+        part = PARTS["one-mpc"]
+        found = sh.compare(
+            case_of(part.case, part.noise), part.contenders, seeds=1, duration=60.0,
+            heights=part.heights[:1], traces=False, starts=1, jobs=1,
+        )  # fmt: skip
+        write(rows_of(part, found.cells), path)
+        return
     for name in given.only.split(",") if given.only else ():
         if given.until and datetime.datetime.now().strftime("%H:%M") >= given.until:
             break
@@ -303,7 +307,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             jobs=given.jobs,
         )
         print(name, datetime.datetime.now().strftime("%H:%M"), flush=True)
-        write(rows_of(part, found.cells))
+        write(rows_of(part, found.cells), path)
     for make in TABLES.values():
         print(make(load()), end="\n\n")
 

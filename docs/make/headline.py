@@ -11,13 +11,13 @@ The notebook `notebooks/01-thesis-1975.ipynb` shows the tables and repeats some 
 
 from __future__ import annotations
 
-import csv
 import platform
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from stored import docs_folder, read_rows, study_parser, write_rows
 
 import stillhook as sh
 from synth.question import pose
@@ -131,7 +131,12 @@ def redesign(key: Row) -> sh.GainDesign:
     return sh.optimise_gains(case_for(key))
 
 
-def study(tell: Callable[[str], None] = lambda text: None) -> tuple[list[Row], list[float]]:
+def study(
+    tell: Callable[[str], None] = lambda text: None,
+    lengths: Sequence[float] = LENGTHS,
+    delays: Sequence[float] = DELAYS,
+    filters: Mapping[float, float] = FILTERS,
+) -> tuple[list[Row], list[float]]:
     """Return all rows, and the seconds that each redesign took."""
     rows: list[Row] = []
     seconds: list[float] = []
@@ -147,31 +152,29 @@ def study(tell: Callable[[str], None] = lambda text: None) -> tuple[list[Row], l
         )
         return design
 
-    for length in LENGTHS:
+    for length in lengths:
         for model in MODELS:
             key = key_of("thesis", model, length)
             case = case_for(key)
             assert case.gains is not None
             rows.append(given_row(key, case, case.gains.model_dump()))
-    for length in LENGTHS:
-        for delay in DELAYS:
+    for length in lengths:
+        for delay in delays:
             spring = timed(key_of("redesign", "spring", length, delay))
             key = key_of("transplant", "rope", length, delay)
             rows.append(given_row(key, case_for(key), spring.gains))
             timed(key_of("redesign", "rope", length, delay))
-    for length, bandwidth in FILTERS.items():
+    for length, bandwidth in filters.items():
         timed(key_of("filter", "rope", length, 0.0, bandwidth))
     return rows, seconds
 
 
-def load() -> list[Row]:
+def load(path: Path = CSV) -> list[Row]:
     """Return the rows that are stored in `docs/data/headline.csv`."""
-    with CSV.open(encoding="utf-8", newline="") as file:
-        lines = (line for line in file if not line.startswith("#"))
-        return [
-            {k: v if k in ("kind", "model") else float(v) for k, v in row.items()}
-            for row in csv.DictReader(lines)
-        ]
+    return [
+        {k: v if k in ("kind", "model") else float(v) for k, v in row.items()}
+        for row in read_rows(path)
+    ]
 
 
 def pick(rows: Iterable[Row], **wanted: str | float) -> Row:
@@ -308,18 +311,29 @@ def _machine() -> str:
     return names[0] if names else platform.machine()
 
 
-def write(rows: Sequence[Row], seconds: Sequence[float]) -> None:
-    """Write the data file and the page."""
-    CSV.parent.mkdir(parents=True, exist_ok=True)
-    with CSV.open("w", encoding="utf-8", newline="") as file:
-        file.write("# Written by docs/make/headline.py. SI units; margin.phase in rad.\n")
-        writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        for row in rows:
-            writer.writerow({k: v if isinstance(v, str) else f"{v:.6g}" for k, v in row.items()})
+def write(rows: Sequence[Row], path: Path = CSV) -> None:
+    """Write the data file."""
+    told = ({k: v if isinstance(v, str) else f"{v:.6g}" for k, v in row.items()} for row in rows)
+    write_rows(path, list(rows[0]), told, "SI units; margin.phase in rad.")
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Run the study; write the data file and the page."""
+    quick = study_parser(__doc__).parse_args(argv).quick
+    docs = docs_folder(quick)
+    path = docs / "data" / CSV.name
+
+    def tell(text: str) -> None:
+        print(text, flush=True)
+
+    if quick:  # one depth and no delay: too little for the page, which compares them
+        write(study(tell, LENGTHS[-1:], DELAYS[:1], {})[0], path)
+        return
+    rows, seconds = study(tell)
+    write(rows, path)
     # From what was stored, so that page and data cannot differ in a rounded digit.
-    PAGE.write_text(page(load(), seconds), encoding="utf-8")
+    (docs / PAGE.name).write_text(page(load(path), seconds), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    write(*study(lambda text: print(text, flush=True)))
+    main()

@@ -8,10 +8,11 @@ The bundled crane on the bundled vessel `osv-83m`, in a short-crested sea.
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable
 from pathlib import Path
+
+from stored import docs_folder, study_parser
 
 import stillhook as sh
 from models.hook import HookMotion, hook_motion
@@ -32,13 +33,13 @@ def case(**changes: object) -> sh.Case:
     return sh.load_case("subsea-crane").replace({**VESSEL, **SPREADING, **changes})
 
 
-def picture() -> None:
+def picture(path: Path = IMAGE) -> None:
     """Write the figure."""
     from stillhook.seas import motion_figure
     from stillhook.text import picture as drawn
 
-    IMAGE.write_bytes(drawn(motion_figure(hook_motion(case())), "svg"))
-    print(f"written: {IMAGE}")
+    path.write_bytes(drawn(motion_figure(hook_motion(case())), "svg"))
+    print(f"written: {path}")
 
 
 def best_of(work: Callable[[], object], rounds: int = 5) -> float:
@@ -70,9 +71,10 @@ def timed() -> None:
 
 def main() -> None:
     """Draw, or measure."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser = study_parser(__doc__)
     parser.add_argument("--time", action="store_true", help="measure instead of drawing")
-    timed() if parser.parse_args().time else picture()
+    given = parser.parse_args()
+    timed() if given.time else picture(docs_folder(given.quick) / "images" / IMAGE.name)
 
 
 if __name__ == "__main__":

@@ -11,12 +11,12 @@ writes `docs/landing.md`, `docs/data/landing.csv` with a row for each run, and
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from stored import docs_folder, read_rows, study_parser, write_rows
 
 import stillhook as sh
 from models.basics import Interval, mean_interval
@@ -135,23 +135,20 @@ def numbers(run: sh.Run, scenario: sh.Scenario) -> dict[str, float]:
     }
 
 
-def study(tell: Callable[[str], None] = lambda text: None) -> list[Row]:
+def study(tell: Callable[[str], None] = lambda text: None, seeds: int = SEEDS) -> list[Row]:
     """Return all rows."""
     rows = []
     for name in (*CONTROLLERS, *LIMITS):
-        rows += rows_of(name, SEEDS)
+        rows += rows_of(name, seeds)
         tell(f"{name}: {1e3 * mean(rows, name, 'rms').mean:.1f} mm")
     return rows
 
 
-def load() -> list[Row]:
+def load(path: Path = CSV) -> list[Row]:
     """Return the rows that are stored in `docs/data/landing.csv`."""
-    with CSV.open(encoding="utf-8", newline="") as file:
-        lines = (line for line in file if not line.startswith("#"))
-        return [
-            {k: v if k == "controller" else float(v) for k, v in row.items()}
-            for row in csv.DictReader(lines)
-        ]
+    return [
+        {k: v if k == "controller" else float(v) for k, v in row.items()} for row in read_rows(path)
+    ]
 
 
 def values(rows: Iterable[Row], controller: str, number: str) -> list[float]:
@@ -338,19 +335,22 @@ def figure(kind: str = "svg", seed: int = 0) -> bytes:
     return picture(drawn, kind)
 
 
-def write(rows: Sequence[Row]) -> None:
-    """Write the data file, the figure and the page."""
-    CSV.parent.mkdir(parents=True, exist_ok=True)
-    with CSV.open("w", encoding="utf-8", newline="") as file:
-        file.write("# Written by docs/make/landing.py. SI units; nan is what did not happen.\n")
-        writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        for row in rows:
-            writer.writerow({k: v if isinstance(v, str) else f"{v:.6g}" for k, v in row.items()})
-    FIGURE.write_bytes(figure())
+def write(rows: Sequence[Row], path: Path = CSV) -> None:
+    """Write the data file."""
+    told = ({k: v if isinstance(v, str) else f"{v:.6g}" for k, v in row.items()} for row in rows)
+    write_rows(path, list(rows[0]), told, "SI units; nan is what did not happen.")
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Run the study; write the data file, the figure and the page."""
+    quick = study_parser(__doc__).parse_args(argv).quick
+    docs = docs_folder(quick)
+    path = docs / "data" / CSV.name
+    write(study(lambda text: print(text, flush=True), 2 if quick else SEEDS), path)
+    (docs / "images" / FIGURE.name).write_bytes(figure())
     # From what was stored, so that page and data cannot differ in a rounded digit.
-    PAGE.write_text(page(load()), encoding="utf-8")
+    (docs / PAGE.name).write_text(page(load(path)), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    write(study(lambda text: print(text, flush=True)))
+    main()

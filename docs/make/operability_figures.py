@@ -10,6 +10,8 @@ import time
 import warnings
 from pathlib import Path
 
+from stored import docs_folder, study_parser
+
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 VESSEL = {
     "vessel.raos": "osv-83m",
@@ -34,23 +36,28 @@ def main() -> None:
     from stillhook.text import picture
     from synth.operability import operability
 
+    quick = study_parser(__doc__).parse_args().quick
+    images = docs_folder(quick) / "images"
     warnings.simplefilter("ignore", PhysicsWarning)
     case = sh.load_case("subsea-crane").replace(VESSEL)
-    design = sh.optimise_structure(case, "combined", starts=1)
+    design = sh.optimise_structure(case, "feed-forward" if quick else "combined", starts=1)
     print(design)
     begun = time.perf_counter()
     study = operability(
         design,
-        headings=np.radians(np.arange(0.0, 360.0, 15.0)),
+        headings=np.radians(np.arange(0.0, 360.0, 90.0 if quick else 15.0)),
         payload_rms="50 mm",
         scatter="example",
     )
     seas = study.periods.size * (1 if study.headings is None else study.headings.size)
     print(f"{seas} seas in {time.perf_counter() - begun:.1f} s")
     deep = operability(
-        design, periods=np.arange(5.0, 16.0), headings=[np.radians(165.0)], payload_rms="50 mm",
+        design,
+        periods=np.arange(5.0, 16.0, 5.0 if quick else 1.0),
+        headings=[np.radians(165.0)],
+        payload_rms="50 mm",
         depths=[300.0, 500.0, 1000.0, 1300.0],
-    )  # fmt: skip
+    )
     print(study)
     print(deep)
     for check in (*study.verify(), *deep.verify(1)):
@@ -62,7 +69,7 @@ def main() -> None:
         ("capability", capability_figure(study)),
         ("depths", depth_figure(deep)),
     ):
-        (IMAGES / f"operability-{name}.svg").write_bytes(picture(figure, "svg"))
+        (images / f"operability-{name}.svg").write_bytes(picture(figure, "svg"))
 
 
 if __name__ == "__main__":

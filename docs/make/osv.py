@@ -10,12 +10,12 @@ needs the extra `bem`, and about a minute.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from stored import study_parser
 
 from models.basics import write_text_atomically
 from models.vessel import MODES, VesselRaos
@@ -65,14 +65,14 @@ def text(raos: VesselRaos) -> str:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = study_parser(__doc__)
     parser.add_argument(
         "--check", action="store_true", help="compare with fewer panels, write none"
     )
     arguments = parser.parse_args()
-    vessel = computed(450 if arguments.check else 900)
+    vessel = computed(200 if arguments.quick else 450 if arguments.check else 900)
     print(f"\n{vessel.natural_periods}, {vessel.raos.omega.size} frequencies")
-    if not arguments.check:
+    if not (arguments.check or arguments.quick):
         write_text_atomically(PLACE, text(vessel.raos))
         print(f"{PLACE}: {PLACE.stat().st_size / 1e3:.0f} kB")
         PICTURE.write_bytes(picture(hull_figure(vessel), "png"))

@@ -18,8 +18,6 @@ import os
 # Before NumPy is loaded: one thread for matrices of twenty rows.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import argparse
-import csv
 import math
 import time
 import warnings
@@ -29,6 +27,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from stored import docs_folder, read_rows, study_parser, write_rows
 
 from models import PhysicsWarning, load_case
 from models.basics import one_thread
@@ -145,31 +144,35 @@ def summary(rows: Sequence[Row]) -> str:
 
 def read(path: Path = CSV) -> list[Row]:
     """Return the stored rows."""
-    with path.open(encoding="utf-8", newline="") as file:
-        return [
-            Row(
-                question=entry["question"],
-                start=int(entry["start"]),
-                cost=float(entry["cost"]),
-                accepted=entry["accepted"] == "yes",
-                unstable=int(entry["unstable"]),
-                iterations=int(entry["iterations"]),
-                seconds=float(entry["seconds"]),
-            )
-            for entry in csv.DictReader(file)
-        ]
+    return [
+        Row(
+            question=entry["question"],
+            start=int(entry["start"]),
+            cost=float(entry["cost"]),
+            accepted=entry["accepted"] == "yes",
+            unstable=int(entry["unstable"]),
+            iterations=int(entry["iterations"]),
+            seconds=float(entry["seconds"]),
+        )
+        for entry in read_rows(path)
+    ]
 
 
 def write(rows: Sequence[Row], path: Path = CSV) -> None:
     """Write the rows."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        names = ("question", "start", "cost", "accepted", "unstable", "iterations", "seconds")
-        writer.writerow(names)
-        for row in rows:
-            accepted = "yes" if row.accepted else "no"
-            numbers = (f"{row.cost:.6g}", accepted, row.unstable, row.iterations)
-            writer.writerow((row.question, row.start, *numbers, f"{row.seconds:.3g}"))
+    told = [
+        {
+            "question": row.question,
+            "start": row.start,
+            "cost": f"{row.cost:.6g}",
+            "accepted": "yes" if row.accepted else "no",
+            "unstable": row.unstable,
+            "iterations": row.iterations,
+            "seconds": f"{row.seconds:.3g}",
+        }
+        for row in rows
+    ]
+    write_rows(path, list(told[0]), told)
 
 
 def figure(rows: Sequence[Row], kind: str = "svg") -> bytes:
@@ -204,25 +207,27 @@ def figure(rows: Sequence[Row], kind: str = "svg") -> bytes:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run all questions, or some; return 1 if an accepted answer is unstable."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = study_parser(__doc__)
     parser.add_argument("--starts", type=int, default=1000)
     parser.add_argument("--draw", action="store_true", help="only draw what is stored")
     parser.add_argument("--only", default="", help="part of the name of a question")
     given = parser.parse_args(argv)
+    docs = docs_folder(given.quick)
+    path, picture = docs / "data" / CSV.name, docs / "images" / FIGURE.name
     if given.draw:
-        FIGURE.write_bytes(figure(read()))
+        picture.write_bytes(figure(read()))
         return 0
-    known = read() if CSV.exists() and given.only else []
+    known = read(path) if path.exists() and given.only else []
     rows = []
     for name in QUESTIONS:
         if given.only not in name:
             rows += [row for row in known if row.question == name]
             continue
-        found, total = rows_of(name, given.starts)
+        found, total = rows_of(name, 10 if given.quick else given.starts)
         print(f"{summary(found)}; {total} gains drawn for {len(found)} stable ones", flush=True)
         rows += found
-    write(rows)
-    FIGURE.write_bytes(figure(rows))
+    write(rows, path)
+    picture.write_bytes(figure(rows))
     return int(any(row.unstable for row in rows))
 
 

@@ -15,14 +15,14 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-import argparse
-import csv
 import time
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from robust_figures import write
+from stored import docs_folder, study_parser, write_rows
 
 from models import load_case
 from models.basics import PhysicsWarning, one_thread
@@ -178,23 +178,22 @@ def bounds(starts: int) -> list[Row]:
     return rows
 
 
-def store(name: str, rows: Sequence[Row]) -> None:
+def store(path: Path, rows: Sequence[Row]) -> None:
     """Write rows as CSV in SI units."""
-    with (DATA / name).open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        for row in rows:
-            writer.writerow({k: f"{v:.8g}" if isinstance(v, float) else v for k, v in row.items()})
+    told = ({k: f"{v:.8g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows)
+    write_rows(path, list(rows[0]), told)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Ask the questions."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
-    parser.add_argument("--quick", action="store_true", help="little effort, nothing stored")
+    parser = study_parser(__doc__)
     parser.add_argument("--only", default="", help="minimax, objectives, fronts or bounds")
     given = parser.parse_args(arguments)
     warnings.simplefilter("ignore", PhysicsWarning)
     quick = given.quick
+    docs = docs_folder(quick)
+    if quick and not given.only:
+        given.only = "objectives"
     if given.only in ("", "minimax"):
         minimax(2 if quick else 8, 500 if quick else 10_000)
     stored = {
@@ -207,13 +206,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     }
     for question, (name, answer) in stored.items():
         if given.only in ("", question):
-            rows = answer()
-            if not quick:
-                store(name, rows)
-    if not quick:
-        from robust_figures import write
-
-        write()
+            store(docs / "data" / name, answer())
+    write(docs)
     return 0
 
 

@@ -7,11 +7,10 @@ on the subsea crane beside the least that any linear controller leaves with the 
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from stored import DOCS, docs_folder, read_rows, study_parser
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA, IMAGES = ROOT / "docs" / "data", ROOT / "docs" / "images"
@@ -23,17 +22,16 @@ LABELS = {
 SCALES = {"torque": 1e-3}
 
 
-def read(name: str) -> list[dict[str, str]]:
+def read(name: str, docs: Path = DOCS) -> list[dict[str, str]]:
     """Return the rows of a data file."""
-    with (DATA / name).open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+    return read_rows(docs / "data" / name)
 
 
-def pareto(kind: str = "svg") -> bytes:
+def pareto(kind: str = "svg", docs: Path = DOCS) -> bytes:
     """Return the fronts as a picture."""
     from stillhook.text import AFTER, BEFORE, new_figure, picture, styled, typeset
 
-    rows = read("pareto.csv")
+    rows = read("pareto.csv", docs)
     names = list(dict.fromkeys(row["against"] for row in rows))
     with styled():
         sheet = new_figure(9.2, 3.6)
@@ -57,11 +55,11 @@ def pareto(kind: str = "svg") -> bytes:
     return picture(sheet, kind)
 
 
-def robust(kind: str = "svg") -> bytes:
+def robust(kind: str = "svg", docs: Path = DOCS) -> bytes:
     """Return each scenario with the drum held, with gains for all and with gains of its own."""
     from stillhook.text import AFTER, BEFORE, REFERENCE, new_figure, picture, styled
 
-    rows = read("robust.csv")
+    rows = read("robust.csv", docs)
     by_objective = {
         name: {row["scenario"]: row for row in rows if row["objective"] == name}
         for name in ("worst", "mean", "regret")
@@ -102,11 +100,13 @@ def robust(kind: str = "svg") -> bytes:
     return picture(sheet, kind)
 
 
-def structure_bounds(kind: str = "svg") -> bytes:
+def structure_bounds(kind: str = "svg", docs: Path = DOCS) -> bytes:
     """Return the structures beside their bounds as a picture."""
     from stillhook.text import AFTER, REFERENCE, new_figure, picture, styled
 
-    rows = sorted(read("structure_bounds.csv"), key=lambda r: float(r["on_the_bound_s_terms"]))
+    rows = sorted(
+        read("structure_bounds.csv", docs), key=lambda r: float(r["on_the_bound_s_terms"])
+    )
     with styled():
         sheet = new_figure(8.4, 4.2)
         axes = sheet.subplots()
@@ -130,13 +130,12 @@ def structure_bounds(kind: str = "svg") -> bytes:
     return picture(sheet, kind)
 
 
-def write(kinds: Sequence[str] = ("svg",)) -> None:
+def write(docs: Path, kind: str = "svg") -> None:
     """Write the figures whose data are there."""
-    for kind in kinds:
-        for make in (pareto, robust, structure_bounds):
-            if (DATA / f"{make.__name__}.csv").exists():
-                (IMAGES / f"{make.__name__}.{kind}").write_bytes(make(kind))
+    for make in (pareto, robust, structure_bounds):
+        if (docs / "data" / f"{make.__name__}.csv").exists():
+            (docs / "images" / f"{make.__name__}.{kind}").write_bytes(make(kind, docs))
 
 
 if __name__ == "__main__":
-    write()
+    write(docs_folder(study_parser(__doc__).parse_args().quick))

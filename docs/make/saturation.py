@@ -12,15 +12,14 @@ repeats the first seeds.
 
 from __future__ import annotations
 
-import csv
 import math
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from stored import docs_folder, read_rows, study_parser, write_rows
 
 import stillhook as sh
 from models.basics import FallTime, Share, fall_time, share
@@ -135,20 +134,18 @@ def seas() -> list[Sea]:
 
 def load() -> list[Falls]:
     """Return the rows that are stored in `docs/data/saturation.csv`."""
-    with CSV.open(encoding="utf-8", newline="") as file:
-        lines = (line for line in file if not line.startswith("#"))
-        return [
-            Falls(
-                sea=Sea(
-                    continuation=row["continuation"],
-                    height=float(row["H_s"]),
-                    sample_time=float(row["sample_time"]),
-                ),
-                fell_at=tuple(float(text) for text in row["fell_at"].split()),
-                held_rms=float(row["held_rms"]),
-            )
-            for row in csv.DictReader(lines)
-        ]
+    return [
+        Falls(
+            sea=Sea(
+                continuation=row["continuation"],
+                height=float(row["H_s"]),
+                sample_time=float(row["sample_time"]),
+            ),
+            fell_at=tuple(float(text) for text in row["fell_at"].split()),
+            held_rms=float(row["held_rms"]),
+        )
+        for row in read_rows(CSV)
+    ]
 
 
 def pick(rows: Sequence[Falls], continuation: str, height: float, T: float = SAMPLE_TIME) -> Falls:
@@ -158,38 +155,39 @@ def pick(rows: Sequence[Falls], continuation: str, height: float, T: float = SAM
     return found
 
 
-def write(rows: Sequence[Falls]) -> None:
+def write(rows: Sequence[Falls], path: Path = CSV) -> None:
     """Write the data file."""
-    CSV.parent.mkdir(parents=True, exist_ok=True)
-    with CSV.open("w", encoding="utf-8", newline="") as file:
-        file.write(
-            "# Written by docs/make/saturation.py. SI units; fell_at of seeds 0, 1, 2, ...\n"
-        )
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(
-            ["continuation", "H_s", "sample_time", "runs", "falls", "held_rms", "fell_at"]
-        )
-        for row in rows:
-            times = " ".join("inf" if math.isinf(t) else f"{t:.3f}" for t in row.fell_at)
-            sea, counted = row.sea, row.share
-            key = (sea.continuation, sea.height, sea.sample_time, counted.total)
-            writer.writerow([*key, counted.count, f"{row.held_rms:.6g}", times])
+    told = [
+        {
+            "continuation": row.sea.continuation,
+            "H_s": row.sea.height,
+            "sample_time": row.sea.sample_time,
+            "runs": row.share.total,
+            "falls": row.share.count,
+            "held_rms": f"{row.held_rms:.6g}",
+            "fell_at": " ".join("inf" if math.isinf(t) else f"{t:.3f}" for t in row.fell_at),
+        }
+        for row in rows
+    ]
+    write_rows(path, list(told[0]), told, "SI units; fell_at of seeds 0, 1, 2, ...")
 
 
-def main() -> None:
+def main(argv: Sequence[str] | None = None) -> None:
     """Run the study and write it."""
-    rows = []
-    for sea in seas():
+    quick = study_parser(__doc__).parse_args(argv).quick
+    path = docs_folder(quick) / "data" / CSV.name
+    rows: list[Falls] = []
+    for sea in seas()[:2] if quick else seas():
         start = time.perf_counter()
-        rows.append(falls_in(sea, SEEDS))
+        rows.append(falls_in(sea, 2 if quick else SEEDS))
         counted = rows[-1].share
         print(
             f"{sea}: {counted.count} of {counted.total} fell, "
             f"{1e3 * rows[-1].held_rms:.2f} mm while held ({time.perf_counter() - start:.0f} s)",
             flush=True,
         )
-        write(rows)
+        write(rows, path)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

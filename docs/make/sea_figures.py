@@ -9,6 +9,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+from stored import docs_folder, study_parser
 
 from models.sea import SeaSpectrum, Spreading
 from stillhook.text import AFTER, BEFORE, DRUM, HOOK, REFERENCE, new_figure, picture, styled
@@ -68,8 +69,9 @@ def seas() -> bytes:
 
 def main() -> None:
     """Draw the figure."""
-    (IMAGES / "seas.svg").write_bytes(seas())
-    print("docs/images/seas.svg")
+    path = docs_folder(study_parser(__doc__).parse_args().quick) / "images" / "seas.svg"
+    path.write_bytes(seas())
+    print(f"written: {path}")
 
 
 if __name__ == "__main__":

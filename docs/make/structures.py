@@ -19,13 +19,13 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import argparse
-import csv
 import time
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
+
+from stored import docs_folder, read_rows, study_parser, write_rows
 
 from models import Case, PhysicsWarning, load_case
 from synth.design import StructureDesign, optimise_structure
@@ -163,20 +163,19 @@ def read(path: Path) -> dict[tuple[str, str, str, float], Row]:
     if not path.exists():
         return {}
     rows = {}
-    with path.open(encoding="utf-8", newline="") as file:
-        for entry in csv.DictReader(file):
-            values: dict[str, object] = {}
-            for column in fields(Row):
-                text = entry[column.name]
-                if column.name == "parameters":
-                    pairs = (item.partition("=") for item in text.split(";") if item)
-                    values[column.name] = {name: float(value) for name, _, value in pairs}
-                elif column.type == "bool":
-                    values[column.name] = text == "yes"
-                else:
-                    values[column.name] = {"float": float, "int": int}.get(column.type, str)(text)
-            row = Row(**values)  # type: ignore[arg-type]
-            rows[row.key] = row
+    for entry in read_rows(path):
+        values: dict[str, object] = {}
+        for column in fields(Row):
+            text = entry[column.name]
+            if column.name == "parameters":
+                pairs = (item.partition("=") for item in text.split(";") if item)
+                values[column.name] = {name: float(value) for name, _, value in pairs}
+            elif column.type == "bool":
+                values[column.name] = text == "yes"
+            else:
+                values[column.name] = {"float": float, "int": int}.get(column.type, str)(text)
+        row = Row(**values)  # type: ignore[arg-type]
+        rows[row.key] = row
     return rows
 
 
@@ -185,13 +184,8 @@ def write(path: Path, rows: Mapping[tuple[str, str, str, float], Row]) -> None:
     ropes = [*(f"{v:g}" for v in LENGTHS), "one spring"]
     order = [row.key for row in questions(STRUCTURES, ropes)]
     listed = sorted(rows.values(), key=lambda r: order.index(r.key) if r.key in order else 9999)
-    scratch = path.with_suffix(".part")
-    with scratch.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([column.name for column in fields(Row)])
-        for row in listed:
-            writer.writerow([_text(getattr(row, column.name)) for column in fields(Row)])
-    scratch.replace(path)
+    names = [column.name for column in fields(Row)]
+    write_rows(path, names, ({name: _text(getattr(row, name)) for name in names} for row in listed))
 
 
 def _text(value: object) -> str:
@@ -234,16 +228,23 @@ def answered(row: Row, near: Sequence[Mapping[str, float]], starts: int) -> Row:
 
 def main(argv: Sequence[str] | None = None) -> None:
     """Fill the file."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = study_parser(__doc__)
     parser.add_argument("--starts", type=int, default=8)
     parser.add_argument("--passes", type=int, default=3)
     parser.add_argument("--structures", default=",".join(STRUCTURES))
     parser.add_argument("--lengths", default=",".join(f"{v:g}" for v in LENGTHS) + ",spring")
-    parser.add_argument("--output", type=Path, default=OUTPUT)
     given = parser.parse_args(argv)
+    if given.quick:
+        given.starts, given.passes, given.structures, given.lengths = (
+            1,
+            1,
+            "payload-feedback",
+            "300",
+        )
+    output = docs_folder(given.quick) / "data" / OUTPUT.name
     ropes = ["one spring" if v == "spring" else v for v in given.lengths.split(",")]
     asked = questions(given.structures.split(","), ropes)
-    rows = read(given.output)
+    rows = read(output)
     for k in range(given.passes):
         better = 0
         for row in asked:
@@ -259,8 +260,8 @@ def main(argv: Sequence[str] | None = None) -> None:
                 if not (new.ok and new.payload_rms < known.payload_rms * (1.0 - _BETTER)):
                     continue
                 better += 1
-            rows = {**read(given.output), row.key: new}
-            write(given.output, rows)
+            rows = {**read(output), row.key: new}
+            write(output, rows)
             status = "" if new.ok else " (not ok)"
             print(
                 f"pass {k + 1}: {row.rope}, {row.structure}, {1e3 * row.delay:.0f} ms: "

@@ -7,10 +7,11 @@ The table stands between two marks in the page, and a test holds it against the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from stored import docs_folder, study_parser
 from structures import DELAYS, HEARS_NO_PAYLOAD, LENGTHS, STRUCTURES, Row, read
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -128,11 +129,15 @@ def write_into(page: Path, text: str) -> None:
     page.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{after}", encoding="utf-8")
 
 
-def main() -> None:
+def main(argv: Sequence[str] | None = None) -> None:
     """Write table and figure."""
+    docs = docs_folder(study_parser(__doc__).parse_args(argv).quick)
     rows = read(CSV)
-    write_into(PAGE, table(rows))
-    FIGURE.write_bytes(figure(rows))
+    if docs == PAGE.parent:
+        write_into(PAGE, table(rows))
+    else:
+        (docs / PAGE.name).write_text(table(rows), encoding="utf-8")
+    (docs / "images" / FIGURE.name).write_bytes(figure(rows))
 
 
 if __name__ == "__main__":

@@ -124,8 +124,8 @@ def test_a_stored_design_does_what_its_row_says(rows, key):
 
 
 def test_rows_survive_being_written(rows, tmp_path):
-    structures.write(tmp_path / "again.csv", rows)
-    assert structures.read(tmp_path / "again.csv") == rows
+    structures.write(tmp_path / "structures.csv", rows)
+    assert structures.read(tmp_path / "structures.csv") == rows
 
 
 def test_no_accepted_random_start_is_unstable(random_rows):
