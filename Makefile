@@ -13,6 +13,11 @@ VENV := .venv
 PY := $(VENV)/bin/python
 PIP_INSTALL := $(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
+# Each writes its rows, then its pages and figures; those that only draw come after.
+STUDIES := $(addprefix docs/make/,$(addsuffix .py,headline landing saturation random_starts robust \
+    structures comparison structures_page operability_figures hook_motion sea_figures)) \
+    benchmarks/sweep.py
+
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
@@ -42,6 +47,9 @@ lint: $(VENV)/.installed-dev  ## ruff, mypy --strict and the import contract
 bench: $(VENV)/.installed-dev  ## how good and how fast the gain synthesis and the simulation are
 	$(PY) benchmarks/synthesis.py
 	$(PY) benchmarks/simulation.py
+
+studies: $(VENV)/.installed-dev  ## the stored studies of the docs anew; takes hours
+	@for script in $(STUDIES); do echo "== $$script"; $(PY) $$script || exit 1; done
 
 docs: $(VENV)/.installed-docs  ## the documentation, into docs/_build/html
 	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html

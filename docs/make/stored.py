@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import csv
 import re
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -61,16 +62,26 @@ def read_rows(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
+def digest_of(script: str) -> str:
+    """Return the digest of the code that a script runs."""
+    from stillhook.keeper import code_digest
+
+    path = ROOT / script
+    sys.path.insert(0, str(path.parent))
+    try:
+        return code_digest(path.stem)
+    finally:
+        sys.path.remove(str(path.parent))
+
+
 def write_rows(
     path: Path, columns: Sequence[str], rows: Iterable[Mapping[str, object]], note: str = ""
 ) -> None:
     """Write the rows of a study at once, under a line that says which code made them."""
-    from stillhook.keeper import code_digest
-
     script = SCRIPTS[path.name]
     scratch = path.with_suffix(".part")
     with scratch.open("w", encoding="utf-8", newline="") as file:
-        file.write(f"# Written by {script} with code {code_digest(ROOT / script)}. {note}".rstrip())
+        file.write(f"# Written by {script} with code {digest_of(script)}. {note}".rstrip())
         file.write("\n")
         writer = csv.DictWriter(file, columns, lineterminator="\n")
         writer.writeheader()
@@ -80,8 +91,6 @@ def write_rows(
 
 def older_than_their_code(folder: Path = DOCS / "data") -> list[str]:
     """Return a sentence for each stored study that other code than today's has made."""
-    from stillhook.keeper import code_digest
-
     now: dict[str, str] = {}
     found = []
     for path in sorted(folder.glob("*.csv")):
@@ -95,7 +104,7 @@ def older_than_their_code(folder: Path = DOCS / "data") -> list[str]:
             found.append(f"{path.name}: does not say which code made it ({script})")
             continue
         if script not in now:
-            now[script] = code_digest(ROOT / script)
+            now[script] = digest_of(script)
         if made["code"] != now[script]:
             found.append(f"{path.name}: made by code {made['code']}, {script} is {now[script]} now")
     return found
