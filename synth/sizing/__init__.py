@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .purchase import Worth as Worth
     from .purchase import WorthRow as WorthRow
     from .purchase import worth as worth
+    from .sizing import Sizing as Sizing
     from .sizing import size_winch as size_winch
-    from .sizing_result import Sizing as Sizing
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -29,9 +29,8 @@ from models.case import Case
 
 from ..design import StructureDesign, optimise_structure
 from ..search import Progress
-from .follow import Answer, Posed, follow, slope
+from .follow import Answer, Posed, designed, follow, slope
 from .motor import changed
-from .sizing_design import designed
 
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 _GRID = 7  # gears that are tried before the golden section

@@ -26,13 +26,16 @@ from typing_extensions import override
 from models.basics import FloatArray, PhysicsWarning, Quadrature
 from models.case import Case
 
-from ..design import StructureDesign
+from ..design import StructureDesign, tuning_of
+from ..design.structure_search import _design, _verified
 from ..limits import Limit, drive_limits
 from ..loop import Assessment
 from ..question import PAYLOAD, Goal, Problem, StructureQuestion, pose_structure
 from ..search import (
+    Found,
     Pace,
     Programme,
+    Progress,
     Solution,
     begin_points,
     cost_nodes,
@@ -220,6 +223,24 @@ def follow(
     if not solved.converged or excess > max(best.excess, EXCESS):
         return best
     return replace(best, solved=solved, view=view, excess=excess)
+
+
+def designed(
+    case: Case, structure: str, near: Answer, masses: int, tell: Progress
+) -> StructureDesign | None:
+    """Return the best gains of a case close to a known answer, verified; None if none keep it."""
+    posed = Posed.of(case, structure, masses)
+    enforced = case.limits.drive == "enforce"
+    problem = posed.problem((*posed.loop, *(posed.drive if enforced else ())))
+    begins = [near.carried(problem), near.solved.values]
+    answer = follow(problem, begins, near=near, fine=True)
+    if answer is None:
+        return None
+    found = Found(solved=answer.solved, view=answer.view, excess=answer.excess)
+    tuning = tuning_of(problem, found)
+    return _verified(
+        _design(pose_structure(case, structure, masses), tuning, drive_kept=True), tell
+    )
 
 
 def slope(answer: Answer, changed: Problem, step: float) -> float:

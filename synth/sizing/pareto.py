@@ -22,10 +22,9 @@ from models.case import Case
 
 from ..limits import DelayMargin, Limit, MaxSensitivity, Rms
 from ..question import Problem, pose
-from ..search import KEPT, Found, search
-from .pareto_exchange import exchanged
-from .pareto_point import ParetoPoint
-from .pareto_walk import Walk, with_bound
+from ..search import KEPT, Found, Solution, polish, search
+from .pareto_point import ParetoPoint, point_of
+from .pareto_walk import Walk, exchanged, with_bound
 
 Progress = Callable[[str, int, int], None]
 
@@ -42,6 +41,8 @@ _ENDS = 2  # distinct answers of each that a walk begins from
 _FROM, _TO = 1.15, 3.0  # of M_s, where the user does not say
 _LONGER = 4.0  # that of the best motion, which a front of delay margins ends at
 _LONGEST = 0.2  # of a telemetry delay [s]
+_DELAY_STARTS = 8  # of the searches of a front of delays, whose points share no programme
+_SAME = 1e-6  # log costs that differ by less are the same answer
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -157,8 +158,6 @@ def pareto_front(
     if between is not None and not 0.0 <= between[0] < between[1]:
         raise InputError(f"pareto: between must be two ascending numbers, got {between}")
     if against == "delay":
-        from .pareto_delay import delay_points
-
         found = delay_points(case, points, between or (0.0, _LONGEST), seed, progress)
     else:
         found = _bound_points(case, against, points, between, seed, progress)
@@ -275,3 +274,60 @@ def _checked(
         amplifier=case.gains.A if case.gains is not None else 1.0,
         verified=(passed, len(chosen) if points else 0),
     )
+
+
+def delay_points(
+    case: Case, count: int, between: tuple[float, float], seed: int, progress: Progress | None
+) -> list[tuple[float, ParetoPoint | None]]:
+    """Return the best answer at each delay [s], None where there is none."""
+    delays = np.linspace(*between, count)
+    problems = [pose(case.replace({"sensors.telemetry.delay": float(d)})).problem for d in delays]
+    guesses = [[case.gains.a, case.gains.a1, case.gains.a2]] if case.gains is not None else []
+    tell = progress or (lambda stage, done, total: None)
+    best: list[tuple[Solution, float] | None] = [None] * count
+    begins: list[tuple[int, Solution, FloatArray]] = []
+    for n, k in enumerate((0, count // 2, count - 1)):
+        tell("ends of the front", n, 3)
+        found = search(problems[k], _DELAY_STARTS, seed, guesses)
+        if found.solved is not None and found.excess <= KEPT and found.reference is not None:
+            begins.append((k, found.solved, found.reference))
+            _keep(best, k, found.solved, found.excess)
+    if not begins:
+        raise SynthesisError("pareto: no gains keep the limits at any delay in the range")
+    for n, (k, solved, reference) in enumerate(begins):
+        tell("walking along the front", n, len(begins))
+        _along(problems, best, range(k + 1, count), solved, reference)
+        _along(problems, best, range(k - 1, -1, -1), solved, reference)
+    points: list[tuple[float, ParetoPoint | None]] = []
+    for delay, problem, kept in zip(delays, problems, best, strict=True):
+        point = None if kept is None else point_of(problem, "", float(delay), kept[0])
+        points.append((float(delay), point))
+    return points
+
+
+def _along(
+    problems: Sequence[Problem],
+    best: list[tuple[Solution, float] | None],
+    order: Sequence[int],
+    solved: Solution,
+    reference: FloatArray,
+) -> None:
+    """Go on from delay to delay until another walk has been there with a better answer."""
+    for i in order:
+        problem = problems[i]
+        if not problem.stable(solved.values, solved.coefficient):
+            return
+        again, _, excess = polish(problem, solved, solved.values)
+        if again is solved or excess > KEPT:
+            return
+        if not _keep(best, i, again, excess):
+            return
+        solved = again
+
+
+def _keep(best: list[tuple[Solution, float] | None], index: int, solved: Solution, e: float) -> bool:
+    known = best[index]
+    if known is not None and known[0].objective <= solved.objective + _SAME:
+        return False
+    best[index] = solved, e
+    return True

@@ -24,19 +24,78 @@ from models.basics import FloatArray, InputError, check_range, one_thread
 from models.case import Case
 from models.plant import MAX_MASSES
 
+from ..design import StructureDesign
+from ..design.structure_design import _SOURCES
+from ..loop import Assessment
+from ..question import HOOK, PAYLOAD
 from ..search import KEPT, Progress, search
 from .catalogue import Choice, choose, read_catalogue
-from .follow import EXCESS, Answer, Posed, follow
+from .follow import EXCESS, Answer, Posed, designed, follow
 from .motor import MotorData, changed, with_motor
-from .point import Least, least_motor, target_of
-from .sizing_design import designed, why_not
-from .sizing_result import Sizing as Sizing
-from .sizing_sea import highest_sea
+from .point import Least, SizePoint, highest_sea, least_motor, target_of
 
 _SPAN = 2.5  # gears that are tried: the case's over and times this
 _FINE = 0.03  # of the logarithm of the gear, to which the best is found
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 _ROOM = 1.005  # by which the chosen motor is larger than the smallest
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sizing:
+    """The answer of `size_winch`.
+
+    Attributes
+    ----------
+    case, structure
+        The case in the sea asked for, its own motor in it, and the controller structure.
+    target, hook_rms
+        What the payload may move, and what the hook does (rms) [m].
+    ok, status
+        Whether a motor was found and verified; the sentence for the user.
+    unlimited_rms
+        What the loop's margins and the sensors alone leave, with a motor without limits [m].
+    points
+        The smallest motor behind each gear, by ratio.
+    chosen, sized_case, design
+        The smallest of all; the case with it, its limits enforced; its gains, verified.
+    given_rms
+        What the payload moves with the case's own motor and gear in that sea [m]; infinite if
+        they cannot keep their limits.
+    highest_height
+        H_s up to which the case's own winch meets the target [m]; 0 if in none that was looked
+        at.
+    choice
+        The motor out of the catalogue, if there is one.
+    """
+
+    case: Case
+    structure: str
+    target: float
+    hook_rms: float
+    ok: bool
+    status: str
+    unlimited_rms: float
+    points: tuple[SizePoint, ...]
+    chosen: SizePoint | None
+    sized_case: Case | None
+    design: StructureDesign | None
+    given_rms: float
+    highest_height: float
+    choice: Choice | None = None
+
+    def to_csv(self) -> str:
+        """Return the smallest motor over the gear as CSV, SI units."""
+        lines = ["gear,scale,torque_continuous,torque_peak,power,inertia,payload_rms,limited_by"]
+        for p in self.points:
+            m = p.motor
+            figures = (
+                [m.torque_continuous, m.torque_peak, m.power, m.inertia, p.payload_rms]
+                if m is not None
+                else []
+            )
+            cells = [f"{v:.8g}" for v in (p.gear, p.scale, *figures)] + [""] * (5 - len(figures))
+            lines.append(",".join([*cells, " ".join(p.binding).replace(",", "")]))
+        return "\n".join(lines) + "\n"
 
 
 @dataclass(kw_only=True)
@@ -210,7 +269,7 @@ def _sized(
     )
     feasible = [g for g, least in walk.found.items() if least.point.feasible]
     if not feasible:
-        return replace(result, status=why_not(result, free)), posed.masses, free
+        return replace(result, status=_why_not(result, free)), posed.masses, free
     best = min(feasible, key=lambda g: walk.found[g].point.scale)
     least = walk.found[best]
     return _chosen(result, walk, least), posed.masses, least.answer
@@ -332,3 +391,39 @@ def _with_choice(
         sized_case=choice.case,
         design=design,
     )
+
+
+def _why_not(sizing: Sizing, free: Answer) -> str:
+    """Return why no motor meets the target.
+
+    Parameters
+    ----------
+    sizing
+        One without a motor.
+    free
+        The optimum without a motor's limits.
+    """
+    if sizing.unlimited_rms > sizing.target:
+        binding = [n for n, use in free.uses().items() if use > 1.0 - 5e-3]
+        binding.sort(key=lambda n: -abs(free.solved.prices[n]))
+        view = free.view
+        for d in free.problem.disturbances:
+            share = Assessment(view.plant, view.controller, [d]).sigma(PAYLOAD) / free.payload_rms
+            if d.name != HOOK and share**2 > 0.5:
+                binding.insert(0, _SOURCES.get(d.name, d.name))
+        stops = " and ".join(binding) or "the structure itself"
+        return (
+            f"no motor holds the payload to {_mm(sizing.target)} rms: without any limit of the "
+            f"motor it moves {_mm(sizing.unlimited_rms)}; {stops} stops it"
+        )
+    names: dict[str, None] = {}
+    for point in sizing.points:
+        names |= dict.fromkeys(point.binding[:1])
+    return (
+        f"no motor of this kind holds the payload to {_mm(sizing.target)} rms behind any of these "
+        f"gears: {', '.join(names) or 'stability'} stops it"
+    )
+
+
+def _mm(value: float) -> str:
+    return f"{1e3 * value:.4g} mm"

@@ -10,7 +10,7 @@ import pytest
 import stillhook as sh
 from synth.sizing import Worth, purchase
 from synth.sizing.follow import Posed, begin_from, follow
-from synth.sizing.purchase_items import limit_items, part_items
+from synth.sizing.purchase import limit_items, part_items
 from synth.structures import structure_named
 
 pytestmark = pytest.mark.ci  # whole optimisations in fixtures
