@@ -1,7 +1,7 @@
 r"""Co-design: gear ratio and drum radius together with the gains, for a given motor.
 
     case, ranges -> optimum of the gains behind each gear, from neighbour to neighbour
-                 -> golden section on log n (and log r) -> slope by the envelope theorem -> CoDesign
+                 -> Brent's method on log n (and log r) -> slope by the envelope theorem -> CoDesign
 
 The gear enters plant and limits: reflected inertia I_D/n^2, speed n/r of the haul, torque r/n of
 the tension.  So it is searched around the gains, whose optimum behind a neighbouring gear is a
@@ -18,8 +18,8 @@ hardly depend on each other; a drum that gains nothing stays as it is.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,13 +29,12 @@ from models.case import Case
 
 from ..design import StructureDesign, optimise_structure
 from ..search import Progress
-from .follow import Answer, Posed, designed, follow, slope
+from .follow import Answer, Posed, designed, follow, least_between, slope
 from .motor import changed
 
-_GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
-_GRID = 7  # gears that are tried before the golden section
+_GRID = 7  # gears that are tried before the Brent's method
 _FINE = 2e-3  # of the logarithm of the gear
-_RADII = 3  # golden sections along the radius and back
+_RADII = 3  # Brent's methods along the radius and back
 _STEP = 1e-4  # of the logarithm, for the slope
 _GAIN = 1e-3  # share of the rms that another drum must gain at least
 _SMOOTH = 0.02  # slope below which an optimum is one without a corner
@@ -195,7 +194,7 @@ def co_design(
         for _ in range(_RADII):
             ratio = best / r
             inside = max(radii[0], low / ratio), min(radii[1], high / ratio)
-            other = _golden(lambda x, q=ratio: search.cost(q * x, x), *inside)  # type: ignore[misc]
+            other = least_between(partial(_cost_at, search, ratio), *inside, _FINE)
             if search.cost(ratio * other, other) > (1.0 - _GAIN) * search.cost(best, r):
                 break
             r, best = other, _best_gear(search, low, high, other, near=ratio * other)
@@ -225,7 +224,7 @@ def _begin(first: StructureDesign) -> Answer | None:
 def _best_gear(
     search: _Gears, low: float, high: float, radius: float, near: float | None = None
 ) -> float:
-    """Return the best gear at a radius: a grid, from the known outwards, then golden section."""
+    """Return the best gear at a radius: a grid, from the known outwards, then Brent's method."""
     if near is None:
         grid = np.geomspace(low, high, _GRID)
         own = search.case.winch.gearbox.ratio
@@ -239,25 +238,13 @@ def _best_gear(
     known = sorted(g for g, r in search.answers if r == radius and low <= g <= high)
     at = min(range(len(known)), key=lambda i: search.cost(known[i], radius))
     ends = known[max(at - 1, 0)], known[min(at + 1, len(known) - 1)]
-    best = _golden(lambda g: search.cost(g, radius), *ends)
+    best = least_between(lambda g: search.cost(g, radius), *ends, _FINE)
     return min((best, known[at]), key=lambda g: search.cost(g, radius))
 
 
-def _golden(cost: Callable[[float], float], low: float, high: float) -> float:
-    """Return where a function is least between two ends, on a logarithmic scale."""
-    a, b = math.log(low), math.log(high)
-    one, two = b - _GOLDEN * (b - a), a + _GOLDEN * (b - a)
-    first, second = cost(math.exp(one)), cost(math.exp(two))
-    while b - a > _FINE:
-        if first <= second:
-            b, two, second = two, one, first
-            one = b - _GOLDEN * (b - a)
-            first = cost(math.exp(one))
-        else:
-            a, one, first = one, two, second
-            two = a + _GOLDEN * (b - a)
-            second = cost(math.exp(two))
-    return math.exp(one if first <= second else two)
+def _cost_at(search: _Gears, ratio: float, radius: float) -> float:
+    """Return the payload's rms with a drum radius at a given ratio of gear and radius [m]."""
+    return search.cost(ratio * radius, radius)
 
 
 def _finished(

@@ -16,12 +16,11 @@ is counted right.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from typing_extensions import override
+from scipy.optimize import minimize_scalar
 
 from models.basics import FloatArray, PhysicsWarning, Quadrature
 from models.case import Case
@@ -103,8 +102,6 @@ class Answer:
     nodes, omega, held
         Where its spectra were integrated and its margins held, and which of those frequencies
         the exchange added [rad/s].
-    multipliers
-        Of every row of the programme, (m,).
     vector
         The programme's vector.
     """
@@ -116,7 +113,6 @@ class Answer:
     nodes: Quadrature
     omega: FloatArray
     held: FloatArray
-    multipliers: FloatArray
     vector: FloatArray
 
     @property
@@ -138,33 +134,6 @@ class Answer:
         old, new = self.problem.law.parameters, problem.law.parameters
         ratio = np.array([b.scale / a.scale for a, b in zip(old, new, strict=True)])
         return _inside(problem, self.solved.values * ratio)
-
-
-class _Priced(Programme):
-    """A programme that keeps the multipliers of its last solve."""
-
-    last: dict[str, FloatArray]
-
-    @override
-    def _solver(self, pace: Pace) -> Any:
-        solver = super()._solver(pace)
-        programme = self
-
-        class Keeping:
-            """The solver, remembered."""
-
-            def __call__(self, **given: Any) -> Any:
-                answer = solver(**given)
-                programme.last = {
-                    name: np.array(answer[name], dtype=np.float64).ravel()
-                    for name in ("x", "lam_g")
-                }
-                return answer
-
-            def stats(self) -> Any:
-                return solver.stats()
-
-        return Keeping()
 
 
 def begin_from(problem: Problem, design: StructureDesign | Sequence[float]) -> FloatArray:
@@ -243,6 +212,29 @@ def designed(
     )
 
 
+def least_between(cost: Callable[[float], float], low: float, high: float, fine: float) -> float:
+    """Return where a cost of a positive number is least between two ends.
+
+    Parameters
+    ----------
+    cost
+        The cost; infinite where there is no answer.
+    low, high
+        The ends.
+    fine
+        Of the number's logarithm, to which the least is found.
+    """
+    # Where a neighbour is infinite Brent's parabola is no number, and the step a golden section.
+    with np.errstate(invalid="ignore"):
+        found = minimize_scalar(
+            lambda size: cost(float(np.exp(size))),
+            bounds=(np.log(low), np.log(high)),
+            method="bounded",
+            options={"xatol": fine},
+        )
+    return float(np.exp(found.x))
+
+
 def slope(answer: Answer, changed: Problem, step: float) -> float:
     """Return d log(cost) of the optimum per `step`, by the envelope theorem.
 
@@ -268,7 +260,8 @@ def _lagrangian(answer: Answer, problem: Problem, vector: FloatArray) -> float:
     bounds = np.array([limit.bound for limit in problem.limits], dtype=np.float64)
     cost, rows = programme.evaluate(vector, bounds)
     flat = np.array(rows, dtype=np.float64).ravel()
-    prices = answer.multipliers.copy()
+    assert answer.solved.multipliers is not None
+    prices = answer.solved.multipliers.copy()
     # The row that keeps slow poles off is normalised by the reference: it has no price.
     prices[-1 if problem.drag is None else -2] = 0.0
     return float(cost) + float(np.dot(prices, flat))
@@ -291,7 +284,7 @@ def _arrived(
     for k in range(rounds):
         nodes = cost_nodes(problem, [view], rtol=_RTOL)
         omega = np.union1d(margin_nodes(problem, [view.poles], 40), held)
-        programme = _Priced(
+        programme = Programme(
             problem, nodes, omega, goal, reference=begin, relaxed=relaxed, tolerance=1e-8
         )
         values = begin if solved is None else solved.values
@@ -313,8 +306,7 @@ def _arrived(
             nodes=nodes,
             omega=omega,
             held=_fewer(view, problem, held),
-            multipliers=programme.last["lam_g"],
-            vector=programme.last["x"],
+            vector=programme.pack(solved.values, solved.coefficient, solved.extra),
         )
         if best is None or answer.excess < best.excess:
             best = answer
@@ -332,7 +324,7 @@ def _fewer(view: Assessment, problem: Problem, held: FloatArray) -> FloatArray:
     return np.union1d(recent, thinned(extremes))
 
 
-def _solved(programme: _Priced, start: FloatArray, *, first: bool) -> Solution | None:
+def _solved(programme: Programme, start: FloatArray, *, first: bool) -> Solution | None:
     for pace in (Pace.FAR, Pace.NEAR) if first else (Pace.NEAR, Pace.FAR):
         solved = programme.solve(start, pace=pace)
         if solved.converged and programme.problem.stable(solved.values, solved.coefficient):

@@ -1,7 +1,7 @@
 """Sizing: the smallest motor and gear that hold a payload still enough in a given sea.
 
     case, target, H_s -> best without a motor's limits (is it possible at all?)
-        -> smallest motor behind each gear, from neighbour to neighbour -> golden section
+        -> smallest motor behind each gear, from neighbour to neighbour -> Brent's method
         -> chosen motor and gear -> gains within its limits, verified -> Sizing
 
 Motors are the case's own, scaled (`synth.sizing.motor`), or those of a catalogue
@@ -30,13 +30,12 @@ from ..loop import Assessment
 from ..question import HOOK, PAYLOAD
 from ..search import KEPT, Progress, search
 from .catalogue import Choice, choose, read_catalogue
-from .follow import EXCESS, Answer, Posed, designed, follow
+from .follow import EXCESS, Answer, Posed, designed, follow, least_between
 from .motor import MotorData, changed, with_motor
 from .point import Least, SizePoint, highest_sea, least_motor, target_of
 
 _SPAN = 2.5  # gears that are tried: the case's over and times this
 _FINE = 0.03  # of the logarithm of the gear, to which the best is found
-_GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 _ROOM = 1.005  # by which the chosen motor is larger than the smallest
 
 
@@ -302,28 +301,18 @@ def _walked(walk: _Search, grid: FloatArray) -> None:
     known = sorted(walk.found)
     at = known.index(min(gears, key=lambda g: walk.found[g].point.scale))
     ends = known[max(at - 1, 0)], known[min(at + 1, len(known) - 1)]
-    _golden(walk, math.log(ends[0]), math.log(ends[1]), total)
+    _home_in(walk, *ends, total)
 
 
-def _golden(walk: _Search, low: float, high: float, total: int) -> None:
-    """Home in on the gear with the smallest motor by golden section."""
+def _home_in(walk: _Search, low: float, high: float, total: int) -> None:
+    """Home in on the gear with the smallest motor."""
 
-    def size(log_gear: float) -> float:
+    def size(gear: float) -> float:
         walk.tell("the best gear", min(len(walk.found), total), total)
         # Three digits: a gear is ordered by a number.
-        return walk.at(float(f"{math.exp(log_gear):.3g}")).point.scale
+        return walk.at(float(f"{gear:.3g}")).point.scale
 
-    one, two = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    first, second = size(one), size(two)
-    while high - low > _FINE:
-        if first <= second:
-            high, two, second = two, one, first
-            one = high - _GOLDEN * (high - low)
-            first = size(one)
-        else:
-            low, one, first = one, two, second
-            two = low + _GOLDEN * (high - low)
-            second = size(two)
+    least_between(size, low, high, _FINE)
 
 
 def _given(walk: _Search, posed: Posed) -> Answer | None:
