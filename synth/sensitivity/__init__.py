@@ -1,8 +1,7 @@
-"""What matters most: how a design's figures answer to every number of its case.
+"""Sensitivity of a design to the numbers of its case, locally and over whole ranges.
 
-Locally and exactly: from the numbers of a case to slopes of the plant's matrices, of the spectra
-and of the law, and from those, by the gradient of the spectral integral, to elasticities.  Over
-ranges: from a sweep to Sobol indices, and Morris screening.
+A design comes in, with a spread where ranges are meant; elasticities by the adjoint method
+(`sensitivity`), Sobol's indices (`sobol_indices`) or Morris's effects (`morris_screening`) go out.
 """
 
 from typing import TYPE_CHECKING

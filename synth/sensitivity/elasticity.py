@@ -21,24 +21,21 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.basics import FloatArray, InputError, PhysicsWarning
 from models.plant import PlantData
 
+from ..design import GainDesign, StructureDesign
 from ..loop import Assessment, Disturbance
 from ..question import PAYLOAD
-from .answers import Answers, answers_of
 from .differences import StepError, derivative
 from .fields import Number, numbers_of
+from .fixed_design import FixedDesign, fixed_design
 from .gradient import Gradient, sensitivity_gradient, variance_gradient
 from .results import FIGURES, Elasticity, Sensitivity
 from .slopes import PlantSlopes, changed
-
-if TYPE_CHECKING:
-    from ..design import GainDesign, StructureDesign
 
 Progress = Callable[[str, int, int], None]
 
@@ -73,13 +70,13 @@ def sensitivity(
     """
     if design.margins is None:
         raise InputError("sensitivity: the loop must be stable; an unstable one has no rms")
-    answers = answers_of(design)
-    figures, found, idle, steps = _first(answers, progress)
+    fixed = fixed_design(design)
+    figures, found, idle, steps = _first(fixed, progress)
     found.sort(key=lambda e: -abs(e.payload_rms))
     for k in range(min(second, len(found))):
         if progress is not None:
             progress("second derivatives", k, min(second, len(found)))
-        found[k] = _with_curvature(answers, found[k])
+        found[k] = _with_curvature(fixed, found[k])
     return Sensitivity(
         design=design,
         elasticities=tuple(found),
@@ -90,21 +87,21 @@ def sensitivity(
 
 
 def _first(
-    answers: Answers, progress: Progress | None, only: str | None = None
+    fixed: FixedDesign, progress: Progress | None, only: str | None = None
 ) -> tuple[dict[str, float], list[Elasticity], list[str], list[str]]:
     """Return the figures, the elasticities, the paths without effect, and those that step."""
-    view = answers.view()
+    view = fixed.view()
     if view is None:
         raise InputError("sensitivity: the loop must be stable; an unstable one has no rms")
-    gradients = _gradients(view, answers)
+    gradients = _gradients(view, fixed)
     figures = {name: gradients[name].value for name in _OUTPUTS}
     figures["max_sensitivity"] = view.max_sensitivity
     slopes = PlantSlopes(
-        answers.case, masses=answers.masses, drag=view.coefficient or answers.fixed_drag,
-        measurements=answers.measurements,
+        fixed.case, masses=fixed.masses, drag=view.coefficient or fixed.fixed_drag,
+        measurements=fixed.measurements,
     )  # fmt: skip
-    drag = _DragMotion(answers, view, gradients, slopes) if answers.stochastic else None
-    numbers = [n for n in numbers_of(answers.case) if only is None or n.path == only]
+    drag = _DragMotion(fixed, view, gradients, slopes) if fixed.stochastic else None
+    numbers = [n for n in numbers_of(fixed.case) if only is None or n.path == only]
     found: list[Elasticity] = []
     idle: list[str] = []
     steps: list[str] = []
@@ -113,7 +110,7 @@ def _first(
             progress("numbers of the case", k, len(numbers))
         try:
             matrices = slopes.of(number)
-            densities = _density_slopes(answers, number, gradients["payload_rms"].omega)
+            densities = _density_slopes(fixed, number, gradients["payload_rms"].omega)
         except StepError:
             steps.append(number.path)
             continue
@@ -129,19 +126,19 @@ def _first(
             continue
         whole = _shares(number.value, own, moved, drag)
         found.append(Elasticity(path=number.path, value=number.value, unit=number.unit, **whole))
-    for name, value, slope in answers.law_slopes(gradients["payload_rms"].s):
+    for name, value, slope in fixed.law_slopes(gradients["payload_rms"].s):
         path = f"gains.{name}"
         if only is not None and path != only:
             continue
         own = {
             key: gradient.along_law(
-                answers.law_slope(name, gradient.s) if key.startswith(_PEAK) else slope
+                fixed.law_slope(name, gradient.s) if key.startswith(_PEAK) else slope
             )
             for key, gradient in gradients.items()
         }
         moved = drag.shift(own["velocity"]) if drag is not None else 0.0
         whole = _shares(value, own, moved, drag)
-        found.append(Elasticity(path=path, value=value, unit=answers.units.get(name, ""), **whole))
+        found.append(Elasticity(path=path, value=value, unit=fixed.units.get(name, ""), **whole))
     return figures, found, idle, steps
 
 
@@ -162,12 +159,12 @@ class _DragMotion:
 
     def __init__(
         self,
-        answers: Answers,
+        fixed: FixedDesign,
         view: Assessment,
         gradients: Mapping[str, Gradient],
         slopes: PlantSlopes,
     ) -> None:
-        self._case, self.C = answers.case, view.coefficient
+        self._case, self.C = fixed.case, view.coefficient
         self.of = {name: g.along(slopes.of_drag()) for name, g in gradients.items()}
 
     def shift(self, velocity: float, quadratic: float = 0.0) -> float:
@@ -187,10 +184,10 @@ class _DragMotion:
         return self.shift(velocity, own)
 
 
-def _gradients(view: Assessment, answers: Answers) -> dict[str, Gradient]:
+def _gradients(view: Assessment, fixed: FixedDesign) -> dict[str, Gradient]:
     outputs = {**_OUTPUTS, "velocity": "payload.velocity"}
     nodes = view.quadrature(list(outputs.values()))
-    arguments = view.plant, view.controller, answers.disturbances
+    arguments = view.plant, view.controller, fixed.disturbances
     found = {
         name: variance_gradient(*arguments, output, nodes.omega, nodes.weights)
         for name, output in outputs.items()
@@ -200,19 +197,19 @@ def _gradients(view: Assessment, answers: Answers) -> dict[str, Gradient]:
     return found
 
 
-def _density_slopes(answers: Answers, number: Number, omega: FloatArray) -> dict[str, FloatArray]:
+def _density_slopes(fixed: FixedDesign, number: Number, omega: FloatArray) -> dict[str, FloatArray]:
     """Return d S / d number at the nodes by disturbance, where the number shakes anything."""
-    if not number.path.startswith(answers.shaken_by):
+    if not number.path.startswith(fixed.shaken_by):
         return {}
 
     def densities(value: float) -> FloatArray:
-        sources = answers.disturbances_of(changed(answers.case, number, value))
-        return np.array([_density(sources, d.name, omega) for d in answers.disturbances])
+        sources = fixed.disturbances_of(changed(fixed.case, number, value))
+        return np.array([_density(sources, d.name, omega) for d in fixed.disturbances])
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PhysicsWarning)
         slopes = np.asarray(derivative(densities, number.value, common=True), dtype=np.float64)
-    pairs = zip(answers.disturbances, slopes, strict=True)
+    pairs = zip(fixed.disturbances, slopes, strict=True)
     return {d.name: slope for d, slope in pairs if slope.any()}
 
 
@@ -223,11 +220,11 @@ def _density(sources: Sequence[Disturbance], name: str, omega: FloatArray) -> Fl
     return np.zeros_like(omega)
 
 
-def _with_curvature(answers: Answers, entry: Elasticity) -> Elasticity:
+def _with_curvature(fixed: FixedDesign, entry: Elasticity) -> Elasticity:
     """Return the elasticity with its own slope, by differences of exact first derivatives."""
     ends = []
     for sign in (1.0, -1.0):
-        other = answers.with_number(entry.path, np.exp(sign * _SECOND))
+        other = fixed.with_number(entry.path, np.exp(sign * _SECOND))
         found = _first(other, None, entry.path)[1] if other is not None else []
         ends.append(found[0].payload_rms if found else np.nan)
     curvature = float((ends[0] - ends[1]) / (2.0 * _SECOND))

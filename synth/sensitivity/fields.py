@@ -1,4 +1,4 @@
-"""The numbers of a case: every quantity that is a length, a mass, a delay and the like, by path.
+"""Numbers of a case by path: every quantity that is a length, a mass, a delay and the like.
 
     Case -> walk over its sections -> Number(path, value, unit)
 

@@ -1,4 +1,4 @@
-r"""Gradients of a closed loop's figures in everything that they are made of, by the adjoint.
+r"""Gradients of a closed loop's figures in all that they are made of, by the adjoint method.
 
 A closed-loop response F = z/w at s = i omega, u = kappa y with kappa = C(s) e^{-s tau}, moves with
 the plant's matrices and the controller as

@@ -1,4 +1,4 @@
-"""What a sensitivity study hands over: elasticities, largest first, and designs moved in full.
+"""Results of local sensitivity: elasticities, largest first, and designs moved in full.
 
 `elasticity.sensitivity` computes them; figures and commands show them.
 """
@@ -8,19 +8,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.basics import InputError
 
+from ..design import GainDesign, StructureDesign
 from ..question import PAYLOAD
-from .answers import Answers, answers_of
 from .fields import numbers_of
+from .fixed_design import FixedDesign, fixed_design
 from .slopes import changed
-
-if TYPE_CHECKING:
-    from ..design import GainDesign, StructureDesign
 
 FIGURES = ("payload_rms", "max_sensitivity", "torque_rms", "speed_rms")
 """The figures of a design that have elasticities."""
@@ -121,8 +118,8 @@ class Sensitivity:
         raise InputError(f"sensitivity: {path!r} has no elasticity here")
 
     @cached_property
-    def _answers(self) -> Answers:
-        return answers_of(self.design)
+    def _fixed(self) -> FixedDesign:
+        return fixed_design(self.design)
 
     def moved(self, share: float = 0.1, paths: Sequence[str] | None = None) -> tuple[Moved, ...]:
         """Recompute the design with numbers moved one at a time.
@@ -140,14 +137,14 @@ class Sensitivity:
             If a path is unknown.
         """
         wanted = [e.path for e in self.elasticities if e.path.startswith("gains.")]
-        numbers = {n.path: n for n in numbers_of(self._answers.case)}
+        numbers = {n.path: n for n in numbers_of(self._fixed.case)}
         found = []
         for path in wanted if paths is None else paths:
             if path.startswith("gains."):
-                view = self._answers.view(gain=path.removeprefix("gains."), factor=1.0 + share)
+                view = self._fixed.view(gain=path.removeprefix("gains."), factor=1.0 + share)
             elif path in numbers:
-                case = changed(self._answers.case, numbers[path], numbers[path].value * (1 + share))
-                view = self._answers.view(case)
+                case = changed(self._fixed.case, numbers[path], numbers[path].value * (1 + share))
+                view = self._fixed.view(case)
             else:
                 raise InputError(f"sensitivity: there is no number {path!r} in the case")
             found.append(

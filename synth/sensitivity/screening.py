@@ -1,4 +1,4 @@
-r"""Which of many numbers can be forgotten: Morris's screening by elementary effects.
+r"""Morris's screening: which of many numbers can be forgotten, by elementary effects.
 
     ranges -> r trajectories through a grid, one number moved at a time -> one sweep -> effects
 
@@ -13,18 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.basics import FloatArray, check_range, read_only
 from models.spread import Spread
 
-from .global_indices import on_ranges
-from .rows import evaluate_rows
-
-if TYPE_CHECKING:
-    from ..design import GainDesign, StructureDesign
+from ..design import GainDesign, StructureDesign
+from .global_indices import evaluate_rows, on_ranges
 
 Progress = Callable[[str, int, int], None]
 Evaluate = Callable[[FloatArray], FloatArray]

@@ -1,6 +1,6 @@
-"""A fixed design on a world that changes: one face for gains and for every other structure.
+"""A fixed design on a case that changes, gains and every other structure alike: `FixedDesign`.
 
-    GainDesign | StructureDesign -> Answers -> closed loop on any case, with any gain moved
+    GainDesign | StructureDesign -> FixedDesign -> closed loop on any case, with any gain moved
 
 The controller is that of the design whatever the case becomes: sensitivity is about a world that
 differs from the one designed for.
@@ -30,7 +30,7 @@ from .fields import numbers_of
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Answers:
+class FixedDesign:
     """A design as sensitivity sees it.
 
     Attributes
@@ -133,7 +133,7 @@ class Answers:
         """Return the controller of some values."""
         return self.law.controller(values)
 
-    def with_number(self, path: str, factor: float) -> Answers | None:
+    def with_number(self, path: str, factor: float) -> FixedDesign | None:
         """Return the same design with a number of its case, or a gain, times a factor."""
         if path.startswith("gains."):
             name = path.removeprefix("gains.")
@@ -173,13 +173,13 @@ class Answers:
         return PlantData.from_case(case).quadratic_drag
 
 
-def answers_of(design: GainDesign | StructureDesign) -> Answers:
+def fixed_design(design: GainDesign | StructureDesign) -> FixedDesign:
     """Return a design as sensitivity sees it."""
     if isinstance(design, StructureDesign):
         posed = design.posed
         names = tuple(p.name for p in posed.law.parameters)
         stochastic = posed.question.drag is not None
-        return Answers(
+        return FixedDesign(
             case=design.case,
             masses=design.masses,
             law=posed.law,
@@ -193,7 +193,7 @@ def answers_of(design: GainDesign | StructureDesign) -> Answers:
     case = design.sea_case
     question = pose(case, design.masses)
     scale = design.gains["A"] / question.amplifier
-    return Answers(
+    return FixedDesign(
         case=case,
         masses=design.masses,
         law=question.structure.bind(question.plant),
