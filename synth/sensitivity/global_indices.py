@@ -148,7 +148,7 @@ def sobol_indices(
     design
         The design; its controller is fixed.
     spread
-        Independent ranges of at least two numbers.
+        Independent ranges.
     samples
         Base points, a power of two; the sweep has samples times (numbers + 2) cases.
     figure
@@ -225,17 +225,19 @@ def indices_of(
     spreads = np.ptp(kept)
     if spreads <= 1e-12 * np.abs(kept).max():
         raise InputError(f"sensitivity: {figure} does not move over these ranges")
+    # SciPy squeezes its answers, and cannot do with those of one number: it is given twice then.
+    crossings = np.repeat(kept[2:], 2, axis=0) if d == 1 else kept[2:]
     answer: Any = estimate(
-        func={"f_A": kept[:1], "f_B": kept[1:2], "f_AB": kept[2:, None, :]}, n=kept.shape[1]
+        func={"f_A": kept[:1], "f_B": kept[1:2], "f_AB": crossings[:, None, :]}, n=kept.shape[1]
     )
     boot: Any = answer.bootstrap(confidence_level=confidence, n_resamples=resamples)
     return SobolIndices(
         figure=figure,
         paths=spread.paths,
-        first=np.ravel(answer.first_order),
-        total=np.ravel(answer.total_order),
-        first_interval=_interval(boot.first_order),
-        total_interval=_interval(boot.total_order),
+        first=np.ravel(answer.first_order)[:d],
+        total=np.ravel(answer.total_order)[:d],
+        first_interval=_interval(boot.first_order)[:d],
+        total_interval=_interval(boot.total_order)[:d],
         confidence=confidence,
         samples=samples,
         kept=int(kept.shape[1]),

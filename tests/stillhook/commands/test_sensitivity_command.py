@@ -50,6 +50,15 @@ def test_ranges_are_studied_too(tmp_path, capsys):
 
 
 @pytest.mark.ci
+def test_one_number_alone_is_studied_too(tmp_path, capsys):
+    words = ["--vary", "payload.mass=5%", "--samples", "32", "--quiet"]
+    assert main(["sensitivity", "thesis-1975", *words, "--out", str(tmp_path / "out")]) == 0
+    table = pd.read_csv(tmp_path / "out" / "indices.csv")
+    assert set(table.path) == {"payload.mass"}
+    assert table.total.to_numpy() == pytest.approx(1.0, abs=0.2)
+
+
+@pytest.mark.ci
 def test_quietly_it_says_one_sentence(tmp_path, capsys, study):
     assert (
         main(["sensitivity", "thesis-1975", "--quiet", "--second", "0", "--out", str(tmp_path)])

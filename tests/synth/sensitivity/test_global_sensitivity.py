@@ -37,6 +37,20 @@ def test_indices_of_ishigamis_function():
     assert found.unstable == 0
 
 
+def test_one_number_alone_is_to_blame_for_everything():
+    one = Spread({"x": Uniform(0.0, 1.0)})
+    found = indices_of(lambda rows: rows[:, 0] ** 2, one, samples=1024, resamples=49)
+    assert found.paths == ("x",)
+    for index, interval in (
+        (found.first, found.first_interval),
+        (found.total, found.total_interval),
+    ):
+        assert index == pytest.approx([1.0], abs=0.02)
+        assert interval.shape == (1, 2)
+        assert interval[0, 0] <= index[0] <= interval[0, 1]
+    assert found.evaluations == 1024 * 3
+
+
 def test_the_intervals_hold_the_truth_about_as_often_as_they_say():
     held = []
     for seed in range(20):
