@@ -71,21 +71,21 @@ def test_every_elasticity_is_that_of_finite_differences(study):
     for entry in study.elasticities:
         ours = [getattr(entry, name) for name in FIGURES]
         assert ours == pytest.approx(
-            by_differences(study._answers, entry.path), rel=2e-5, abs=2e-5
+            by_differences(study._fixed, entry.path), rel=2e-5, abs=2e-5
         ), entry.path
 
 
 @pytest.mark.ci
 def test_numbers_without_effect_have_none(study):
-    view = figures(study._answers.view())
+    view = figures(study._fixed.view())
     for path in study.without_effect:
-        other = study._answers.with_number(path, 1.01)
+        other = study._fixed.with_number(path, 1.01)
         assert other is None or figures(other.view()) == pytest.approx(view, abs=1e-9), path
 
 
 def test_every_number_of_the_case_is_in_one_of_the_two_lists(study):
     told = {e.path for e in study.elasticities} | {*study.without_effect, *study.stepping}
-    numbers = {n.path for n in numbers_of(study._answers.case)}
+    numbers = {n.path for n in numbers_of(study._fixed.case)}
     assert told == numbers | {"gains.a", "gains.a1", "gains.a2"}
 
 
