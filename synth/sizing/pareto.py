@@ -325,7 +325,9 @@ def _along(
         solved = again
 
 
-def _keep(best: list[tuple[Solution, float] | None], index: int, solved: Solution, e: float) -> bool:
+def _keep(
+    best: list[tuple[Solution, float] | None], index: int, solved: Solution, e: float
+) -> bool:
     known = best[index]
     if known is not None and known[0].objective <= solved.objective + _SAME:
         return False
