@@ -141,14 +141,12 @@ def share(count: int, total: int, *, confidence: float = 0.95) -> Share:
     >>> print(f"{found.value:g} ({found.low:.4f} to {found.high:.4f})")
     0.2 (0.0252 to 0.5561)
     """
-    from scipy.special import betaincinv
+    from scipy.stats import binomtest
 
     check_range("share", "total", total, low=1)
     check_range("share", "count", count, low=0, high=total)
-    tail = 0.5 * (1.0 - confidence)
-    low = betaincinv(count, total - count + 1, tail) if count else 0.0
-    high = betaincinv(count + 1, total - count, 1.0 - tail) if count < total else 1.0
-    return Share(count=count, total=total, low=float(low), high=float(high))
+    ends = binomtest(count, total).proportion_ci(confidence, method="exact")
+    return Share(count=count, total=total, low=float(ends.low), high=float(ends.high))
 
 
 def fall_time(times: npt.ArrayLike, fell: npt.ArrayLike, *, confidence: float = 0.95) -> FallTime:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .distribution import Distribution as Distribution
+    from .distributions import Distribution as Distribution
     from .distributions import LogNormal as LogNormal
     from .distributions import Normal as Normal
     from .distributions import Samples as Samples

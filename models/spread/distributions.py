@@ -4,31 +4,136 @@ A value may be a number in SI, a text with a unit (``50 ms``), or a percentage o
 value: ``-10 %`` is a tenth below it, and a width of ``10 %`` is a tenth of it.  Texts are read
 when the spread meets a case (`models.spread.spread.Spread.on`), which knows units and values;
 until then a distribution is only a description.
+
+Quantiles are of our own making, from SciPy's normal integral: a frozen distribution of
+`scipy.stats` knows neither a bell of no width nor one that a field's range cuts on the scale of
+its logarithm, and its ends are a rounding error away from those that were asked for.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from scipy.special import ndtr, ndtri
 from typing_extensions import override
 
 from ..basics import FloatArray, InputError, check_finite, check_range
-from .distribution import (
-    NOMINAL,
-    TAIL,
-    Distribution,
-    Read,
-    Value,
-    cuts_of,
-    ends_of,
-    narrowed,
-    number,
-)
+
+Value = float | str
+Read = Callable[[Value], float]
+D = TypeVar("D", bound="Distribution")
+B = TypeVar("B", bound="Bell")
+
+_NOMINAL = "0 %"  # the case's own value
+_TAIL = 0.00135  # quantile at three standard deviations, where a corner of a bell is put
+
+
+@dataclass(frozen=True)
+class Distribution(ABC):
+    """How one number is distributed."""
+
+    name: ClassVar[str]
+    widths: ClassVar[tuple[str, ...]] = ()
+    """The fields that are distances; the others are places."""
+
+    def __post_init__(self) -> None:
+        if self.numeric:
+            self._check()
+
+    def resolved(self: D, place: Read, width: Read) -> D:
+        """Return the distribution in plain numbers.
+
+        Parameters
+        ----------
+        place, width
+            Read a value, and a distance from the case's own value, in SI.
+        """
+        given = {f.name: getattr(self, f.name) for f in fields(self)}
+        return replace(
+            self,
+            **{
+                name: (width if name in self.widths else place)(value)
+                for name, value in given.items()
+                if value is not None
+            },
+        )
+
+    @abstractmethod
+    def quantile(self, share: FloatArray) -> FloatArray:
+        """Return the values that shares in (0, 1) of all draws stay below, of the same shape."""
+
+    @property
+    @abstractmethod
+    def support(self) -> tuple[float, float]:
+        """Smallest and largest value; infinite where there is none."""
+
+    @property
+    def numeric(self) -> bool:
+        """Whether all its values are numbers already."""
+        return not any(isinstance(getattr(self, f.name), str) for f in fields(self))
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The values of a corner: its ends, or of a bell those at three standard deviations."""
+        return self.support
+
+    def within(self: D, low: float, high: float) -> D:
+        """Return the distribution cut to what is possible at all, where it has tails."""
+        del low, high
+        return self
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as in a file, ``{name: {field: value}}``, without empty fields."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {self.name: {k: v for k, v in values.items() if v is not None}}
+
+    @abstractmethod
+    def _check(self) -> None:
+        """Check the values, once they are numbers."""
+
+
+class Bell(Distribution):
+    """A distribution with tails, which a field's own range cuts."""
+
+    low: Value | None
+    high: Value | None
+
+    @property
+    @override
+    def support(self) -> tuple[float, float]:
+        return (
+            -math.inf if self.low is None else _number(self.low),
+            math.inf if self.high is None else _number(self.high),
+        )
+
+    @property
+    @override
+    def ends(self) -> tuple[float, float]:
+        low, high = self.quantile(np.array([_TAIL, 1.0 - _TAIL]))
+        return float(low), float(high)
+
+    @override
+    def within(self: B, low: float, high: float) -> B:
+        first, last = max(self.support[0], low), min(self.support[1], high)
+        cuts: dict[str, Any] = {
+            "low": first if math.isfinite(first) else None,
+            "high": last if math.isfinite(last) else None,
+        }
+        return replace(self, **cuts)
+
+
+def _number(value: Value | None) -> float:
+    """Return a value that is a number already."""
+    if value is None or isinstance(value, str):
+        raise InputError(
+            f"spread: {value!r} means something on a case only; call Spread.on(case) first"
+        )
+    return float(value)
 
 
 @dataclass(frozen=True)
@@ -46,18 +151,14 @@ class Uniform(Distribution):
     high: Value | None = None
     name: ClassVar[str] = "uniform"
 
-    def __post_init__(self) -> None:
-        if self.numeric:
-            self._check()
-
     @override
     def resolved(self, place: Read, width: Read) -> Uniform:
         if self.high is None:
-            middle, half = place(NOMINAL), width(self.low)
+            middle, half = place(_NOMINAL), width(self.low)
             if half < 0.0:
                 raise InputError(f"must have a width of at least 0, got {self.low!r}")
             return Uniform(middle - half, middle + half)
-        return Uniform(place(self.low), place(self.high))
+        return super().resolved(place, width)
 
     @override
     def quantile(self, share: FloatArray) -> FloatArray:
@@ -67,7 +168,7 @@ class Uniform(Distribution):
     @property
     @override
     def support(self) -> tuple[float, float]:
-        return number(self.low), number(self.high)
+        return _number(self.low), _number(self.high)
 
     @property
     @override
@@ -83,7 +184,7 @@ class Uniform(Distribution):
 
 
 @dataclass(frozen=True)
-class Normal(Distribution):
+class Normal(Bell):
     """Gauss's bell, cut at `low` and `high`.
 
     Parameters
@@ -96,51 +197,30 @@ class Normal(Distribution):
         Where it is cut; else where the field's own range ends.
     """
 
-    mean: Value = NOMINAL
+    mean: Value = _NOMINAL
     sd: Value | None = None
     low: Value | None = None
     high: Value | None = None
     name: ClassVar[str] = "normal"
+    widths: ClassVar[tuple[str, ...]] = ("sd",)
 
     def __post_init__(self) -> None:
         if self.sd is None:
             raise InputError('normal: sd is missing, as in Normal(sd="10 %")')
-        if self.numeric:
-            self._check()
-
-    @override
-    def resolved(self, place: Read, width: Read) -> Normal:
-        assert self.sd is not None
-        return Normal(place(self.mean), width(self.sd), *cuts_of(self.low, self.high, place))
+        super().__post_init__()
 
     @override
     def quantile(self, share: FloatArray) -> FloatArray:
-        mean, sd = number(self.mean), number(self.sd)
+        mean, sd = _number(self.mean), _number(self.sd)
         first, last = (ndtr((v - mean) / sd) if sd else float(v > mean) for v in self.support)
         value = mean + sd * ndtri(first + (last - first) * share) if sd else mean + 0.0 * share
         return np.asarray(np.clip(value, *self.support))
 
-    @property
-    @override
-    def support(self) -> tuple[float, float]:
-        return ends_of(self.low, self.high)
-
-    @property
-    @override
-    def ends(self) -> tuple[float, float]:
-        low, high = self.quantile(np.array([TAIL, 1.0 - TAIL]))
-        return float(low), float(high)
-
-    @override
-    def within(self, low: float, high: float) -> Normal:
-        first, last = narrowed(self.support, low, high)
-        return replace(self, low=first, high=last)
-
     @override
     def _check(self) -> None:
-        check_finite("normal", "mean", [number(self.mean)])
-        check_range("normal", "sd", number(self.sd), low=0.0)
-        mean, sd = number(self.mean), number(self.sd)
+        check_finite("normal", "mean", [_number(self.mean)])
+        check_range("normal", "sd", _number(self.sd), low=0.0)
+        mean, sd = _number(self.mean), _number(self.sd)
         low, high = self.support
         if not (
             low < high and ndtr((high - mean) / (sd or 1.0)) > ndtr((low - mean) / (sd or 1.0))
@@ -152,7 +232,7 @@ class Normal(Distribution):
 
 
 @dataclass(frozen=True)
-class LogNormal(Distribution):
+class LogNormal(Bell):
     """The logarithm is normal: for what is known to a factor, and positive.
 
     Parameters
@@ -165,27 +245,23 @@ class LogNormal(Distribution):
         Where it is cut; else where the field's own range ends.
     """
 
-    median: Value = NOMINAL
+    median: Value = _NOMINAL
     sigma: float | None = None
     low: Value | None = None
     high: Value | None = None
     name: ClassVar[str] = "lognormal"
+    widths: ClassVar[tuple[str, ...]] = ("sigma",)
 
     def __post_init__(self) -> None:
         if self.sigma is None:
             raise InputError("lognormal: sigma is missing, as in LogNormal(sigma=0.1)")
         check_range("lognormal", "sigma", self.sigma, low=0.0, high=10.0)
-        if self.numeric:
-            self._check()
-
-    @override
-    def resolved(self, place: Read, width: Read) -> LogNormal:
-        return LogNormal(place(self.median), self.sigma, *cuts_of(self.low, self.high, place))
+        super().__post_init__()
 
     @override
     def quantile(self, share: FloatArray) -> FloatArray:
         low, high = self.support
-        median = number(self.median)
+        median = _number(self.median)
         cuts = [math.log(max(v, 0.0) / median) if v > 0.0 else -math.inf for v in (low, high)]
         bell = Normal(0.0, self.sigma, *cuts)
         return np.asarray(np.clip(median * np.exp(bell.quantile(share)), low, high))
@@ -193,23 +269,12 @@ class LogNormal(Distribution):
     @property
     @override
     def support(self) -> tuple[float, float]:
-        low, high = ends_of(self.low, self.high)
+        low, high = super().support
         return max(low, 0.0), high
 
     @override
-    def within(self, low: float, high: float) -> LogNormal:
-        first, last = narrowed(self.support, low, high)
-        return replace(self, low=first, high=last)
-
-    @property
-    @override
-    def ends(self) -> tuple[float, float]:
-        low, high = self.quantile(np.array([TAIL, 1.0 - TAIL]))
-        return float(low), float(high)
-
-    @override
     def _check(self) -> None:
-        check_range("lognormal", "median", number(self.median), low=0.0, open_low=True)
+        check_range("lognormal", "median", _number(self.median), low=0.0, open_low=True)
         low, high = self.support
         if not low < high:
             raise InputError(f"lognormal: low must be below high, got {low:g} and {high:g}")
@@ -229,21 +294,13 @@ class Triangular(Distribution):
 
     low: Value
     high: Value
-    mode: Value = NOMINAL
+    mode: Value = _NOMINAL
     name: ClassVar[str] = "triangular"
-
-    def __post_init__(self) -> None:
-        if self.numeric:
-            self._check()
-
-    @override
-    def resolved(self, place: Read, width: Read) -> Triangular:
-        return Triangular(place(self.low), place(self.high), place(self.mode))
 
     @override
     def quantile(self, share: FloatArray) -> FloatArray:
         low, high = self.support
-        mode, width = number(self.mode), high - low
+        mode, width = _number(self.mode), high - low
         if width == 0.0:
             return np.asarray(low + 0.0 * share)
         turn = (mode - low) / width
@@ -254,12 +311,12 @@ class Triangular(Distribution):
     @property
     @override
     def support(self) -> tuple[float, float]:
-        return number(self.low), number(self.high)
+        return _number(self.low), _number(self.high)
 
     @override
     def _check(self) -> None:
         low, high = self.support
-        mode = number(self.mode)
+        mode = _number(self.mode)
         check_finite("triangular", "low, mode and high", [low, mode, high])
         if not low <= mode <= high:
             raise InputError(
@@ -288,8 +345,7 @@ class Samples(Distribution):
         )
         if not self.values:
             raise InputError("samples: must have at least one value, got none")
-        if self.numeric:
-            self._check()
+        self.__post_init__()
 
     @override
     def resolved(self, place: Read, width: Read) -> Samples:
@@ -298,7 +354,7 @@ class Samples(Distribution):
     @property
     def numbers(self) -> FloatArray:
         """The values in their order, (n,)."""
-        return np.array([number(v) for v in self.values])
+        return np.array([_number(v) for v in self.values])
 
     @override
     def quantile(self, share: FloatArray) -> FloatArray:
@@ -330,3 +386,20 @@ KINDS: dict[str, type[Distribution]] = {
     kind.name: kind for kind in (Uniform, Normal, LogNormal, Triangular, Samples)
 }
 """The distributions by their names in a file."""
+
+
+def distribution_of(path: str, given: Any) -> Distribution:
+    """Return a distribution; a text or a number alone is the width of a uniform one."""
+    if isinstance(given, Distribution):
+        return given
+    if isinstance(given, str | int | float) and not isinstance(given, bool):
+        return Uniform(given)
+    raise InputError(f"spread: {path} must be a distribution, got {given!r}")
+
+
+def at_ends(distribution: Distribution, points: FloatArray) -> FloatArray:
+    """Return values at points of [0, 1]: even steps between the ends of a range."""
+    low, high = distribution.ends
+    if isinstance(distribution, Samples):
+        return distribution.quantile(np.minimum(points, 1.0 - 2.0**-53))
+    return np.asarray(low + (high - low) * points)

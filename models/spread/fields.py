@@ -11,11 +11,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..basics import KINDS, InputError
+from ..basics import KINDS, InputError, parse_quantity
 from ..case import Case
 from ..casefile import Quantity, suggestion
 from ..operation import PREFIX as FAULTS
 from ..operation import fault_of
+from .distributions import Distribution, Value
 
 #: Short names of what is most often varied.
 ALIASES: Mapping[str, str] = {
@@ -147,3 +148,37 @@ def _quantity(annotation: Any) -> Quantity | None:
     parts = annotation if isinstance(annotation, tuple) else typing.get_args(annotation)
     inner = (*parts, *getattr(annotation, "__metadata__", ()))
     return next((q for part in inner if (q := _quantity(part)) is not None), None)
+
+
+def resolved(distribution: Distribution, field: Field) -> Distribution:
+    """Return a distribution in the field's SI unit; percentages are of its nominal value."""
+
+    def width(value: Value) -> float:
+        if not isinstance(value, str):
+            return float(value)
+        share = _share(value)
+        if share is None:
+            return parse_quantity(value, field.kind)
+        if share != 0.0 and field.nominal == 0.0:
+            raise InputError(
+                f"is 0 in this case, so {value} of it is nothing; give a value with its unit"
+            )
+        return share * abs(field.nominal)
+
+    def place(value: Value) -> float:
+        if isinstance(value, str) and _share(value) is not None:
+            return field.nominal + width(value)
+        return parse_quantity(value, field.kind)
+
+    return distribution.resolved(place, width)
+
+
+def _share(text: str) -> float | None:
+    """Return the share that a percentage stands for; None if the text is none."""
+    body = text.strip()
+    if not body.endswith("%"):
+        return None
+    try:
+        return float(body[:-1].strip()) / 100.0
+    except ValueError:
+        raise InputError(f"must be a percentage such as '-10 %', got {text!r}") from None

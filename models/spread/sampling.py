@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import warnings
+from collections.abc import Mapping
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -81,6 +82,27 @@ def unit_points(
     per_axis = _per_axis(samples, columns)
     at = np.stack(np.unravel_index(np.arange(start, stop), (per_axis,) * columns), axis=1)
     return np.asarray(at / (per_axis - 1.0) if per_axis > 1 else at + 0.5)
+
+
+def copula_factor(
+    paths: tuple[str, ...], pairs: Mapping[tuple[str, str], float]
+) -> FloatArray | None:
+    """Return the Cholesky factor of the normal scores' correlation, None if there is none.
+
+    A Gaussian copula with correlation r has the rank correlation 6/pi asin(r/2) (Pearson 1907).
+    """
+    if not pairs:
+        return None
+    matrix = np.eye(len(paths))
+    for (one, other), rank in pairs.items():
+        i, j = paths.index(one), paths.index(other)
+        matrix[i, j] = matrix[j, i] = 2.0 * np.sin(np.pi * rank / 6.0)
+    try:
+        return np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        raise InputError(
+            "spread: the correlations contradict each other: no numbers can have them all"
+        ) from None
 
 
 def correlated(points: FloatArray, factor: FloatArray) -> FloatArray:

@@ -21,10 +21,9 @@ import numpy.typing as npt
 from ..basics import FloatArray, InputError, PhysicsWarning, check_range
 from ..case import Case
 from ..operation import PREFIX as FAULTS
-from .distributions import Samples
-from .fields import ALIASES, DRAG, GAINS, Field, field_of
-from .reading import at_ends, copula_factor, distribution_of, resolved, words
-from .sampling import correlated, counted, unit_points
+from .distributions import Samples, at_ends, distribution_of
+from .fields import ALIASES, DRAG, GAINS, Field, field_of, resolved
+from .sampling import copula_factor, correlated, counted, unit_points
 from .spread_file import read_spread, spread_text
 
 Pairs = Mapping[tuple[str, str], float]
@@ -317,7 +316,7 @@ class Spread:
         lines = ["Spread"]
         units = {field.path: field.unit for field in self.fields}
         for path, d in self.distributions.items():
-            text = ", ".join(words(k, v) for k, v in d.to_dict().items())
+            text = ", ".join(_words(k, v) for k, v in d.to_dict().items())
             lines.append(f"├ {path}: {text} {units.get(path, '')}".rstrip())
         lines += [
             f"├ rank correlation of {a} and {b}: {r:g}"
@@ -369,3 +368,19 @@ class Spread:
         j = self.paths.index(path)
         alone = Spread({path: Samples([value])}, None, (self.fields[j],), self.case)
         alone.case_at([value])
+
+
+def _words(kind: str, values: Any) -> str:
+    """Return a distribution in words."""
+    if isinstance(values, dict):
+        inner = ", ".join(f"{k} {_short(v)}" for k, v in values.items())
+    elif len(values) > 4:
+        inner = f"{len(values)} values"
+    else:
+        inner = ", ".join(_short(v) for v in values)
+    return f"{kind} ({inner})"
+
+
+def _short(value: Any) -> str:
+    """Return a value as a sentence shows it: six digits at the most."""
+    return f"{value:.6g}" if isinstance(value, int | float) else str(value)

@@ -18,8 +18,7 @@ from typing import Any
 
 from ..basics import InputError
 from ..casefile import line_of, message_line, read_yaml, suggestion, yaml_text
-from .distribution import Distribution
-from .distributions import KINDS, Samples, Uniform
+from .distributions import KINDS, Distribution, Samples, Uniform
 
 Lines = dict[tuple[str | int, ...], int]
 Pairs = dict[tuple[str, str], float]
