@@ -47,6 +47,8 @@ if TYPE_CHECKING:
     from .quadrature import adaptive_nodes as adaptive_nodes
     from .quadrature import spectral_nodes as spectral_nodes
     from .riccati import balanced_truncation as balanced_truncation
+    from .riccati import solve_discrete_lyapunov as solve_discrete_lyapunov
+    from .riccati import solve_discrete_riccati as solve_discrete_riccati
     from .riccati import solve_lyapunov as solve_lyapunov
     from .riccati import solve_riccati as solve_riccati
     from .signals import White as White

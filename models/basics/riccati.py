@@ -1,4 +1,4 @@
-r"""Riccati equations for plants in physical units: scaled first, refined afterwards.
+r"""Riccati equations of plants in physical units, in continuous and in discrete time.
 
 The states of a winch reach from radians to newtons, and its noises over ten decades, where a
 general solver loses the stabilising solution.  Here the equation
@@ -7,7 +7,8 @@ general solver loses the stabilising solution.  Here the equation
 
 is brought to even scales (states by balancing, inputs by the root of R, and X as a whole, as
 SLICOT's SB02RD does), solved by the ordered Schur form of its Hamiltonian matrix (Laub 1979)
-and refined by Newton's method (Kleinman 1968), which also says how well it is solved.
+and refined by Newton's method (Kleinman 1968), which also says how well it is solved.  The
+discrete equations are solved by doubling.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ from .checks import SolverError
 _REFINEMENTS = 3
 _SOLVED = 1e-13  # relative change of X below which a refinement is the last one
 _TRUSTED = 1e-4  # ... and above which the solution is not trusted
+_DOUBLINGS = 60
+_MENDED = 4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,6 +94,42 @@ def solve_riccati(
     )
 
 
+def solve_discrete_riccati(A: FloatArray, C: FloatArray, Q: FloatArray) -> FloatArray:
+    r"""Return the stabilising P of the filter's equation, for measurement errors of variance one.
+
+    .. math:: P = A P A' + Q - A P C' (C P C' + I)^{-1} C P A'
+
+    Doubling squares the recursion at every step, so that some fifteen products of matrices do what
+    takes a generalised Schur form ten times as long; a tuning solves hundreds of them
+    (E. K.-W. Chu, H.-Y. Fan, W.-W. Lin and C.-S. Wang, Int. J. Control 77 (2004), 767-788).  The
+    regulator's equation is the filter's, transposed.
+
+    Parameters
+    ----------
+    A, C, Q
+        (n, n), (m, n), (n, n).
+
+    Raises
+    ------
+    SolverError
+        If it does not converge: something grows that is not seen, or does not settle.
+    """
+    eye = np.eye(len(A))
+    F, S, P = A.T, C.T @ C, Q
+    with np.errstate(all="ignore"):
+        for _ in range(_DOUBLINGS):
+            W = np.linalg.inv(eye + S @ P)
+            F, S, after = F @ W @ F, S + F @ W @ S @ F.T, P + F.T @ P @ W @ F
+            after = 0.5 * (after + after.T)
+            size = float(np.abs(after).max())
+            if not np.isfinite(size):
+                break
+            if np.abs(after - P).max() <= 1e-11 * size:
+                return _polished(A, C, Q, after)
+            P = after
+    raise SolverError("Riccati equation: the equation has no stabilising solution")
+
+
 def solve_lyapunov(A: FloatArray, Q: FloatArray) -> FloatArray:
     """Return the symmetric X of A X + X A' + Q = 0."""
     T, U = scipy.linalg.schur(A, output="real")
@@ -99,6 +138,29 @@ def solve_lyapunov(A: FloatArray, Q: FloatArray) -> FloatArray:
         raise SolverError("Lyapunov equation: it has no unique solution")
     X = U @ Y @ U.T / scale
     return np.asarray(0.5 * (X + X.T), dtype=np.float64)
+
+
+def solve_discrete_lyapunov(A: FloatArray, Q: FloatArray) -> FloatArray | None:
+    """Return the X of X = A X A' + Q by doubling; None if A is not stable.
+
+    Parameters
+    ----------
+    A, Q
+        (n, n).
+    """
+    X = Q
+    with np.errstate(all="ignore"):
+        for _ in range(_DOUBLINGS):
+            after = X + A @ X @ A.T
+            size = float(np.abs(after).max())
+            if not np.isfinite(size):
+                return None
+            A = A @ A
+            # Done only when nothing is left of the transient either.
+            if np.abs(after - X).max() <= 1e-12 * size and np.abs(A).max() < 1e-3:
+                return np.asarray(after)
+            X = after
+    return None
 
 
 def balanced_truncation(
@@ -155,3 +217,12 @@ def _from_schur(A: FloatArray, G: FloatArray, Q: FloatArray) -> FloatArray:
     except np.linalg.LinAlgError as error:
         raise SolverError("Riccati equation: no stabilising solution was found") from error
     return np.asarray(0.5 * (X + X.T), dtype=np.float64)
+
+
+def _polished(A: FloatArray, C: FloatArray, Q: FloatArray, P: FloatArray) -> FloatArray:
+    """Return P after steps of the recursion, which mend what is small beside the largest entry."""
+    for _ in range(_MENDED):
+        gain = np.linalg.solve(C @ P @ C.T + np.eye(len(C)), C @ P).T
+        kept = np.eye(len(A)) - gain @ C
+        P = A @ (kept @ P @ kept.T + gain @ gain.T) @ A.T + Q
+    return np.asarray(0.5 * (P + P.T))

@@ -16,13 +16,12 @@ import math
 
 import numpy as np
 
-from models.basics import FloatArray, read_only
+from models.basics import FloatArray, read_only, solve_discrete_riccati
 from models.plant import MEASUREMENTS
 from models.sensing import MEASURED, Measurement
 from models.sensing.control import MEASURED as HEARD
 
 from ..programme import corrected, kalman_gain
-from .doubling import riccati
 from .prediction import PredictionModel, constant_scales
 
 _AT = np.array([HEARD.index(name) for name in MEASURED])
@@ -234,7 +233,7 @@ def kalman_covariance(model: PredictionModel) -> FloatArray:
     G = model.G / s[:, None]
     # Each measurement in units of its own error.
     C = model.C * s / np.sqrt(model.R)[:, None]
-    P = riccati(A, C, G @ G.T)
+    P = solve_discrete_riccati(A, C, G @ G.T)
     return read_only(P * np.outer(s, s))
 
 

@@ -12,10 +12,9 @@ import math
 import numpy as np
 import scipy.linalg
 
-from models.basics import FloatArray, check_range
+from models.basics import FloatArray, check_range, solve_discrete_riccati
 
 from ..programme import LQRegulator, lq_regulator
-from .doubling import riccati
 from .prediction import PredictionModel
 
 
@@ -46,7 +45,7 @@ def regulator(model: PredictionModel, weight: float) -> LQRegulator:
     A = winch.A / scale[:, None] * scale
     B = winch.B / scale[:, None]
     Q = np.outer(winch.payload * scale, winch.payload * scale)
-    P = riccati(A.T, B.T / math.sqrt(rho), Q)
+    P = solve_discrete_riccati(A.T, B.T / math.sqrt(rho), Q)
     return lq_regulator(
         np.asarray(winch.A),
         np.asarray(winch.B),

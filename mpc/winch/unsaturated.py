@@ -18,10 +18,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import ComplexArray, FloatArray, read_only
+from models.basics import ComplexArray, FloatArray, read_only, solve_discrete_lyapunov
 
 from ..programme import LQRegulator, kalman_gain
-from .doubling import lyapunov
 from .estimator import kalman_covariance
 from .prediction import PredictionModel
 from .regulation import feedback_row
@@ -170,7 +169,7 @@ class Unsaturated:
         at = truth.constants_at
         noise[at] = 0.0  # constants stay where they are
         closed[at, at] = 0.0
-        covariance = lyapunov(closed, noise @ noise.T)
+        covariance = solve_discrete_lyapunov(closed, noise @ noise.T)
         if covariance is None:
             return np.inf, np.inf
         row = np.zeros(n + m)

@@ -15,7 +15,6 @@ from models.plant import build_plant
 from models.sensing import MEASURED
 from mpc.programme import hermite_hold, kalman_gain, noisy_hold, root_of
 from mpc.winch import plan_model, prediction_model, regulator, tune_weights, with_noise
-from mpc.winch.doubling import lyapunov, riccati
 from mpc.winch.estimator import kalman_covariance
 from mpc.winch.prediction import CONSTANTS
 from mpc.winch.regulation import feedback_row
@@ -145,18 +144,6 @@ def test_a_force_on_the_payload_is_felt_by_its_accelerometer():
     row = model.now[0]
     assert row[model.constants_at][0] == pytest.approx(1.0 / mass, rel=1e-3)
     assert CONSTANTS[0] == "payload.force"
-
-
-def test_doubling_agrees_with_a_schur_form_and_says_when_there_is_no_solution():
-    rng = np.random.default_rng(4)
-    A, C, Q = 1.2 * rng.normal(size=(6, 6)) / 2.5, rng.normal(size=(2, 6)), np.eye(6)
-    found = riccati(A, C, Q)
-    assert found == pytest.approx(scipy.linalg.solve_discrete_are(A.T, C.T, Q, np.eye(2)))
-    stable = A / np.abs(np.linalg.eigvals(A)).max() * 0.95
-    assert lyapunov(stable, Q) == pytest.approx(scipy.linalg.solve_discrete_lyapunov(stable, Q))
-    assert lyapunov(stable / 0.9, Q) is None
-    with pytest.raises(SolverError, match="no stabilising solution"):
-        riccati(2.0 * np.eye(2), np.array([[1.0, 0.0]]), np.eye(2))
 
 
 @pytest.mark.parametrize("name", NAMES)

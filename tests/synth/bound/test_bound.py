@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from models.basics import InputError, SynthesisError, White, solve_lyapunov, solve_riccati
+from models.basics import InputError, SynthesisError, White
 from models.plant import LinearPlant
 from models.sea import SeaSpectrum
 from stillhook import load_case
@@ -164,40 +164,6 @@ def test_bound_of_a_random_plant_is_that_of_a_semidefinite_programme(seed: int) 
     spectra = {name: White(1.0) for name in plant.disturbances}
     found = lqg_bound(plant, spectra, {"z1": 1.0, "z2": 1.0})
     assert found.value == pytest.approx(h2_by_semidefinite_programme(plant), rel=2e-4)
-
-
-@settings(max_examples=25, deadline=None)
-@given(seed=st.integers(0, 10_000), decades=st.floats(0.0, 6.0))
-def test_riccati_equations_hold_whatever_the_units(seed: int, decades: float) -> None:
-    rng = np.random.default_rng(seed)
-    n, m = 5, 2
-    unit = 10.0 ** rng.uniform(-decades, decades, n)
-    A = (rng.normal(size=(n, n)) / unit[:, None]) * unit
-    B = rng.normal(size=(n, m)) / unit[:, None]
-    root = rng.normal(size=(n + m, n + m)) * np.append(unit, np.ones(m))
-    weight = root.T @ root
-    Q, S, R = weight[:n, :n], weight[:n, n:], weight[n:, n:]
-    found = solve_riccati(A, B, Q, R, S)
-    X = found.X * np.outer(1 / unit, 1 / unit)  # back to even units
-    A, B, Q, S = (
-        A * unit[:, None] / unit,
-        B * unit[:, None],
-        Q / np.outer(unit, unit),
-        S / unit[:, None],
-    )
-    left = X @ B + S
-    residual = A.T @ X + X @ A - left @ np.linalg.solve(R, left.T) + Q
-    size = np.linalg.norm(Q) + 2 * np.linalg.norm(A) * np.linalg.norm(X)
-    assert np.linalg.norm(residual) < 1e-8 * size
-    gain = found.gain / unit
-    assert np.linalg.eigvals(A + B @ gain).real.max() < 0.0
-
-
-def test_lyapunov_equation_has_the_closed_form() -> None:
-    A = np.array([[0.0, 1.0], [-4.0, -0.2]])
-    found = solve_lyapunov(A, np.diag([0.0, 2.0]))
-    # x'' + 0.2 x' + 4 x = w of intensity 2: sigma_v^2 = 2/0.4, sigma_x^2 = sigma_v^2/4
-    np.testing.assert_allclose(found, np.diag([1.25, 5.0]), atol=1e-12)
 
 
 def test_sea_and_delay_verify_and_keep_their_limits(late: Bound) -> None:
