@@ -37,8 +37,8 @@ import stillhook as sh
 from models.case import Case
 from models.spread import Spread
 from stillhook.sweeps import sweep, usual_spread
-from stillhook.sweeps.header import Draw
 from stillhook.sweeps.pilots import pilot_of
+from stillhook.sweeps.store import Draw
 from stillhook.sweeps.time_cases import CaseResult, CaseTask, TimeBench, TimeQuestion
 from stillhook.sweeps.time_metrics import METRICS
 from stillhook.sweeps.time_sweep import run_sweep

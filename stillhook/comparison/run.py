@@ -139,7 +139,8 @@ def compare(
         if out is not None:
             from ..text import OutputFolder
 
-            store = stack.enter_context(Store(OutputFolder.prepare(out).path / STORE, question))
+            store = Store(OutputFolder.prepare(out).path / STORE, question)
+            stack.enter_context(store.journal)
         work = Work(
             question=question,
             contenders=contenders,

@@ -9,9 +9,7 @@ if TYPE_CHECKING:
     from .digest import code_digest as code_digest
     from .digest import versions as versions
     from .journal import Journal as Journal
-    from .kept_lines import difference as difference
-    from .kept_lines import lock as lock
-    from .kept_lines import put as put
+    from .journal import question_in as question_in
     from .pool import POLL as POLL
     from .pool import Alone as Alone
     from .pool import Died as Died

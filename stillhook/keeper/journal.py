@@ -1,22 +1,37 @@
-"""What was written into a store, line by line: a crash leaves at most one half line at the end.
+"""Journals: results in a file that only grows, a checked line each, so that work can go on.
 
-Each line is JSON with a check sum of its own and is on the disk before anything else happens.  The
-first says whose journal it is; then each piece of the store has a line "begin" before it is written
-and one "end" with the check sum of its content after.  So a piece whose last line is "begin" was
-cut short and is computed again, and one that is not as its last "end" says was spoilt by somebody.
+    question; key, values --> Journal.add --> lines on disk --> Journal --> take(key, values)
+
+The first line says what question the others answer, by which code; a journal that answers another
+one, or that other code wrote, is refused.  A line has a check sum and is written at once.  One that
+a crash cut short can only be the last, and is dropped; anything else that does not read as it was
+written is refused, because nobody can say what else is wrong with it.
 """
 
 from __future__ import annotations
 
 import json
+import math
+import os
+import re
+import time as clock
 import zlib
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
 
 from models.basics import InputError
 
-from .kept_lines import lock, put
+FORMAT = 2
+"""Version of what stands in a line."""
+
+_BEGIN = b'{"crc": '
+_LINE = re.compile(rb'\{"crc": (\d+), "of": (\{.*\})\}\n')
+_SYNC = 1.0  # a power failure may cost as much of the work [s]; a killed process costs none
+_TOLD = "python"  # is told in the question, and may differ
+
+Take = Callable[[Any, Any], None]
 
 
 class Journal:
@@ -26,45 +41,61 @@ class Journal:
     ----------
     path
         The file; it is made if there is none.
-    identity
-        Of the store that it belongs to.
+    what
+        What it keeps, "sweep" or "comparison".
+    question
+        What its results answer, as plain data; "versions" are those of `versions`.
+    take
+        Called with key and values of every result that is there.
 
     Raises
     ------
     InputError
-        If it belongs to another store, is spoilt, is being written by another process, or cannot
-        be written.
+        If the file is not such a journal, is spoilt, answers another question, was written by
+        other code or is being written by another process, or cannot be written.
     """
 
-    def __init__(self, path: Path, identity: str) -> None:
-        self.path = path
-        self.sums: dict[int, int] = {}
-        self.torn: set[int] = set()
+    def __init__(self, path: Path, what: str, question: Mapping[str, Any], take: Take) -> None:
+        self.path, self._what = path, what
         try:
             self._file: BinaryIO = open(path, "a+b")  # noqa: SIM115
         except OSError as error:
             raise InputError(f"{path}: cannot be written: {error.strerror}") from error
+        self._synced = -math.inf
         try:
-            lock(self._file, self.path.parent, "sweep")
-            self._read(identity)
+            self._lock()
+            self._file.seek(0)
+            whole = 0
+            for number, line in enumerate(self._file, 1):
+                if not line.endswith(b"\n"):  # a crash cut it short: the last, and one of ours
+                    if not (line.startswith(_BEGIN) or _BEGIN.startswith(line)):
+                        raise _foreign(path, what) if number == 1 else self._spoilt(number)
+                    self._file.truncate(whole)
+                    break
+                self._read(number, line, question, take)
+                whole += len(line)
+            if not whole:
+                self._put({"stillhook": what, "format": FORMAT, "question": question})
         except BaseException:
             self._file.close()
             raise
 
-    def begin(self, piece: int) -> None:
-        """Say that a piece is about to be written."""
-        put(self._file, self.path, json.dumps({"begin": piece}))
-        self.torn.add(piece)
+    def add(self, key: object, values: object) -> None:
+        """Keep a result; what is not finite is written as a text, and read back as it was.
 
-    def end(self, piece: int, check_sum: int) -> None:
-        """Say that a piece is written, and what the check sum of its content is."""
-        put(self._file, self.path, json.dumps({"end": piece, "sum": check_sum}))
-        self.torn.discard(piece)
-        self.sums[piece] = check_sum
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        self._put({"key": key, "values": values})
 
     def close(self) -> None:
-        """Close the file."""
-        self._file.close()
+        """Close the file, all of it on the disk."""
+        try:
+            self._sync()
+        finally:
+            self._file.close()
 
     def __enter__(self) -> Journal:
         """Return the journal."""
@@ -79,50 +110,162 @@ class Journal:
         """Close the file."""
         self.close()
 
-    def _read(self, identity: str) -> None:
-        self._file.seek(0)
-        data = self._file.read()
-        whole = data.rfind(b"\n") + 1
-        if whole < len(data):
-            start = b'{"crc": '
-            rest = data[whole:]
-            if not (rest.startswith(start) or start.startswith(rest)):
-                raise self._spoilt(data[:whole].count(b"\n") + 1)
-            self._file.truncate(whole)
-        lines = data[:whole].splitlines()
-        if not lines:
-            put(self._file, self.path, json.dumps({"sweep": identity}))
+    def _read(self, number: int, line: bytes, question: Mapping[str, Any], take: Take) -> None:
+        content = _content(line)
+        if number == 1:
+            changed = differences(_question(self.path, self._what, line), _plain(question))
+            if changed:
+                raise InputError(
+                    f"{self.path}: holds another {self._what}: {'; '.join(changed)}; take another "
+                    "folder, or remove the file"
+                )
             return
-        for number, line in enumerate(lines, 1):
-            content = self._content(line, number)
-            if number == 1:
-                if content.get("sweep") != identity:
-                    raise InputError(
-                        f"{self.path}: is the journal of another sweep than the results beside "
-                        "it; take another folder"
-                    )
-            elif "begin" in content:
-                self.torn.add(int(content["begin"]))
-            elif "end" in content:
-                self.torn.discard(int(content["end"]))
-                self.sums[int(content["end"])] = int(content["sum"])
-            else:
-                raise self._spoilt(number)
-
-    def _content(self, line: bytes, number: int) -> dict[str, Any]:
-        try:
-            read = json.loads(line)
-            content = read["of"]
-            sound = isinstance(content, dict)
-            sound = sound and zlib.crc32(json.dumps(content).encode()) == read["crc"]
-        except (ValueError, KeyError, TypeError):
-            sound, content = False, {}
-        if not sound:
+        if content is None:
             raise self._spoilt(number)
-        return dict(content)
+        try:
+            take(_numbers(content["key"]), _numbers(content["values"]))
+        except (TypeError, KeyError, ValueError, IndexError) as error:
+            raise InputError(f"{self.path}: line {number} is no result ({error})") from None
+
+    def _put(self, content: Mapping[str, Any]) -> None:
+        text = json.dumps(_plain(content), allow_nan=False).encode()
+        try:
+            self._file.write(b'{"crc": %d, "of": %b}\n' % (zlib.crc32(text), text))
+            self._file.flush()
+        except OSError as error:
+            raise self._unwritten(error) from error
+        if clock.monotonic() - self._synced > _SYNC:
+            self._sync()
+
+    def _sync(self) -> None:
+        try:
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise self._unwritten(error) from error
+        self._synced = clock.monotonic()
+
+    def _lock(self) -> None:
+        """Keep other processes out; the system lets go when this one ends, however it does."""
+        try:
+            import fcntl
+        except ImportError:  # Windows
+            return
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise InputError(
+                f"{self.path}: another process writes this {self._what}; wait for it, or take "
+                "another folder"
+            ) from None
 
     def _spoilt(self, number: int) -> InputError:
         return InputError(
-            f"{self.path}: line {number} is not as it was written: the journal is spoilt; take "
+            f"{self.path}: line {number} is not as it was written: the file is spoilt; remove it, "
+            "or take another folder"
+        )
+
+    def _unwritten(self, error: OSError) -> InputError:
+        return InputError(f"{self.path}: cannot be written: {error.strerror}")
+
+
+def question_in(path: Path, what: str) -> dict[str, Any]:
+    """Return the question that a journal answers.
+
+    Raises
+    ------
+    InputError
+        If there is no journal, or it is none of this version's.
+    """
+    try:
+        with open(path, "rb") as file:
+            line = file.readline()
+    except OSError:
+        raise InputError(f"{path}: there is no {what} to go on with") from None
+    return dict(_numbers(_question(path, what, line)))
+
+
+def differences(there: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:
+    """Return in words where two questions differ; of each entry the first place."""
+    found = []
+    for key in asked:
+        if key == "versions":
+            found += _other_code(there.get(key, {}), asked[key])
+        elif text := _difference(key, there.get(key), asked[key]):
+            found.append(text)
+    return found
+
+
+def _question(path: Path, what: str, line: bytes) -> dict[str, Any]:
+    """Return the question of a first line, not finite numbers still as texts."""
+    content = _content(line)
+    if content is None and _LINE.fullmatch(line):
+        raise InputError(
+            f"{path}: line 1 is not as it was written: the file is spoilt; remove it, or take "
             "another folder"
         )
+    if content is None or content.get("stillhook") != what or content.get("format") != FORMAT:
+        raise _foreign(path, what)
+    return dict(content["question"])
+
+
+def _content(line: bytes) -> dict[str, Any] | None:
+    """Return what a line says; None if it is not as it was written."""
+    match = _LINE.fullmatch(line)
+    if match is None or zlib.crc32(match[2]) != int(match[1]):
+        return None
+    content: dict[str, Any] = json.loads(match[2])
+    return content
+
+
+def _foreign(path: Path, what: str) -> InputError:
+    return InputError(
+        f"{path}: is not a {what} that this version of Stillhook has written; remove it, or take "
+        "another folder"
+    )
+
+
+def _other_code(there: Mapping[str, str], asked: Mapping[str, str]) -> list[str]:
+    for name, version in asked.items():
+        if name != _TOLD and there.get(name) != version:
+            what = "Stillhook's own code" if name == "code" else name
+            return [
+                f"it was computed with another version of {what} ({there.get(name)}, now "
+                f"{version}), and the numbers may not belong together"
+            ]
+    return []
+
+
+def _difference(key: str, there: object, asked: object) -> str:
+    if there == asked:
+        return ""
+    if isinstance(there, dict) and isinstance(asked, dict):
+        for name in sorted({*there, *asked}):
+            text = _difference(f"{key}.{name}", there.get(name), asked.get(name))
+            if text:
+                return text
+    return f"{key} is {_short(there)}, not {_short(asked)}"
+
+
+def _short(value: object) -> str:
+    text = "not given" if value is None or value == {} else str(value)
+    return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+def _plain(value: Any) -> Any:
+    """Return what JSON can hold: numbers that are not finite, and all else, as texts."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return f"float:{value}"
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    return value if value is None or isinstance(value, str | int | float) else str(value)
+
+
+def _numbers(value: Any) -> Any:
+    """Return what `_plain` was given."""
+    if isinstance(value, str) and value.startswith("float:"):
+        return float(value[6:])
+    if isinstance(value, dict):
+        return {key: _numbers(each) for key, each in value.items()}
+    return [_numbers(each) for each in value] if isinstance(value, list) else value

@@ -12,10 +12,8 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .export import write_result as write_result
     from .figures import sweep_figures as sweep_figures
-    from .header import ATTRIBUTE as ATTRIBUTE
-    from .header import question_from as question_from
-    from .header import read_header as read_header
-    from .store import RESULT as RESULT
+    from .store import ATTRIBUTE as ATTRIBUTE
+    from .store import stored_question as stored_question
     from .sweeping import resume_sweep as resume_sweep
     from .sweeping import spread_of as spread_of
     from .sweeping import sweep as sweep

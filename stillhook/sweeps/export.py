@@ -59,7 +59,7 @@ def write_result(result: xr.Dataset, path: str | Path) -> Path:
     Raises
     ------
     InputError
-        If the ending is another, or it cannot be written.
+        If the ending is another, it cannot be written, or zarr is not installed.
     """
     place = check_writable(path)
     if place.suffix == ".csv":
@@ -72,6 +72,11 @@ def write_result(result: xr.Dataset, path: str | Path) -> Path:
 
 
 def _zarr(result: xr.Dataset, place: Path) -> Path:
+    try:
+        import zarr  # noqa: F401
+    except ImportError:
+        raise InputError(f"{place}: needs zarr: pip install 'stillhook[zarr]'") from None
+
     def write(new: Path) -> None:
         try:
             result.to_zarr(new, mode="w", consolidated=False, zarr_format=3)

@@ -1,87 +1,204 @@
-"""The results of a sweep on disk, so that a driver that was killed goes on where it was.
+"""The results of a sweep in memory and in its journal, so that a driver that was killed goes on.
 
-    CaseResult --> put --> pieces of result.zarr + journal.jsonl --> open --> what is there already
+    TimeQuestion, Spread, Draw --> header_of --> journal and attributes --> stored_question
+    CaseResult --> Results.put --> journal.jsonl --> Results --> what is there already --> result.nc
 
-A folder holds ``result.zarr``, which any tool that reads Zarr opens, and a journal of what was
-written into it.  A piece (some tens to thousands of cases) is written when its cases are done, or
-after half a minute with those that are; what a crash cut short is computed again.  The store says
-in its attributes what question it answers; one that answers another, or was computed by other
-code, or is not as it was written, is refused: nobody can say what else is wrong with it.
+The header holds everything that the numbers hang on: case, controller with its gains, spread,
+seeds, the run's options, and the versions of the code.  So a sweep can be gone on with from its
+journal alone, and one that answers another question is known.  A file for other tools is written
+from the journal at the end.
 """
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
-import shutil
-import time as clock
-import uuid
-import zlib
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from models.basics import BoolArray, InputError
+from models.case import Case
+from models.spread import Spread
 
-from ..keeper import Journal
-from ..text import OutputFolder
-from .header import ATTRIBUTE, differences, read_header
+from ..keeper import Journal, question_in, versions
+from .export import ENDINGS, check_writable
+from .pilots import pilot_from
+from .time_cases import TimeQuestion
 from .time_metrics import STATUS
 
 if TYPE_CHECKING:
     import xarray as xr
 
+ATTRIBUTE = "stillhook_sweep"
+"""Name of the attribute."""
 
-RESULT, JOURNAL = "result.zarr", "journal.jsonl"
-_IDENTITY = "stillhook_store"
-_OFTEN = 30.0  # between two writes of pieces that are not full [s]
+JOURNAL, RESULT = "journal.jsonl", "result.nc"
+"""Names of the files in the folder of a sweep."""
 
-
-def piece_of(samples: int) -> int:
-    """Return how many cases make a piece: about a hundred pieces, 16 to 4096 cases each."""
-    return int(min(4096, max(16, -(-samples // 100))))
+_WHAT = "sweep"
 
 
-class Store:
-    """Results on disk; a context manager that writes what is left and closes.
+@dataclass(frozen=True, kw_only=True)
+class Draw:
+    """How the cases are drawn.
 
-    Parameters
+    Attributes
     ----------
-    folder
-        The folder; it is made if there is none.
-    template
-        The result with nothing in it yet: coordinates, variables along "case", attributes with
-        the header.
+    samples
+        Number of cases.
+    sampling
+        Method of `Spread.sample`.
+    seed
+        Of the draws and of the runs.
+    common
+        Whether all runs have the same seed.
+    first
+        Number of the first case: a part of a longer sweep.
+    """
+
+    samples: int
+    sampling: str
+    seed: int
+    common: bool
+    first: int = 0
+
+
+def header_of(question: TimeQuestion, spread: Spread, draw: Draw) -> dict[str, Any]:
+    """Return what a store says about itself, as plain data."""
+    found: dict[str, Any] = {
+        "mode": "time",
+        "case": question.case.to_dict(),
+        "controller": question.pilot.to_dict(),
+        "spread": spread.to_dict(),
+        "samples": draw.samples,
+        "first": draw.first,
+        "sampling": draw.sampling,
+        "seed": draw.seed,
+        "common_seed": draw.common,
+        "metrics": list(question.metrics),
+        "duration": question.duration,
+        "settle": question.settle,
+        "scenario": question.scenario,
+        "options": {str(key): value for key, value in question.options.items()},
+        "masses": question.masses,
+        "compiled": question.compiled,
+        "design_follows": question.design_follows,
+        "weighed": question.weighed,
+        "starts": question.starts,
+        "versions": versions(TimeQuestion),
+    }
+    plain: dict[str, Any] = json.loads(text_of(found))
+    return plain
+
+
+def text_of(header: Mapping[str, Any]) -> str:
+    """Return a header as JSON; infinities are written as JavaScript has them."""
+    return json.dumps(_plain(header), ensure_ascii=True)
+
+
+def places_of(store: str | Path) -> tuple[Path, Path]:
+    """Return where the journal of a store is, and the file for other tools.
+
+    A store is a folder with both, or that file, with the journal beside it.
 
     Raises
     ------
     InputError
-        If the folder holds another sweep, something that is none, or one that is spoilt; if
-        another process writes it; or it cannot be written.
+        If the folder cannot be made, or the file is there without a journal.
+    """
+    place = Path(store)
+    if place.suffix not in ENDINGS:
+        return place / JOURNAL, place / RESULT
+    journal = place.with_suffix(".jsonl")
+    if check_writable(place).exists() and not journal.exists():
+        raise InputError(
+            f"{place}: is there, but not its journal {journal.name}: no sweep of this version of "
+            "Stillhook to go on with; take another file, or remove it"
+        )
+    return journal, place
+
+
+def stored_question(store: str | Path) -> tuple[TimeQuestion, Spread, Draw]:
+    """Return the question of a stored sweep, its spread and how the cases are drawn.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it cannot be asked again: its controller was Python code.
+    """
+    path, _ = places_of(store)
+    return question_from(question_in(path, _WHAT), str(path))
+
+
+def question_from(header: Mapping[str, Any], source: str) -> tuple[TimeQuestion, Spread, Draw]:
+    """Return the question that a header tells of, its spread and how the cases are drawn.
+
+    Raises
+    ------
+    InputError
+        If it cannot be asked again: its controller was Python code, or something is missing.
+    """
+    try:
+        case = Case.from_dict(header["case"], source=source)
+        pilot = pilot_from(header["controller"])
+        question = TimeQuestion(
+            case=case,
+            pilot=pilot,
+            metrics=tuple(header["metrics"]),
+            duration=float(header["duration"]),
+            settle=header["settle"],
+            scenario=header["scenario"],
+            options=header["options"],
+            masses=header["masses"],
+            compiled=header["compiled"],
+            design_follows=header["design_follows"],
+            weighed=header["weighed"],
+            starts=header["starts"],
+        )
+        spread = Spread.from_dict(header["spread"], source=source).on(case, pilot.gains)
+        draw = Draw(
+            samples=int(header["samples"]),
+            sampling=header["sampling"],
+            seed=int(header["seed"]),
+            common=bool(header["common_seed"]),
+            first=int(header["first"]),
+        )
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{source}: its question is spoilt ({error!r})") from error
+    return question, spread, draw
+
+
+class Results:
+    """Results of a sweep, in memory and, if it is kept, in a journal.
+
+    Parameters
+    ----------
+    template
+        The result with nothing in it yet: coordinates, variables along "case", attributes with
+        the header.
+    path
+        Of the journal; None if nothing is kept.
+
+    Raises
+    ------
+    InputError
+        As for `Journal`.
     """
 
-    def __init__(self, folder: str | Path, template: xr.Dataset) -> None:
-        self.folder = OutputFolder.prepare(folder).path
-        self._path = self.folder / RESULT
+    def __init__(self, template: xr.Dataset, path: Path | None = None) -> None:
         self._template = template
-        self._names = tuple(str(name) for name in template.data_vars)
-        self._n = template.sizes["case"]
-        self._piece = piece_of(self._n)
-        self._values = {name: template[name].to_numpy().copy() for name in self._names}
-        self._dirty: set[int] = set()
-        self._written = clock.monotonic()
-        identity = self._open() if self._path.exists() else self._create()
-        self._journal = Journal(self.folder / JOURNAL, identity)
-        try:
-            self._load()
-        except BaseException:
-            self._journal.close()
-            raise
+        self._values = {str(n): template[n].to_numpy().copy() for n in template.data_vars}
+        self._first = int(template["case"][0])
+        self.journal: Journal | None = None
+        if path is not None:
+            header = json.loads(template.attrs[ATTRIBUTE])
+            self.journal = Journal(path, _WHAT, header, self._take)
 
     @property
     def done(self) -> BoolArray:
@@ -90,145 +207,31 @@ class Store:
 
     def put(self, index: int, row: Mapping[str, float]) -> None:
         """Keep the numbers of a case, by variable."""
-        for name, value in row.items():
-            self._values[name][index] = value
-        piece = index // self._piece
-        self._dirty.add(piece)
-        if (self._values["status"][self._span(piece)] != STATUS["not run"]).all():
-            self._write(piece)
-        elif clock.monotonic() - self._written > _OFTEN:
-            self.flush()
-
-    def flush(self) -> None:
-        """Write everything that is not on disk yet."""
-        for piece in sorted(self._dirty):
-            self._write(piece)
-        self._written = clock.monotonic()
+        self._take(index, row)
+        if self.journal is not None:
+            self.journal.add(index, row)
 
     def dataset(self) -> xr.Dataset:
         """Return the results so far."""
-        return self._template.assign(
-            {
-                name: (self._template[name].dims, values.copy(), self._template[name].attrs)
-                for name, values in self._values.items()
-            }
+        own = self._template
+        return own.assign(
+            {name: (own[name].dims, v.copy(), own[name].attrs) for name, v in self._values.items()}
         )
 
-    def close(self) -> None:
-        """Write what is left, and let go of the folder."""
-        try:
-            self.flush()
-        finally:
-            self._journal.close()
-
-    def __enter__(self) -> Store:
-        """Return the store."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """Write what is left, and let go of the folder."""
-        self.close()
-
-    def _span(self, piece: int) -> slice:
-        return slice(piece * self._piece, min((piece + 1) * self._piece, self._n))
-
-    def _create(self) -> str:
-        """Write the empty store under another name, then rename it: it is there whole or not."""
-        journal = self.folder / JOURNAL
-        if journal.exists():
-            raise InputError(
-                f"{journal}: is there, but {RESULT} beside it is not; take another folder"
-            )
-        identity = uuid.uuid4().hex
-        for left in self.folder.glob(f".{RESULT}.*.tmp"):  # by one that was killed at once
-            shutil.rmtree(left, ignore_errors=True)
-        temporary = self.folder / f".{RESULT}.{os.getpid()}.tmp"
-        started = self._template.assign_attrs({_IDENTITY: identity})
-        encoding = {name: {"chunks": (self._piece,)} for name in self._names}
-        try:
-            started.to_zarr(
-                temporary, mode="w", consolidated=False, zarr_format=3, encoding=encoding
-            )
-            os.rename(temporary, self._path)
-        except OSError as error:
-            raise InputError(f"{self._path}: cannot be written: {error.strerror}") from error
-        finally:
-            with contextlib.suppress(OSError):
-                shutil.rmtree(temporary, ignore_errors=True)
-        return identity
-
-    def _open(self) -> str:
-        """Check that the store there answers the same question; return whose it is."""
-        there = read_header(self._path)
-        asked = json.loads(self._template.attrs[ATTRIBUTE])
-        changed = differences(there, asked)
-        if changed:
-            raise InputError(
-                f"{self._path}: holds another sweep: {'; '.join(changed)}; take another folder, "
-                "or remove it"
-            )
-        return str(self._group().attrs.get(_IDENTITY, ""))
-
-    def _load(self) -> None:
-        """Take the pieces that are as they were written."""
-        group = self._group()
-        try:
-            same = all(
-                np.array_equal(np.asarray(group[str(name)][:]), coordinate.to_numpy())
-                for name, coordinate in self._template.coords.items()
-            )
-            found = {name: np.asarray(group[name][:]) for name in self._names}
-        except Exception as error:  # whatever a reader makes of broken files
-            raise self._spoilt(f"{type(error).__name__}: {error}") from error
-        if not same:
-            raise self._spoilt("the values that were varied are not those of its own question")
-        if any(values.shape != (self._n,) for values in found.values()):
-            raise self._spoilt("its variables do not have the length of its own question")
-        for piece, wanted in self._journal.sums.items():
-            if piece in self._journal.torn:
-                continue  # it was being written when the driver ended
-            span = self._span(piece)
-            part = {name: found[name][span] for name in self._names}
-            if _check_sum(part) != wanted:
-                first, last = span.start, span.stop - 1
-                raise self._spoilt(f"cases {first} to {last} are not as they were written")
-            for name, values in part.items():
-                self._values[name][span] = values
-
-    def _write(self, piece: int) -> None:
-        span = self._span(piece)
-        part = {name: values[span] for name, values in self._values.items()}
-        group = self._group()
-        self._journal.begin(piece)
-        try:
-            for name, values in part.items():
-                group[name][span] = values
-        except OSError as error:
-            raise InputError(f"{self._path}: cannot be written: {error.strerror}") from error
-        self._journal.end(piece, _check_sum(part))
-        self._dirty.discard(piece)
-
-    def _group(self) -> Any:
-        import zarr
-
-        try:
-            return zarr.open_group(self._path, mode="r+")
-        except Exception as error:
-            raise self._spoilt(f"{type(error).__name__}: {error}") from error
-
-    def _spoilt(self, why: str) -> InputError:
-        return InputError(f"{self._path}: is spoilt: {why}; take another folder, or remove it")
+    def _take(self, index: int, row: Mapping[str, float]) -> None:
+        place = index - self._first
+        if not 0 <= place < self._template.sizes["case"]:
+            raise IndexError(f"there is no case {index}")
+        for name, values in self._values.items():
+            values[place] = row[name]
 
 
-def _check_sum(part: Mapping[str, npt.NDArray[Any]]) -> int:
-    """Return the check sum of a piece, the same on every machine."""
-    total = 0
-    for name in sorted(part):
-        little = np.ascontiguousarray(part[name]).astype(part[name].dtype.newbyteorder("<"))
-        total = zlib.crc32(name.encode() + b"\0" + little.tobytes(), total)
-    return total
+def _plain(value: Any) -> Any:
+    """Return plain data, what is no JSON as text."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, float) and math.isnan(value):
+        return None
+    return value if value is None or isinstance(value, str | int | float | bool) else str(value)

@@ -97,9 +97,9 @@ def sweep(
         In time: "processes" (default), "serial", ``local:4`` or the address of a dask scheduler;
         number of processes.  The numbers are the same on all of them, to the bit.
     store
-        In time: folder, or ``.nc`` file for a small sweep, in which results are kept as they come;
-        the same call goes on with what it finds.  In the frequency domain: where the result is
-        written (``.nc``, ``.zarr``, ``.parquet``, ``.csv``).
+        In time: folder in which results are kept as they come; the same call goes on with what it
+        finds.  In the frequency domain: where the result is written (``.nc``, ``.zarr``,
+        ``.parquet``, ``.csv``); such a file in time has its journal beside it (``.jsonl``).
     chunk
         In the frequency domain: cases computed at once.
     progress
@@ -140,8 +140,8 @@ def sweep(
         return _in_frequency(
             design, given, nominal, int(wanted), sampling, seed, metrics, chunk, store, progress
         )
-    from .header import Draw
     from .pilots import pilot_of
+    from .store import Draw
     from .time_cases import TimeQuestion
     from .time_metrics import names_of
     from .time_sweep import run_sweep
@@ -197,13 +197,11 @@ def resume_sweep(
         Python code (then call `sweep` again as before).
     """
     from . import accessor
-    from .header import question_from, read_header
-    from .store import RESULT
+    from .store import stored_question
     from .time_sweep import run_sweep
 
     del accessor
-    path = Path(store) / RESULT
-    question, spread, draw = question_from(read_header(path), str(path))
+    question, spread, draw = stored_question(store)
     return run_sweep(
         question, spread, draw, engine=engine, jobs=jobs, store=store, progress=progress
     )

@@ -10,20 +10,21 @@ from __future__ import annotations
 import contextlib
 import sys
 import time as clock
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import BoolArray, FloatArray, InputError, check_range
+from models.basics import FloatArray, InputError, check_range
 from models.operation import FAULTS, PREFIX, scenario_named
 from models.spread import Spread
 
 from ..keeper import Alone, Cluster, Died, Pool, Processes
-from .header import ATTRIBUTE, Draw, header_of, text_of
+from ..text import OutputFolder
+from .export import write_result
+from .store import ATTRIBUTE, Draw, Results, header_of, places_of, text_of
 from .time_cases import CaseResult, CaseTask, TimeQuestion, seed_of
 from .time_metrics import METRICS, STATUS
 
@@ -33,42 +34,6 @@ if TYPE_CHECKING:
 Progress = Callable[[str, int, int], None]
 
 _TOLD = 20  # reasons of failed cases that a result tells
-
-
-class Keeper(Protocol):
-    """Where results are kept: a store on disk, or memory."""
-
-    @property
-    def done(self) -> BoolArray:
-        """Which cases are there (n,)."""
-
-    def put(self, index: int, row: Mapping[str, float]) -> None:
-        """Keep the numbers of a case, by variable."""
-
-    def dataset(self) -> xr.Dataset:
-        """Return the results so far."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Memory:
-    """Results in memory alone."""
-
-    template: xr.Dataset
-    values: dict[str, npt.NDArray[np.generic]]
-
-    @property
-    def done(self) -> BoolArray:
-        return np.asarray(self.values["status"] != STATUS["not run"])
-
-    def put(self, index: int, row: Mapping[str, float]) -> None:
-        for name, value in row.items():
-            self.values[name][index] = value
-
-    def dataset(self) -> xr.Dataset:
-        own = self.template
-        return own.assign(
-            {name: (own[name].dims, v, own[name].attrs) for name, v in self.values.items()}
-        )
 
 
 def run_sweep(
@@ -90,7 +55,8 @@ def run_sweep(
     engine, jobs
         As for `engine_of`.
     store
-        Folder or ``.nc`` file in which results are kept as they come; None for memory alone.
+        Folder in which results are kept as they come, or file (``.nc``) beside whose name they
+        are (``.jsonl``); None for memory alone.
     progress
         Called as progress(what, done, total), several times a second; it may raise
         KeyboardInterrupt.
@@ -117,7 +83,11 @@ def run_sweep(
     used = engine_of(engine, question, jobs)
     messages: dict[int, str] = {}
     began, wall = clock.perf_counter(), 0.0
-    with _keeper(store, template) as keeper:
+    journal, export = (None, None) if store is None else places_of(store)
+    if journal is not None:
+        OutputFolder.prepare(journal.parent)
+    keeper = Results(template, journal)
+    with keeper.journal or contextlib.nullcontext():
         missing = np.flatnonzero(~keeper.done)
         done, total = len(rows) - len(missing), len(rows)
         if missing.size and not question.design_follows:
@@ -139,6 +109,8 @@ def run_sweep(
                         messages[task.index] = result.message
                 tell("", done, total)
         found = keeper.dataset()
+        if export is not None:
+            write_result(found, export)
     complete = bool((found["status"] != STATUS["not run"]).all())
     return found.assign_attrs(
         complete=int(complete),
@@ -297,20 +269,6 @@ def _check(question: TimeQuestion, spread: Spread) -> None:
                 f"sweep: fault.at must be before the end of the run, {question.duration:g} s, got "
                 f"up to {latest:g} s; vary it too, or run for longer"
             )
-
-
-@contextlib.contextmanager
-def _keeper(store: str | Path | None, template: xr.Dataset) -> Iterator[Keeper]:
-    if store is None:
-        values = {str(n): template[n].to_numpy().copy() for n in template.data_vars}
-        yield _Memory(template=template, values=values)
-        return
-    from .netcdf_store import NetcdfStore
-    from .store import Store
-
-    kind = NetcdfStore if str(store).endswith(".nc") else Store
-    with kind(store, template) as keeper:
-        yield keeper
 
 
 def _silent(what: str, done: int, total: int) -> None:

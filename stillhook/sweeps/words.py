@@ -21,7 +21,7 @@ from models.basics import InputError, PhysicsWarning, Share, check_range, pick, 
 from models.case import Case
 from models.spread import Samples, Spread
 
-from .header import ATTRIBUTE
+from .store import ATTRIBUTE
 from .time_metrics import STATUS
 
 if TYPE_CHECKING:

@@ -128,16 +128,15 @@ def _resumed(arguments: argparse.Namespace) -> Swept:
 
     from models.basics import PhysicsWarning
 
-    from ...sweeps import RESULT, question_from, read_header, resume_sweep
+    from ...sweeps import resume_sweep, stored_question
     from .compare import _progress
 
     if arguments.case is not None:
         raise InputError(
             f"sweep: --resume takes case and all else from {arguments.resume}; give no CASE"
         )
-    path = Path(arguments.resume) / RESULT
     warnings.simplefilter("ignore", PhysicsWarning)  # told when it was begun
-    question, spread, _ = question_from(read_header(path), str(path))
+    question, spread, _ = stored_question(arguments.resume)
     with stoppable() as stop, _progress(stop, shown=not arguments.quiet) as tell:
         result = resume_sweep(
             arguments.resume, engine=arguments.cluster, jobs=arguments.jobs, progress=tell

@@ -30,7 +30,7 @@ def test_a_sweep_in_time_is_written_and_told(tmp_path, capsys):
     assert status == 0
     assert "6 of 6 cases hold the payload: 100 % (95 % interval 54.07 to 100 %)" in out
     names = {path.name for path in folder.iterdir()}
-    assert names >= {"result.zarr", "journal.jsonl", "cases.csv", "cases.parquet", "spread.yaml"}
+    assert names >= {"result.nc", "journal.jsonl", "cases.csv", "cases.parquet", "spread.yaml"}
     assert names >= {"summary.json", "worst.yaml", "worst-5.yaml", "scatter.png"}
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["stable"]["count"] == 6

@@ -15,6 +15,7 @@ from designs import thesis_design
 import stillhook as sh
 from models.sensing import Measurement
 from stillhook.comparison import Comparison
+from stillhook.comparison import store as compare_store
 from stillhook.comparison import work as compare_work
 from stillhook.comparison.bench import Bench, Task
 from stillhook.comparison.cell import Cell, Prepared, Question
@@ -211,6 +212,14 @@ def test_a_store_that_answers_another_question_is_refused_and_told_apart(tmp_pat
     with pytest.raises(sh.InputError, match=r"holds another comparison: case.payload.mass is 36"):
         sh.compare(heavier, ["none"], jobs=1, out=tmp_path, **FAST)
     assert (tmp_path / STORE).read_bytes() == data
+
+
+def test_a_store_of_other_code_is_refused(tmp_path, monkeypatch):
+    sh.compare(CASE, ["none"], jobs=1, out=tmp_path, **FAST)
+    own = compare_store.versions(compare_store.Bench)
+    monkeypatch.setattr(compare_store, "versions", lambda entry: {**own, "code": "0123456789"})
+    with pytest.raises(sh.InputError, match="another version of Stillhook's own code"):
+        sh.compare(CASE, ["none"], jobs=1, out=tmp_path, **FAST)
 
 
 def test_two_comparisons_do_not_write_into_one_store(tmp_path):
