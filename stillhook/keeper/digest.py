@@ -80,11 +80,7 @@ class _Reached:
             path = self._file(module)
             if module in self.contents or path is None:
                 continue
-            tree = ast.parse(path.read_bytes())
-            words: list[str] = []
-            imports: list[ast.Import | ast.ImportFrom] = []
-            _read(tree, words, imports)
-            self.contents[module] = hashlib.sha256("\0".join(words).encode()).hexdigest()
+            self.contents[module], imports = _contents(path, path.stat().st_mtime_ns)
             for line in imports:
                 todo += self._targets(line, _package(module, path))
             if path.name == "__init__.py":  # imported as a whole: all that it hands on
@@ -133,6 +129,16 @@ class _Reached:
                 place = next((path for path in both if path.is_file()), None)
             self._homes[module] = place
         return self._homes[module]
+
+
+@lru_cache(maxsize=1024)  # entries share most of their files
+def _contents(path: Path, changed: int) -> tuple[str, tuple[ast.Import | ast.ImportFrom, ...]]:
+    """Return the digest of a file, as it is since a time [ns], and its imports."""
+    del changed
+    words: list[str] = []
+    imports: list[ast.Import | ast.ImportFrom] = []
+    _read(ast.parse(path.read_bytes()), words, imports)
+    return hashlib.sha256("\0".join(words).encode()).hexdigest(), tuple(imports)
 
 
 def _package(module: str, path: Path) -> str:
