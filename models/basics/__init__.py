@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .checks import SolverError as SolverError
     from .checks import StillhookError as StillhookError
     from .checks import SynthesisError as SynthesisError
+    from .checks import ascending_fault as ascending_fault
     from .checks import check_ascending as check_ascending
     from .checks import check_finite as check_finite
     from .checks import check_range as check_range

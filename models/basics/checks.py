@@ -116,15 +116,24 @@ def check_ascending(owner: str, name: str, values: Sequence[float] | FloatArray)
         If two neighbours are equal or in the wrong order; both are named.
     """
     array = check_finite(owner, name, values)
-    wrong = np.flatnonzero(np.diff(array) <= 0.0)
-    if wrong.size:
-        i = int(wrong[0])
-        kind = "repeated" if array[i + 1] == array[i] else "out of order"
-        raise InputError(
-            f"{owner}: {name} must be strictly ascending, got {array[i]:g} followed by "
-            f"{array[i + 1]:g} ({kind}, index {i + 1})"
-        )
+    fault = ascending_fault(array)
+    if fault:
+        raise InputError(f"{owner}: {name} {fault}")
     return array
+
+
+def ascending_fault(values: Sequence[float] | FloatArray) -> str:
+    """Return what is wrong with numbers that must be strictly ascending; nothing if they are."""
+    array = np.asarray(values, dtype=np.float64)
+    wrong = np.flatnonzero(np.diff(array) <= 0.0)
+    if not wrong.size:
+        return ""
+    i = int(wrong[0])
+    kind = "repeated" if array[i + 1] == array[i] else "out of order"
+    return (
+        f"must be strictly ascending, got {array[i]:g} followed by {array[i + 1]:g} "
+        f"({kind}, index {i + 1})"
+    )
 
 
 def check_seed(owner: str, seed: int) -> int:
@@ -147,7 +156,9 @@ def read_only(array: npt.ArrayLike) -> FloatArray:
     return copy
 
 
-def range_text(low: float, high: float, unit: str, open_low: bool, open_high: bool) -> str:
+def range_text(
+    low: float, high: float, unit: str, open_low: bool = False, open_high: bool = False
+) -> str:
     """Return a range in words, as in `in [0, 2) m` or `above 0 kg`."""
     tail = f" {unit}" if unit else ""
     if math.isinf(low) and math.isinf(high):

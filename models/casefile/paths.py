@@ -10,13 +10,18 @@ import numpy as np
 
 from ..basics import InputError
 from .messages import path_text, suggestion
-from .section import Section, discriminator, sections_of
+from .section import TAGS, Section, discriminator, sections_of
 
 
 def plain(value: Any) -> Any:
-    """Return sections as dicts without empty fields, and sequences as lists."""
+    """Return sections as dicts without empty fields, and sequences as lists.
+
+    A default that a factory made follows from the other fields: it is left out too.
+    """
     if isinstance(value, Section):
-        names = (name for name in type(value).model_fields if name not in value._derived)
+        given = value.model_fields_set
+        fields = type(value).model_fields.items()
+        names = (name for name, f in fields if f.default_factory is None or name in given)
         items = ((name, getattr(value, name)) for name in names)
         return {name: plain(item) for name, item in items if item is not None}
     if isinstance(value, Mapping):
@@ -65,7 +70,7 @@ def replaced(
 
 
 def _rank(path: str) -> tuple[int, bool]:
-    return path.count("."), path.rpartition(".")[2] not in ("type", "method")
+    return path.count("."), path.rpartition(".")[2] not in TAGS
 
 
 class _Place:
@@ -84,6 +89,12 @@ class _Place:
             if tag is None or self.tree.get(tag[0]) == tag[1]:
                 return member
         return self.members[0]
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """The keys that may be set; of a section that forgets nothing, those of all its kinds."""
+        kinds = (self.model,) if self.model.forgets else self.members
+        return tuple(dict.fromkeys(key for kind in kinds for key in kind.model_fields))
 
 
 def _set(place: _Place, keys: Sequence[str], value: Any, given: set[tuple[str, ...]]) -> None:
@@ -110,8 +121,9 @@ def _down(place: _Place, key: str) -> _Place:
         step: str | int = index
     else:
         _check_key(place, key)
-        field = place.model.model_fields[key]
-        members, step = sections_of(field.annotation), key
+        field = place.model.model_fields.get(key)
+        members = sections_of(field.annotation) if field is not None else ()
+        step = key
         below = place.tree.get(key)
         if below is None and members:
             below = place.tree[key] = {}
@@ -122,11 +134,9 @@ def _down(place: _Place, key: str) -> _Place:
 
 
 def _check_key(place: _Place, key: str) -> None:
-    known = place.model.model_fields if place.members else {}
+    known = place.known if place.members else ()
     if key not in known:
-        raise InputError(
-            f"{path_text((*place.path, key))} is unknown; {suggestion(key, list(known))}"
-        )
+        raise InputError(f"{path_text((*place.path, key))} is unknown; {suggestion(key, known)}")
 
 
 def _index(place: _Place, key: str) -> int:
@@ -147,5 +157,5 @@ def _assign(place: _Place, key: str, value: Any, given: set[tuple[str, ...]]) ->
             full = (*map(str, place.path), other)
             if key in group and other != key and full not in given:
                 tree.pop(other, None)
-    for name in set(tree) - set(place.model.model_fields):  # left over from another tag
+    for name in set(tree) - set(place.known):  # left over from another tag
         del tree[name]

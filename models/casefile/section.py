@@ -14,12 +14,15 @@ import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Literal, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, PrivateAttr, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import PydanticCustomError
 
 from ..basics import InputError
 from .messages import Path, line_of, message_line, suggestion
 from .quantity import Quantity, custom_error
+
+TAGS = ("type", "method", "spectrum")
+"""Fields that select a section among its alternatives."""
 
 
 class Section(BaseModel):
@@ -30,8 +33,8 @@ class Section(BaseModel):
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()
     """Groups of fields of which one is given: replacing one drops the others of its group."""
 
-    _derived: frozenset[str] = PrivateAttr(default=frozenset())
-    """Fields that were not given but follow from the others; they are not written to a file."""
+    forgets: ClassVar[bool] = True
+    """Whether setting the tag of a section by its path drops the fields of the former kind."""
 
     def __init__(self, **data: Any) -> None:
         try:
@@ -78,6 +81,8 @@ def describe(
     """
     found: list[tuple[int, str]] = []
     for entry in error.errors(include_url=False):
+        if entry["type"] == "default_factory_not_called":
+            continue  # a default that follows from a field which is wrong itself
         path, owner = _walk(model, entry["loc"])
         for where, text in _sentences(entry, path, owner):
             line = line_of(where, lines)
@@ -93,7 +98,7 @@ def sections_of(annotation: Any) -> tuple[type[Section], ...]:
 
 def discriminator(member: type[Section]) -> tuple[str, str] | None:
     """Return the key and the value that select a section among its alternatives."""
-    for name in ("type", "method"):
+    for name in TAGS:
         field = member.model_fields.get(name)
         if field is not None and get_origin(field.annotation) is Literal:
             return name, str(get_args(field.annotation)[0])
@@ -131,7 +136,7 @@ def _sentences(entry: Any, path: Path, owner: type[Section] | None) -> Iterator[
     kind, context = entry["type"], entry.get("ctx", {})
     got = _got(entry.get("input"))
     fields = owner.model_fields if owner is not None else {}
-    key = path[-1] if path else ""
+    key = next((part for part in reversed(path) if isinstance(part, str)), "")
     if kind == "stillhook" and "problems" in context:
         for name, text in context["problems"]:
             parts = [int(part) if part.isdigit() else part for part in name.split(".") if part]
@@ -139,19 +144,22 @@ def _sentences(entry: Any, path: Path, owner: type[Section] | None) -> Iterator[
     elif kind == "stillhook":
         yield path, context["message"]
     elif kind == "missing":
-        yield path, f"is missing{_wanted(fields.get(str(key)))}"
+        yield path, f"is missing{_wanted(fields.get(key))}"
     elif kind in ("extra_forbidden", "invalid_key"):
-        yield (*path[:-1], str(key)), f"unknown key; {suggestion(key, list(fields))}"
+        key = str(path[-1])
+        yield (*path[:-1], key), f"unknown key; {suggestion(key, list(fields))}"
     elif kind in ("model_type", "model_attributes_type", "dict_type"):
         yield path, f"must be a section with keys of its own, got {got}"
     elif kind == "literal_error":
-        yield path, f"must be {context['expected']}, got {got}{_near(entry.get('input'), context)}"
+        expected = context["expected"]
+        yield path, f"must be {expected}, got {got}{_near(entry.get('input'), expected)}"
     elif kind == "union_tag_not_found":
         tag = str(context["discriminator"]).strip("'")
-        yield (*path, tag), f"is missing; {_choices(fields.get(str(key)))}"
+        yield (*path, tag), f"is missing; {_choices(fields.get(key))}"
     elif kind == "union_tag_invalid":
         tag = str(context["discriminator"]).strip("'")
-        yield (*path, tag), f"{_choices(fields.get(str(key)))}, got {context['tag']!r}"
+        text = f"{_choices(fields.get(key))}, got {context['tag']!r}"
+        yield (*path, tag), text + _near(context["tag"], context["expected_tags"])
     elif kind in ("tuple_type", "list_type"):
         yield path, f"must be a list, got {got}"
     elif kind in ("too_short", "too_long"):
@@ -192,10 +200,13 @@ def _wanted(field: Any) -> str:
 
 def _choices(field: Any) -> str:
     tags = [tag for member in sections_of(field.annotation) if (tag := discriminator(member))]
-    return f"must be {' or '.join(repr(value) for _, value in tags)}"
+    values = [repr(value) for _, value in tags]
+    if len(values) > 3:
+        values = [", ".join(values[:-1]), values[-1]]
+    return f"must be {' or '.join(values)}"
 
 
-def _near(value: object, context: Mapping[str, Any]) -> str:
-    known = [part.strip("' ") for part in str(context["expected"]).replace(" or ", ",").split(",")]
+def _near(value: object, expected: str) -> str:
+    known = [part.strip("' ") for part in expected.replace(" or ", ",").split(",")]
     near = difflib.get_close_matches(str(value), known, n=1, cutoff=0.6)
     return f"; did you mean {near[0]!r}?" if near else ""

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from .scatter_files import write_scatter as write_scatter
     from .sea import SeaSpectrum as SeaSpectrum
     from .sea_section import Sea as Sea
-    from .sea_section import SeaPart as SeaPart
     from .spreading import Spreading as Spreading
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -22,6 +22,7 @@ rounded constants make H_s = 4 sqrt(m0) come out 0.3 % below H_S.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -38,10 +39,30 @@ from ..basics import (
     spectrum_statistics,
 )
 from . import shapes
-from .kinds import SPECTRA, check_fields
-from .peak import highest_of
 from .spreading import Spreading
 from .table import SpectrumTable
+
+STANDARD_SPECTRA = (
+    "bretschneider-1975", "bretschneider", "pierson-moskowitz", "jonswap", "tma", "torsethaugen",
+    "ochi-hubble", "gaussian-swell",
+)  # fmt: skip
+"""The standard forms by their names in a case file."""
+
+SPECTRA = (*STANDARD_SPECTRA, "measured", "sum")
+"""All spectra by their names in a case file."""
+
+FIELDS: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(STANDARD_SPECTRA, ("peak_period",)),
+    "bretschneider-1975": ("significant_period",),
+    "pierson-moskowitz": (),
+    "tma": ("peak_period", "depth"),
+    "gaussian-swell": ("peak_period", "width"),
+    "measured": ("table",),
+    "sum": ("parts",),
+}
+"""What each kind needs, besides the height that all standard forms do."""
+
+_UNITS = {"peak_period": "s", "significant_period": "s", "depth": "m", "width": "rad/s"}
 
 HIGHEST_FREQUENCY = 60.0
 """Where integrals over a sea end [rad/s]: a resonant loop still answers to the tail at 10 rad/s."""
@@ -51,9 +72,6 @@ HIGHEST_FREQUENCY = 60.0
 _LOWEST = 0.35
 _NOTHING = 0.1
 
-# Widths of a Gaussian swell, of its peak frequency: the time series' harmonics are 1/200 of it
-# apart, and from a sixth on there would be energy at zero frequency.
-_WIDTHS = (1.0 / 200.0, 1.0 / 6.0)
 _GAUSSIAN_END = 12.0  # standard deviations: exp(-72)
 
 
@@ -117,7 +135,7 @@ class SeaSpectrum:
             raise InputError(
                 f"sea: spectrum must be one of {', '.join(SPECTRA)}; got {self.kind!r}"
             )
-        check_fields(self.kind, lambda name: getattr(self, name))
+        _check_fields(self.kind, lambda name: getattr(self, name))
         if self.parts is not None:
             object.__setattr__(self, "parts", tuple(self.parts))
             if not self.parts or any(part.kind == "sum" for part in self.parts):
@@ -133,7 +151,7 @@ class SeaSpectrum:
         if self.kind == "ochi-hubble":
             check_range("sea", "order", self.order, low=0.5, high=20.0)
         if self.width is not None:
-            low, high = (share * self.peak_frequency for share in _WIDTHS)
+            low, high = shapes.gaussian_widths(self.peak_frequency)
             check_range("sea", "width", self.width, low=low, high=high, unit="rad/s")
         peak = np.array([self.peak_frequency])
         if self.kind == "torsethaugen" and not np.all(np.isfinite(self._formula(peak))):
@@ -329,3 +347,48 @@ class SeaSpectrum:
             self.kind, omega, height, self._period, gamma=self.gamma, order=self.order
         )
         return result if self.depth is None else result * shapes.depth_function(omega, self.depth)
+
+
+def _takes(kind: str) -> str:
+    """Return what a kind takes, in words."""
+    named = [f"{name} [{_UNITS[name]}]" if name in _UNITS else name for name in FIELDS[kind]]
+    return ", ".join(named) or "no period"
+
+
+def _check_fields(kind: str, value_of: Callable[[str], object]) -> None:
+    """Check that a sea has the fields of its kind and none of another's."""
+    for name in dict.fromkeys(name for names in FIELDS.values() for name in names):
+        if name not in FIELDS[kind] and value_of(name) is not None:
+            raise InputError(f"sea: spectrum {kind} takes {_takes(kind)}, not {name}")
+    for name in FIELDS[kind]:
+        value, unit = value_of(name), _UNITS.get(name, "")
+        if value is None:
+            raise InputError(f"sea: spectrum {kind} needs {name}" + (f" [{unit}]" if unit else ""))
+        if unit and isinstance(value, int | float):
+            check_range("sea", name, value, low=0.0, unit=unit, open_low=True)
+
+
+def highest_of(density: Callable[[FloatArray], FloatArray], peaks: Sequence[float]) -> float:
+    """Return the frequency at which a sum of spectra is highest [rad/s].
+
+    Parameters
+    ----------
+    density
+        The sum, (k,) -> (k,).
+    peaks
+        Where its parts are highest, above zero [rad/s]: the maximum of the sum is near one of
+        them, and may be the kink of a JONSWAP, so they stay among the candidates throughout.
+
+    Examples
+    --------
+    >>> def humps(w):
+    ...     return np.exp(-((w - 1.0) ** 2)) + np.exp(-((w - 1.5) ** 2))
+    >>> round(highest_of(humps, [1.0, 1.5]), 6)
+    1.25
+    """
+    grid = np.unique(np.concatenate([np.geomspace(0.5, 2.0, 801) * peak for peak in peaks]))
+    for _ in range(6):
+        at = int(np.argmax(density(grid)))
+        low, high = grid[max(at - 1, 0)], grid[min(at + 1, grid.size - 1)]
+        grid = np.union1d(np.linspace(low, high, 101), [p for p in peaks if low < p < high])
+    return float(grid[int(np.argmax(density(grid)))])

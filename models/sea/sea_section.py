@@ -1,34 +1,94 @@
-"""The sea, as a section of the case file.
+"""Sea of a case file: one section for each kind of spectrum, told apart by `spectrum`.
 
-The section holds what the user gave; `models.sea.sea.SeaSpectrum`, which `Sea.to_spectrum` makes,
-is what everything downstream asks.  Fields that follow from the others (the height of a measured
-sea, the periods of a sea by its wind) are filled in on validation, so that every sea has a
-`significant_height` and a peak, and are left out again where the case is written.
+A section holds what the user gave; `models.sea.sea.SeaSpectrum`, which `to_spectrum` makes, is
+what everything downstream asks.  What follows from other fields (the height of a measured sea, the
+period of a sea by its wind) is the default of its field, made from them: so every sea has a
+`significant_height` and a `spectral_peak_period`, and what was not given is not written to a file.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
-from pydantic import Field, model_validator
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
-from ..basics import GRAVITY, InputError
-from ..casefile import DataFile, Quantity, Section, problems
-from .kinds import FIELDS
-from .shapes import fully_developed_period, jonswap_gamma
-from .wind import fully_arisen
+from ..basics import GRAVITY, InputError, range_text
+from ..casefile import DataFile, Quantity, Section, custom_error, problems
+from .shapes import fully_arisen, gaussian_widths, jonswap_gamma
+from .table import SpectrumTable, row_faults
 
 if TYPE_CHECKING:
     from .sea import SeaSpectrum
 
-_BY_WIND = ("bretschneider-1975", "bretschneider", "pierson-moskowitz")
-_MEASURED = ("table", "file", "record", "beyond")
-_MOST_PARTS = 10
-# T_p of the 1975 form over its T_S: see `SeaPart.spectral_peak_period`.
+# T_p of the 1975 form over its T_S: it peaks at f T_mean = 0.54^(1/4) with T_mean = 0.9 T_S.
 _PEAK_OF_SIGNIFICANT = 0.9 / math.sqrt(math.sqrt(0.54))
+
+_HIGHEST = 30.0
+_MOST_PARTS = 10
+
+# Files written before each kind had its own fields carry these under every kind.
+_IDLE = ("gamma", "order")
+
+
+def _on_the_table(wind_speed: float) -> float:
+    try:
+        fully_arisen(wind_speed)
+    except InputError as error:
+        raise custom_error(str(error)) from None
+    return wind_speed
+
+
+def _readable(file: str) -> str:
+    from .records import read_seas  # here, as most cases have no file
+
+    try:
+        read_seas(file)
+    except InputError as error:
+        raise custom_error(str(error)) from None
+    return file
+
+
+_Height = Annotated[
+    float,
+    Quantity("length", 0.0, _HIGHEST, open_low=True),
+    Field(
+        description="Significant wave height H_s (4 standard deviations of the surface elevation; "
+        "the 1975 form takes H_mean = 0.625 H_s). May be left out where `wind_speed`, the measured "
+        "spectrum or the parts have it; they are scaled to it where it is given."
+    ),
+]
+_PeakPeriod = Annotated[
+    float,
+    Quantity("time", 0.0, 60.0, open_low=True),
+    Field(
+        description="Period of the spectrum's peak; not for `bretschneider-1975`, "
+        "`pierson-moskowitz`, `measured` and `sum`."
+    ),
+]
+_Gamma = Annotated[
+    float | Literal["auto"],
+    Quantity("ratio", 1.0, 7.0, word="auto"),
+    Field(
+        description="Peak enhancement of `jonswap` and `tma`; `auto` takes it from T_p and H_s "
+        "(DNV-RP-C205). The other spectra do not use it."
+    ),
+]
+
+
+def _kind(section: type[SeaSection]) -> str:
+    return str(get_args(section.model_fields["spectrum"].annotation)[0])
 
 
 class SeaTable(Section):
@@ -42,6 +102,13 @@ class SeaTable(Section):
     density: tuple[Annotated[float, Quantity("spectral density", 0.0, 1e6)], ...]
     """Variance density of the elevation at each frequency."""
 
+    @model_validator(mode="after")
+    def _check(self) -> SeaTable:
+        found = row_faults(np.array(self.omega), np.array(self.density))
+        if found:
+            raise problems(*found)
+        return self
+
 
 class SeaSpreading(Section):
     """How the energy of a short-crested sea divides over headings."""
@@ -52,81 +119,60 @@ class SeaSpreading(Section):
     """s or n: wind seas have s of 5 to 15 or n of 2 to 6, swell s of 30 and more."""
 
 
-class SeaPart(Section):
-    """A sea that is no sum: what stands under `parts`, and most of what stands under `sea`."""
+class SeaSection(Section):
+    """What the seas of every kind have in common."""
 
-    spectrum: Literal[
-        "bretschneider-1975",
-        "bretschneider",
-        "jonswap",
-        "torsethaugen",
-        "ochi-hubble",
-        "pierson-moskowitz",
-        "tma",
-        "gaussian-swell",
-        "measured",
-        "sum",
-    ]
-    """Shape of the wave spectrum; `bretschneider-1975` in the variables of the 1975 thesis,
-    `pierson-moskowitz` fully developed, `tma` in shallow water, `measured` a table or a record of
-    a file, `sum` the sum of `parts`."""
-    significant_height: Annotated[float, Quantity("length", 0.0, 30.0, open_low=True)] = Field(
-        default_factory=lambda: math.nan
-    )
-    """Significant wave height H_s (4 standard deviations of the surface elevation; the 1975
-    form takes H_mean = 0.625 H_s). May be left out where `wind_speed`, the measured spectrum or
-    the parts have it; they are scaled to it where it is given."""
-    peak_period: Annotated[float, Quantity("time", 0.0, 60.0, open_low=True)] | None = None
-    """Period of the spectrum's peak; not for `bretschneider-1975`, `pierson-moskowitz`,
-    `measured` and `sum`."""
-    significant_period: Annotated[float, Quantity("time", 0.0, 60.0, open_low=True)] | None = None
-    """Significant period T_S, for `bretschneider-1975` only (T_mean = 0.9 T_S)."""
-    wind_speed: Annotated[float, Quantity("speed", 0.0, 100.0, open_low=True)] | None = None
-    """Wind of a fully arisen sea, 18 to 24.5 knots (1975 thesis, Table 3), instead of a height
-    and a period, for `bretschneider-1975`, `bretschneider` and `pierson-moskowitz`."""
-    gamma: Annotated[float | Literal["auto"], Quantity("ratio", 1.0, 7.0, word="auto")] = 3.3
-    """Peak enhancement of `jonswap` and `tma`; `auto` takes it from T_p and H_s (DNV-RP-C205).
-    The other spectra do not use it."""
-    order: Annotated[float, Quantity("ratio", 0.5, 20.0)] = 2.0
-    """Shape parameter of `ochi-hubble`; 1 gives `bretschneider`. The other spectra do not use
-    it."""
-    depth: Annotated[float, Quantity("length", 0.0, 12e3, open_low=True)] | None = None
-    """Water depth, for `tma` only."""
-    width: Annotated[float, Quantity("frequency", 0.0, 10.0, open_low=True)] | None = None
-    """Standard deviation of the frequency of `gaussian-swell`, 1/200 to 1/6 of the peak's."""
-    table: SeaTable | None = None
-    """Table of a `measured` spectrum, or give `file`."""
-    file: Annotated[str, DataFile(what="a file of wave spectra")] | None = None
-    """File of a `measured` spectrum (NDBC, Spotter, SWAN, WAVEWATCH III, ERA5 and more),
-    relative to the case file; `stillhook sea FILE` shows its records."""
-    record: Annotated[int, Quantity("count", 0, 10_000_000)] | None = None
-    """Which record of `file`, counted from 0 in order of time; by default 0."""
-    beyond: Literal["decay", "zero"] | None = None
-    """What a `measured` spectrum is above its last row: `decay` falls as 1/omega^5, `zero` is 0.
-    Default decay."""
+    spectrum: str
+    """Shape of the wave spectrum."""
+    spreading: SeaSpreading | None = None
+    """Spreading of the energy over headings; without it the sea is long-crested."""
+    if TYPE_CHECKING:
+        # Each kind has this field behind those that it may follow from.
+        significant_height: float
 
     alternatives = (("peak_period", "significant_period", "wind_speed"), ("table", "file"))
+    forgets = False
+    takes: ClassVar[str] = "peak_period"
+    """What the kind takes besides a height, for messages."""
 
-    @model_validator(mode="after")
-    def _check(self) -> SeaPart:
-        found = self._misplaced()
+    @model_validator(mode="before")
+    @classmethod
+    def _fields(cls, data: Any) -> Any:
+        """Tell which fields are missing and which are another kind's, before any is read."""
+        if not isinstance(data, Mapping):
+            return data
+        kind, own = _kind(cls), set(cls.model_fields)
+        given = {name for name, value in data.items() if value is not None}
+        foreign = {name for one in KINDS_OF_SEA for name in one.model_fields} - own
+        if "wind_speed" in given & foreign:
+            names = ", ".join(_kind(one) for one in KINDS_OF_SEA if issubclass(one, _SeaByWind))
+            raise problems(("wind_speed", f"is not for the {kind} spectrum: it is for {names}"))
+        found = [
+            (name, f"is missing: the {kind} spectrum needs it")
+            for name in cls._needs(data)
+            if name not in given
+        ]
+        found += [
+            (name, f"is not for the {kind} spectrum, which takes {cls.takes}")
+            for name in data
+            if name in given & foreign and name not in _IDLE
+        ]
         if found:
             raise problems(*found)
-        found = self._filled()
-        if found:
-            raise problems(*found)
-        return self
+        empty = (own | foreign) - given
+        return {name: value for name, value in data.items() if name not in foreign | empty}
+
+    @classmethod
+    def _needs(cls, data: Mapping[str, Any]) -> tuple[str, ...]:
+        """Return the fields that have to be given."""
+        del data
+        fields = cls.model_fields.items()
+        return tuple(n for n, field in fields if field.is_required() and n != "spectrum")
 
     @property
     def spectral_peak_period(self) -> float:
-        """Period of the spectrum's peak [s], also where it is not a field.
-
-        The 1975 form peaks at f T_mean = 0.54^(1/4) with T_mean = 0.9 T_S: setting to zero the
-        derivative of nu^-5 exp(-0.675 nu^-4) (1975 thesis, Appendix B).
-        """
-        if self.significant_period is not None:
-            return 0.9 * self.significant_period / math.sqrt(math.sqrt(0.54))
-        return self.peak_period or math.nan
+        """Period of the spectrum's peak [s], also where it is not a field."""
+        return 2.0 * math.pi / self.to_spectrum().peak_frequency
 
     @property
     def steepness(self) -> float:
@@ -151,184 +197,363 @@ class SeaPart(Section):
         InputError
             If the form is not defined for these values, or a file of spectra cannot be read.
         """
-        return _spectrum(self, _stamps(self))
+        return _spectrum(self, tuple(_stamp(file) for file in self._files()))
 
-    def _misplaced(self) -> list[tuple[str, str]]:
-        """Return which fields are missing, and which are not for the spectrum."""
-        kind, found = self.spectrum, []
-        if kind == "sum" and "parts" not in type(self).model_fields:
-            return [("spectrum", "must not be a sum itself")]
-        measured, by_wind = kind == "measured", self.wind_speed is not None
-        if by_wind and kind not in _BY_WIND:
-            text = f"is not for the {kind} spectrum: it is for {', '.join(_BY_WIND)}"
-            return [("wind_speed", text)]
-        wanted = [name for name in FIELDS[kind] if name not in ("table", "parts")]
-        for name in wanted:
-            period = name.endswith("period")
-            if getattr(self, name) is None and not (by_wind and period):
-                found.append((name, f"is missing: the {kind} spectrum needs it"))
-            elif by_wind and period and getattr(self, name) is not None:
-                found.append((name, "is not for a sea by its wind_speed, which gives the period"))
-        if math.isnan(self.significant_height) and not (by_wind or kind in ("measured", "sum")):
-            text = f"is missing: the {kind} spectrum needs it"
-            found.append(("significant_height", text))
-        takes = " and ".join(wanted) or {"measured": "a table or a file", "sum": "parts"}.get(
-            kind, "no period"
-        )
-        for name in ("peak_period", "significant_period", "depth", "width"):
-            if getattr(self, name) is not None and name not in wanted:
-                found.append((name, f"is not for the {kind} spectrum, which takes {takes}"))
-        for name in _MEASURED:
-            if getattr(self, name) is not None and not measured:
-                found.append((name, f"is not for the {kind} spectrum, which takes {takes}"))
-        if measured and (self.table is None) == (self.file is None):
-            text = "is missing: the measured spectrum needs a table or a file"
-            found.append(("table", text if self.table is None else "must be left out, or file"))
-        if measured and self.file is None and self.record is not None:
-            found.append(("record", "is for a file of spectra, and none is given"))
-        return found
+    def _form(self) -> dict[str, Any]:
+        """Return what the kind hands to :class:`SeaSpectrum`, besides height and spreading."""
+        raise NotImplementedError
 
-    def _filled(self) -> list[tuple[str, str]]:
-        """Fill in what follows from the other fields; return what is wrong."""
-        values: dict[str, Any] = {}
-        asked = None if math.isnan(self.significant_height) else self.significant_height
-        if self.wind_speed is not None:
+    def _files(self) -> tuple[str, ...]:
+        return ()
+
+
+class _SeaByPeak(SeaSection):
+    """A sea of given height and peak period."""
+
+    significant_height: _Height
+    peak_period: _PeakPeriod
+
+    @property
+    def spectral_peak_period(self) -> float:
+        """Period of the spectrum's peak [s]."""
+        return self.peak_period
+
+    def _form(self) -> dict[str, Any]:
+        return {"peak_period": self.peak_period}
+
+
+class _SeaOfLimitedFetch(_SeaByPeak):
+    """A growing sea, whose peak is enhanced."""
+
+    gamma: _Gamma = 3.3
+
+    def _form(self) -> dict[str, Any]:
+        gamma = self.gamma
+        if gamma == "auto":
+            gamma = jonswap_gamma(self.peak_period, self.significant_height)
+        return {**super()._form(), "gamma": gamma}
+
+
+class JonswapSea(_SeaOfLimitedFetch):
+    """A sea of limited fetch in deep water."""
+
+    spectrum: Literal["jonswap"]
+    """`jonswap`: a growing sea of limited fetch."""
+
+
+class TmaSea(_SeaOfLimitedFetch):
+    """A sea of limited fetch in shallow water."""
+
+    spectrum: Literal["tma"]
+    """`tma`: the JONSWAP sea in shallow water."""
+    depth: Annotated[float, Quantity("length", 0.0, 12e3, open_low=True)]
+    """Water depth, for `tma` only."""
+
+    takes = "peak_period and depth"
+
+    def _form(self) -> dict[str, Any]:
+        return {**super()._form(), "depth": self.depth}
+
+
+class TorsethaugenSea(_SeaByPeak):
+    """A wind sea and a swell together."""
+
+    spectrum: Literal["torsethaugen"]
+    """`torsethaugen`: a wind sea and a swell, as in the northern North Sea."""
+
+
+class OchiHubbleSea(_SeaByPeak):
+    """A sea of one Ochi-Hubble hump."""
+
+    spectrum: Literal["ochi-hubble"]
+    """`ochi-hubble`: one hump of adjustable width."""
+    order: Annotated[float, Quantity("ratio", 0.5, 20.0)] = 2.0
+    """Shape parameter of `ochi-hubble`; 1 gives `bretschneider`. The other spectra do not use
+    it."""
+
+    def _form(self) -> dict[str, Any]:
+        return {**super()._form(), "order": self.order}
+
+
+class GaussianSwell(_SeaByPeak):
+    """A swell whose energy is normally distributed over frequency."""
+
+    spectrum: Literal["gaussian-swell"]
+    """`gaussian-swell`: a swell from far away."""
+    width: Annotated[float, Quantity("frequency", 0.0, 10.0, open_low=True)]
+    """Standard deviation of the frequency of `gaussian-swell`, 1/200 to 1/6 of the peak's."""
+
+    takes = "peak_period and width"
+
+    @model_validator(mode="after")
+    def _check(self) -> GaussianSwell:
+        low, high = gaussian_widths(2.0 * math.pi / self.peak_period)
+        if not low <= self.width <= high:
+            text = f"must be {range_text(low, high, 'rad/s')}, got {self.width!r}"
+            raise problems(("width", text))
+        return self
+
+    def _form(self) -> dict[str, Any]:
+        return {**super()._form(), "width": self.width}
+
+
+class _SeaByWind(SeaSection):
+    """A sea of given height and period, or fully arisen in a given wind."""
+
+    wind_speed: (
+        Annotated[
+            float, Quantity("speed", 0.0, 100.0, open_low=True), AfterValidator(_on_the_table)
+        ]
+        | None
+    ) = None
+    """Wind of a fully arisen sea, 18 to 24.5 knots (1975 thesis, Table 3), instead of a height
+    and a period, for `bretschneider-1975`, `bretschneider` and `pierson-moskowitz`."""
+    significant_height: _Height = Field(
+        default_factory=lambda data: fully_arisen(data["wind_speed"])[0]
+    )
+
+    _period: ClassVar[str] = ""
+    """Field of the period, if the kind has one."""
+
+    @classmethod
+    def _needs(cls, data: Mapping[str, Any]) -> tuple[str, ...]:
+        if data.get("wind_speed") is not None:
+            return ()
+        return (cls._period, "significant_height") if cls._period else ("significant_height",)
+
+    @model_validator(mode="after")
+    def _check(self) -> _SeaByWind:
+        if self.wind_speed is not None and self._period in self.model_fields_set:
+            text = "is not for a sea by its wind_speed, which gives the period"
+            raise problems((self._period, text))
+        return self
+
+
+class Bretschneider1975Sea(_SeaByWind):
+    """A sea in the variables of the 1975 thesis."""
+
+    spectrum: Literal["bretschneider-1975"]
+    """`bretschneider-1975`: Bretschneider's in the variables of the 1975 thesis."""
+    significant_period: Annotated[float, Quantity("time", 0.0, 60.0, open_low=True)] = Field(
+        default_factory=lambda data: fully_arisen(data["wind_speed"])[1]
+    )
+    """Significant period T_S, for `bretschneider-1975` only (T_mean = 0.9 T_S)."""
+
+    takes = _period = "significant_period"
+
+    def _form(self) -> dict[str, Any]:
+        return {"significant_period": self.significant_period}
+
+
+class BretschneiderSea(_SeaByWind):
+    """A sea of two parameters."""
+
+    spectrum: Literal["bretschneider"]
+    """`bretschneider`: two parameters, for seas of unknown history."""
+    peak_period: _PeakPeriod = Field(
+        default_factory=lambda data: _PEAK_OF_SIGNIFICANT * fully_arisen(data["wind_speed"])[1]
+    )
+
+    _period = "peak_period"
+
+    def _form(self) -> dict[str, Any]:
+        return {"peak_period": self.peak_period}
+
+
+class PiersonMoskowitzSea(_SeaByWind):
+    """A fully developed sea, whose period follows from its height."""
+
+    spectrum: Literal["pierson-moskowitz"]
+    """`pierson-moskowitz`: fully developed."""
+
+    takes = "no period"
+
+    def _form(self) -> dict[str, Any]:
+        # Another height than the wind's scales the sea of that wind.
+        return {"shape_height": self.wind_speed and fully_arisen(self.wind_speed)[0]}
+
+
+class _SeaOfData(SeaSection):
+    """A sea whose height and peak follow from what it is made of."""
+
+    @model_validator(mode="after")
+    def _check(self) -> _SeaOfData:
+        found = self._faults()
+        if not found and self.significant_height > _HIGHEST:
+            text = f"must be in (0, 30] m, got {self.significant_height:.4g} from the data"
+            found = [("significant_height", text)]
+        if found:
+            raise problems(*found)
+        return self
+
+    def _faults(self) -> list[tuple[str, str]]:
+        raise NotImplementedError
+
+
+def _height_of_rows(data: dict[str, Any]) -> float:
+    if (data["table"] is None) == (data["file"] is None):
+        return math.nan  # the section's own check tells
+    return 4.0 * math.sqrt(_rows(**{name: data[name] for name in _ROWS}).variance)
+
+
+class MeasuredSea(_SeaOfData):
+    """A measured spectrum: a table, or a record of a file."""
+
+    spectrum: Literal["measured"]
+    """`measured`: a table or a record of a file."""
+    table: SeaTable | None = None
+    """Table of a `measured` spectrum, or give `file`."""
+    file: (
+        Annotated[str, DataFile(what="a file of wave spectra"), AfterValidator(_readable)] | None
+    ) = None
+    """File of a `measured` spectrum (NDBC, Spotter, SWAN, WAVEWATCH III, ERA5 and more),
+    relative to the case file; `stillhook sea FILE` shows its records."""
+    record: Annotated[int, Quantity("count", 0, 10_000_000)] | None = None
+    """Which record of `file`, counted from 0 in order of time; by default 0."""
+    beyond: Literal["decay", "zero"] | None = None
+    """What a `measured` spectrum is above its last row: `decay` falls as 1/omega^5, `zero` is 0.
+    Default decay."""
+    significant_height: _Height = Field(default_factory=_height_of_rows)
+
+    takes = "a table or a file"
+
+    @field_validator("record")
+    @classmethod
+    def _in_the_file(cls, record: int, info: ValidationInfo) -> int:
+        from .records import read_seas
+
+        file = info.data.get("file", "")
+        if file is None:
+            raise custom_error("is for a file of spectra, and none is given")
+        if file:
             try:
-                height, period = fully_arisen(self.wind_speed)
+                read_seas(file).sea(record)
             except InputError as error:
-                return [("wind_speed", str(error))]
-            values["significant_height"] = asked or height
-            if self.spectrum == "bretschneider-1975":
-                values["significant_period"] = period
-            elif self.spectrum == "bretschneider":
-                values["peak_period"] = _PEAK_OF_SIGNIFICANT * period
-            else:
-                values["peak_period"] = fully_developed_period(height)
-        elif self.spectrum == "pierson-moskowitz":
-            values["peak_period"] = fully_developed_period(self.significant_height)
-        # The fields are set past pydantic's lock: from here on the section is as good as frozen.
-        derived = frozenset(values) - ({"significant_height"} if asked else set())
-        self.__dict__.update(values)
-        self._derived = derived
-        if self.spectrum not in ("measured", "sum", "gaussian-swell"):
-            return []  # the fields' own ranges are all there is to check
-        try:
-            spectrum = self.to_spectrum()
-        except InputError as error:
-            return [self._blame(str(error))]
-        if self.spectrum in ("measured", "sum"):
-            self.__dict__["significant_height"] = spectrum.significant_height
-            self.__dict__["peak_period"] = 2.0 * math.pi / spectrum.peak_frequency
-            derived = frozenset({"peak_period"} if asked else {"peak_period", "significant_height"})
-            if spectrum.significant_height > 30.0:
-                text = f"must be in (0, 30] m, got {spectrum.significant_height:.4g} from the data"
-                return [("significant_height", text)]
-            self._derived = derived
-        return []
+                raise custom_error(str(error)) from None
+        return record
 
-    def _blame(self, message: str) -> tuple[str, str]:
-        """Return the field that an error of the spectrum is about, and its sentence."""
-        text = message.removeprefix("sea: ")
-        if self.spectrum == "measured":
-            if self.file is not None:
-                return "record" if text.startswith("record ") else "file", text
-            text = text.removeprefix("measured spectrum: ")
-            name, _, rest = text.partition(" ")
-            return (f"table.{name}", rest) if name in ("omega", "density") else ("table", text)
-        name, _, rest = text.partition(" ")
-        return (
-            (name, rest) if name in type(self).model_fields and name != "spectrum" else ("", text)
-        )
+    def _faults(self) -> list[tuple[str, str]]:
+        if (self.table is None) != (self.file is None):
+            return []
+        text = "is missing: the measured spectrum needs a table or a file"
+        return [("table", text if self.table is None else "must be left out, or file")]
+
+    def _form(self) -> dict[str, Any]:
+        return {"table": _rows(**{name: getattr(self, name) for name in _ROWS})}
+
+    def _files(self) -> tuple[str, ...]:
+        return () if self.file is None else (self.file,)
 
 
-class Sea(SeaPart):
-    """The sea state."""
+def _no_sum(part: Any) -> Any:
+    if isinstance(part, Mapping):
+        if part.get("spectrum") == "sum":
+            raise problems(("spectrum", "must not be a sum itself"))
+        if part.get("spreading") is not None:
+            raise problems(("spreading", "is for the sea as a whole, not for one of its parts"))
+    return part
 
-    parts: tuple[SeaPart, ...] | None = None
+
+SeaPart = Annotated[
+    Bretschneider1975Sea
+    | BretschneiderSea
+    | JonswapSea
+    | TorsethaugenSea
+    | OchiHubbleSea
+    | PiersonMoskowitzSea
+    | TmaSea
+    | GaussianSwell
+    | MeasuredSea,
+    Field(discriminator="spectrum"),
+    BeforeValidator(_no_sum),
+]
+"""A sea that is no sum: what stands under `parts`."""
+
+
+class SumSea(_SeaOfData):
+    """Several seas that run at the same time: their variances add up."""
+
+    spectrum: Literal["sum"]
+    """`sum`: the sum of `parts`."""
+    parts: tuple[SeaPart, ...]
     """The seas of `sum`, such as a wind sea and a swell: each with a `spectrum` and its fields."""
-    spreading: SeaSpreading | None = None
-    """Spreading of the energy over headings; without it the sea is long-crested."""
+    significant_height: _Height = Field(
+        default_factory=lambda data: math.hypot(*(p.significant_height for p in data["parts"]))
+    )
 
-    def _misplaced(self) -> list[tuple[str, str]]:
-        found = super()._misplaced()
-        if self.spectrum == "sum":
-            if self.parts is None:
-                found.append(("parts", "is missing: the sum spectrum needs it"))
-            elif not 1 <= len(self.parts) <= _MOST_PARTS:
-                text = f"must have 1 to {_MOST_PARTS} seas, got {len(self.parts)}"
-                found.append(("parts", text))
-        elif self.parts is not None:
-            found.append(("parts", f"is not for the {self.spectrum} spectrum, but for sum"))
+    takes = "parts"
+
+    def _faults(self) -> list[tuple[str, str]]:
+        if not 1 <= len(self.parts) <= _MOST_PARTS:
+            return [("parts", f"must have 1 to {_MOST_PARTS} seas, got {len(self.parts)}")]
+        found = []
+        for index, part in enumerate(self.parts):
+            try:
+                part.to_spectrum()
+            except InputError as error:  # a form that is not defined for its values
+                found.append((f"parts.{index}", str(error)))
         return found
 
+    def _form(self) -> dict[str, Any]:
+        return {"parts": tuple(part.to_spectrum() for part in self.parts)}
 
-def _stamps(section: SeaPart) -> tuple[tuple[int, int], ...]:
-    """Return time and size of the section's files: a file may change under its name."""
-    parts: tuple[SeaPart, ...] = getattr(section, "parts", None) or ()
-    found = []
-    for file in (section.file, *(part.file for part in parts)):
-        if file is not None:
-            try:
-                about = Path(file).stat()
-            except OSError:
-                continue  # whoever reads it will say so
-            found.append((about.st_mtime_ns, about.st_size))
-    return tuple(found)
+    def _files(self) -> tuple[str, ...]:
+        return tuple(file for part in self.parts for file in part._files())
+
+
+Sea = Annotated[
+    Bretschneider1975Sea
+    | BretschneiderSea
+    | JonswapSea
+    | TorsethaugenSea
+    | OchiHubbleSea
+    | PiersonMoskowitzSea
+    | TmaSea
+    | GaussianSwell
+    | MeasuredSea
+    | SumSea,
+    Field(discriminator="spectrum"),
+]
+"""The sea state: a section of the kind that its `spectrum` names."""
+
+KINDS_OF_SEA: tuple[type[SeaSection], ...] = get_args(get_args(Sea)[0])
+
+_ROWS = ("table", "file", "record", "beyond")
+
+
+def _rows(
+    table: SeaTable | None, file: str | None, record: int | None, beyond: str | None
+) -> SpectrumTable:
+    """Return the table of a measured sea."""
+    if table is not None:
+        return SpectrumTable(omega=table.omega, density=table.density, beyond=beyond or "decay")
+    from .records import read_seas
+
+    found = read_seas(file or "").sea(record or 0, beyond=beyond or "decay").table
+    assert found is not None
+    return found
+
+
+def _stamp(file: str) -> tuple[int, int]:
+    """Return time and size of a file, which may change under its name."""
+    try:
+        about = Path(file).stat()
+    except OSError:
+        return (0, 0)  # whoever reads it will say so
+    return about.st_mtime_ns, about.st_size
 
 
 @lru_cache(maxsize=64)
-def _spectrum(section: SeaPart, stamps: tuple[tuple[int, int], ...]) -> SeaSpectrum:
+def _spectrum(section: SeaSection, stamps: tuple[tuple[int, int], ...]) -> SeaSpectrum:
     del stamps  # a part of the cache's key only
     # Here, so that reading a case does not load scipy.
     from .sea import SeaSpectrum
     from .spreading import Spreading
 
-    spread = getattr(section, "spreading", None)
-    spreading = None if spread is None else Spreading(kind=spread.kind, exponent=spread.exponent)
-    height = section.significant_height
-    if section.spectrum == "sum":
-        parts: tuple[SeaPart, ...] = getattr(section, "parts", None) or ()
-        return SeaSpectrum(
-            kind="sum",
-            significant_height=height,
-            parts=tuple(part.to_spectrum() for part in parts),
-            spreading=spreading,
-        )
-    if section.spectrum == "measured":
-        beyond = section.beyond or "decay"
-        if section.table is None:
-            from .records import read_seas
-
-            sea = read_seas(section.file or "").sea(section.record or 0, beyond=beyond)
-            table = sea.table
-        else:
-            from .table import SpectrumTable
-
-            table = SpectrumTable(
-                omega=section.table.omega, density=section.table.density, beyond=beyond
-            )
-        return SeaSpectrum(
-            kind="measured", significant_height=height, table=table, spreading=spreading
-        )
-    kind, gamma, shape_height = section.spectrum, section.gamma, None
-    if kind == "pierson-moskowitz":
-        shape_height = _height_of_period(section.peak_period or math.nan)
-    if gamma == "auto":
-        gamma = jonswap_gamma(section.spectral_peak_period, height)
+    law = section.spreading
     return SeaSpectrum(
-        kind=kind,
-        significant_height=height,
-        peak_period=None if kind == "pierson-moskowitz" else section.peak_period,
-        significant_period=section.significant_period,
-        gamma=gamma,
-        order=section.order,
-        depth=section.depth,
-        width=section.width,
-        shape_height=shape_height,
-        spreading=spreading,
+        kind=section.spectrum,
+        significant_height=section.significant_height,
+        spreading=None if law is None else Spreading(kind=law.kind, exponent=law.exponent),
+        **section._form(),
     )
-
-
-def _height_of_period(period: float) -> float:
-    """Return the H_s whose fully developed sea has this peak period [m]."""
-    return (period / fully_developed_period(1.0)) ** 2

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..basics import FloatArray, InputError, check_ascending, check_finite
+from ..basics import FloatArray, InputError, ascending_fault, check_finite
 
 BEYOND = ("decay", "zero")
 """What a measured spectrum may be above its last row: falling with omega^-5, or zero."""
@@ -58,15 +58,12 @@ class SpectrumTable:
     def __post_init__(self) -> None:
         """Check the table and hold it as tuples of floats."""
         owner = "measured spectrum"
-        omega = check_ascending(owner, "omega", _flat(owner, "omega", self.omega))
-        density = check_finite(owner, "density", _flat(owner, "density", self.density))
+        omega = _flat(owner, "omega", self.omega)
+        density = _flat(owner, "density", self.density)
         if not 3 <= omega.size <= MOST_ROWS:
             raise InputError(f"{owner}: must have 3 to {MOST_ROWS} rows, got {omega.size}")
-        if density.size != omega.size:
-            raise InputError(
-                f"{owner}: density must have as many rows as omega ({omega.size}), "
-                f"got {density.size}"
-            )
+        for name, fault in row_faults(omega, density):
+            raise InputError(f"{owner}: {f'{name} {fault}'.lstrip()}")
         if omega[0] < 0.0 or omega[-1] > _TAIL_END:
             wrong = omega[0] if omega[0] < 0.0 else omega[-1]
             raise InputError(f"{owner}: omega must be in [0, {_TAIL_END:g}] rad/s, got {wrong:g}")
@@ -81,8 +78,6 @@ class SpectrumTable:
             )
         object.__setattr__(self, "omega", tuple(omega.tolist()))
         object.__setattr__(self, "density", tuple(density.tolist()))
-        if not self.variance > 0.0 or not math.isfinite(self.variance):
-            raise InputError(f"{owner}: must hold some energy, got a variance of {self.variance:g}")
 
     def __call__(self, omega: FloatArray) -> FloatArray:
         """Return the density at frequencies of any shape [m^2 s/rad]."""
@@ -131,6 +126,26 @@ class SpectrumTable:
             return 0.0
         last = self.omega[-1]
         return 0.25 * self.density[-1] * last * (1.0 - (last / _TAIL_END) ** 4)
+
+
+def row_faults(omega: FloatArray, density: FloatArray) -> list[tuple[str, str]]:
+    """Return what is wrong with the rows of a table, as pairs of a column, or none, and a sentence.
+
+    Parameters
+    ----------
+    omega, density
+        Frequencies [rad/s] and densities [m^2 s/rad], finite numbers each.
+    """
+    fault = ascending_fault(omega)
+    if fault:
+        return [("omega", fault)]
+    if density.size != omega.size:
+        text = f"must have as many rows as omega ({omega.size}), got {density.size}"
+        return [("density", text)]
+    variance = float(np.trapezoid(density, omega))
+    if not 0.0 < variance < math.inf:
+        return [("", f"must hold some energy, got a variance of {variance:g}")]
+    return []
 
 
 def _flat(owner: str, name: str, values: Sequence[float]) -> FloatArray:

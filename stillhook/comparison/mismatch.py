@@ -117,7 +117,8 @@ def _paths(name: str, case: Case) -> tuple[str, ...]:
     if name == "sea":
         return ("sea.significant_height",)
     if name == "period":
-        return ("sea.peak_period" if sea.significant_period is None else "sea.significant_period",)
+        own = sea.spectrum == "bretschneider-1975"
+        return ("sea.significant_period" if own else "sea.peak_period",)
     if name == "spectrum":
         return ("sea",)
     if "." not in name:
@@ -153,7 +154,7 @@ def _value(name: str, path: str, value: object, case: Case) -> object:
     if size.endswith("%"):
         return now * (1.0 + sign * 0.01 * _number(name, size[:-1], value))
     try:
-        return now + sign * float(parse_quantity(size, _kind_of(path)))
+        return now + sign * float(parse_quantity(size, _kind_of(path, case)))
     except InputError as error:
         raise InputError(f"{_OWNER} {name}: {error}") from None
 
@@ -173,28 +174,18 @@ def _present(path: str, case: Case) -> float:
     return float(found)
 
 
-def _kind_of(path: str) -> str:
+def _kind_of(path: str, case: Case) -> str:
     """Return the kind of quantity that a path holds, as `models.basics.units` names it."""
     from models.casefile import Quantity
 
-    section: Any = Case
+    section: Any = case
     *parents, last = path.split(".")
     for part in parents:
-        section = _section(section.model_fields[part].annotation)
-    for item in _flat(section.model_fields[last]):
+        section = getattr(section, part)
+    for item in _flat(type(section).model_fields[last]):
         if isinstance(item, Quantity):
             return item.kind
     return "number"
-
-
-def _section(annotation: Any) -> Any:
-    """Return the section that an annotation holds, without None and alternatives."""
-    from typing import get_args
-
-    if hasattr(annotation, "model_fields"):
-        return annotation
-    inner = (_section(part) for part in get_args(annotation))
-    return next((part for part in inner if part is not None), None)
 
 
 def _flat(field: Any) -> list[Any]:

@@ -98,9 +98,11 @@ class LimitRow:
 def sea_text(design: GainDesign) -> str:
     """Return the sea that the figures hold for."""
     sea = design.case.sea
-    period = "T_p" if sea.significant_period is None else "T_S"
-    value = sea.peak_period if sea.significant_period is None else sea.significant_period
-    text = f"H_s {quantity(design.significant_height, 'm')}, {period} {quantity(value or 0.0, 's')}"
+    if sea.spectrum == "bretschneider-1975":
+        period = f"T_S {quantity(sea.significant_period, 's')}"
+    else:
+        period = f"T_p {quantity(sea.spectral_peak_period, 's')}"
+    text = f"H_s {quantity(design.significant_height, 'm')}, {period}"
     if not design.feasible:
         text += f" (asked for: H_s {quantity(sea.significant_height, 'm')})"
     return f"{text}, {sea.spectrum}"

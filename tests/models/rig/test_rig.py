@@ -20,7 +20,7 @@ from models.rig.tables import (
     DRUM_LAYERS,
     prism_added_mass,
 )
-from models.sea import Sea
+from models.sea.sea_section import Bretschneider1975Sea, JonswapSea
 from models.vessel import HeaveRAO
 
 ROPE = {"diameter": "44 mm", "mass_per_length": 8.1, "length": 2000}
@@ -351,7 +351,9 @@ class TestWinch:
 
 class TestOtherSections:
     def test_thesis_peak_period_is_where_its_spectrum_peaks(self):
-        sea = Sea(spectrum="bretschneider-1975", significant_height=2.43, significant_period=8.1)
+        sea = Bretschneider1975Sea(
+            spectrum="bretschneider-1975", significant_height=2.43, significant_period=8.1
+        )
         mean_period = 0.9 * 8.1
         nu = np.linspace(0.5, 1.5, 200001)
         spectrum = nu**-5 * np.exp(-0.675 * nu**-4)
@@ -360,10 +362,10 @@ class TestOtherSections:
         )
 
     def test_steepness(self):
-        sea = Sea(spectrum="jonswap", significant_height=4, peak_period=8)
+        sea = JonswapSea(spectrum="jonswap", significant_height=4, peak_period=8)
         assert sea.steepness == pytest.approx(4 / (9.80665 * 64 / (2 * math.pi)))
         assert sea.breaking_steepness == pytest.approx(1 / 15)
-        longer = Sea(spectrum="jonswap", significant_height=4, peak_period=15)
+        longer = JonswapSea(spectrum="jonswap", significant_height=4, peak_period=15)
         assert longer.breaking_steepness == pytest.approx(1 / 25)
 
     def test_rao_takes_mixed_units(self):

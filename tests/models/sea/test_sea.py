@@ -19,7 +19,7 @@ from models import load_case
 from models.basics import InputError, spectral_nodes
 from models.hook import HookMotion
 from models.sea import SeaSpectrum
-from models.sea.kinds import SPECTRA
+from models.sea.sea import SPECTRA
 from models.vessel import HeaveRao
 
 # 1975 thesis, Table 3: the design sea has H_S = 8.0 ft; App. B: T_S = 8.1 s.
