@@ -12,7 +12,7 @@ from typing import Any
 
 from models.basics import PhysicsWarning, StillhookError
 
-from ..controllers import Contender, Law, design_law
+from ..controllers import Contender, StoredDesign, design_law
 from .cell import Question
 from .floor import prepare
 
@@ -41,7 +41,7 @@ class Task:
     name: str
     height: float
     seed: int = -1
-    law: Law | None = field(default=None, compare=False)
+    law: StoredDesign | None = field(default=None, compare=False)
     moment: float = 0.0
 
     @property
@@ -79,7 +79,7 @@ class Bench:
         self._prepared: Any = None
 
     def do(self, task: Task, progress: Any = None) -> Any:
-        """Return the answer to a task: a `Law`, a `Cell`, a `Trace`, or `Refused`."""
+        """Return the answer to a task: a `StoredDesign`, a `Cell`, a `Trace`, or `Refused`."""
         with warnings.catch_warnings():  # told once, where the case was read
             warnings.simplefilter("ignore", PhysicsWarning)
             try:

@@ -1,6 +1,6 @@
 """One run of a comparison: a contender in a sea with a seed, and what there is to keep of it.
 
-    Question, Contender, H_s, Law --> Prepared --> run(seed) --> Cell (plain data)
+    Question, Contender, H_s, StoredDesign --> Prepared --> run(seed) --> Cell (plain data)
 
 Common random numbers: every contender meets the same motion of the hook, to the last bit at the
 nodes that it is drawn at, growing out of rest in the same way, and is judged over the same time.
@@ -25,7 +25,7 @@ from models.run import ERROR, Run
 from models.sensing import holds_brake
 from models.simulation import EASE, Progress, SimulationOptions
 
-from ..controllers import Contender, Law
+from ..controllers import Contender, StoredDesign
 from ..runs import TRIPS, Series, controller_of
 from .mismatch import Mismatch
 
@@ -196,7 +196,7 @@ class Prepared:
     """
 
     def __init__(
-        self, question: Question, contender: Contender, height: float, law: Law | None
+        self, question: Question, contender: Contender, height: float, law: StoredDesign | None
     ) -> None:
         if contender.make is None:
             raise InputError("the floor is no controller")

@@ -23,7 +23,7 @@ import numpy as np
 from models.basics import Interval, mean_interval
 from models.case import Case
 
-from ..controllers import Contender, Law
+from ..controllers import Contender, StoredDesign
 from .cell import Cell, Question, Trace
 
 COLUMNS: Mapping[str, str] = {
@@ -110,7 +110,7 @@ class Comparison:
     question: Question
     cells: tuple[Cell, ...]
     refused: Mapping[tuple[str, float], str] = field(default_factory=dict)
-    laws: Mapping[tuple[str, float], Law] = field(default_factory=dict)
+    laws: Mapping[tuple[str, float], StoredDesign] = field(default_factory=dict)
     traces: tuple[Trace, ...] = ()
     complete: bool = True
     seconds: float = math.nan

@@ -16,7 +16,7 @@ from models.basics import FloatArray, InputError, StillhookError
 from models.operation import SpectrumMotion
 from models.simulation import EASE, Progress
 
-from ..controllers import Contender, Law
+from ..controllers import Contender, StoredDesign
 from .cell import WINDOW, Cell, CommonSea, Prepared, Question, Trace
 
 _SAMPLE = 0.05  # of the demand, which may bend in any way from one to the next [s]
@@ -78,7 +78,7 @@ class Floor:
 
 
 def prepare(
-    question: Question, contender: Contender, height: float, law: Law | None
+    question: Question, contender: Contender, height: float, law: StoredDesign | None
 ) -> Prepared | Floor:
     """Return a contender in one sea, ready to run.
 

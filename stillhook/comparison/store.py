@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ..controllers import Contender, Law
+from ..controllers import Contender, StoredDesign
 from ..keeper import Journal, versions
 from .bench import Bench
 from .cell import Cell, Question
@@ -50,22 +50,24 @@ class Store:
 
     def __init__(self, path: Path, question: Question) -> None:
         self._cells: dict[tuple[str, str, float, int], Cell] = {}
-        self._laws: dict[tuple[str, float], Law] = {}
+        self._laws: dict[tuple[str, float], StoredDesign] = {}
         self.journal = Journal(path, "comparison", question_of(question), self._take)
 
-    def cell(self, contender: Contender, law: Law | None, height: float, seed: int) -> Cell | None:
+    def cell(
+        self, contender: Contender, law: StoredDesign | None, height: float, seed: int
+    ) -> Cell | None:
         """Return the result of a run, if there is one of this very contender."""
         return self._cells.get((contender.name, _identity(contender, law), height, seed))
 
-    def law(self, needs: str, height: float) -> Law | None:
+    def law(self, needs: str, height: float) -> StoredDesign | None:
         """Return a design, if there is one."""
         return self._laws.get((needs, height))
 
-    def add_cell(self, contender: Contender, law: Law | None, cell: Cell) -> None:
+    def add_cell(self, contender: Contender, law: StoredDesign | None, cell: Cell) -> None:
         """Keep the result of a run."""
         self.journal.add(["run", _identity(contender, law)], cell.to_dict())
 
-    def add_law(self, needs: str, height: float, law: Law) -> None:
+    def add_law(self, needs: str, height: float, law: StoredDesign) -> None:
         """Keep a design."""
         self.journal.add(["design", needs, height], law.to_dict())
 
@@ -75,9 +77,9 @@ class Store:
             cell = Cell(**values)
             self._cells[cell.contender, rest[0], cell.height, cell.seed] = cell
         else:
-            self._laws[rest[0], float(rest[1])] = Law(**values)
+            self._laws[rest[0], float(rest[1])] = StoredDesign(**values)
 
 
-def _identity(contender: Contender, law: Law | None) -> str:
+def _identity(contender: Contender, law: StoredDesign | None) -> str:
     """Return what a result hangs on besides the question: the contender and its law."""
     return f"{contender.identity}.{'' if law is None else law.digest}"

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ..controllers import Contender, Law
+from ..controllers import Contender, StoredDesign
 from ..keeper import POLL, Died, Processes
 from .bench import Bench, Refused, Setup, Task
 from .cell import Cell, Question, Trace
@@ -42,7 +42,7 @@ class Work:
     seeds: tuple[int, ...]
     store: Store | None
     progress: Progress
-    laws: dict[tuple[str, float], Law] = field(default_factory=dict)
+    laws: dict[tuple[str, float], StoredDesign] = field(default_factory=dict)
     refused: dict[tuple[str, float], str] = field(default_factory=dict)
     cells: dict[tuple[str, float, int], Cell] = field(default_factory=dict)
     traces: tuple[Trace, ...] = ()
@@ -188,10 +188,10 @@ class Work:
             self.refused[task.group] = self.no_design[at]
         return at not in self.laws
 
-    def _law(self, task: Task) -> Law | None:
+    def _law(self, task: Task) -> StoredDesign | None:
         return self._law_of(self._names[task.name], task.height)
 
-    def _law_of(self, contender: Contender, height: float) -> Law | None:
+    def _law_of(self, contender: Contender, height: float) -> StoredDesign | None:
         return self.laws.get((contender.needs, self.question.design_height(height)))
 
     def _portable(self, task: Task) -> bool:
@@ -227,7 +227,7 @@ class Work:
                 self.refused[task.group] = answer.reason
             else:
                 self.cells[key] = _without(task, "failed", answer.reason)
-        elif isinstance(answer, Law):
+        elif isinstance(answer, StoredDesign):
             self.laws[task.group] = answer
             if self.store is not None:
                 self.store.add_law(task.name, task.height, answer)

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from .controllers import PREDICTIVE as PREDICTIVE
     from .controllers import controller_by_name as controller_by_name
     from .controllers import known_controllers as known_controllers
-    from .law import Law as Law
-    from .law import design_law as design_law
     from .makers import given as given
+    from .stored_design import StoredDesign as StoredDesign
+    from .stored_design import design_law as design_law
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

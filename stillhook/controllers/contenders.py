@@ -4,7 +4,7 @@
 
 A contender is a recipe, not a controller: it goes to another process and makes the controller
 there, for the case at hand.  What takes long to find, a design, is found once and handed to it as
-a `Law`.
+a `StoredDesign`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from models.case import Case
 from models.sensing import Controller
 from synth.design import GainDesign, StructureDesign, Tuning
 
-from .law import Law
 from .makers import (
     PROTOCOL,
     as_it_is,
@@ -35,8 +34,9 @@ from .makers import (
     nonlinear_mpc,
     thesis,
 )
+from .stored_design import StoredDesign
 
-Make = Callable[[Case, Law | None], Controller]
+Make = Callable[[Case, StoredDesign | None], Controller]
 
 GROUPS = ("brake", "linear", "predictive", "own", "reference", "floor")
 """What contenders are: brake, linear laws, causal prediction, the user's own, those that know
@@ -291,7 +291,7 @@ def _contender(wanted: object) -> Contender:
 
 
 def _of_design(name: str | None, design: GainDesign | StructureDesign | Tuning) -> Contender:
-    law = Law.of(design)
+    law = StoredDesign.of(design)
     usual = design.structure if isinstance(design, StructureDesign) else "design"
     own = name or usual
     return Contender(

@@ -1,6 +1,6 @@
 """How contenders become controllers: one function each, of the case and of its law.
 
-    case, Law --> named, thesis, linear, linear_mpc, ... --> controller
+    case, StoredDesign --> named, thesis, linear, linear_mpc, ... --> controller
 
 Functions of a module, so that a contender can be sent to another process.  The controllers that
 predict are imported when they are made, and not before.
@@ -16,19 +16,19 @@ from models.case import Case
 from models.sensing import Controller
 from synth.controllers import LinearFeedback, controller_named
 
-from .law import EAGER, Law
+from .stored_design import EAGER, StoredDesign
 
 PROTOCOL = ("name", "sample_time", "reset", "step")
 """What a controller has."""
 
 
-def named(name: str, case: Case, law: Law | None) -> Controller:
+def named(name: str, case: Case, law: StoredDesign | None) -> Controller:
     """Return a controller of `synth.controllers.controllers` by its name."""
     del law
     return controller_named(name, case)
 
 
-def thesis(case: Case, law: Law | None) -> Controller:
+def thesis(case: Case, law: StoredDesign | None) -> Controller:
     """Return the feedback with the gains that the case has in use."""
     del law
     if case.gains is None:
@@ -37,7 +37,7 @@ def thesis(case: Case, law: Law | None) -> Controller:
     return LinearFeedback(case, gains, name="thesis")
 
 
-def linear(name: str, anti_windup: bool, case: Case, law: Law | None) -> Controller:
+def linear(name: str, anti_windup: bool, case: Case, law: StoredDesign | None) -> Controller:
     """Return the feedback of a law."""
     if law is None or not law.found:
         raise InputError("no design was found" if law is None else law.status)
@@ -48,14 +48,14 @@ def linear(name: str, anti_windup: bool, case: Case, law: Law | None) -> Control
     return made
 
 
-def given(name: str, fixed: Law, case: Case, law: Law | None) -> Controller:
+def given(name: str, fixed: StoredDesign, case: Case, law: StoredDesign | None) -> Controller:
     """Return the feedback of a law that was given once and for all."""
     del law
     return linear(name, True, case, fixed)
 
 
 def linear_mpc(
-    predictor: Literal["kalman", "ar", "preview"], case: Case, law: Law | None
+    predictor: Literal["kalman", "ar", "preview"], case: Case, law: StoredDesign | None
 ) -> Controller:
     """Return the linear MPC with a predictor."""
     del law
@@ -64,7 +64,7 @@ def linear_mpc(
     return LinearMPC(case, predictor=predictor)
 
 
-def nonlinear_mpc(case: Case, law: Law | None) -> Controller:
+def nonlinear_mpc(case: Case, law: StoredDesign | None) -> Controller:
     """Return the nonlinear MPC."""
     del law
     from mpc.nonlinear import NonlinearMPC
@@ -72,14 +72,14 @@ def nonlinear_mpc(case: Case, law: Law | None) -> Controller:
     return NonlinearMPC(case)
 
 
-def as_it_is(controller: Controller, case: Case, law: Law | None) -> Controller:
+def as_it_is(controller: Controller, case: Case, law: StoredDesign | None) -> Controller:
     """Return a controller that was given."""
     del case, law
     return controller
 
 
 def from_factory(
-    name: str, factory: Callable[[Case], Any], case: Case, law: Law | None
+    name: str, factory: Callable[[Case], Any], case: Case, law: StoredDesign | None
 ) -> Controller:
     """Return what a function of the case returns."""
     del law

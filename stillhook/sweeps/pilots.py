@@ -20,7 +20,7 @@ from models.sensing import Controller
 from synth.design import GainDesign, StructureDesign, Tuning
 
 from ..controllers import (
-    Law,
+    StoredDesign,
     contenders_of,
     controller_by_name,
     design_law,
@@ -28,7 +28,7 @@ from ..controllers import (
     known_controllers,
 )
 
-Make = Callable[[Case, Law | None], Controller]
+Make = Callable[[Case, StoredDesign | None], Controller]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,7 +57,7 @@ class Pilot:
     name: str
     kind: str
     make: Make
-    law: Law | None = None
+    law: StoredDesign | None = None
     needs: str = ""
     portable: bool = True
     identity: str = ""
@@ -135,7 +135,7 @@ def pilot_of(wanted: object) -> Pilot:
         return Pilot(name=wanted, kind="name", make=make, identity=wanted)
     own = wanted[1] if isinstance(wanted, tuple) and len(wanted) == 2 else wanted
     if isinstance(own, GainDesign | StructureDesign | Tuning):
-        law = Law.of(own)
+        law = StoredDesign.of(own)
         needs = ""
         if isinstance(own, GainDesign):
             needs = "gains"
@@ -165,25 +165,25 @@ def pilot_from(about: Mapping[str, Any]) -> Pilot:
     if about["kind"] == "name":
         return pilot_of(str(about["name"]))
     if about["kind"] == "law":
-        return _of_law(str(about["name"]), Law(**about["law"]), str(about["needs"]))
+        return _of_law(str(about["name"]), StoredDesign(**about["law"]), str(about["needs"]))
     raise InputError(
         f"its controller {about['name']} was given as Python code, which is not kept: go on with "
         "the same call of sh.sweep(..., store=...) as before"
     )
 
 
-def _of_law(name: str, law: Law, needs: str) -> Pilot:
+def _of_law(name: str, law: StoredDesign, needs: str) -> Pilot:
     if not law.found:
         raise InputError(f"{name}: the design has no stable law: {law.status}")
     make = functools.partial(_given, name)
     return Pilot(name=name, kind="law", make=make, law=law, needs=needs, identity=law.digest)
 
 
-def _named(name: str, case: Case, law: Law | None) -> Controller:
+def _named(name: str, case: Case, law: StoredDesign | None) -> Controller:
     del law
     return controller_by_name(name, case)
 
 
-def _given(name: str, case: Case, law: Law | None) -> Controller:
+def _given(name: str, case: Case, law: StoredDesign | None) -> Controller:
     assert law is not None
     return given(name, law, case, None)

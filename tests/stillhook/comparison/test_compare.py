@@ -22,7 +22,7 @@ from stillhook.comparison.cell import Cell, Prepared, Question
 from stillhook.comparison.figures import heights, worst_moment
 from stillhook.comparison.mismatch import Mismatch
 from stillhook.comparison.store import STORE
-from stillhook.controllers import CONTENDERS, DEFAULTS, Law, contenders_of
+from stillhook.controllers import CONTENDERS, DEFAULTS, StoredDesign, contenders_of
 from synth.controllers import LinearFeedback
 
 CASE = sh.load_case("thesis-1975").replace({"sea.significant_height": 0.5})
@@ -89,7 +89,7 @@ def numbers(found: Comparison) -> list[dict]:
 
 
 def test_every_contender_meets_the_same_hook_motion_whatever_its_sample_time():
-    law = Law.of(thesis_design())
+    law = StoredDesign.of(thesis_design())
     question = asked()
     shown = {}
     for name in ("none", "feed-forward", "thesis"):
@@ -333,8 +333,8 @@ def test_a_law_survives_json_to_the_last_bit():
     values |= {"C": rng.standard_normal((1, 2)).tolist(), "D": rng.standard_normal((1, 1)).tolist()}
     values["A"] = (np.array(values["A"]) - 5.0 * np.eye(2)).tolist()
     values |= {"measurements": ["payload.velocity"], "inputs": ["drive.command"]}
-    law = Law(kind="controller", values=values, ok=True)
-    again = Law(**json.loads(json.dumps(law.to_dict())))
+    law = StoredDesign(kind="controller", values=values, ok=True)
+    again = StoredDesign(**json.loads(json.dumps(law.to_dict())))
     assert again.digest == law.digest
     for name in "ABCD":
         assert np.array_equal(getattr(again.law, name), np.array(values[name]))

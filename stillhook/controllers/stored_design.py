@@ -1,6 +1,6 @@
 """The designs of a comparison: one for each sea, fair to the linear laws, as plain data.
 
-    case at one H_s --> optimise_gains, optimise_structure --> Law --> store, other processes
+    case at one H_s --> optimise_gains, optimise_structure --> StoredDesign --> store, processes
 
 A linear law can be designed to keep the drive's limits, or as if there were none: the first is
 slow in a sea that the drive could follow, the second falls off where it cannot.  In between is one
@@ -30,7 +30,7 @@ Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Law:
+class StoredDesign:
     """A linear law as plain data, exact to the last bit in JSON.
 
     Attributes
@@ -86,7 +86,7 @@ class Law:
         return asdict(self)
 
     @classmethod
-    def of(cls, design: GainDesign | StructureDesign | Tuning, drive: str = "") -> Law:
+    def of(cls, design: GainDesign | StructureDesign | Tuning, drive: str = "") -> StoredDesign:
         """Return the law of a design."""
         about: dict[str, Any] = {"ok": bool(design.ok), "drive": drive, "status": design.status}
         if isinstance(design, GainDesign):
@@ -104,7 +104,9 @@ class Law:
         return cls(kind="controller", values=values, **about)
 
 
-def design_law(needs: str, case: Case, starts: int, progress: Progress | None = None) -> Law:
+def design_law(
+    needs: str, case: Case, starts: int, progress: Progress | None = None
+) -> StoredDesign:
     """Return the law that is designed for a case.
 
     Parameters
@@ -126,14 +128,16 @@ def design_law(needs: str, case: Case, starts: int, progress: Progress | None = 
     """
     if needs.endswith(EAGER):
         free = case.replace({"limits.drive": "report"})
-        return Law.of(_design(needs.removesuffix(EAGER), free, starts, progress), "reported")
+        return StoredDesign.of(
+            _design(needs.removesuffix(EAGER), free, starts, progress), "reported"
+        )
     changes: dict[str, object] = {"limits.drive": "enforce"}
     if needs.endswith(HALF):
         needs = needs.removesuffix(HALF)
         changes["sea.significant_height"] = 0.5 * float(case.sea.significant_height)
     strict = case.replace(changes)
     design = _design(needs, strict, starts, progress)
-    law = Law.of(design, "enforced")
+    law = StoredDesign.of(design, "enforced")
     if isinstance(design, StructureDesign) and not design.drive_kept:
         # What was found ignores the limits: that is the eager one, and takes part as such.
         status = f"no law within the drive's limits: {law.status}"
