@@ -141,11 +141,6 @@ class SplashZone:
         ):
             check_range(owner, name, getattr(self, name), low=0.0, unit=unit)
 
-    @property
-    def displaced_mass(self) -> float:
-        """Mass of the water that the submerged payload displaces, rho V [kg]."""
-        return self.buoyancy / GRAVITY
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SurroundingForces:

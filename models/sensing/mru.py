@@ -35,8 +35,6 @@ from .telemetry import Interval, check_intervals, during
 
 Bias = tuple[float, float, float, float]
 
-_SETTLED = 0.01  # share of the filter's transient that is left after the settling time
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MruBlock:
@@ -127,8 +125,8 @@ class MruModel:
     A filter that begins with the run has not seen the waves before it.  With `heave_frequency`
     it begins as if they had been a sine of that frequency that fits the first sample, without
     as if the hook had come out of rest in its mean position.  Either way the rest of the
-    transient decays with exp(-w t/sqrt(2)): after `settling_time`, about one filter period, a
-    hundredth of it is left.
+    transient decays with exp(-w t/sqrt(2)): a hundredth of it is left after about one filter
+    period.
     """
 
     mru: MRU | None
@@ -160,13 +158,6 @@ class MruModel:
         if self.mru is None:
             return 0.0
         return max(self.mru.noise_floor, self.mru.noise_fraction * self.heave_rms)
-
-    @property
-    def settling_time(self) -> float:
-        """Time after which a hundredth of the filter's transient is left, and the delay [s]."""
-        corner = self._corner
-        decay = 0.0 if corner is None else -math.log(_SETTLED) * math.sqrt(2.0) / corner
-        return decay + self.delay
 
     def transfer(self, omega: npt.ArrayLike) -> ComplexArray:
         """Return reported heave over heave [-] at `omega` [rad/s], without the error."""

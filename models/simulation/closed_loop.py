@@ -27,8 +27,7 @@ import numpy as np
 from ..basics import FloatArray
 from ..plant import MOTION, Plant
 from ..sensing import Recursion, SensorModel
-from .braked_step import braked_step, disturbances
-from .integrate import StepChoice
+from .integrate import StepChoice, braked_step, disturbances
 from .rows import FLAGS
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from barge import barge, barge_case, barge_file
 from models import Case, InputError, load_case
 from models.basics import PhysicsWarning
 from models.hook import HookMotion
-from models.operation.second_bodies import boat_motion, surface_motion
+from models.operation.contact_scenarios import boat_motion, surface_motion
 from models.sea import Spreading
 from models.vessel import heave_operators, hook_rao, vessel_raos
 from models.vessel.readers import write_raos
