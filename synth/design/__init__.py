@@ -9,8 +9,11 @@ if TYPE_CHECKING:
     from .infeasible import shortfall as shortfall
     from .optimise import evaluate_gains as evaluate_gains
     from .optimise import optimise_gains as optimise_gains
+    from .structure_design import SOURCE_NAMES as SOURCE_NAMES
     from .structure_design import StructureDesign as StructureDesign
+    from .structure_search import design_of as design_of
     from .structure_search import optimise_structure as optimise_structure
+    from .structure_search import verified as verified
     from .tuning import LimitUse as LimitUse
     from .tuning import Tuning as Tuning
     from .tuning import limit_uses as limit_uses

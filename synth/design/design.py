@@ -97,11 +97,6 @@ class GainDesign:
         return 4.0 * self.payload_rms
 
     @property
-    def compensation(self) -> float:
-        """Share of the payload's motion that is taken away [%]."""
-        return 100.0 * (1.0 - self.payload_rms / self.payload_rms_before)
-
-    @property
     def compensation_db(self) -> float:
         """Payload motion before over after [dB]."""
         return float(20.0 * np.log10(self.payload_rms_before / self.payload_rms))

@@ -26,7 +26,8 @@ from .tuning import LimitUse, Tuning
 if TYPE_CHECKING:
     from ..bound import DesignBound
 
-_SOURCES = {HOOK: "the sea", "mru.error": "the reference unit"}
+#: What disturbances are called in reports; others by their own names.
+SOURCE_NAMES: Mapping[str, str] = {HOOK: "the sea", "mru.error": "the reference unit"}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -187,7 +188,7 @@ class StructureDesign:
             f"{1e3 * self.payload_rms_before:.4g} mm, hook {1e3 * self.hook_rms:.4g} mm",
         ]
         lines += [
-            f"├ from {_SOURCES.get(name, name)}: {1e3 * rms:.4g} mm"
+            f"├ from {SOURCE_NAMES.get(name, name)}: {1e3 * rms:.4g} mm"
             for name, rms in self.parts.items()
         ]
         lines += [f"├ {k} = {v:.6g} {self.units.get(k, '')}" for k, v in self.parameters.items()]

@@ -71,12 +71,12 @@ def optimise_structure(
     known = starts_from(posed, guesses) or nested_starts(posed, int(starts), seed, progress)
     design, values = _searched(posed, int(starts), seed, known, progress)
     most = 1 if posed.question.data.lumping == "thesis" else MAX_MASSES
-    checked = _verified(design, progress)
+    checked = verified(design, progress)
     while design.ok and not checked.ok and 2 * design.masses <= most:
         # It stands on its own rope only: once more on twice the masses.
         posed = pose_structure(case, name, 2 * design.masses)
         design, values = _searched(posed, int(starts), seed, [values], progress)
-        checked = _verified(design, progress)
+        checked = verified(design, progress)
     return checked
 
 
@@ -92,7 +92,7 @@ def _searched(
     free = _patient(problem, starts, seed, guesses, progress)
     values = list(free.parameters.values())
     if not posed.drive or not free.ok or free.assessment is None:
-        return _design(posed, free, drive_kept=not posed.drive), values
+        return design_of(posed, free, drive_kept=not posed.drive), values
     broken = _broken(posed.drive, free.assessment)
     full = posed.problem((*posed.limits, *posed.drive))
     near = _within(full, values, seed) if broken else values
@@ -101,12 +101,12 @@ def _searched(
         count = starts + len(known) if broken else 1
         tuned = tuning_of(full, no_worse(full, search(full, count, seed, known, progress), known))
         if tuned.ok:
-            return _design(posed, tuned, drive_kept=True), list(tuned.parameters.values())
+            return design_of(posed, tuned, drive_kept=True), list(tuned.parameters.values())
     needs = [f"{u.name} {u.value:.4g} {u.unit} instead of {u.bound:.4g}" for u in broken]
     status = f"the drive is too small: without its limits the best takes {', '.join(needs)}"
     if not broken:
         status = "the search within the drive's limits did not arrive"
-    return replace(_design(posed, free, drive_kept=False), ok=False, status=status), values
+    return replace(design_of(posed, free, drive_kept=False), ok=False, status=status), values
 
 
 def _within(problem: Problem, values: Sequence[float], seed: int) -> list[float] | None:
@@ -147,7 +147,8 @@ def _broken(limits: Sequence[Limit], view: Assessment) -> list[LimitUse]:
     return [use for use in limit_uses(limits, view, {}).values() if not use.kept]
 
 
-def _design(posed: StructureQuestion, tuning: Tuning, *, drive_kept: bool) -> StructureDesign:
+def design_of(posed: StructureQuestion, tuning: Tuning, *, drive_kept: bool) -> StructureDesign:
+    """Return a tuning as a design, with the limits that it did not have to keep as reported."""
     question, view = posed.question, tuning.assessment
     limits: dict[str, LimitUse] = dict(tuning.limits)
     parts: dict[str, float] = {}
@@ -185,7 +186,7 @@ def _design(posed: StructureQuestion, tuning: Tuning, *, drive_kept: bool) -> St
     )
 
 
-def _verified(design: StructureDesign, progress: Progress | None) -> StructureDesign:
+def verified(design: StructureDesign, progress: Progress | None) -> StructureDesign:
     """Return the design with its independent check; one that fails it is not ok."""
     if not design.parameters or design.margins is None:
         return design

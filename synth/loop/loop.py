@@ -102,14 +102,6 @@ def constant(values: npt.NDArray[np.complex128]) -> Phasor:
     )
 
 
-def squared_magnitude(value: Complex) -> Any:
-    """Return |value|^2 of a phasor or of NumPy complex numbers."""
-    if isinstance(value, Phasor):
-        return value.squared()
-    array = np.asarray(value)
-    return array.real**2 + array.imag**2
-
-
 @dataclass(frozen=True, kw_only=True)
 class PlantBlocks:
     """A plant's response at the nodes, as nested lists of vectors over the nodes."""

@@ -141,12 +141,6 @@ class FamilyProblem:
             found.setdefault(key if problem.drag is None else (i,), []).append(i)
         return tuple(tuple(members) for members in found.values())
 
-    def with_scenarios(self, scenarios: Sequence[FamilyLoop]) -> FamilyProblem:
-        """Return the same problem over other scenarios."""
-        return FamilyProblem(
-            scenarios=tuple(scenarios), objective=self.objective, parameters=self.parameters
-        )
-
     def stable(self, values: Values, coefficients: Sequence[float | None] | None = None) -> bool:
         """Return whether every loop is stable."""
         for group in self.groups:

@@ -25,8 +25,7 @@ from scipy.optimize import minimize_scalar
 from models.basics import FloatArray, PhysicsWarning, Quadrature
 from models.case import Case
 
-from ..design import StructureDesign, tuning_of
-from ..design.structure_search import _design, _verified
+from ..design import StructureDesign, design_of, tuning_of, verified
 from ..limits import Limit, drive_limits
 from ..loop import Assessment
 from ..question import PAYLOAD, Goal, Problem, StructureQuestion, pose_structure
@@ -207,8 +206,8 @@ def designed(
         return None
     found = Found(solved=answer.solved, view=answer.view, excess=answer.excess)
     tuning = tuning_of(problem, found)
-    return _verified(
-        _design(pose_structure(case, structure, masses), tuning, drive_kept=True), tell
+    return verified(
+        design_of(pose_structure(case, structure, masses), tuning, drive_kept=True), tell
     )
 
 

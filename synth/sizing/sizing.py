@@ -24,8 +24,7 @@ from models.basics import FloatArray, InputError, check_range, one_thread
 from models.case import Case
 from models.plant import MAX_MASSES
 
-from ..design import StructureDesign
-from ..design.structure_design import _SOURCES
+from ..design import SOURCE_NAMES, StructureDesign
 from ..loop import Assessment
 from ..question import HOOK, PAYLOAD
 from ..search import KEPT, Progress, search
@@ -399,7 +398,7 @@ def _why_not(sizing: Sizing, free: Answer) -> str:
         for d in free.problem.disturbances:
             share = Assessment(view.plant, view.controller, [d]).sigma(PAYLOAD) / free.payload_rms
             if d.name != HOOK and share**2 > 0.5:
-                binding.insert(0, _SOURCES.get(d.name, d.name))
+                binding.insert(0, SOURCE_NAMES.get(d.name, d.name))
         stops = " and ".join(binding) or "the structure itself"
         return (
             f"no motor holds the payload to {_mm(sizing.target)} rms: without any limit of the "

@@ -51,10 +51,6 @@ class FilterSection(ABC):
         """Return the transfer function at s, numbers or a `synth.loop.Phasor`."""
 
     @abstractmethod
-    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
-        """Return the monic denominator at s."""
-
-    @abstractmethod
     def matrices(self, values: Sequence[float]) -> Matrices:
         """Return A (n, n), B (n, 1), C (1, n), D (1, 1)."""
 
@@ -98,12 +94,8 @@ class RollOffFilter(FilterSection):
 
     def response(self, values: Sequence[Any], s: Any) -> Any:
         """Return the transfer function."""
-        return (1.0 / self.characteristic(values, s)) * (values[0] * values[0])
-
-    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
-        """Return s^2 + 2 z w s + w^2."""
         w, z = values
-        return s * (s + 2.0 * z * w) + w * w
+        return (1.0 / (s * (s + 2.0 * z * w) + w * w)) * (w * w)
 
     def matrices(self, values: Sequence[float]) -> Matrices:
         """Return states scaled by the corner: their sizes are those of the signal."""
@@ -137,10 +129,6 @@ class LeadLag(FilterSection):
         """Return the transfer function."""
         zero, pole = values
         return (s + zero) * (1.0 / (s + pole)) * (pole / zero)
-
-    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
-        """Return s + w_p."""
-        return s + values[1]
 
     def matrices(self, values: Sequence[float]) -> Matrices:
         """Return one state, the low-passed input."""
@@ -180,12 +168,7 @@ class Notch(FilterSection):
     def response(self, values: Sequence[Any], s: Any) -> Any:
         """Return the transfer function."""
         w, b, d = values
-        return (s * (s + 2.0 * b * d * w) + w * w) * (1.0 / self.characteristic(values, s))
-
-    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
-        """Return s^2 + 2 b w s + w^2."""
-        w, b, _ = values
-        return s * (s + 2.0 * b * w) + w * w
+        return (s * (s + 2.0 * b * d * w) + w * w) * (1.0 / (s * (s + 2.0 * b * w) + w * w))
 
     def matrices(self, values: Sequence[float]) -> Matrices:
         """Return states scaled by the frequency."""
@@ -216,11 +199,6 @@ class Integral(FilterSection):
     def response(self, values: Sequence[Any], s: Any) -> Any:
         """Return the transfer function."""
         return (1.0 / s) * values[0] + 1.0
-
-    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
-        """Return s."""
-        del values
-        return s
 
     def matrices(self, values: Sequence[float]) -> Matrices:
         """Return one state, the integral times the corner."""
@@ -255,10 +233,6 @@ class LeadTime(FilterSection):
         """Return the transfer function."""
         time, w = values
         return (s * time + 1.0) * (1.0 / (s + w)) * w
-
-    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
-        """Return s + w."""
-        return s + values[1]
 
     def matrices(self, values: Sequence[float]) -> Matrices:
         """Return one state, the low-passed input."""

@@ -97,14 +97,6 @@ class BlockForm:
                         result[i][j] = state[j] * weight + result[i][j]
         return result
 
-    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
-        """Return det(s - A), for numbers or symbols."""
-        result: Any = 1.0
-        for block in self.blocks:
-            alpha = values[block.alpha]
-            result = result * (s * (s + alpha[0]) + alpha[1] if block.size == 2 else s + alpha[0])
-        return result
-
     def values(self, A: FloatArray, B: FloatArray, C: FloatArray) -> FloatArray:
         """Return the numbers of a controller of this order.
 

@@ -117,16 +117,6 @@ class DiagramLaw(ParametrisedController):
             start = step if start is None else start * step
         return start
 
-    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
-        """Return the product of the sections' denominators, each as often as it stands."""
-        result: Any = 1.0
-        for group in self._groups:
-            inner = [section for branch in group.branches for section in branch.sections]
-            for section in (*group.sections, *inner):
-                step = section.characteristic(values[self._slices[section.name]], s)
-                result = step if isinstance(result, float) else result * step
-        return result
-
     def controller(self, values: Sequence[float]) -> LinearController:
         """Return the controller in state space; measurements that are not heard are left out."""
         A, B, C, D = self.matrices(values)

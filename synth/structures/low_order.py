@@ -149,10 +149,6 @@ class LowOrderLaw(ParametrisedController):
         return result
 
     @override
-    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
-        return self._form.characteristic(values, s)
-
-    @override
     def controller(self, values: Sequence[float]) -> LinearController:
         A, B, C, D = self._matrices(values)
         names = self._plant.measurements, self._plant.inputs

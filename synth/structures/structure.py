@@ -86,11 +86,6 @@ class ParametrisedController(ABC):
         del problem, omega
         return np.zeros((0, len(self.parameters)))
 
-    def characteristic(self, values: Sequence[Any], s: Any) -> Any:
-        """Return the controller's characteristic polynomial at s, monic; 1 if it is static."""
-        del values, s
-        return 1.0
-
     @abstractmethod
     def draw(self, points: FloatArray, omega: FloatArray, yu: ComplexArray) -> FloatArray:
         """Return candidates, (m, number of parameters), from uniform `points`, (m, dimensions).

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import stillhook as sh
 from models import build_plant
 from models.plant import DriveLimits
-from models.simulation import prepare, run_simulation
+from models.simulation import SimulationOptions, prepare, run_simulation
 from synth.loop import LinearController, closed_loop_poles
 from synth.saturation.describing import bias_for, gaussian_response, sine_response
 from synth.saturation.limit_cycles import clipped_harmonics, limit_cycles
@@ -253,14 +253,14 @@ def shaken(case):
     """Runs in still water after a burst of the hook's motion of a strength."""
     controller = sh.LinearFeedback(case, GAINS, sample_time=0.005)
     scenario = sh.Scenario(name="calm", description="still water", duration=90.0)
-    calm = prepare(case, controller, scenario=scenario, limits=DriveLimits(torque=11_880.0))
+    still = SimulationOptions(limits=DriveLimits(torque=11_880.0), lock_limit=0.5, settle=0.0)
+    calm = prepare(case, controller, scenario, still)
     clock = np.arange(0.0, 400.0, 0.02)
     burst = np.sin(np.pi * np.clip((clock - 30.0) / 10.0, 0.0, 1.0)) ** 2 * np.sin(6.0 * clock)
 
     def run(strength, **options):
         hook = sh.RecordMotion.from_arrays(clock, strength * burst, detrend="none")
-        there = replace(calm, hook=hook)
-        return run_simulation(there, seed=0, lock_limit=0.5, settle=0.0, **options)
+        return run_simulation(replace(calm, hook=hook).with_options(**options), seed=0)
 
     return run
 

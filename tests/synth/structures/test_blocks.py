@@ -47,18 +47,6 @@ def test_state_space_has_the_response(name: str, share: float) -> None:
 
 
 @pytest.mark.parametrize("name", SECTIONS)
-@given(share=st.floats(0.02, 0.98))
-@settings(max_examples=20, deadline=None)
-def test_characteristic_is_that_of_the_state_matrix(name: str, share: float) -> None:
-    section = SECTIONS[name]
-    values = values_of(section, share)
-    A = section.matrices(values)[0]
-    s = 1j * OMEGA
-    found = [np.linalg.det(p * np.eye(len(A)) - A) for p in s]
-    assert np.asarray(section.characteristic(values, s)) == pytest.approx(np.array(found))
-
-
-@pytest.mark.parametrize("name", SECTIONS)
 def test_symbols_and_numbers_agree(name: str) -> None:
     section = SECTIONS[name]
     values = values_of(section, 0.4)

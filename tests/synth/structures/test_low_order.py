@@ -99,9 +99,6 @@ def test_response_in_numbers_and_symbols_is_that_of_the_state_space(
             re, im = ca.Function("entry", [x], [entry.re, entry.im])(values)
             found = np.array(re).ravel() + 1j * np.array(im).ravel()
             assert found == pytest.approx(exact[:, i, j], rel=1e-10)
-    characteristic = law.characteristic(list(values), 0.7j)
-    poles = np.linalg.eigvals(law.controller(list(values)).A)
-    assert characteristic == pytest.approx(np.prod(0.7j - poles), rel=1e-9)
 
 
 def test_names_say_what_the_parameters_are() -> None:
