@@ -31,6 +31,14 @@ from models.plant import LinearPlant, ShapingFilter
 
 from ..structures import LqgEstimator, LqgRegulator, weighing
 
+_LEAST = 1e-6  # of a multiplier, as a price: lambda b^2 over the cost
+_MOST = 1e6
+_SETTLED = 1e-7  # gap at which no further step is made
+_STEPS = 12
+_NEAR = 0.3  # gap from which Newton's method is tried first ...
+_ARRIVED = 1e-6  # ... and at which its answer is taken
+_HAIR = 0.5  # in the logarithm of a multiplier that is at most a millionth of the cost
+
 
 def with_input_outputs(plant: LinearPlant, names: Sequence[str]) -> LinearPlant:
     """Return the plant with those of its inputs that are named among its outputs, too."""
@@ -108,15 +116,6 @@ def shaped(plant: LinearPlant, sources: Mapping[str, ShapingFilter | float]) -> 
         measurements=plant.measurements,
         outputs=plant.outputs,
     )
-
-
-_LEAST = 1e-6  # of a multiplier, as a price: lambda b^2 over the cost
-_MOST = 1e6
-_SETTLED = 1e-7  # gap at which no further step is made
-_STEPS = 12
-_NEAR = 0.3  # gap from which Newton's method is tried first ...
-_ARRIVED = 1e-6  # ... and at which its answer is taken
-_HAIR = 0.5  # in the logarithm of a multiplier that is at most a millionth of the cost
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -43,6 +43,7 @@ _ORDER = 12  # Gauss-Legendre nodes a panel
 _TAIL = 8  # panels of 1/omega above all features
 _BELOW = 1e-3  # of the slowest pole: from there on to zero the densities are constant
 _BEYOND = 30.0  # ... which begin this far above the fastest pole
+_LOYAL, _FAINT = 0.3, 1e-5  # weight of a spectrum's own fit, and its floor over the peak
 
 
 def frequencies(
@@ -189,9 +190,6 @@ class Truth:
 def filter_plant(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray) -> LinearPlant:
     """Return x' = Ax + Bu, y = Cx + Du as a plant that nothing shakes."""
     return LinearPlant(A=A, B=B, E=np.zeros((len(A), 0)), C=C, D=D)
-
-
-_LOYAL, _FAINT = 0.3, 1e-5  # weight of a spectrum's own fit, and its floor over the peak
 
 
 def densities(sources: tuple[Disturbance, ...], omega: FloatArray) -> FloatArray:

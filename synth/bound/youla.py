@@ -55,6 +55,14 @@ from .bound import Bound
 from .check import weighted_rms
 from .truth import densities, filter_plant, frequencies
 
+cp: Any = cvxpy  # its functions come through a star import that mypy does not follow
+_POINTS, _DENSE = 200, 2000  # at which M_s holds at first, and is looked at
+_EXCHANGES = 5
+_ABOVE = 1.5  # times the mean frequency of the sea: the functions' pole
+_INSIDE = 0.998  # of a limit between them
+_PADE = 6  # of the delays, in the verification
+_TIME, _SPREAD = 0.03, 5e-3  # agreement with the fitted sea, and of a margin
+
 
 def laguerre(a: float, count: int, channels: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return A, B of Laguerre functions sqrt(2a)/(s+a) ((s-a)/(s+a))^k of every channel, C of ones.
@@ -146,16 +154,6 @@ def realised(
         measurements=plant.measurements,
         inputs=plant.inputs,
     )
-
-
-cp: Any = cvxpy  # its functions come through a star import that mypy does not follow
-
-_POINTS, _DENSE = 200, 2000  # at which M_s holds at first, and is looked at
-_EXCHANGES = 5
-_ABOVE = 1.5  # times the mean frequency of the sea: the functions' pole
-_INSIDE = 0.998  # of a limit between them
-_PADE = 6  # of the delays, in the verification
-_TIME, _SPREAD = 0.03, 5e-3  # agreement with the fitted sea, and of a margin
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

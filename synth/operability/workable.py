@@ -28,6 +28,7 @@ from .contour import Contour, over_headings
 
 HIGHEST_TENTH = 1.27
 """H_1/10 over H_s [-]."""
+_MOST_CLASSES = 80  # of H_s: more are measured heights
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,9 +68,6 @@ RULES = (
     Rule(operation="platform building, large derrick barge", safe=0.9, marginal=1.5),
 )
 """The operations of the table."""
-
-
-_MOST_CLASSES = 80  # of H_s: more are measured heights
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

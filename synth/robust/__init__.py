@@ -7,7 +7,8 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .family import Choice as Choice
     from .family import Family as Family
-    from .gain_schedule import GainSchedule as GainSchedule
+    from .family import SeaState as SeaState
+    from .family import read_scatter as read_scatter
     from .mu import Robustness as Robustness
     from .mu import robustness as robustness
     from .perturbation import GainRadius as GainRadius
@@ -15,8 +16,7 @@ if TYPE_CHECKING:
     from .robust import optimise_robust as optimise_robust
     from .robust_result import RobustDesign as RobustDesign
     from .robust_result import ScenarioResult as ScenarioResult
+    from .schedule import GainSchedule as GainSchedule
     from .schedule import schedule_gains as schedule_gains
-    from .sea_states import SeaState as SeaState
-    from .sea_states import read_scatter as read_scatter
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -23,8 +23,7 @@ from models.basics import InputError, check_range, one_thread
 from ..loop import LinearController, Margins, closed_loop_poles
 from ..structures import ParametrisedController
 from ..verify import LawMatrices, winding_of_plant
-from .mu_doubts import Doubt, doubts_of
-from .mu_plant import UncertainLoop, uncertain_loop
+from .mu_plant import Doubt, UncertainLoop, doubts_of, uncertain_loop
 from .mu_search import critical_point, furthest, grid_of, proved_bound
 from .perturbation import GainRadius, gain_radius
 

@@ -17,16 +17,27 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import FloatArray
+from models.basics import ComplexArray, FloatArray, Quadrature, peak_factor
 from models.case import Case
 from models.plant import LinearPlant, PlantData, build_plant, pade_bank, parameter_values
 
+from ..loop import LinearController
+from ..verify import LawMatrices
 from .family import Family, Member
 
 _PADE = 6
 _SHORTEST = 1e-4  # of a delay that has a Pade model [s]
 _BLOCKS = ("A", "B", "E", "C", "D", "F", "Cz", "Dz", "Fz")
 _CHECKED = 8  # members whose numbers are compared with those of the checked case
+_CHUNK = 400  # loops whose responses are evaluated at once
+_ZOOM = np.array([-1.0, -0.6, -0.3, -0.1, 0.1, 0.3, 0.6, 1.0])
+_NEAR = np.array([-3.0, -1.5, -0.7, -0.3, 0.0, 0.3, 0.7, 1.5, 3.0])
+_ROUNDS = 6  # of zooming into the peak of the sensitivity
+_LIGHT = 0.02  # damping of a mode that the common nodes may miss
+_DRAG_ROUNDS = 30
+_PEAKS = 3  # of each sensitivity that are zoomed into
+_STEP = 1.5  # of the logarithm of a drag coefficient, at most
+_AGREE = 3e-5  # of a drag coefficient with its response
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -227,3 +238,194 @@ def _static(data: Sequence[PlantData]) -> dict[str, FloatArray]:
     if data[0].motor == "dc":
         found["motor.voltage"] = current * np.array([d.resistance for d in data])
     return found
+
+
+class LoopStack:
+    """Closed loops of one controller around many plants.
+
+    Parameters
+    ----------
+    plants
+        The plants, with the drag that is to count.
+    controller
+        u = +C y, the same for all.
+    """
+
+    def __init__(self, plants: PlantStack, controller: LinearController) -> None:
+        self.plants = plants
+        bare = plants.without_delays()
+        law = LawMatrices.of(controller, plants.like)
+        m = len(bare)
+        eye = np.eye(bare.B.shape[2])
+        inner = np.linalg.inv(eye - law.D @ bare.D)
+        on_plant, on_law = inner @ law.D @ bare.C, inner @ law.C
+        direct, nk = inner @ law.D @ bare.F, len(law.A)
+        heard = np.concatenate([bare.C + bare.D @ on_plant, bare.D @ on_law], axis=2)
+        own = np.concatenate([np.zeros((nk, bare.A.shape[1])), law.A], axis=1)
+        upper = np.concatenate([bare.A + bare.B @ on_plant, bare.B @ on_law], axis=2)
+        A = np.concatenate([upper, law.B @ heard + own], axis=1)
+        E = [bare.E + bare.B @ direct, law.B @ (bare.F + bare.D @ direct)]
+        self._E = np.concatenate(E, axis=1)
+        self._F = bare.Fz + bare.Dz @ direct
+        self._Cz = np.concatenate([bare.Cz + bare.Dz @ on_plant, bare.Dz @ on_law], axis=2)
+        # The command that a test signal at the drive causes: S = 1/(1 + L), first loop.
+        self._B = np.concatenate([bare.B @ inner, law.B @ bare.D @ inner], axis=1)[:, :, :1]
+        self._Cu = np.concatenate([on_plant, on_law], axis=2)[:, :1]
+        self._Du = np.broadcast_to(inner, (m, *eye.shape))[:, 0, 0]
+        self.poles, self._modes = np.linalg.eig(A)
+        self._inverse = np.linalg.inv(self._modes)
+
+    @property
+    def growth(self) -> FloatArray:
+        """Largest real part of a pole of each loop, (m,) [1/s]."""
+        return np.asarray(self.poles.real.max(axis=1), dtype=np.float64)
+
+    @property
+    def stable(self) -> npt.NDArray[np.bool_]:
+        """Whether each loop is stable, (m,)."""
+        return np.asarray(self.growth < -1e-10 * np.abs(self.poles).max(axis=1))
+
+    def lightly_damped(self, low: float, high: float) -> npt.NDArray[np.bool_]:
+        """Return which loops have a mode in a band [rad/s] that common nodes may miss, (m,)."""
+        inside = (np.abs(self.poles.imag) > low) & (np.abs(self.poles.imag) < high)
+        light = np.abs(self.poles.real) < _LIGHT * np.abs(self.poles.imag)
+        return np.asarray((inside & light).any(axis=1))
+
+    def max_sensitivity(self) -> FloatArray:
+        """Return M_s of each loop, broken at the first input, (m,)."""
+        left, right = self._Cu @ self._modes, self._inverse @ self._B
+        residues = left[:, 0] * right[:, :, 0]
+        found = np.empty(len(self.poles))
+        for part in _chunks(len(found)):
+            poles, r = self.poles[part], residues[part]
+            sizes = np.abs(poles)
+            low = 0.1 * np.sort(sizes, axis=1)[:, :1]
+            common = np.geomspace(1e-3, 1e3, 240)[None] * np.ones((len(poles), 1))
+            damping = np.minimum(np.abs(poles.real), 0.3 * np.abs(poles.imag))
+            near = np.abs(poles.imag)[:, :, None] + damping[:, :, None] * _NEAR
+            omega = np.concatenate([common, near.reshape(len(poles), -1), low], axis=1)
+            omega = np.sort(np.maximum(omega, 1e-6), axis=1)
+            size = self._size(poles, r, part, omega)
+            inner = np.zeros(size.shape, dtype=bool)
+            inner[:, 1:-1] = (size[:, 1:-1] >= size[:, :-2]) & (size[:, 1:-1] >= size[:, 2:])
+            ranked = np.argsort(np.where(inner, size, -np.inf), axis=1)[:, -_PEAKS:]
+            rows = np.arange(len(poles))
+            peak = size.max(axis=1)
+            for chosen in ranked.T:  # the highest on the grid need not be the highest
+                at, best = omega[rows, chosen], size[rows, chosen]
+                right_end = omega[rows, np.minimum(chosen + 1, omega.shape[1] - 1)]
+                width = np.maximum(right_end - omega[rows, np.maximum(chosen - 1, 0)], 1e-9)
+                for _ in range(_ROUNDS):
+                    closer = np.maximum(at[:, None] + width[:, None] * _ZOOM, 1e-6)
+                    around = self._size(poles, r, part, closer)
+                    k = np.argmax(around, axis=1)
+                    at = np.where(around[rows, k] > best, closer[rows, k], at)
+                    best = np.maximum(best, around[rows, k])
+                    width = 0.4 * width
+                peak = np.maximum(peak, best)
+            found[part] = peak
+        return found
+
+    def _size(
+        self, poles: ComplexArray, residues: ComplexArray, part: slice, omega: FloatArray
+    ) -> FloatArray:
+        total = self._Du[part][:, None] + np.zeros(omega.shape, dtype=np.complex128)
+        for k in range(poles.shape[1]):  # a loop over modes keeps the arrays flat
+            total += residues[:, k, None] / (1j * omega - poles[:, k, None])
+        return np.asarray(np.abs(total), dtype=np.float64)
+
+    def moments(
+        self, outputs: Sequence[str], nodes: Quadrature, densities: Mapping[str, FloatArray]
+    ) -> dict[str, tuple[FloatArray, FloatArray]]:
+        """Return m_0 and m_2 of outputs, (m,) each.
+
+        Parameters
+        ----------
+        outputs
+            Performance outputs.
+        nodes
+            Common quadrature nodes [rad/s].
+        densities
+            By name of a disturbance: its density at the nodes in each loop, (m, k).
+        """
+        like, omega = self.plants.like, nodes.omega
+        rows = [like.outputs.index(name) for name in outputs]
+        left = self._Cz[:, rows] @ self._modes  # (m, z, n)
+        zero = np.zeros((len(self.poles), len(rows)))
+        second = zero.copy()
+        for name, density in densities.items():
+            base = like.disturbances.index(name)
+            rates = [like.disturbances.index(r) for r, of in like.rates.items() if of == name]
+            into = (self._inverse @ self._E[:, :, [base]])[:, :, 0]
+            rate = (self._inverse @ self._E[:, :, rates]).sum(axis=2)
+            through = self._F[:, rows, base]
+            late = self._F[:, rows][:, :, rates].sum(axis=2)
+            for part in _chunks(len(zero)):
+                gap = 1.0 / (1j * omega - self.poles[part][:, :, None])  # (m, n, k)
+                driven = (into[part][:, :, None] + rate[part][:, :, None] * 1j * omega) * gap
+                response = left[part] @ driven + through[part][:, :, None]
+                response = response + late[part][:, :, None] * 1j * omega
+                spectrum = np.abs(response) ** 2 * (density[part] * nodes.weights)[:, None]
+                zero[part] += spectrum.sum(axis=2)
+                second[part] += spectrum @ omega**2
+        return {name: (zero[:, j], second[:, j]) for j, name in enumerate(outputs)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class StackView:
+    """One loop of a stack as the limits see it (`synth.limits.limits.Limit.measure`)."""
+
+    max_sensitivity: float
+    sigmas: Mapping[str, tuple[float, float]]
+
+    def sigma(self, output: str) -> float:
+        """Return the standard deviation of an output."""
+        return float(np.sqrt(self.sigmas[output][0]))
+
+    def peak(self, output: str, duration: float) -> float:
+        """Return the most probable maximum of an output in `duration` [s]."""
+        m0, m2 = self.sigmas[output]
+        period = 2.0 * np.pi * np.sqrt(m0 / m2) if m2 > 0.0 else np.inf
+        return peak_factor(float(period), duration) * self.sigma(output)
+
+
+def consistent_stack(
+    plants: PlantStack,
+    controller: LinearController,
+    nodes: Quadrature,
+    densities: Mapping[str, FloatArray],
+    start: float,
+) -> LoopStack:
+    """Return the loops with the drag that agrees with each one's own response.
+
+    C = q sqrt(8/pi) sigma_v(C), by the secant rule on logarithms, which the right side's slow
+    fall suits; where a loop is unstable it is given more drag.
+    """
+    loops = LoopStack(plants, controller)
+    if not plants.quadratic_drag.any():
+        return loops
+    slope = plants.quadratic_drag * np.sqrt(8.0 / np.pi)
+    x = np.full(len(plants), np.log(max(start, 1.0)))
+    x_before, gap_before = np.full_like(x, np.nan), np.full_like(x, np.nan)
+    open_still = np.ones(len(plants), dtype=bool)
+    for _ in range(_DRAG_ROUNDS):
+        at = np.flatnonzero(open_still)
+        some = LoopStack(plants.part(at).with_drag(np.exp(x[at])), controller)
+        own = {name: density[at] for name, density in densities.items()}
+        variance = some.moments(["payload.velocity"], nodes, own)["payload.velocity"][0]
+        gap = np.log(np.maximum(slope[at] * np.sqrt(variance), 1e-300)) - x[at]
+        gap = np.where(some.stable, np.clip(gap, -_STEP, _STEP), _STEP)
+        rise = (gap - gap_before[at]) / (x[at] - x_before[at])
+        # The gap falls with a slope between -2 and -1/2 at any sound loop.
+        rise = np.where(np.isfinite(rise) & some.stable, np.clip(rise, -2.0, -0.5), -1.5)
+        x_before[at], gap_before[at] = x[at], gap
+        x[at] -= gap / rise
+        open_still[at[np.abs(gap) < _AGREE]] = False
+        if not open_still.any():
+            break
+    C = np.exp(x)
+    return LoopStack(plants.with_drag(C), controller)
+
+
+def _chunks(count: int) -> list[slice]:
+    return [slice(at, min(at + _CHUNK, count)) for at in range(0, count, _CHUNK)]

@@ -24,9 +24,9 @@ from ..search import KEPT, FamilyFound, search, search_family
 from ..structures import Structure
 from .family import Family, Member
 from .family_plants import PAYLOAD_FEEDBACK, FamilyPlants
-from .robust_answer import answer_of
 from .robust_result import RobustDesign as RobustDesign
 from .robust_result import ScenarioResult as ScenarioResult
+from .robust_result import answer_of
 from .worst_case import worst_members
 
 Progress = Callable[[str, int, int], None]

@@ -3,7 +3,7 @@
     gains + family -> corners, Sobol points -> the worst of them, zoomed in on -> members to add
     gains + family -> 10 000 draws -> share that is stable, worst figures -> DrawCheck
 
-Everything goes through `synth.robust.loop_stack`, which no search uses.  Peaks of narrow resonances
+Everything goes through `plant_stack.LoopStack`, which no search uses.  Peaks of narrow resonances
 and limits that need crossings (gain and delay margins, roll-off) are looked at exactly, one
 by one, for the members that are worst already.
 """
@@ -23,8 +23,7 @@ from ..loop import Assessment
 from ..question import PAYLOAD, Objective
 from .family import Member
 from .family_plants import FamilyPlants
-from .loop_stack import StackView, consistent_stack
-from .plant_stack import PlantStack
+from .plant_stack import PlantStack, StackView, consistent_stack
 
 Progress = Callable[[str, int, int], None]
 

@@ -45,6 +45,8 @@ _LARGEST = 1e3  # scale that is looked at
 _ABOVE = 1.0 + 1e-6  # the load at rest, at least
 _FAR = 1.0  # guess of the factor's logarithm where that of the neighbour does not serve
 _BINDING = 5e-3  # a limit that is used up to this share of itself binds
+_SEA_STEPS, _SEA_FINE = 8, 2e-3  # of the search
+_LOWEST, _HIGHEST = 0.05, 6.0  # of the sea asked for, that are looked at
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -324,10 +326,6 @@ def target_of(target: float | str, hook_rms: float) -> float:
             f"5 % or 26 dB, got {target!r}"
         ) from None
     return check_range("size", "target", value, low=0.0, high=100.0, unit="m", open_low=True)
-
-
-_SEA_STEPS, _SEA_FINE = 8, 2e-3  # of the search
-_LOWEST, _HIGHEST = 0.05, 6.0  # of the sea asked for, that are looked at
 
 
 def highest_sea(

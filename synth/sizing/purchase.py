@@ -31,6 +31,11 @@ _RPM = 0.10471975511965977
 _NOISE = ("acceleration", "velocity", "displacement")
 #: Natural steps of a limit by its unit [SI].
 _STEPS = {"N m": 1e3, "rad/s": 100.0 * _RPM, "W": 1e5, "V": 100.0, "A": 100.0, "N": 1e4}
+_STEP = 0.05  # of the logarithm, for the elasticity
+_SMALL = 1e-4  # of the logarithm, for the price
+_FREE = 1e-6  # price below which a limit is one that does not bind
+_SHARES = (1.0, 0.5, 0.25, 0.125)  # of a factor of two, for the gear
+_WORTH = 0.01  # share of the rms below which nothing is worth its money
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -211,13 +216,6 @@ def _scaled(
         step=step,
         changes=lambda factor: {path: value * factor},
     )
-
-
-_STEP = 0.05  # of the logarithm, for the elasticity
-_SMALL = 1e-4  # of the logarithm, for the price
-_FREE = 1e-6  # price below which a limit is one that does not bind
-_SHARES = (1.0, 0.5, 0.25, 0.125)  # of a factor of two, for the gear
-_WORTH = 0.01  # share of the rms below which nothing is worth its money
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

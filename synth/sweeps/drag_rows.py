@@ -1,6 +1,6 @@
 """Drag that agrees with each loop's own response, for many loops at once.
 
-C = q sqrt(8/pi) sigma_v(C), by the secant rule on logarithms, as `synth.robust.loop_stack` does.
+C = q sqrt(8/pi) sigma_v(C), by the secant rule on logarithms, as `synth.robust.plant_stack` does.
 More drag means less motion, so that the right side falls; where a loop is unstable it is given
 more.
 """

@@ -11,7 +11,7 @@ from models.basics import InputError
 from synth.loop import closed_loop_poles
 from synth.question import assess_gains, pose
 from synth.robust import GainSchedule, schedule_gains
-from synth.robust.gain_schedule import blend_of
+from synth.robust.schedule import blend_of
 
 pytestmark = pytest.mark.ci  # whole optimisations in fixtures
 

@@ -20,8 +20,7 @@ from stillhook.cli import main
 from stillhook.commands.design.margins import parse_off
 from synth.loop import LinearController, closed_loop_poles
 from synth.robust import robustness
-from synth.robust.mu_doubts import Doubt, doubts_of
-from synth.robust.mu_plant import UncertainLoop, uncertain_loop
+from synth.robust.mu_plant import Doubt, UncertainLoop, doubts_of, uncertain_loop
 from synth.robust.mu_search import critical_point, grid_of, proved_bound
 from synth.robust.mu_structured_value import Block, mu_upper
 
