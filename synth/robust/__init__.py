@@ -1,4 +1,9 @@
-"""Robust design: families of plants, schedules, worst cases, mu."""
+"""Robust design: one set of gains for a family of plants and seas, and how far it may be off.
+
+A case and what varies come in (`Family`); gains for all of it (`optimise_robust`), gains over the
+rope's length (`schedule_gains`), the structured singular value of a design (`robustness`) and the
+exact radius of errors of its gains (`gain_radius`) go out.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -8,7 +13,7 @@ if TYPE_CHECKING:
     from .family import Choice as Choice
     from .family import Family as Family
     from .family import SeaState as SeaState
-    from .family import read_scatter as read_scatter
+    from .family import sea_states as sea_states
     from .mu import Robustness as Robustness
     from .mu import robustness as robustness
     from .perturbation import GainRadius as GainRadius

@@ -1,4 +1,4 @@
-"""A family of plants and seas: what one set of gains has to hold.
+"""Family of plants and seas: what one set of gains has to hold.
 
     case + what varies + sea states -> Family -> corners, grid, random draws -> cases
 
@@ -9,18 +9,17 @@ an occurrence, as in a scatter diagram.
 
 from __future__ import annotations
 
-import csv
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
 from models.basics import FloatArray, InputError, check_range
 from models.case import Case
+from models.sea import Scatter
 from models.spread import ALIASES
 
 _MOST_CORNERS = 4096
@@ -43,7 +42,7 @@ class SeaState:
         if self.peak_period is None:
             return found
         if case.sea.spectrum == "bretschneider-1975":
-            # The 1975 form peaks at 0.9 T_S / 0.54^(1/4), see `models.case.environment.Sea`.
+            # The 1975 form peaks at 0.9 T_S / 0.54^(1/4), see `models.sea.section`.
             period = self.peak_period * 0.54**0.25 / 0.9
             return {**found, "sea.significant_period": period}
         return {**found, "sea.peak_period": self.peak_period}
@@ -54,42 +53,16 @@ class SeaState:
         return f"H_s {self.significant_height:.3g} m{period}"
 
 
-def read_scatter(path: str | Path) -> list[SeaState]:
-    """Return the sea states of a scatter table, a CSV file.
-
-    The header names the columns ``significant_height`` [m], ``peak_period`` [s] and
-    ``occurrence`` (counts or shares); rows without occurrence are left out.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a column is missing or a figure is not a number.
-    """
-    wanted = ("significant_height", "peak_period", "occurrence")
-    try:
-        with open(path, encoding="utf-8", newline="") as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: the scatter table cannot be read: {error}") from error
-    states = []
-    for line, row in enumerate(rows, start=2):
-        try:
-            height, period, occurrence = (float(row[name]) for name in wanted)
-        except KeyError as missing:
-            raise InputError(
-                f"{path}: must have the columns {', '.join(wanted)}; {missing} is missing"
-            ) from None
-        except (TypeError, ValueError):
-            raise InputError(
-                f"{path}:{line}: must be three numbers, got {list(row.values())}"
-            ) from None
-        if occurrence > 0.0:
-            states.append(
-                SeaState(significant_height=height, peak_period=period, occurrence=occurrence)
-            )
-    if not states:
-        raise InputError(f"{path}: must have at least one row with an occurrence above 0")
-    return states
+def sea_states(scatter: Scatter) -> list[SeaState]:
+    """Return the sea states of a scatter diagram, those of all its months and headings as one."""
+    shares: dict[tuple[float, float], float] = {}
+    columns = (scatter.significant_height, scatter.peak_period, scatter.occurrence)
+    for height, period, share in zip(*(column.tolist() for column in columns), strict=True):
+        shares[height, period] = shares.get((height, period), 0.0) + share
+    return [
+        SeaState(significant_height=height, peak_period=period, occurrence=share)
+        for (height, period), share in shares.items()
+    ]
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from models.plant import LinearPlant
 
 from ..loop import Disturbance, disturbances
 from ..question import HOOK, PAYLOAD, DesignQuestion, FamilyLoop, Problem, pose
-from ..structures import ParametrisedController, Structure
+from ..structures import ParametrisedController, Structure, structure_named
 from .family import Family, Member
 from .plant_stack import PlantStack, numbers_of, stacked_members
 
@@ -64,8 +64,6 @@ class FamilyPlants:
             return self.nominal.structure.bind(self.nominal.plant)
         structure = self.structure
         if isinstance(structure, str):
-            from ..structures import structure_named
-
             bound: Structure = structure_named(structure, self.nominal.case)
         else:
             bound = structure

@@ -1,4 +1,4 @@
-r"""How far a design's plant may be off in all its numbers at once before the loop is unstable.
+r"""Robustness of a design by the structured singular value: its plant off in all numbers at once.
 
     design + ranges -> M-Delta form -> mu from above (scalings) and from below (a pole found on
     the axis) -> the worst parameters, tried on the true plant -> random draws -> Robustness
@@ -14,21 +14,20 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from models.basics import InputError, check_range, one_thread
 
+from ..design import GainDesign, StructureDesign
 from ..loop import LinearController, Margins, closed_loop_poles
+from ..question import pose
 from ..structures import ParametrisedController
 from ..verify import LawMatrices, winding_of_plant
-from .mu_plant import Doubt, UncertainLoop, doubts_of, uncertain_loop
+from .mu_plant import UncertainLoop, UncertainNumber, uncertain_loop, uncertain_numbers
 from .mu_search import critical_point, furthest, grid_of, proved_bound
 from .perturbation import GainRadius, gain_radius
-
-if TYPE_CHECKING:
-    from ..design import GainDesign, StructureDesign
 
 Progress = Callable[[str, int, int], None]
 
@@ -71,7 +70,7 @@ class Robustness:
         the margins of the nominal loop.
     """
 
-    doubts: tuple[Doubt, ...]
+    doubts: tuple[UncertainNumber, ...]
     proved: float
     found: float
     omega: float
@@ -185,7 +184,7 @@ def robustness(
     tell = progress or (lambda stage, done, total: None)
     case = getattr(design, "sea_case", design.case)
     controller, law, values = _parts(design)
-    doubts = doubts_of(case, design.drag, uncertainty)
+    doubts = uncertain_numbers(case, design.drag, uncertainty)
     count = design.masses if masses is None else masses
     loop = uncertain_loop(case, controller, doubts, masses=count, drag=design.drag, seed=seed)
     nominal = loop.plant_at([0.0] * len(loop.doubts))
@@ -243,9 +242,6 @@ def _parts(
     design: GainDesign | StructureDesign,
 ) -> tuple[LinearController, ParametrisedController, Sequence[float]]:
     """Return controller, law and parameters of a design."""
-    from ..design import StructureDesign
-    from ..question import pose
-
     if isinstance(design, StructureDesign):
         law = design.posed.law
         return design.controller, law, [design.parameters[p.name] for p in law.parameters]

@@ -1,4 +1,4 @@
-r"""A case's linear plant with what is uncertain pulled out: the M-Delta form.
+r"""M-Delta form of a case's linear plant: its uncertain numbers, pulled out.
 
     case, shares -> plants at the corners of the ranges -> LFT, delta_k real and repeated
                  -> + a disc for every uncertain delay -> UncertainPlant -> M(i omega)
@@ -37,7 +37,7 @@ from models.spread import ALIASES
 from ..loop import LinearController
 from ..verify import LawMatrices
 from .family import Axis, Family, Member
-from .mu_structured_value import Block
+from .mu_structured_value import UncertaintyBlock
 
 #: Paths of delays, and the measurements that they make late.
 DELAYS: Mapping[str, str] = {"sensors.telemetry.delay": "payload.", "sensors.mru.delay": "mru."}
@@ -48,7 +48,7 @@ _SAMPLES = 4  # plants that the LFT is compared with
 
 
 @dataclass(frozen=True, kw_only=True)
-class Doubt:
+class UncertainNumber:
     """One uncertain number: its path, its value in the case, how far it may be off.
 
     ``drag`` is the linear drag coefficient of the design [N s/m]; the others are fields of the
@@ -79,7 +79,9 @@ class Doubt:
         return self.nominal / self.half if self.nominal > 0.0 else np.inf
 
 
-def doubts_of(case: Case, drag: float, uncertainty: Mapping[str, Any]) -> tuple[Doubt, ...]:
+def uncertain_numbers(
+    case: Case, drag: float, uncertainty: Mapping[str, Any]
+) -> tuple[UncertainNumber, ...]:
     """Return what is uncertain about a case.
 
     Parameters
@@ -117,7 +119,7 @@ def doubts_of(case: Case, drag: float, uncertainty: Mapping[str, Any]) -> tuple[
             raise InputError(
                 f"robustness: {path} must be less uncertain than its value {own:g}, got {half:g}"
             )
-        found.append(Doubt(path=path, nominal=own, half=half))
+        found.append(UncertainNumber(path=path, nominal=own, half=half))
     if len({d.path for d in found}) < len(found):
         raise InputError("robustness: a path is given twice")
     if sum(not d.delay for d in found) > _MOST:
@@ -126,7 +128,7 @@ def doubts_of(case: Case, drag: float, uncertainty: Mapping[str, Any]) -> tuple[
 
 
 def plant_of(
-    case: Case, doubts: Sequence[Doubt], delta: Sequence[float], masses: int, drag: float
+    case: Case, doubts: Sequence[UncertainNumber], delta: Sequence[float], masses: int, drag: float
 ) -> LinearPlant:
     """Return the true plant at some deltas; the rope's damping time stays the nominal one."""
     values = {d.path: d.at(float(x)) for d, x in zip(doubts, delta, strict=True)}
@@ -180,16 +182,19 @@ class UncertainLoop:
     masses: int
     drag: float
     controller: LinearController
-    doubts: tuple[Doubt, ...]
+    doubts: tuple[UncertainNumber, ...]
     plant: LinearPlant
     sizes: tuple[int, ...]
     error: float = 0.0
 
     @cached_property
-    def blocks(self) -> tuple[Block, ...]:
+    def blocks(self) -> tuple[UncertaintyBlock, ...]:
         """The blocks of Delta."""
         late = len(self.doubts) - len(self.sizes)
-        return (*(Block(size=n) for n in self.sizes), *(Block(real=False) for _ in range(late)))
+        return (
+            *(UncertaintyBlock(size=n) for n in self.sizes),
+            *(UncertaintyBlock(real=False) for _ in range(late)),
+        )
 
     @cached_property
     def law(self) -> LawMatrices:
@@ -276,7 +281,7 @@ class UncertainLoop:
             delays=tuple(float(v) for v in np.maximum(late, 0.0)),
         )
 
-    def _hears(self, doubt: Doubt) -> FloatArray:
+    def _hears(self, doubt: UncertainNumber) -> FloatArray:
         start = DELAYS[doubt.path]
         return np.array([float(name.startswith(start)) for name in self.plant.measurements])
 
@@ -284,7 +289,7 @@ class UncertainLoop:
 def uncertain_loop(
     case: Case,
     controller: LinearController,
-    doubts: Sequence[Doubt],
+    doubts: Sequence[UncertainNumber],
     *,
     masses: int,
     drag: float,

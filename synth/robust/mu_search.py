@@ -1,4 +1,4 @@
-r"""How far uncertain parameters may go before a loop is unstable: from below and from above.
+r"""Search for the structured singular value of a loop: from below and from above.
 
     UncertainLoop -> scalings at frequencies until they prove all of them -> mu at most this
                   -> corners of the box, zeros of det(I - M Delta), local search
@@ -87,6 +87,9 @@ def proved_bound(
     floor
         Bound that need not be improved upon: mu is known to be as large, or it does not matter.
     """
+    # Row i of the table is what scalings i prove at every node.  An interval is held by the row
+    # that is lowest at its worse end; the interval held worst is halved, and gets scalings of its
+    # own, which may serve its neighbours too.
     omega = np.unique(np.concatenate([grid[::_THIN], grid[-1:], np.asarray(near)]))
     matrices = loop.matrix(omega)
     first = mu_upper(matrices[int(np.argmin(np.abs(omega - 1.0)))], loop.blocks)
@@ -100,6 +103,7 @@ def proved_bound(
             break
         low, high = omega[k], omega[k + 1]
         if high / low - 1.0 < _NARROW:
+            # As narrow as a step of mu: real parameters alone may make it jump.
             peak, at_peak = float(held[k]), float(low)
             continue
         middle = float(np.sqrt(low * high))

@@ -1,4 +1,4 @@
-r"""The structured singular value of a matrix: how little it takes to make I - M Delta singular.
+r"""Structured singular value of a matrix, bounded from above by scalings.
 
     mu(M) = 1 / min { k : det(I - k M Delta) = 0, Delta = diag(delta_i I), |delta_i| <= 1 }
 
@@ -39,7 +39,7 @@ _WORTH = 2.0  # over the best, up to which other scalings are worth a search
 
 
 @dataclass(frozen=True, kw_only=True)
-class Block:
+class UncertaintyBlock:
     """A repeated scalar of Delta: how often it stands there, and whether it is real."""
 
     size: int = 1
@@ -81,7 +81,7 @@ class Scaling:
 
 def mu_upper(
     M: npt.ArrayLike,
-    blocks: Sequence[Block],
+    blocks: Sequence[UncertaintyBlock],
     *,
     begin: Scaling | None = None,
     enough: float = 0.0,
@@ -118,7 +118,7 @@ def mu_upper(
     if best.bound > enough and any(block.size > 1 for block in blocks):
         # Where a parameter stands often, in the coordinates of what it does alone: its modes.
         modal = _balanced(matrix, _modes(matrix, blocks))
-        single = [Block(real=block.real) for block in blocks for _ in range(block.size)]
+        single = [UncertaintyBlock(real=block.real) for block in blocks for _ in range(block.size)]
         other = _improved(matrix, single, modal, enough)
         best = min(best, _improved(matrix, blocks, other, enough), key=lambda s: s.bound)
     if begin is not None and best.bound > enough:
@@ -131,7 +131,7 @@ def mu_upper(
 
 
 def _improved(
-    matrix: ComplexArray, blocks: Sequence[Block], best: Scaling, enough: float
+    matrix: ComplexArray, blocks: Sequence[UncertaintyBlock], best: Scaling, enough: float
 ) -> Scaling:
     """Return better scalings than those given, if there are any."""
     if best.bound <= enough:
@@ -172,7 +172,7 @@ def _improved(
 class _Shape:
     """Scalings as a vector: the lower triangle of each L, its diagonal as logarithms, and G."""
 
-    def __init__(self, blocks: Sequence[Block]) -> None:
+    def __init__(self, blocks: Sequence[UncertaintyBlock]) -> None:
         self._parts: list[tuple[slice, bool, tuple[npt.NDArray[np.intp], ...]]] = []
         at = 0
         for block in blocks:
@@ -225,12 +225,16 @@ class _Shape:
 
     def value(self, x: FloatArray, M: ComplexArray, sharp: float) -> tuple[float, FloatArray]:
         """Return the smoothed largest eigenvalue of the pencil, and its gradient."""
+        # log-sum-exp of the eigenvalues, from above within log(m)/sharp: the largest alone has no
+        # gradient where two of them meet, and there the optimum lies.
         root, G = self.unpack(x)
         squares, vectors = np.linalg.eigh(_pencil(M[None], root, G)[0])
         shifted = sharp * (squares - squares[-1])
         weights = np.exp(shifted)
         total = float(weights.sum())
         weights /= total
+        # d lambda_i = v_i^H (M^H dD M - lambda_i dD + j(dG M - M^H dG)) v_i with v = L^-H times
+        # the pencil's eigenvectors; D = L L^H makes dD of dL.
         v = scipy.linalg.solve_triangular(root, vectors, lower=True, trans="C")
         w = M @ v
         into_D = (w * weights) @ w.conj().T - (v * (weights * squares)) @ v.conj().T
@@ -267,7 +271,7 @@ def _pencil(M: ComplexArray, root: ComplexArray, G: ComplexArray) -> ComplexArra
     return np.asarray(inverse @ inner @ inverse.conj().T, dtype=np.complex128)
 
 
-def _modes(M: ComplexArray, blocks: Sequence[Block]) -> ComplexArray:
+def _modes(M: ComplexArray, blocks: Sequence[UncertaintyBlock]) -> ComplexArray:
     """Return R whose coordinates R^H M R^-H make the inside of every repeated block diagonal."""
     found = np.eye(len(M), dtype=np.complex128)
     at = 0

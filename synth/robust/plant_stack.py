@@ -1,4 +1,4 @@
-"""Thousands of linear plants at once: stacked matrices of a case's random draws.
+"""Stacks of plants, and of the loops that a controller closes around them: thousands at once.
 
     members of a family -> numbers of each -> Jacobians of one symbolic plant, mapped -> PlantStack
 
@@ -6,6 +6,13 @@ Building a plant takes some twenty milliseconds, nearly all of it for symbols, c
 point of rest.  The linear plant depends on none of these: its matrices are the Jacobians at any
 taut rope, functions of the plant's numbers alone, and CasADi evaluates them for all draws in
 one call.
+
+    PlantStack + one controller -> closed-loop matrices -> eigenvalues and residues -> LoopStack
+
+One eigendecomposition of each closed loop says whether it is stable, and turns every response
+into a sum over modes, H(s) = F + sum_k r_k/(s - p_k), that costs a few additions per
+frequency.  Delays are Pade models of order six.  Nothing here is used to find a design: the
+searches close loops node by node (`synth.loop.loop`), so this is a second opinion.
 """
 
 from __future__ import annotations
@@ -33,7 +40,6 @@ _CHUNK = 400  # loops whose responses are evaluated at once
 _ZOOM = np.array([-1.0, -0.6, -0.3, -0.1, 0.1, 0.3, 0.6, 1.0])
 _NEAR = np.array([-3.0, -1.5, -0.7, -0.3, 0.0, 0.3, 0.7, 1.5, 3.0])
 _ROUNDS = 6  # of zooming into the peak of the sensitivity
-_LIGHT = 0.02  # damping of a mode that the common nodes may miss
 _DRAG_ROUNDS = 30
 _PEAKS = 3  # of each sensitivity that are zoomed into
 _STEP = 1.5  # of the logarithm of a drag coefficient, at most
@@ -285,14 +291,9 @@ class LoopStack:
         """Whether each loop is stable, (m,)."""
         return np.asarray(self.growth < -1e-10 * np.abs(self.poles).max(axis=1))
 
-    def lightly_damped(self, low: float, high: float) -> npt.NDArray[np.bool_]:
-        """Return which loops have a mode in a band [rad/s] that common nodes may miss, (m,)."""
-        inside = (np.abs(self.poles.imag) > low) & (np.abs(self.poles.imag) < high)
-        light = np.abs(self.poles.real) < _LIGHT * np.abs(self.poles.imag)
-        return np.asarray((inside & light).any(axis=1))
-
     def max_sensitivity(self) -> FloatArray:
         """Return M_s of each loop, broken at the first input, (m,)."""
+        # S = D + sum_k r_k / (s - p_k); its peaks stand near poles, whose widths are their damping.
         left, right = self._Cu @ self._modes, self._inverse @ self._B
         residues = left[:, 0] * right[:, :, 0]
         found = np.empty(len(self.poles))

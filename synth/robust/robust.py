@@ -1,4 +1,4 @@
-"""One set of gains for a family of plants and seas: the top of robust design.
+"""Robust design: one set of gains for a family of plants and seas, `optimise_robust`.
 
     case + Family -> scenarios -> search -> worst member of the ranges -> add it, search again
                   -> nothing hurts more -> random draws, verification -> RobustDesign

@@ -1,4 +1,4 @@
-"""`RobustDesign`: one set of gains for a family, with everything that was asked of it."""
+"""Result of a robust design, with the checks and the verdict on it: `RobustDesign`."""
 
 from __future__ import annotations
 

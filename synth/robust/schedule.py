@@ -1,4 +1,4 @@
-r"""Gains that follow the rope's length: smooth functions through optimised nodes.
+r"""Gain schedule over the rope's length: smooth functions through optimised nodes.
 
     case + lengths -> gains at a few nodes -> spline in log L -> checked between the nodes
                    -> where it does not hold or costs too much: one more node -> GainSchedule
@@ -26,7 +26,7 @@ from models.case import Case
 
 from ..design import tuning_of
 from ..question import FamilyLoop, FamilyProblem, Objective
-from ..search import KEPT, FamilyFound, Found, search, search_family
+from ..search import KEPT, FamilyFound, Found, search, search_family, view_of
 from .family import Family, Member
 from .family_plants import FamilyPlants
 from .worst_case import exact_figures
@@ -295,6 +295,9 @@ class _Work:
         if lost:
             status = f"no gains keep the limits at a length of {lost[0]:.4g} m"
             return self._made([0, len(own) - 1], np.zeros((2, len(names))), [], False, status)
+        # Two sets grow: the nodes, through which the gains go, and the members, at which the limits
+        # are held.  A length that leaks becomes a member; where all hold and one still loses too
+        # much against gains of its own, it becomes a node.
         nodes = [0, len(own) - 1]
         members = {float(self.lengths[i]) for i in (0, len(own) // 2, len(own) - 1)}
         best: tuple[list[int], FloatArray, list[SchedulePoint], int] | None = None
@@ -426,8 +429,6 @@ class _Work:
 
     def _verified(self, nodes: Sequence[int], gains: FloatArray, index: int) -> bool:
         """Return whether other code confirms the loop at one length."""
-        from ..search import view_of
-
         scenario: FamilyLoop = self.plants.scenario(self.members[index])
         own = self.own[index]
         assert own is not None

@@ -1,4 +1,4 @@
-"""The members of a family that hurt most, and what thousands of random ones say.
+"""Worst members of a family, and what thousands of random ones say.
 
     gains + family -> corners, Sobol points -> the worst of them, zoomed in on -> members to add
     gains + family -> 10 000 draws -> share that is stable, worst figures -> DrawCheck

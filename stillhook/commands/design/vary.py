@@ -13,7 +13,8 @@ from typing import Any
 
 from models.basics import InputError
 from models.casefile import read_yaml
-from synth.robust import Choice, SeaState, read_scatter
+from models.sea import read_scatter
+from synth.robust import Choice, SeaState, sea_states
 
 
 def parse_vary(texts: Sequence[str]) -> dict[str, list[Any] | Choice]:
@@ -66,7 +67,7 @@ def parse_seas(text: str | None, scatter: str | None) -> list[SeaState] | None:
     if text is not None and scatter is not None:
         raise InputError("--seas and --scatter: must be one or the other, got both")
     if scatter is not None:
-        return read_scatter(scatter)
+        return sea_states(read_scatter(scatter))
     if text is None:
         return None
     states = []

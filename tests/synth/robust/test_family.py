@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from models import load_case
 from models.basics import InputError
 from models.plant import PlantData
+from models.sea import Scatter, read_scatter
 from synth.loop import Assessment
-from synth.robust import Choice, Family, SeaState, read_scatter
+from synth.robust import Choice, Family, sea_states
 from synth.robust.family import Member
 from synth.robust.family_plants import FamilyPlants
 from synth.robust.plant_stack import numbers_of
@@ -132,24 +133,30 @@ def test_unstable_draws_are_counted(case):
 def test_a_scatter_table_is_read(tmp_path):
     path = tmp_path / "scatter.csv"
     path.write_text("significant_height,peak_period,occurrence\n1.5,8,30\n2.5,9,0\n3,10,5\n")
-    states = read_scatter(path)
-    assert [s.occurrence for s in states] == [30.0, 5.0]
-    assert states[1] == SeaState(significant_height=3.0, peak_period=10.0, occurrence=5.0)
+    states = sea_states(read_scatter(path))
+    assert [s.occurrence for s in states] == pytest.approx([30.0 / 35.0, 5.0 / 35.0])
+    assert (states[1].significant_height, states[1].peak_period) == (3.0, 10.0)
+
+
+def test_the_months_of_a_scatter_table_are_one_sea():
+    columns = {"significant_height": [1.5, 3.0, 1.5], "peak_period": [8.0, 10.0, 8.0]}
+    states = sea_states(Scatter(**columns, occurrence=[2, 4, 2], month=[1, 1, 2]))
+    assert [(s.significant_height, s.occurrence) for s in states] == [(1.5, 0.5), (3.0, 0.5)]
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("significant_height,occurrence\n1,1\n", "'peak_period' is missing"),
-        ("significant_height,peak_period,occurrence\n1,a,1\n", ":2: must be three numbers"),
-        ("significant_height,peak_period,occurrence\n1,8,0\n", "at least one row"),
+        ("significant_height,occurrence\n1,1\n", "peak_period .* is missing"),
+        ("significant_height,peak_period,occurrence\n1,a,1\n", ":2: peak_period must be a number"),
+        ("significant_height,peak_period,occurrence\n1,8,0\n", "occurrence"),
     ],
 )
 def test_a_scatter_table_that_is_wrong_is_told(tmp_path, text, message):
     path = tmp_path / "scatter.csv"
     path.write_text(text)
     with pytest.raises(InputError, match=message):
-        read_scatter(path)
+        sea_states(read_scatter(path))
 
 
 @pytest.mark.parametrize(

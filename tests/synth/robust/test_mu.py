@@ -20,9 +20,9 @@ from stillhook.cli import main
 from stillhook.commands.design.margins import parse_off
 from synth.loop import LinearController, closed_loop_poles
 from synth.robust import robustness
-from synth.robust.mu_plant import Doubt, UncertainLoop, doubts_of, uncertain_loop
+from synth.robust.mu_plant import UncertainLoop, UncertainNumber, uncertain_loop, uncertain_numbers
 from synth.robust.mu_search import critical_point, grid_of, proved_bound
-from synth.robust.mu_structured_value import Block, mu_upper
+from synth.robust.mu_structured_value import UncertaintyBlock, mu_upper
 
 GAINS = {"A": 1.0, "a": 4394.0, "a1": 2393.0, "a2": 13691.0}
 RANGES = {"payload.mass": 0.3, "stiffness": 0.2, "drag": 0.5, "delay": 0.5}
@@ -36,7 +36,7 @@ def late_design() -> sh.GainDesign:
 
 def thesis_loop() -> UncertainLoop:
     design = late_design()
-    doubts = doubts_of(design.case, design.drag, RANGES)
+    doubts = uncertain_numbers(design.case, design.drag, RANGES)
     controller = design.assessment.controller
     return uncertain_loop(design.case, controller, doubts, masses=design.masses, drag=design.drag)
 
@@ -58,7 +58,10 @@ def cubic(gain: float) -> UncertainLoop:
         masses=1,
         drag=0.0,
         controller=LinearController.static([[-gain]], ["y"], ["u"]),
-        doubts=(Doubt(path="d1", nominal=0.0, half=1.0), Doubt(path="d2", nominal=0.0, half=1.0)),
+        doubts=(
+            UncertainNumber(path="d1", nominal=0.0, half=1.0),
+            UncertainNumber(path="d2", nominal=0.0, half=1.0),
+        ),
         plant=plant,
         sizes=(1, 1),
     )
@@ -84,25 +87,27 @@ def test_rank_one_with_independent_reals_has_a_closed_form(seed: int) -> None:
         b_eq=[1.0, 0.0],
         bounds=[(None, None)] * 5 + [(0.0, None)],
     )
-    found = mu_upper(np.outer(a, b), [Block()] * 5).bound
+    found = mu_upper(np.outer(a, b), [UncertaintyBlock()] * 5).bound
     assert found == pytest.approx(1.0 / least.fun, rel=1e-5)
 
 
 def test_one_complex_scalar_gives_the_spectral_radius() -> None:
     M = random_matrix(5, 3)
     radius = np.abs(np.linalg.eigvals(M)).max()
-    assert mu_upper(M, [Block(size=5, real=False)]).bound == pytest.approx(radius, rel=5e-3)
+    assert mu_upper(M, [UncertaintyBlock(size=5, real=False)]).bound == pytest.approx(
+        radius, rel=5e-3
+    )
 
 
 def test_one_real_scalar_sees_only_real_eigenvalues() -> None:
     rotated = np.array([[0.5, -2.0], [2.0, 0.5]])  # eigenvalues 0.5 +- 2i
-    assert mu_upper(rotated, [Block(size=2)]).bound < 1e-3
+    assert mu_upper(rotated, [UncertaintyBlock(size=2)]).bound < 1e-3
     diagonal = np.diag([1.5, -3.0]) + np.triu(np.ones((2, 2)), 1)
-    assert mu_upper(diagonal, [Block(size=2)]).bound == pytest.approx(3.0, rel=5e-3)
+    assert mu_upper(diagonal, [UncertaintyBlock(size=2)]).bound == pytest.approx(3.0, rel=5e-3)
 
 
 def test_bound_is_that_of_a_semidefinite_programme() -> None:
-    blocks = [Block(size=2), Block(), Block(size=2, real=False)]
+    blocks = [UncertaintyBlock(size=2), UncertaintyBlock(), UncertaintyBlock(size=2, real=False)]
     M = random_matrix(5, 4)
     found = mu_upper(M, blocks).bound
 
@@ -169,7 +174,7 @@ def test_form_holds_on_a_rope_with_every_sensor() -> None:
     controller = LinearController.static([[10.0, 1.0, 1e-5]], names, ["drive.command"])
     ranges = {"payload.mass": 0.3, "stiffness": 0.2, "winch.motor.inertia": 0.3, "drag": 1.0}
     loop = uncertain_loop(
-        case, controller, doubts_of(case, 6e3, ranges), masses=4, drag=6e3, seed=1
+        case, controller, uncertain_numbers(case, 6e3, ranges), masses=4, drag=6e3, seed=1
     )
     assert loop.sizes[0] == loop.sizes[-1] == 1
     assert loop.error < 1e-8
@@ -259,9 +264,9 @@ def test_an_unstable_design_and_a_wrong_matrix_are_refused() -> None:
     with pytest.raises(InputError, match="must be stable"):
         robustness(unstable, {"payload.mass": 0.1})
     with pytest.raises(InputError, match="shape"):
-        mu_upper(np.eye(3), [Block()])
+        mu_upper(np.eye(3), [UncertaintyBlock()])
     with pytest.raises(InputError, match="size"):
-        Block(size=0)
+        UncertaintyBlock(size=0)
     no_delay = sh.evaluate_gains(load_case("thesis-1975"), GAINS)
     with pytest.raises(InputError, match="a share of it is nothing"):
         robustness(no_delay, {"delay": 0.5})
