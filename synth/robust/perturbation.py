@@ -1,4 +1,4 @@
-r"""How much the gains themselves may be off before the loop is unstable: exactly.
+r"""Radius of errors of the gains that leave a loop stable, exactly: `gain_radius`.
 
 For a loop affine in its gains, 1 + L = 1 - sum_k g_k phi_k(i omega), a pole can only cross
 the axis where this vanishes.  At each frequency that is two real linear equations in the
