@@ -1,4 +1,8 @@
-"""From a hull's panels to the motions of a vessel, by Capytaine."""
+"""Hulls in panels, and the motions of the vessels they make, by Capytaine.
+
+Main dimensions or a mesh file and a loading go in; hydrostatics, hydrodynamic coefficients and a
+`VesselRaos` come out.
+"""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""Keeping what the panel method found: the same hull in the same waves is never solved twice.
+"""A cache of hydrodynamic coefficients: the same hull in the same waves is never solved twice.
 
 A file per computation in the user's cache folder, under a digest of everything that the numbers
 depend on: panels, frequencies, headings, point, depth, density, lid, and the versions of the

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...basics import FloatArray, InputError, check_range
 from ..assemble import read_bytes
-from .hull import Hull
+from .hull import Hull, panel_areas
 
 FORMATS = (".stl", ".gdf", ".pnl", ".hst", ".mar")
 """Endings of the files that are read."""
@@ -160,10 +160,7 @@ def _wet(owner: str, panels: FloatArray) -> FloatArray:
         raise InputError(f"{owner}: no panel is below the waterline")
     found = np.array(pieces)
     lid = np.all(found[..., 2] > -tolerance, axis=1)
-    area = 0.5 * np.linalg.norm(
-        np.cross(found[:, 2] - found[:, 0], found[:, 3] - found[:, 1]), axis=1
-    )
-    return np.asarray(found[~lid & (area > 1e-12 * size**2)])
+    return np.asarray(found[~lid & (panel_areas(found) > 1e-12 * size**2)])
 
 
 def _cut(panel: FloatArray, tolerance: float) -> list[FloatArray]:

@@ -1,4 +1,4 @@
-"""The force of the undisturbed wave on a hull: the Froude-Krylov force.
+"""The Froude-Krylov force: that of the undisturbed wave on a hull.
 
 It could come from the panel method, by the pressure in the middle of each panel.  For roll that is
 not good enough: the moment of long waves is a small difference of large parts, as is the
@@ -14,8 +14,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from ...basics import GRAVITY, SEA_WATER_DENSITY, ComplexArray, FloatArray, wave_number
-from .hull import Hull
+from ...basics import GRAVITY, SEA_WATER_DENSITY, ComplexArray, wave_number
+from .hull import Hull, quadrature_rule
 
 
 def froude_krylov(
@@ -51,7 +51,7 @@ def froude_krylov(
     """
     k = float(wave_number(omega, depth))
     direction = np.atleast_1d(np.asarray(heading, dtype=np.float64))
-    points, normals = _rule(hull.panels)
+    points, normals = quadrature_rule(hull.panels)
     arms = np.cross(points - np.asarray(point), normals)
     generalised = np.concatenate([normals, arms], axis=1)  # (q, 6), with the weights
     z = points[:, 2]
@@ -64,15 +64,3 @@ def froude_krylov(
     # Pressure pushes inwards, against the outward normal.
     force: ComplexArray = -(pressure @ generalised)
     return force
-
-
-def _rule(panels: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return points (q, 3) and outward normals times weights (q, 3) of the integration rule."""
-    points, normals = [], []
-    for corners in ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3)):
-        a, b, c = (panels[:, i, :] for i in corners)
-        normal = 0.25 * np.cross(b - a, c - a)
-        for middle in (a + b, b + c, c + a):
-            points.append(0.5 * middle)
-            normals.append(normal / 3.0)
-    return np.concatenate(points), np.concatenate(normals)

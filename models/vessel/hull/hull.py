@@ -1,11 +1,11 @@
-"""A hull as a computation by panels sees it: flat pieces of its wetted surface.
+"""The wetted surface of a hull in panels: `Hull`, its integrals, and the box.
 
 First stop on the way from main dimensions, or from a mesh, to motions:
 
     Hull -> hydrostatics -> coefficients by panels (models.vessel.hull.bem) -> VesselRaos
 
-A `Hull` is nothing but panels, whoever made them: a box here, a ship in `hull_lines`, a file in
-`hull_files`.  They are checked where they enter: a surface that is not closed below the waterline,
+A `Hull` is nothing but panels, whoever made them: a box here, a ship in `lines`, a file in
+`files`.  They are checked where they enter: a surface that is not closed below the waterline,
 or whose panels look inwards, gives forces that no later step would notice to be wrong.
 
 Frame: x forward, y to port, z up, z = 0 at the still waterline.
@@ -144,8 +144,8 @@ def volumes(panels: FloatArray) -> FloatArray:
     return np.array([panel_integral(panels, itemgetter((..., axis)))[axis] for axis in range(3)])
 
 
-def panel_integral(panels: FloatArray, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """Return the integral of a function times the outward normal, over all panels (3,).
+def quadrature_rule(panels: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return points (q, 3) and outward normals times weights (q, 3) of integrals over panels.
 
     Each panel is two flat triangles, in the mean over both ways to cut it, so that mirrored panels
     have mirrored integrals.  The rule with the middles of a triangle's edges is exact for
@@ -155,16 +155,28 @@ def panel_integral(panels: FloatArray, function: Callable[[FloatArray], FloatArr
     ----------
     panels
         Corners (n, 4, 3) [m].
-    function
-        Maps points (..., 3) to values (...).
     """
-    total = np.zeros(3)
+    points, normals = [], []
     for corners in ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3)):
         a, b, c = (panels[:, k, :] for k in corners)
         normal = 0.25 * np.cross(b - a, c - a)  # half its area, half its weight
-        middles = 0.5 * np.stack([a + b, b + c, c + a], axis=1)
-        total += (normal * function(middles).mean(axis=1)[:, None]).sum(axis=0)
+        for middle in (a + b, b + c, c + a):
+            points.append(0.5 * middle)
+            normals.append(normal / 3.0)
+    return np.concatenate(points), np.concatenate(normals)
+
+
+def panel_integral(panels: FloatArray, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Return the integral of a function (q, 3) -> (q,) times the outward normal (3,)."""
+    points, normals = quadrature_rule(panels)
+    total: FloatArray = function(points) @ normals
     return total
+
+
+def panel_areas(panels: FloatArray) -> FloatArray:
+    """Return the areas of panels (n,) [m2]: half the cross product of the diagonals."""
+    cross = np.cross(panels[:, 2] - panels[:, 0], panels[:, 3] - panels[:, 1])
+    return np.asarray(0.5 * np.linalg.norm(cross, axis=1))
 
 
 def patch(points: FloatArray) -> FloatArray:
@@ -184,9 +196,7 @@ def patch(points: FloatArray) -> FloatArray:
     panels = np.stack(
         [points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]], axis=2
     ).reshape(-1, 4, 3)
-    area = 0.5 * np.linalg.norm(
-        np.cross(panels[:, 2] - panels[:, 0], panels[:, 3] - panels[:, 1]), axis=1
-    )
+    area = panel_areas(panels)
     found: FloatArray = panels[area > 1e-9 * max(float(area.max(initial=0.0)), 1e-30)]
     return found
 

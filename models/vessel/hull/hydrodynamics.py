@@ -1,4 +1,4 @@
-"""From added mass, damping and wave force to motions: the equation of a floating body.
+"""The equation of motion of a floating body: `Hydrodynamics` and `FloatingBody`.
 
     [ -omega^2 (M + A) + i omega (B + B_roll) + C ] x = F,      time factor e^{+i omega t}
 

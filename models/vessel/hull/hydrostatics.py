@@ -1,9 +1,15 @@
-"""What a hull floats like: volume, centres, metacentric heights, and the stiffness they make.
+"""Hydrostatics of a hull: volume, centres, metacentric heights, mass and stiffness matrices.
 
 All of it is integrals over the panels, by the divergence theorem and exact for flat triangles.
 Mass and stiffness are made about one point that is given, never about a point that a library
 picked: matrices about two different points in one equation of motion are an error that no number
 betrays.
+
+Capytaine has hydrostatics of its own, which the tests hold these against.  They take each panel as
+flat and as one point, or as four: with 1 m of metacentric height and 160 panels the roll stiffness
+of a box comes out 40 % too small, that of a ship of 430 panels 5 % (1e-4 with four points).  The
+Froude-Krylov force here goes by the same triangles as these integrals, so that the righting moment
+and the moment of long waves balance whatever the panels; taken from elsewhere, they would not.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from ...basics import FloatArray
-from .hull import Hull, patch
+from .hull import Hull, panel_areas, patch
 
 
 def waterplane_lid(hull: Hull) -> FloatArray | None:
@@ -29,7 +29,7 @@ def waterplane_lid(hull: Hull) -> FloatArray | None:
     if not len(segments):
         return None
     low, high = float(segments[..., 0].min()), float(segments[..., 0].max())
-    size = math.sqrt(_area(hull.panels) / hull.count)
+    size = math.sqrt(panel_areas(hull.panels).mean())
     length = high - low
     corners = np.unique(np.round(segments[..., 0], 6))
     # The hull's own stations where they are as far apart as its panels.
@@ -66,8 +66,3 @@ def _waterline(hull: Hull) -> FloatArray:
     long = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1) > tolerance
     there = np.all(edges[..., 2] > -tolerance, axis=1)
     return np.asarray(edges[long & there])
-
-
-def _area(panels: FloatArray) -> float:
-    cross = np.cross(panels[:, 2] - panels[:, 0], panels[:, 3] - panels[:, 1])
-    return float(0.5 * np.linalg.norm(cross, axis=1).sum())

@@ -1,4 +1,4 @@
-"""From a hull and how it is loaded to the motions of a vessel.
+"""The vessel of a hull and its loading: `vessel_from_hull`.
 
     hull --panels--> coefficients --mass, stiffness, damping of roll--> motions --> VesselRaos
 
