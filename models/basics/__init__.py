@@ -1,4 +1,7 @@
-"""Foundations that every room stands on: errors, files, signals, units, quadrature, intervals."""
+"""Foundations that every room stands on: errors, files, signals, units, quadrature, intervals.
+
+Arrays, numbers and texts go in and come out; nothing here knows of a vessel, a winch or a case.
+"""
 
 from typing import TYPE_CHECKING
 

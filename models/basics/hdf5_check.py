@@ -1,4 +1,4 @@
-"""Whether an HDF5 file (NetCDF 4 is one) can be read at all, tried in a process of its own.
+"""A trial reading of HDF5 files (NetCDF 4 is one) in a process of its own.
 
 The HDF5 library trusts what is in a file: a few changed bytes can send it into an endless loop or
 end the process, and neither can be caught from inside.  So a file is read through once by a child

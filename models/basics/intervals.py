@@ -1,4 +1,4 @@
-"""How well a few repetitions know a mean, a probability or a rate: confidence intervals.
+"""Confidence intervals of a mean, a probability or a rate from a few repetitions.
 
 The mean of independent values has Student's interval; a share the exact one of Clopper and Pearson
 (1934); the time until something happens, with some runs ended before it did, the product-limit

@@ -1,4 +1,4 @@
-"""The statistics of a spectrum: moments, periods, significant and extreme values.
+"""Statistics of a spectrum: moments, periods, significant and extreme values.
 
 A zero-mean Gaussian process is known by its one-sided variance density S(omega).  Its spectral
 moments m_n, the integrals of omega^n S, give its rms sqrt(m0), its mean zero-up-crossing period

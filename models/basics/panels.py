@@ -1,4 +1,4 @@
-"""The axis on which quadrature panels live, and how it is cut into panels.
+"""The frequency axis of quadrature, and its cut into panels.
 
 Behind :mod:`models.basics.quadrature`: log-frequency, optionally continued to zero and to infinity,
 cut at kinks and refined towards poles.

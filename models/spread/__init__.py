@@ -1,4 +1,4 @@
-"""What may vary about a case, how it is distributed, and how samples are drawn.
+"""Spreads: the numbers of a case that vary, their distributions, and the samples drawn.
 
     Spread (distributions by dotted path) + case -> rows of numbers -> changes of the case
 

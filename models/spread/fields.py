@@ -1,4 +1,4 @@
-"""What stands at a dotted path of a case: its kind, its range, its value, its short names.
+"""Fields of a case by dotted path: kind, range, value, short names.
 
 A spread speaks of fields of a case, of gains of a design (``gains.a``) and of the design's linear
 drag coefficient (``drag``); this module is where their units are looked up.

@@ -1,4 +1,4 @@
-"""Points of the unit cube, from which every row of a spread is made.
+"""Sample points of the unit cube, from which every row of a spread is made.
 
 Row i of a Monte Carlo or a Sobol design depends on the seed, i and the number of columns only;
 row i of a Latin hypercube on the number of rows as well, as every row takes a stratum that

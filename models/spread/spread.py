@@ -1,4 +1,4 @@
-"""`Spread`: which numbers of a case vary, how, how they hang together, and the rows drawn.
+"""The spread of a case, its correlations and the rows drawn from it: `Spread`.
 
     Spread({...}) or file -> .on(case) -> .sample(n) rows (n, d) -> .changes(row) -> case.replace
 

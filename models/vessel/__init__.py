@@ -1,4 +1,4 @@
-"""Vessels from files: six complex RAOs over frequency and heading, in one convention.
+"""The vessel: six complex RAOs over frequency and heading, and the heave of its hook.
 
     RAO file (CSV, WAMIT, OrcaFlex, Capytaine, MSS, ShipX) -> read_raos -> VesselRaos -> the hook
 
@@ -12,14 +12,6 @@ from typing import TYPE_CHECKING
 from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .assemble import finished as finished
-    from .assemble import grid as grid
-    from .assemble import numbers as numbers
-    from .assemble import read_bytes as read_bytes
-    from .assemble import text_of as text_of
-    from .convention import CHOICES as CHOICES
-    from .convention import Convention as Convention
-    from .convention import one_of as one_of
     from .crane import Point as Point
     from .crane import across as across
     from .crane import place_text as place_text
@@ -33,10 +25,9 @@ if TYPE_CHECKING:
     from .hook_operator import vessel_raos as vessel_raos
     from .raos import MODES as MODES
     from .raos import VesselRaos as VesselRaos
-    from .symmetry import SYMMETRIES as SYMMETRIES
     from .vessel import HeaveRao as HeaveRao
     from .vessel import OutsideShare as OutsideShare
-    from .vessel_section import HeaveRAO as HeaveRAO
+    from .vessel_section import HeaveTable as HeaveTable
     from .vessel_section import Vessel as Vessel
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

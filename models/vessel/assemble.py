@@ -1,4 +1,4 @@
-"""From rows in any order to a table over frequency and heading.
+"""The assembly of RAO tables from rows in any order.
 
 What the readers share: bytes and text out of a file that may be anything, rows sorted into a grid,
 the wave's point of zero phase brought to the origin, the headings that symmetry gives.

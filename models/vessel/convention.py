@@ -1,4 +1,4 @@
-r"""The conventions that RAO files come in, and the one conversion out of them and back.
+r"""Conventions of RAO files, and the one conversion out of them and back: `Convention`.
 
 Every program has its own; what one may mean by "roll 1.2, phase 90, heading 30" is told by the
 thirteen fields of a :class:`Convention`.  A reader says which holds for its file, and

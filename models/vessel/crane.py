@@ -1,4 +1,4 @@
-"""Where the tip of a crane is, from its angles.
+"""The tip of a crane, from its angles; sides of the ship.
 
 The rope leaves the vessel there, and the place decides: on an 80 m vessel in beam sea the tip of a
 crane moves two and a half times as much over one side as over the other.

@@ -1,4 +1,4 @@
-"""From the six motions of a vessel to the heave of its hook: the operators that a case asks for.
+"""Heave operators of the hook, from the six motions of its vessel.
 
     case.vessel (file, hook, heading) + case.sea (spreading) -> VesselRaos -> heave at the hook
 

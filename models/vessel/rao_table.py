@@ -1,4 +1,4 @@
-"""Between the rows of a table of RAOs, and beyond its ends.
+"""Interpolation between the rows and headings of a table of RAOs, and beyond its ends.
 
 The rules are told, with their reasons, at :meth:`models.vessel.raos.VesselRaos.response`.
 """

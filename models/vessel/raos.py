@@ -1,4 +1,4 @@
-"""The motions of a vessel in waves: six complex operators over frequency and heading.
+"""Motions of a vessel in waves, six complex operators over frequency and heading: `VesselRaos`.
 
 What every reader of a RAO file returns and what the hook's motion is made of.  Convention, fixed:
 

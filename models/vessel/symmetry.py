@@ -1,4 +1,4 @@
-"""The headings that a table leaves out because the vessel is symmetric.
+"""Headings of a RAO table that follow from the symmetry of the vessel.
 
 Most programs compute waves from one side only.  A vessel whose port and starboard halves are
 mirror images answers waves from the other side with the mirrored motions: surge, heave and pitch

@@ -1,6 +1,6 @@
-"""The vessel: how far the hook heaves per metre of wave.
+"""Heave of the hook per metre of wave, over frequency: `HeaveRao`.
 
-Second room in the data's way: a sea's spectrum times |RAO|^2 is the hook motion's spectrum.  The
+A sea's spectrum times |RAO|^2 is the hook motion's spectrum.  The
 vessel is one response amplitude operator (RAO) of heave at the hook, a table over frequency: given
 in the case, or made of the RAOs of the vessel's six motions (`models.vessel`) for the place of the
 hook and the headings of the sea.

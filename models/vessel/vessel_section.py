@@ -27,7 +27,7 @@ def _bundled() -> Collection[str]:
     return tuple(name for name, _ in bundled_vessels())
 
 
-class HeaveRAO(Section):
+class HeaveTable(Section):
     """Heave of the hook per wave amplitude, as a table over frequency."""
 
     omega: Annotated[
@@ -42,7 +42,7 @@ class HeaveRAO(Section):
     default 0."""
 
     @model_validator(mode="after")
-    def _check(self) -> HeaveRAO:
+    def _check(self) -> HeaveTable:
         found = []
         try:
             check_ascending("rao", "omega", self.omega)
@@ -125,7 +125,7 @@ class Vessel(Section):
         *(("heave_rao", name) for name in _GO_WITH_RAOS),
     )
 
-    heave_rao: HeaveRAO | None = None
+    heave_rao: HeaveTable | None = None
     """Heave of the hook per wave amplitude, or give `raos`."""
     raos: (
         Annotated[str, DataFile(names=_bundled, what="a RAO file or the name of a bundled vessel")]

@@ -1,4 +1,8 @@
-"""RAO files of other programs and our own, each read into one convention."""
+"""RAO files of other programs and our own, each read into one convention.
+
+A path goes in; a `VesselRaos` comes out, checked against the limits of long waves, with notes of
+what was found and converted.
+"""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""Reading the NetCDF files that Capytaine writes.
+"""RAOs from Capytaine: stored in its NetCDF file, or solved from the coefficients there.
 
 A file may hold the RAO itself, or the coefficients it follows from: added mass, radiation
 damping, wave force, and beside them mass and hydrostatic stiffness.  With coefficients, damping of

@@ -1,4 +1,4 @@
-"""One door for all RAO files: what a file is, who reads it, whether it can be true.
+"""The door of all RAO files: `read_raos`, `write_raos`, and the table of formats.
 
     path -> what is in it -> reader -> VesselRaos in the project's convention -> long-wave check
 

@@ -1,4 +1,4 @@
-r"""What every free-floating vessel does in very long waves, and what a table that does not says.
+r"""The check of a RAO table against the limits of long waves.
 
 A vessel that is small against the wave goes with the water: it heaves as the surface does, pitches
 and rolls with its slope, surges and sways with the water's own sweep:

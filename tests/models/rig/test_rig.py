@@ -21,7 +21,7 @@ from models.rig.tables import (
     prism_added_mass,
 )
 from models.sea.sea_section import Bretschneider1975Sea, JonswapSea
-from models.vessel import HeaveRAO
+from models.vessel import HeaveTable
 
 ROPE = {"diameter": "44 mm", "mass_per_length": 8.1, "length": 2000}
 PAYLOAD = {
@@ -369,7 +369,7 @@ class TestOtherSections:
         assert longer.breaking_steepness == pytest.approx(1 / 25)
 
     def test_rao_takes_mixed_units(self):
-        rao = HeaveRAO(omega=[0.5, "0.1 Hz"], amplitude=[1.0, "80 %"], phase=[0.1, "-90 deg"])
+        rao = HeaveTable(omega=[0.5, "0.1 Hz"], amplitude=[1.0, "80 %"], phase=[0.1, "-90 deg"])
         assert rao.omega == (0.5, pytest.approx(0.2 * math.pi))
         assert rao.amplitude == (1.0, 0.8)
         assert rao.phase == (0.1, pytest.approx(-math.pi / 2))

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from vessel_tables import orcaflex_phase, swinging
 
 from models.basics import InputError
-from models.vessel import CHOICES, MODES, Convention
+from models.vessel import MODES
+from models.vessel.convention import CHOICES, Convention
 from models.vessel.readers.csv_file import parse_csv
 
 CONVENTIONS = st.builds(

@@ -25,7 +25,8 @@ from vessel_tables import (
 
 from models.basics import InputError
 from models.sea import SeaSpectrum
-from models.vessel import VesselRaos, grid
+from models.vessel import VesselRaos
+from models.vessel.assemble import grid
 from models.vessel.readers import bundled_vessels, read_raos, write_raos
 from models.vessel.readers.orcaflex import parse_orcaflex
 
