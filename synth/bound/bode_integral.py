@@ -110,18 +110,18 @@ def bode_integral(
     return inside + low * float(ends[0]) + high * float(ends[1])
 
 
-def bode_estimate(view: Assessment, *, available: float | None = None) -> BodeEstimate:
+def bode_estimate(assessment: Assessment, *, available: float | None = None) -> BodeEstimate:
     """Return the estimate for a loop with one input and what shakes it first.
 
     Parameters
     ----------
-    view
+    assessment
         The closed loop; its first disturbance has a band.
     available
         Frequency beyond which the loop has nothing to trade [rad/s]; by default where |L| falls
         below 0.1 for good.
     """
-    sea = view.disturbances[0]
+    sea = assessment.disturbances[0]
     low, high = sea.band or (1e-2, 1e2)
     edges = np.geomspace(low, high, 2000)
     omega, width = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
@@ -129,11 +129,11 @@ def bode_estimate(view: Assessment, *, available: float | None = None) -> BodeEs
     begin, end = np.interp(_QUANTILES, cumulated / cumulated[-1], omega)
     top = available
     if top is None:
-        strong = view.grid[np.abs(view.loop_gain(view.grid)) > _GONE]
+        strong = assessment.grid[np.abs(assessment.loop_gain(assessment.grid)) > _GONE]
         top = float(strong.max(initial=end))
     at = np.linspace(begin, end, 400)
-    inside = np.log(np.abs(1.0 / (1.0 + view.loop_gain(at))))
-    peak = view.margins.max_sensitivity
+    inside = np.log(np.abs(1.0 / (1.0 + assessment.loop_gain(at))))
+    peak = assessment.margins.max_sensitivity
     return BodeEstimate(
         band=float(end - begin),
         available=top,

@@ -368,8 +368,8 @@ def youla_design(
         chosen |= broken
     values = np.asarray(q.value, dtype=np.float64) * scale
     controller = realised(plant, K, L, Aq, Bq, Cq * values)
-    view = Assessment(bound.plant, controller, bound.sources)
-    if not view.stable:
+    assessment = Assessment(bound.plant, controller, bound.sources)
+    if not assessment.stable:
         raise SynthesisError("Youla: the realised controller does not stabilise the true plant")
     rms = {n: float(np.linalg.norm(r @ values + r0)) for n, (r, r0) in rows.items()}
     return YoulaDesign(
@@ -377,7 +377,7 @@ def youla_design(
         value=math.sqrt(sum(w * rms[n] ** 2 for n, w in bound.minimise.items())),
         rms={n: rms[n] for n in bound.limits},
         max_sensitivity=max_sensitivity,
-        margins=view.margins,
+        margins=assessment.margins,
         functions=functions,
         controller=controller,
     )

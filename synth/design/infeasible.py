@@ -15,7 +15,7 @@ import numpy as np
 from models.basics import FloatArray
 
 from ..question import DesignQuestion, Goal, Problem
-from ..search import Solution, briskest, coarse_programme, polish, view_of
+from ..search import Solution, assessment_of, briskest, coarse_programme, polish
 from .tuning import Tuning
 
 Progress = Callable[[str, int, int], None]
@@ -119,11 +119,13 @@ def _required(
     if not found:
         return {}
     least = min(found, key=lambda s: s.extra)
-    _, view, excess = polish(problem, least, reference, Goal.RELAX, binding)
+    _, assessment, excess = polish(problem, least, reference, Goal.RELAX, binding)
     if excess > _KEPT:
         return {}
     # What each of them comes to there; one that the others spare is not asked for more.
-    values = {lim.name: (lim, lim.measure(view)) for lim in problem.limits if lim.name in binding}
+    values = {
+        lim.name: (lim, lim.measure(assessment)) for lim in problem.limits if lim.name in binding
+    }
     return {name: value for name, (lim, value) in values.items() if lim.use(value) > 1.0}
 
 
@@ -133,8 +135,8 @@ def _binding(problem: Problem, solved: Solution) -> list[str]:
     Not by their multipliers alone: of two limits that say nearly the same (torque and current
     of a DC motor) only one has a price, and relaxing that one would change nothing.
     """
-    view = view_of(problem, solved, amplitude=float(np.exp(solved.extra)))
-    uses = {lim.name: lim.use(lim.measure(view)) for lim in problem.limits if lim.drive}
+    assessment = assessment_of(problem, solved, amplitude=float(np.exp(solved.extra)))
+    uses = {lim.name: lim.use(lim.measure(assessment)) for lim in problem.limits if lim.drive}
     names = [name for name, use in uses.items() if use > 1.0 - _BINDING]
     return sorted(names or [max(uses, key=lambda n: uses[n])], key=lambda n: -abs(solved.prices[n]))
 

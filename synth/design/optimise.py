@@ -104,11 +104,11 @@ def evaluate_gains(case: Case, gains: Mapping[str, float]) -> GainDesign:
             growth = _growth(question, complete)
     if growth > 0.0:
         return _unstable(question, complete, growth)
-    view = question.assess(complete)
-    uses = _uses(question, view, {})
+    assessment = question.assess(complete)
+    uses = _uses(question, assessment, {})
     broken = [u.name for u in uses.values() if u.enforced and not u.kept]
     status = "stable; " + (f"breaks {', '.join(broken)}" if broken else "keeps every limit")
-    design = _record(question, complete, view, uses, ok=not broken, status=status)
+    design = _record(question, complete, assessment, uses, ok=not broken, status=status)
     return _verified(question, design, None)
 
 
@@ -134,10 +134,10 @@ def _best_possible(
         tuning = tuning_of(question.problem, search(question.problem, 4, seed, [values], progress))
         return _verified(question, _design(question, tuning, tuning.status), progress)
     gains = {"A": question.amplifier, **found.values}
-    view = calmer.assess(gains, found.coefficient)
-    uses = _uses(calmer, view, {})
+    assessment = calmer.assess(gains, found.coefficient)
+    uses = _uses(calmer, assessment, {})
     design = _record(
-        question, gains, view, uses, ok=False, status=_too_small(question, found, height)
+        question, gains, assessment, uses, ok=False, status=_too_small(question, found, height)
     )
     design = replace(
         design,
@@ -181,18 +181,18 @@ def _design(question: DesignQuestion, tuning: Tuning, status: str) -> GainDesign
 
 
 def _uses(
-    question: DesignQuestion, view: Assessment, prices: Mapping[str, float]
+    question: DesignQuestion, assessment: Assessment, prices: Mapping[str, float]
 ) -> dict[str, LimitUse]:
     return {
-        **limit_uses(question.limits, view, prices),
-        **limit_uses(question.reported, view, prices, enforced=False),
+        **limit_uses(question.limits, assessment, prices),
+        **limit_uses(question.reported, assessment, prices, enforced=False),
     }
 
 
 def _record(
     question: DesignQuestion,
     gains: Mapping[str, float],
-    view: Assessment,
+    assessment: Assessment,
     uses: Mapping[str, LimitUse],
     *,
     ok: bool,
@@ -205,12 +205,12 @@ def _record(
         ok=ok,
         status=status,
         significant_height=question.case.sea.significant_height,
-        payload_rms=view.sigma(PAYLOAD),
+        payload_rms=assessment.sigma(PAYLOAD),
         payload_rms_before=question.payload_rms_before,
         hook_rms=float(question.hook.displacement.rms),
-        margins=view.margins,
+        margins=assessment.margins,
         limits=uses,
-        drag=view.coefficient if question.drag is not None else float(fixed or 0.0),
+        drag=assessment.coefficient if question.drag is not None else float(fixed or 0.0),
         drag_before=question.drag_before,
         masses=question.masses,
     )
@@ -298,13 +298,13 @@ def _masses_wanted(question: DesignQuestion, tuning: Tuning) -> int:
     return _masses_for(question, tuning.assessment)
 
 
-def _masses_for(question: DesignQuestion, view: Assessment) -> int:
+def _masses_for(question: DesignQuestion, assessment: Assessment) -> int:
     """Return the rope masses that the loop's crossover asks for, where the case leaves it open."""
     from models.plant import masses_for_bandwidth
 
-    if question.data.masses is not None or not view.margins.crossovers.size:
+    if question.data.masses is not None or not assessment.margins.crossovers.size:
         return question.masses
-    highest = _MODES * float(view.margins.crossovers.max())
+    highest = _MODES * float(assessment.margins.crossovers.max())
     try:
         return max(question.masses, masses_for_bandwidth(question.data, highest))
     except InputError:

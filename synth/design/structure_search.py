@@ -143,27 +143,27 @@ def _patient(
     return tuning
 
 
-def _broken(limits: Sequence[Limit], view: Assessment) -> list[LimitUse]:
-    return [use for use in limit_uses(limits, view, {}).values() if not use.kept]
+def _broken(limits: Sequence[Limit], assessment: Assessment) -> list[LimitUse]:
+    return [use for use in limit_uses(limits, assessment, {}).values() if not use.kept]
 
 
 def design_of(posed: StructureQuestion, tuning: Tuning, *, drive_kept: bool) -> StructureDesign:
     """Return a tuning as a design, with the limits that it did not have to keep as reported."""
-    question, view = posed.question, tuning.assessment
+    question, assessment = posed.question, tuning.assessment
     limits: dict[str, LimitUse] = dict(tuning.limits)
     parts: dict[str, float] = {}
-    if view is not None:
+    if assessment is not None:
         others = (*posed.reported, *(() if drive_kept else posed.drive))
-        limits |= limit_uses(others, view, {}, enforced=False)
+        limits |= limit_uses(others, assessment, {}, enforced=False)
         for disturbance in tuning.problem.disturbances:
             alone = Assessment(
-                view.plant, view.controller, [disturbance]
+                assessment.plant, assessment.controller, [disturbance]
             )  # its drag is in the plant already
             parts[disturbance.name] = alone.sigma(PAYLOAD)
     fixed = question.case.payload.fixed_drag
     drag = question.drag_before
-    if view is not None:
-        drag = view.coefficient if question.drag is not None else float(fixed or 0.0)
+    if assessment is not None:
+        drag = assessment.coefficient if question.drag is not None else float(fixed or 0.0)
     return StructureDesign(
         case=question.case,
         structure=posed.structure.name,

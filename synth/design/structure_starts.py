@@ -125,9 +125,9 @@ def no_worse(problem: Problem, found: Found, starts: Sequence[Sequence[float]]) 
         solved = _as_it_is(problem, values)
         if solved is None or solved.objective > best - _BETTER:
             continue
-        again, view, excess = polish(problem, solved, np.array(values, dtype=np.float64))
+        again, assessment, excess = polish(problem, solved, np.array(values, dtype=np.float64))
         if again.converged and excess <= KEPT and again.objective < best:
-            found = replace(found, solved=again, view=view, excess=excess)
+            found = replace(found, solved=again, assessment=assessment, excess=excess)
     return found
 
 
@@ -136,13 +136,15 @@ def _as_it_is(problem: Problem, values: Sequence[float]) -> Solution | None:
     controller = problem.law.controller(values)
     if not problem.stable(values):
         return None
-    view = Assessment(problem.plant, controller, problem.disturbances, drag=problem.drag)
-    coefficient = view.coefficient if problem.drag is not None else None
+    assessment = Assessment(problem.plant, controller, problem.disturbances, drag=problem.drag)
+    coefficient = assessment.coefficient if problem.drag is not None else None
     if not problem.stable(values, coefficient):
         return None
-    if any(limit.use(limit.measure(view)) > 1.0 + KEPT for limit in problem.limits):
+    if any(limit.use(limit.measure(assessment)) > 1.0 + KEPT for limit in problem.limits):
         return None
-    variance = sum(weight * view.sigma(name) ** 2 for name, weight in problem.minimise.items())
+    variance = sum(
+        weight * assessment.sigma(name) ** 2 for name, weight in problem.minimise.items()
+    )
     return Solution(
         values=np.array(values, dtype=np.float64),
         coefficient=coefficient,

@@ -175,12 +175,16 @@ def tune(
 
 
 def limit_uses(
-    limits: Sequence[Limit], view: Assessment, prices: Mapping[str, float], *, enforced: bool = True
+    limits: Sequence[Limit],
+    assessment: Assessment,
+    prices: Mapping[str, float],
+    *,
+    enforced: bool = True,
 ) -> dict[str, LimitUse]:
     """Return the use of each limit by name; `prices` are in units of the cost per percent."""
     uses = {}
     for limit in limits:
-        value = limit.measure(view)
+        value = limit.measure(assessment)
         uses[limit.name] = LimitUse(
             name=limit.name,
             value=value,
@@ -195,8 +199,8 @@ def limit_uses(
 
 def tuning_of(problem: Problem, found: Found) -> Tuning:
     """Return what a search found as an answer in words and numbers."""
-    solved, view = found.solved, found.view
-    if solved is None or view is None:
+    solved, assessment = found.solved, found.assessment
+    if solved is None or assessment is None:
         return Tuning(
             problem=problem,
             ok=False,
@@ -210,35 +214,35 @@ def tuning_of(problem: Problem, found: Found) -> Tuning:
             assessment=None,
             found=found,
         )
-    cost = float(np.sqrt(sum(w * view.sigma(o) ** 2 for o, w in problem.minimise.items())))
+    cost = float(np.sqrt(sum(w * assessment.sigma(o) ** 2 for o, w in problem.minimise.items())))
     # The programme prices the logarithm of the cost per logarithm of the bound.
     prices = {name: 0.01 * abs(price) * cost for name, price in solved.prices.items()}
-    uses = limit_uses(problem.limits, view, prices)
-    ok = bool(view.stable and solved.converged and found.excess <= KEPT and np.isfinite(cost))
+    uses = limit_uses(problem.limits, assessment, prices)
+    ok = bool(assessment.stable and solved.converged and found.excess <= KEPT and np.isfinite(cost))
     return Tuning(
         problem=problem,
         ok=ok,
-        status=_status(ok, view, uses, cost),
+        status=_status(ok, assessment, uses, cost),
         cost=cost,
         parameters=problem.law.named([float(v) for v in solved.values]),
         controller=problem.law.controller([float(v) for v in solved.values]),
-        margins=view.margins,
+        margins=assessment.margins,
         limits=uses,
         starts=found.starts,
         agreed=found.agreed,
         coefficient=solved.coefficient,
-        assessment=view,
+        assessment=assessment,
         found=found,
     )
 
 
-def _status(ok: bool, view: Assessment, uses: Mapping[str, LimitUse], cost: float) -> str:
+def _status(ok: bool, assessment: Assessment, uses: Mapping[str, LimitUse], cost: float) -> str:
     if ok:
         binding = [u.name for u in uses.values() if u.price > 1e-5 * cost]
         if not binding:
             return "optimal; no limit binds"
         return f"optimal within the limits; {', '.join(binding)} bind{'s' * (len(binding) == 1)}"
-    if not view.stable:
+    if not assessment.stable:
         return "the search ended at an unstable loop"
     broken = [u for u in uses.values() if not u.kept]
     if not broken:

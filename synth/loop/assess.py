@@ -296,8 +296,8 @@ def consistent_coefficient(
     """
 
     def velocity(coefficient: float) -> float:
-        view = Assessment(plant, controller, disturbances, drag=drag, coefficient=coefficient)
-        return view.sigma(drag.velocity) if view.stable else np.inf
+        assessment = Assessment(plant, controller, disturbances, drag=drag, coefficient=coefficient)
+        return assessment.sigma(drag.velocity) if assessment.stable else np.inf
 
     return consistent_drag(drag.quadratic, velocity)
 

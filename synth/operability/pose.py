@@ -91,8 +91,8 @@ def pose_operability(
         if isinstance(source, GainDesign):
             if source.margins is None:
                 raise InputError("operability: the design has no stabilising gains")
-            view = question.assess(source.gains, 0.0)
-            loop_parts = (question.plant, view.controller, question.drag)
+            assessment = question.assess(source.gains, 0.0)
+            loop_parts = (question.plant, assessment.controller, question.drag)
         elif isinstance(source, StructureDesign):
             if not source.parameters:
                 raise InputError("operability: the design has no controller")

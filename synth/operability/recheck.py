@@ -130,7 +130,7 @@ def recheck(
             warnings.simplefilter("ignore", PhysicsWarning)
             case = columns[p].cases[h].replace({"sea.significant_height": height})
         drag = float(contour.drag[h, p])
-        view = evaluate_in(design, case, drag)
+        assessment = evaluate_in(design, case, drag)
         # The velocity's drag; a coefficient that the case fixes agrees with itself.
         fixed = case.payload.fixed_drag is not None
         slope = PlantData.from_case(case).quadratic_drag * float(np.sqrt(8.0 / np.pi))
@@ -140,10 +140,10 @@ def recheck(
                 heading=None if contour.headings is None else float(contour.headings[h]),
                 height=height,
                 criterion=criterion.name,
-                value=criterion.shown * criterion.limit.measure(view),
+                value=criterion.shown * criterion.limit.measure(assessment),
                 bound=criterion.bound,
                 drag=drag,
-                agreed=drag if fixed else slope * view.sigma("payload.velocity"),
+                agreed=drag if fixed else slope * assessment.sigma("payload.velocity"),
             )
         )
     return tuple(found)

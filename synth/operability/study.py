@@ -306,8 +306,8 @@ def _sensitivity(question: OperabilityQuestion, contour: Contour | None) -> floa
     order = np.abs(contour.periods - question.case.sea.spectral_peak_period).argsort()
     known = [c for p in order for c in contour.drag[:, p] if np.isfinite(c)]
     drag = float(known[0]) if known and loop.drag is not None else loop.reference
-    view = Assessment(loop.plant, loop.controller, (), drag=loop.drag, coefficient=drag)
-    return view.max_sensitivity if view.stable else math.inf
+    assessment = Assessment(loop.plant, loop.controller, (), drag=loop.drag, coefficient=drag)
+    return assessment.max_sensitivity if assessment.stable else math.inf
 
 
 def _lines(periods: FloatArray) -> FloatArray:

@@ -200,7 +200,7 @@ def _problem(
 def _best_of(scenario: FamilyLoop, plants: FamilyPlants, seed: int) -> float:
     """Return the least payload rms that gains of its own reach in a scenario [m]."""
     found = search(scenario.problem, _BEST_STARTS, seed, plants.guesses)
-    if found.solved is None or found.view is None or found.excess > KEPT:
+    if found.solved is None or found.assessment is None or found.excess > KEPT:
         raise InputError(
             f"regret: {scenario.name}: no gains of its own keep the limits, so there is no best "
             "to compare with"
@@ -241,10 +241,10 @@ def _masses_wanted(plants: FamilyPlants, members: Sequence[Member], found: Famil
     most = plants.most_masses
     if plants.masses is not None or found.solved is None:
         return most
-    for member, view in zip(members, found.views, strict=True):
+    for member, assessment in zip(members, found.assessments, strict=True):
         data = plants.question(member).data
-        crossovers = view.margins.crossovers
-        if data.masses is not None or not crossovers.size or not view.stable:
+        crossovers = assessment.margins.crossovers
+        if data.masses is not None or not crossovers.size or not assessment.stable:
             continue
         try:
             most = max(most, masses_for_bandwidth(data, _MODES * float(crossovers.max())))

@@ -211,23 +211,23 @@ def _results(
     assert solved is not None
     results = []
     for i, (member, scenario) in enumerate(zip(members, problem.scenarios, strict=True)):
-        view, question = found.views[i], plants.question(member)
-        if not view.stable:
+        assessment, question = found.assessments[i], plants.question(member)
+        if not assessment.stable:
             continue
         values = [float(v) for v in scenario.values(solved.values)]
         try:
-            radius = gain_radius(view.plant, scenario.problem.law, values)
+            radius = gain_radius(assessment.plant, scenario.problem.law, values)
         except InputError:  # several inputs, or a structure that is not affine in its gains
             radius = None
-        margins = view.margins
-        rms = view.sigma("payload.displacement")
+        margins = assessment.margins
+        rms = assessment.sigma("payload.displacement")
         # As everywhere: what the payload's rms would lose if the bound were 1 % looser.
         prices = {
             name: 0.01 * abs(p) * rms if abs(p) > _BINDS else 0.0
             for name, p in solved.prices[i].items()
         }
-        uses = limit_uses(question.limits, view, prices)
-        uses |= limit_uses(question.reported, view, {}, enforced=False)
+        uses = limit_uses(question.limits, assessment, prices)
+        uses |= limit_uses(question.reported, assessment, {}, enforced=False)
         regret = problem.objective is Objective.REGRET
         results.append(
             ScenarioResult(
@@ -270,7 +270,7 @@ def _verified(
             progress("verify", k, len(chosen))
         scenario = problem.scenarios[i]
         own = found.solved.of(i, scenario)
-        single = Found(solved=own, view=found.views[i], excess=found.excess)
+        single = Found(solved=own, assessment=found.assessments[i], excess=found.excess)
         verdict = tuning_of(scenario.problem, single).verify()
         checked[i] = replace(checked[i], verified=verdict.ok)
         if not verdict.ok:

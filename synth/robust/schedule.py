@@ -26,7 +26,7 @@ from models.case import Case
 
 from ..design import tuning_of
 from ..question import FamilyLoop, FamilyProblem, Objective
-from ..search import KEPT, FamilyFound, Found, search, search_family, view_of
+from ..search import KEPT, FamilyFound, Found, assessment_of, search, search_family
 from .family import Family, Member
 from .family_plants import FamilyPlants
 from .worst_case import exact_figures
@@ -435,10 +435,12 @@ class _Work:
         assert own.solved is not None
         values = blend_of(self.lengths[list(nodes)], float(self.lengths[index])) @ gains
         solved = replace(own.solved, values=np.asarray(values), coefficient=None)
-        view = view_of(scenario.problem, solved)
+        assessment = assessment_of(scenario.problem, solved)
         drag = scenario.problem.drag is not None
-        solved = replace(solved, coefficient=view.coefficient if drag else None)
-        tuning = tuning_of(scenario.problem, Found(solved=solved, view=view, excess=0.0))
+        solved = replace(solved, coefficient=assessment.coefficient if drag else None)
+        tuning = tuning_of(
+            scenario.problem, Found(solved=solved, assessment=assessment, excess=0.0)
+        )
         failed = tuning.verify().failed
         return not [name for name in failed if not name.startswith("limits")]
 

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from .nodes import cost_nodes as cost_nodes
     from .nodes import margin_nodes as margin_nodes
     from .polishing import KEPT as KEPT
-    from .polishing import look as look
+    from .polishing import assess as assess
+    from .polishing import assessment_of as assessment_of
     from .polishing import polish as polish
     from .polishing import thinned as thinned
-    from .polishing import view_of as view_of
     from .programme import Pace as Pace
     from .programme import Programme as Programme
     from .programme import Solution as Solution

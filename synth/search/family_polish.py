@@ -1,4 +1,4 @@
-"""Polishing over a family: exchange of nodes on every loop, and looks at all of them.
+"""Polishing over a family: exchange of nodes on every loop, assessed one by one.
 
 What `synth.search.polishing` does for one loop.  Scenarios that share a loop share its nodes.
 """
@@ -17,7 +17,7 @@ from ..loop import Assessment, Disturbance
 from ..question import FamilyLoop, FamilyProblem, Problem
 from .family_programme import FamilyProgramme, FamilySolved
 from .nodes import cost_nodes, margin_nodes
-from .polishing import KEPT, thinned, view_of
+from .polishing import KEPT, assessment_of, thinned
 from .programme import Pace
 
 PER_DECADE = 16  # margin nodes of the first pass; the exchange finds what lies between
@@ -31,23 +31,23 @@ _SETTLED = 2e-4  # change of the log objective below which the exchange has sett
 def polish_family(
     family: FamilyProblem, solved: FamilySolved, reference: FloatArray
 ) -> tuple[FamilySolved, tuple[Assessment, ...], float]:
-    """Return a solution on refined nodes, the look at each loop, and the largest excess.
+    """Return a solution on refined nodes, the assessment of each loop, and the largest excess.
 
     The exchange of `synth.search.polishing` on every loop: where a limit is pressed becomes a node.
     """
-    views, excess = looks_at(family, solved)
+    assessments, excess = assessments_of(family, solved)
     broken = [np.zeros(0) for _ in family.groups]
     before = [np.zeros(0) for _ in family.groups]
-    best = (excess > KEPT, solved.objective, solved, views, excess)
+    best = (excess > KEPT, solved.objective, solved, assessments, excess)
     tighten: dict[tuple[int, str], float] = {}
     for k_round in range(_ROUNDS):
         nodes, omega = [], []
         for k, group in enumerate(family.groups):
-            problem, view = family.scenarios[group[0]].problem, views[group[0]]
-            before[k] = thinned([before[k], *(lim.critical(view) for lim in problem.limits)])
-            broken[k] = np.concatenate([broken[k], *(m.worst(view) for m in problem.limits)])
-            nodes.append(cost_nodes(shaken_by_all(family, group), [view], rtol=1e-7))
-            near = margin_nodes(problem, [view.poles], 2 * PER_DECADE)
+            problem, assessment = family.scenarios[group[0]].problem, assessments[group[0]]
+            before[k] = thinned([before[k], *(lim.critical(assessment) for lim in problem.limits)])
+            broken[k] = np.concatenate([broken[k], *(m.worst(assessment) for m in problem.limits)])
+            nodes.append(cost_nodes(shaken_by_all(family, group), [assessment], rtol=1e-7))
+            near = margin_nodes(problem, [assessment.poles], 2 * PER_DECADE)
             omega.append(np.unique(np.concatenate([near, before[k], broken[k]])))
         programme = FamilyProgramme(family, nodes, omega, reference=reference, tolerance=1e-8)
         start = programme.pack(solved.values, solved.coefficients)
@@ -55,14 +55,14 @@ def polish_family(
         if again is None:
             break
         moved, solved = abs(again.objective - solved.objective), again
-        views, excess = looks_at(family, solved)
+        assessments, excess = assessments_of(family, solved)
         if (excess > KEPT, solved.objective) < best[:2] or best[0]:
-            best = (excess > KEPT, solved.objective, solved, views, excess)
+            best = (excess > KEPT, solved.objective, solved, assessments, excess)
         if excess <= KEPT and (moved < _SETTLED or k_round >= _EXCHANGED):
             break
         if k_round >= _EXCHANGED and excess < _HAIR:  # what is broken by a hair is mended by a hair
             for i, limit in own_limits(family):
-                over = limit.use(limit.measure(views[i])) - 1.0
+                over = limit.use(limit.measure(assessments[i])) - 1.0
                 if over > 0.5 * KEPT:
                     key = (i, limit.name)
                     tighten[key] = tighten.get(key, 0.0) + 1.1 * over
@@ -79,14 +79,16 @@ def _near(
     return None
 
 
-def looks_at(family: FamilyProblem, solved: FamilySolved) -> tuple[tuple[Assessment, ...], float]:
+def assessments_of(
+    family: FamilyProblem, solved: FamilySolved
+) -> tuple[tuple[Assessment, ...], float]:
     """Return each scenario's loop in numbers, and the largest relative excess over a limit."""
-    views = tuple(
-        view_of(scenario.problem, solved.of(i, scenario))
+    assessments = tuple(
+        assessment_of(scenario.problem, solved.of(i, scenario))
         for i, scenario in enumerate(family.scenarios)
     )
-    own = [lim.use(lim.measure(views[i])) - 1.0 for i, lim in own_limits(family)]
-    return views, max([0.0, *own])
+    own = [lim.use(lim.measure(assessments[i])) - 1.0 for i, lim in own_limits(family)]
+    return assessments, max([0.0, *own])
 
 
 def own_limits(family: FamilyProblem) -> Iterator[tuple[int, Limit]]:
@@ -98,7 +100,7 @@ def own_limits(family: FamilyProblem) -> Iterator[tuple[int, Limit]]:
                     yield i, limit
 
 
-def view_from(scenario: FamilyLoop, searched: FloatArray) -> Assessment:
+def assessment_from(scenario: FamilyLoop, searched: FloatArray) -> Assessment:
     """Return a scenario's loop in numbers, drag as its plant holds it."""
     problem = scenario.problem
     return Assessment(

@@ -4,7 +4,7 @@
                   -> exchange of nodes on every loop -> FamilyFound
 
 The same steps as `synth.search.multistart` takes for one loop, with its candidates, nodes and
-looks.
+assessments.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from models.basics import FloatArray
 
 from ..loop import Assessment
 from ..question import FamilyProblem, Problem, Values
-from .family_polish import PER_DECADE, looks_at, polish_family, shaken_by_all, view_from
+from .family_polish import PER_DECADE, assessment_from, assessments_of, polish_family, shaken_by_all
 from .family_programme import FamilyProgramme, FamilySolved
 from .multistart import Start
 from .nodes import cost_nodes, margin_nodes
@@ -46,8 +46,8 @@ class FamilyFound:
     ----------
     solved
         The best answer, or None if nothing stabilises every loop.
-    views
-        A look at each scenario's loop.
+    assessments
+        The assessment of each scenario's loop.
     excess
         Largest relative excess over a limit of any scenario.
     starts, agreed
@@ -57,7 +57,7 @@ class FamilyFound:
     """
 
     solved: FamilySolved | None
-    views: tuple[Assessment, ...] = ()
+    assessments: tuple[Assessment, ...] = ()
     excess: float = np.inf
     starts: tuple[Start, ...] = ()
     agreed: int = 0
@@ -159,10 +159,10 @@ def search_family(
             (programme.solve(programme.pack(b), pace=Pace.NEAR) for b in begins[:2]),
             key=lambda s: (not s.converged, programme.violations(programme.pack(s.values))[1]),
         )
-        views, excess = looks_at(family, solved)
+        assessments, excess = assessments_of(family, solved)
         return FamilyFound(
             solved=solved,
-            views=views,
+            assessments=assessments,
             excess=max(excess, 1e-3),
             starts=tuple(records),
             reference=reference,
@@ -186,7 +186,7 @@ def search_family(
     tell("polish", 1, 1)
     return FamilyFound(
         solved=best[0],
-        views=best[1],
+        assessments=best[1],
         excess=best[2],
         starts=tuple(records),
         agreed=sum(1 for s in first if abs(s.objective - origin.objective) <= _AGREE),
@@ -235,10 +235,10 @@ def _second_pass(
     """Return (where it came from, answer) again with nodes where any leaked, the best first."""
     held = [np.zeros(0) for _ in family.groups]
     for solved in first:
-        views, _ = looks_at(family, solved)
+        assessments, _ = assessments_of(family, solved)
         for k, group in enumerate(family.groups):
             limits = family.scenarios[group[0]].problem.limits
-            held[k] = thinned([held[k], *(lim.critical(views[group[0]]) for lim in limits)])
+            held[k] = thinned([held[k], *(lim.critical(assessments[group[0]]) for lim in limits)])
     programme = coarse_programme(family, [s.values for s in first], reference, held)
     pairs = []
     for old in first:
@@ -258,8 +258,8 @@ def coarse_programme(
     nodes, omega = [], []
     for k, group in enumerate(family.groups):
         first = family.scenarios[group[0]]
-        views = [view_from(first, begin) for begin in begins[:_SAMPLE]]
-        nodes.append(cost_nodes(shaken_by_all(family, group), views, rtol=1e-4))
-        margins = margin_nodes(first.problem, [v.poles for v in views], PER_DECADE)
+        assessments = [assessment_from(first, begin) for begin in begins[:_SAMPLE]]
+        nodes.append(cost_nodes(shaken_by_all(family, group), assessments, rtol=1e-4))
+        margins = margin_nodes(first.problem, [v.poles for v in assessments], PER_DECADE)
         omega.append(margins if held is None else np.union1d(margins, held[k]))
     return FamilyProgramme(family, nodes, omega, reference=reference, tolerance=1e-6)

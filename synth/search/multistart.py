@@ -19,7 +19,7 @@ from models.basics import FloatArray
 from ..loop import Assessment
 from ..question import Goal, Problem
 from .nodes import cost_nodes, margin_nodes
-from .polishing import KEPT, look, polish, thinned
+from .polishing import KEPT, assess, polish, thinned
 from .programme import Pace, Programme, Solution
 from .starts import begin_points, briskest, coarse_programme, pick_spread, start_coefficient
 
@@ -51,14 +51,14 @@ class Start:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Found:
-    """What a search found: the best answer, a look at it, and every start.
+    """What a search found: the best answer, its assessment, and every start.
 
     `excess` is the largest relative excess over a limit; `solved` is None where nothing
     stable was found at all.  `reference` are parameters of a briskly stable loop.
     """
 
     solved: Solution | None
-    view: Assessment | None
+    assessment: Assessment | None
     excess: float
     starts: tuple[Start, ...] = ()
     agreed: int = 0
@@ -75,7 +75,7 @@ def search(
     """Return the best answer of a multi-start search; see `synth.design.tuning.tune`."""
     begins = begin_points(problem, starts + _RESERVE, seed, guesses)
     if not begins:
-        return Found(solved=None, view=None, excess=np.inf)
+        return Found(solved=None, assessment=None, excess=np.inf)
     reference = briskest(problem, begins)
     return _from(problem, begins, reference, start_coefficient(problem), progress, starts)
 
@@ -102,13 +102,13 @@ def resume(
     if earlier.solved is None or not problem.stable(earlier.solved.values, coefficient):
         return found
     # The earlier answer itself, without leaving its neighbourhood.
-    solved, view, excess = polish(problem, earlier.solved, reference)
+    solved, assessment, excess = polish(problem, earlier.solved, reference)
     if solved is earlier.solved or excess > KEPT:
         return found
     rival = found.solved
     if rival is not None and found.excess <= KEPT and rival.objective <= solved.objective:
         return found
-    return replace(found, solved=solved, view=view, excess=excess)
+    return replace(found, solved=solved, assessment=assessment, excess=excess)
 
 
 def _from(
@@ -151,10 +151,10 @@ def _from(
     tell("starts", count, count)
     if not first:
         solved = least_violation(problem, begins, reference)
-        view, excess = look(problem, solved)
+        assessment, excess = assess(problem, solved)
         return Found(
             solved=solved,
-            view=view,
+            assessment=assessment,
             excess=max(excess, 1.0),
             starts=tuple(records),
             reference=reference,
@@ -216,7 +216,7 @@ def _polished(
     agreed = sum(1 for s in first if abs(s.objective - origin.objective) <= _AGREE)
     return Found(
         solved=best[0],
-        view=best[1],
+        assessment=best[1],
         excess=best[2],
         starts=records,
         agreed=agreed,
@@ -232,12 +232,14 @@ def _second_pass(
     Each stays in its basin if the limits can be kept there, else it may move freely.  Each
     answer comes with the one it began from.
     """
-    views = [look(problem, solved)[0] for solved in first]
-    critical = [limit.critical(view) for view in views for limit in problem.limits]
+    assessments = [assess(problem, solved)[0] for solved in first]
+    critical = [
+        limit.critical(assessment) for assessment in assessments for limit in problem.limits
+    ]
     programme = Programme(
         problem,
-        cost_nodes(problem, views, rtol=1e-6),
-        np.union1d(margin_nodes(problem, [v.poles for v in views], 40), thinned(critical)),
+        cost_nodes(problem, assessments, rtol=1e-6),
+        np.union1d(margin_nodes(problem, [v.poles for v in assessments], 40), thinned(critical)),
         reference=reference,
         tolerance=1e-7,
     )

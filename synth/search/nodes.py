@@ -24,23 +24,25 @@ _MOST_PANELS = 4000
 _INSIDE = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)  # nodes about the edge of a limit's band
 
 
-def cost_nodes(problem: Problem, views: Sequence[Assessment], rtol: float = 1e-8) -> Quadrature:
-    """Return nodes that integrate every output the problem speaks of, for all the views."""
+def cost_nodes(
+    problem: Problem, assessments: Sequence[Assessment], rtol: float = 1e-8
+) -> Quadrature:
+    """Return nodes that integrate every output the problem speaks of, for all assessments."""
     wanted = {*problem.minimise, *(o for limit in problem.limits for o in limit.outputs)}
     if problem.drag is not None:
         wanted.add(problem.drag.velocity)
     outputs = sorted(wanted)
     pairs = [(output, d.name) for output in outputs for d in problem.disturbances]
-    poles = np.concatenate([view.poles for view in views])
+    poles = np.concatenate([assessment.poles for assessment in assessments])
     low, high, half_line = integration_band(problem.disturbances, poles)
 
     def integrands(omega: FloatArray) -> FloatArray:
         shared = numeric_blocks(problem.plant.response(omega)) if problem.drag is None else None
         densities = {d.name: d.density(omega) for d in problem.disturbances}
         rows = []
-        for view in views:
-            blocks = shared or numeric_blocks(view.plant.response(omega))
-            law = view.controller.response_at(1j * omega)
+        for assessment in assessments:
+            blocks = shared or numeric_blocks(assessment.plant.response(omega))
+            law = assessment.controller.response_at(1j * omega)
             entries = [[law[:, i, j] for j in range(law.shape[2])] for i in range(law.shape[1])]
             found = closed_loop(blocks, entries, pairs)
             for output in outputs:

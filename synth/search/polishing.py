@@ -19,7 +19,7 @@ from .nodes import cost_nodes, margin_nodes
 from .programme import Pace, Programme, Solution
 
 KEPT = 1e-5  # a limit counts as kept up to this relative excess
-_MOST_CRITICAL = 300  # frequencies that one look adds
+_MOST_CRITICAL = 300  # frequencies that one assessment adds
 _ROUNDS = 12  # of the exchange of nodes
 _LATE = 4  # rounds after which it settles for less
 _LATE_HAIR = 2e-4  # relative excess that is then mended by tightening
@@ -39,27 +39,27 @@ def polish(
 ) -> tuple[Solution, Assessment, float]:
     """Return a solution on refined nodes: exchange until no limit is broken between them.
 
-    Also returned: the look at it, and the largest relative excess over a limit.
+    Also returned: its assessment, and the largest relative excess over a limit.
     """
     before, broken = np.zeros(0), np.zeros(0)
-    view, excess = look(problem, solved, goal, relaxed)
-    best = (excess > KEPT, solved.objective, solved, view, excess)
+    assessment, excess = assess(problem, solved, goal, relaxed)
+    best = (excess > KEPT, solved.objective, solved, assessment, excess)
     hairs: dict[str, float] = {}
     for k in range(_ROUNDS):
         late = k >= _LATE
         if late:
             # In a flat valley the peaks wander for ever: what a hair mends need not be waited for.
-            for name, over in _overs(problem, view, relaxed).items():
+            for name, over in _overs(problem, assessment, relaxed).items():
                 if 0.5 * KEPT < over < _LATE_HAIR:
                     hairs[name] = hairs.get(name, 0.0) + 1.1 * over
         # Where a limit was broken stays a node; what was merely close stays for one more round.
-        critical = thinned([limit.critical(view) for limit in problem.limits])
-        broken = np.concatenate([broken, *(limit.worst(view) for limit in problem.limits)])
+        critical = thinned([limit.critical(assessment) for limit in problem.limits])
+        broken = np.concatenate([broken, *(limit.worst(assessment) for limit in problem.limits)])
         held, before = np.concatenate([before, critical, broken]), critical
         programme = Programme(
             problem,
-            cost_nodes(problem, [view]),
-            np.unique(np.concatenate([margin_nodes(problem, [view.poles], 60), held])),
+            cost_nodes(problem, [assessment]),
+            np.unique(np.concatenate([margin_nodes(problem, [assessment.poles], 60), held])),
             goal,
             reference=reference,
             relaxed=relaxed,
@@ -71,9 +71,9 @@ def polish(
             break
         moved = abs(again.objective - solved.objective)
         solved = again
-        view, excess = look(problem, solved, goal, relaxed)
+        assessment, excess = assess(problem, solved, goal, relaxed)
         if (excess > KEPT, solved.objective) < best[:2] or best[0]:
-            best = (excess > KEPT, solved.objective, solved, view, excess)
+            best = (excess > KEPT, solved.objective, solved, assessment, excess)
         if excess <= (KEPT if late else 0.5 * KEPT) and moved < (5.0 if late else 1.0) * _SETTLED:
             break
     return best[2:] if not best[0] else _tightened(problem, best[2:], programme, goal, relaxed)
@@ -121,12 +121,12 @@ def _tightened(
     Where the exchange does not settle, the bounds are tightened by what they were broken by;
     the cost of that is of the same order, and stands in no report as a price.
     """
-    solved, view, excess = answer
+    solved, assessment, excess = answer
     if not solved.converged or excess > _HAIR:
         return answer
     tighten: dict[str, float] = {}
     for _ in range(3):
-        for name, over in _overs(problem, view, relaxed).items():
+        for name, over in _overs(problem, assessment, relaxed).items():
             if over > 0.5 * KEPT:
                 tighten[name] = tighten.get(name, 0.0) + 1.1 * over
         start = programme.pack(solved.values, solved.coefficient, solved.extra)
@@ -134,13 +134,13 @@ def _tightened(
         if not (again.converged and problem.stable(again.values, again.coefficient)):
             return answer
         solved = again
-        view, excess = look(problem, solved, goal, relaxed)
+        assessment, excess = assess(problem, solved, goal, relaxed)
         if excess <= KEPT:
-            return solved, view, excess
+            return solved, assessment, excess
     return answer
 
 
-def view_of(problem: Problem, solved: Solution, amplitude: float = 1.0) -> Assessment:
+def assessment_of(problem: Problem, solved: Solution, amplitude: float = 1.0) -> Assessment:
     """Return a solution in numbers, the disturbances' amplitudes times `amplitude`."""
     return Assessment(
         problem.plant,
@@ -151,18 +151,20 @@ def view_of(problem: Problem, solved: Solution, amplitude: float = 1.0) -> Asses
     )
 
 
-def look(
+def assess(
     problem: Problem, solved: Solution, goal: Goal = Goal.COST, relaxed: Sequence[str] = ()
 ) -> tuple[Assessment, float]:
     """Return a solution in numbers, and its largest relative excess over a limit."""
-    view = view_of(problem, solved, float(np.exp(solved.extra)) if goal is Goal.SEA else 1.0)
-    return view, max(_overs(problem, view, relaxed).values(), default=0.0)
+    assessment = assessment_of(
+        problem, solved, float(np.exp(solved.extra)) if goal is Goal.SEA else 1.0
+    )
+    return assessment, max(_overs(problem, assessment, relaxed).values(), default=0.0)
 
 
-def _overs(problem: Problem, view: Assessment, relaxed: Sequence[str]) -> dict[str, float]:
+def _overs(problem: Problem, assessment: Assessment, relaxed: Sequence[str]) -> dict[str, float]:
     """Return the relative excess over each limit that counts, by name."""
     return {
-        limit.name: limit.use(limit.measure(view)) - 1.0
+        limit.name: limit.use(limit.measure(assessment)) - 1.0
         for limit in problem.limits
         if limit.name not in relaxed
     }

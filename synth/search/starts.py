@@ -177,7 +177,7 @@ def coarse_programme(
     **options: Any,
 ) -> Programme:
     """Return a programme on nodes that suit all the starts."""
-    views = [
+    assessments = [
         Assessment(
             problem.plant,
             problem.law.controller([float(v) for v in begin]),
@@ -189,8 +189,8 @@ def coarse_programme(
     ]
     return Programme(
         problem,
-        cost_nodes(problem, views, rtol=1e-4),
-        margin_nodes(problem, [v.poles for v in views[:4]], 40),
+        cost_nodes(problem, assessments, rtol=1e-4),
+        margin_nodes(problem, [v.poles for v in assessments[:4]], 40),
         goal,
         reference=reference,
         tolerance=1e-6,

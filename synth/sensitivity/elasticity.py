@@ -90,17 +90,17 @@ def _first(
     fixed: FixedDesign, progress: Progress | None, only: str | None = None
 ) -> tuple[dict[str, float], list[Elasticity], list[str], list[str]]:
     """Return the figures, the elasticities, the paths without effect, and those that step."""
-    view = fixed.view()
-    if view is None:
+    assessment = fixed.assessment()
+    if assessment is None:
         raise InputError("sensitivity: the loop must be stable; an unstable one has no rms")
-    gradients = _gradients(view, fixed)
+    gradients = _gradients(assessment, fixed)
     figures = {name: gradients[name].value for name in _OUTPUTS}
-    figures["max_sensitivity"] = view.max_sensitivity
+    figures["max_sensitivity"] = assessment.max_sensitivity
     slopes = PlantSlopes(
-        fixed.case, masses=fixed.masses, drag=view.coefficient or fixed.fixed_drag,
+        fixed.case, masses=fixed.masses, drag=assessment.coefficient or fixed.fixed_drag,
         measurements=fixed.measurements,
     )  # fmt: skip
-    drag = _DragMotion(fixed, view, gradients, slopes) if fixed.stochastic else None
+    drag = _DragMotion(fixed, assessment, gradients, slopes) if fixed.stochastic else None
     numbers = [n for n in numbers_of(fixed.case) if only is None or n.path == only]
     found: list[Elasticity] = []
     idle: list[str] = []
@@ -160,11 +160,11 @@ class _DragMotion:
     def __init__(
         self,
         fixed: FixedDesign,
-        view: Assessment,
+        assessment: Assessment,
         gradients: Mapping[str, Gradient],
         slopes: PlantSlopes,
     ) -> None:
-        self._case, self.C = fixed.case, view.coefficient
+        self._case, self.C = fixed.case, assessment.coefficient
         self.of = {name: g.along(slopes.of_drag()) for name, g in gradients.items()}
 
     def shift(self, velocity: float, quadratic: float = 0.0) -> float:
@@ -184,16 +184,18 @@ class _DragMotion:
         return self.shift(velocity, own)
 
 
-def _gradients(view: Assessment, fixed: FixedDesign) -> dict[str, Gradient]:
+def _gradients(assessment: Assessment, fixed: FixedDesign) -> dict[str, Gradient]:
     outputs = {**_OUTPUTS, "velocity": "payload.velocity"}
-    nodes = view.quadrature(list(outputs.values()))
-    arguments = view.plant, view.controller, fixed.disturbances
+    nodes = assessment.quadrature(list(outputs.values()))
+    arguments = assessment.plant, assessment.controller, fixed.disturbances
     found = {
         name: variance_gradient(*arguments, output, nodes.omega, nodes.weights)
         for name, output in outputs.items()
     }
-    for k, peak in enumerate(view.sensitivity_peaks(_TIE * view.max_sensitivity)):
-        found[f"{_PEAK}{k}"] = sensitivity_gradient(view.plant, view.controller, float(peak))
+    for k, peak in enumerate(assessment.sensitivity_peaks(_TIE * assessment.max_sensitivity)):
+        found[f"{_PEAK}{k}"] = sensitivity_gradient(
+            assessment.plant, assessment.controller, float(peak)
+        )
     return found
 
 

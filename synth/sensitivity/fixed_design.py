@@ -95,7 +95,7 @@ class FixedDesign:
         }
         return disturbances(spectra, tuple(spectra))
 
-    def view(
+    def assessment(
         self, case: Case | None = None, *, gain: str | None = None, factor: float = 1.0
     ) -> Assessment | None:
         """Return the closed loop on a case, a gain times a factor; None if it is unstable."""
@@ -117,7 +117,7 @@ class FixedDesign:
             )
         )
         drag = DragElement(quadratic=quadratic, reference=start) if stochastic else None
-        view = Assessment(
+        assessment = Assessment(
             plant,
             self.controller(values),
             self.disturbances if case is None else self.disturbances_of(here),
@@ -125,7 +125,7 @@ class FixedDesign:
             coefficient=self.drag if case is None and gain is None else None,
         )
         try:
-            return view if view.stable else None
+            return assessment if assessment.stable else None
         except SolverError:
             return None  # no drag agrees: unstable with any
 

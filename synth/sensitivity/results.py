@@ -141,18 +141,22 @@ class Sensitivity:
         found = []
         for path in wanted if paths is None else paths:
             if path.startswith("gains."):
-                view = self._fixed.view(gain=path.removeprefix("gains."), factor=1.0 + share)
+                assessment = self._fixed.assessment(
+                    gain=path.removeprefix("gains."), factor=1.0 + share
+                )
             elif path in numbers:
                 case = changed(self._fixed.case, numbers[path], numbers[path].value * (1 + share))
-                view = self._fixed.view(case)
+                assessment = self._fixed.assessment(case)
             else:
                 raise InputError(f"sensitivity: there is no number {path!r} in the case")
             found.append(
                 Moved(
                     path=path,
                     share=share,
-                    payload_rms=view.sigma(PAYLOAD) if view is not None else np.inf,
-                    max_sensitivity=view.max_sensitivity if view is not None else np.inf,
+                    payload_rms=assessment.sigma(PAYLOAD) if assessment is not None else np.inf,
+                    max_sensitivity=assessment.max_sensitivity
+                    if assessment is not None
+                    else np.inf,
                 )
             )
         return tuple(found)

@@ -35,13 +35,13 @@ from ..search import (
     Programme,
     Progress,
     Solution,
+    assess,
+    assessment_of,
     begin_points,
     cost_nodes,
-    look,
     margin_nodes,
     polish,
     thinned,
-    view_of,
 )
 
 EXCESS = 1e-4  # relative excess over a limit that an answer on the way may have
@@ -94,8 +94,8 @@ class Answer:
 
     Attributes
     ----------
-    problem, solved, view
-        The problem, the solver's answer, and a look at it.
+    problem, solved, assessment
+        The problem, the solver's answer, and its assessment.
     excess
         Largest relative excess over a limit that was to be kept.
     nodes, omega, held
@@ -107,7 +107,7 @@ class Answer:
 
     problem: Problem
     solved: Solution
-    view: Assessment
+    assessment: Assessment
     excess: float
     nodes: Quadrature
     omega: FloatArray
@@ -117,7 +117,7 @@ class Answer:
     @property
     def payload_rms(self) -> float:
         """Standard deviation of the payload [m]."""
-        return self.view.sigma(PAYLOAD)
+        return self.assessment.sigma(PAYLOAD)
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -126,7 +126,7 @@ class Answer:
 
     def uses(self) -> dict[str, float]:
         """Return the use of every limit by name."""
-        return {lim.name: lim.use(lim.measure(self.view)) for lim in self.problem.limits}
+        return {lim.name: lim.use(lim.measure(self.assessment)) for lim in self.problem.limits}
 
     def carried(self, problem: Problem) -> FloatArray:
         """Return the parameters for another problem, each as large for it as here."""
@@ -187,10 +187,10 @@ def follow(
             best = found
     if best is None or not fine:
         return best
-    solved, view, excess = polish(problem, best.solved, starts[0], goal, relaxed)
+    solved, assessment, excess = polish(problem, best.solved, starts[0], goal, relaxed)
     if not solved.converged or excess > max(best.excess, EXCESS):
         return best
-    return replace(best, solved=solved, view=view, excess=excess)
+    return replace(best, solved=solved, assessment=assessment, excess=excess)
 
 
 def designed(
@@ -204,7 +204,7 @@ def designed(
     answer = follow(problem, begins, near=near, fine=True)
     if answer is None:
         return None
-    found = Found(solved=answer.solved, view=answer.view, excess=answer.excess)
+    found = Found(solved=answer.solved, assessment=answer.assessment, excess=answer.excess)
     tuning = tuning_of(problem, found)
     return verified(
         design_of(pose_structure(case, structure, masses), tuning, drive_kept=True), tell
@@ -276,13 +276,13 @@ def _arrived(
     extra: float,
     rounds: int,
 ) -> Answer | None:
-    view = _looked(problem, begin, coefficient)
+    assessment = _assessed(problem, begin, coefficient)
     held = near.held if near is not None else np.zeros(0)
     solved: Solution | None = None
     best: Answer | None = None
     for k in range(rounds):
-        nodes = cost_nodes(problem, [view], rtol=_RTOL)
-        omega = np.union1d(margin_nodes(problem, [view.poles], 40), held)
+        nodes = cost_nodes(problem, [assessment], rtol=_RTOL)
+        omega = np.union1d(margin_nodes(problem, [assessment.poles], 40), held)
         programme = Programme(
             problem, nodes, omega, goal, reference=begin, relaxed=relaxed, tolerance=1e-8
         )
@@ -296,29 +296,29 @@ def _arrived(
         if again is None:
             break
         solved = again
-        view, excess = look(problem, solved, goal, relaxed)
+        assessment, excess = assess(problem, solved, goal, relaxed)
         answer = Answer(
             problem=problem,
             solved=solved,
-            view=view,
+            assessment=assessment,
             excess=excess,
             nodes=nodes,
             omega=omega,
-            held=_fewer(view, problem, held),
+            held=_fewer(assessment, problem, held),
             vector=programme.pack(solved.values, solved.coefficient, solved.extra),
         )
         if best is None or answer.excess < best.excess:
             best = answer
         if excess <= 0.5 * EXCESS:
             return answer
-        held = _fewer(view, problem, held)
+        held = _fewer(assessment, problem, held)
     rough = rounds < _ROUNDS
     return best if best is not None and (rough or best.excess <= 10.0 * EXCESS) else None
 
 
-def _fewer(view: Assessment, problem: Problem, held: FloatArray) -> FloatArray:
+def _fewer(assessment: Assessment, problem: Problem, held: FloatArray) -> FloatArray:
     """Return the frequencies that a neighbour should hold: where limits are pressed, and were."""
-    extremes = [f(view) for limit in problem.limits for f in (limit.critical, limit.worst)]
+    extremes = [f(assessment) for limit in problem.limits for f in (limit.critical, limit.worst)]
     recent = held[:: 1 + held.size // _MOST_HELD]
     return np.union1d(recent, thinned(extremes))
 
@@ -331,7 +331,7 @@ def _solved(programme: Programme, start: FloatArray, *, first: bool) -> Solution
     return None
 
 
-def _looked(problem: Problem, values: FloatArray, coefficient: float | None) -> Assessment:
+def _assessed(problem: Problem, values: FloatArray, coefficient: float | None) -> Assessment:
     solved = Solution(
         values=values,
         coefficient=coefficient,
@@ -342,7 +342,7 @@ def _looked(problem: Problem, values: FloatArray, coefficient: float | None) -> 
         iterations=0,
         prices={},
     )
-    return view_of(problem, solved)
+    return assessment_of(problem, solved)
 
 
 def _inside(problem: Problem, values: FloatArray) -> FloatArray:

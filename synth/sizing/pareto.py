@@ -217,18 +217,21 @@ def _ends(
     if against == "max_sensitivity":
         return (_FROM, _TO), {}
     best = search(problem, _STARTS, seed, guesses)
-    if best.solved is None or best.view is None or best.excess > KEPT:
+    if best.solved is None or best.assessment is None or best.excess > KEPT:
         raise SynthesisError("pareto: no gains keep the limits, whatever the other quantity")
     if against == "delay_margin":
-        most = best.view.margins.delay
+        most = best.assessment.margins.delay
         return (most, _LONGER * most), {0: best}
     output = f"motor.{against}"
     least = search(replace(problem, minimise={output: 1.0}), _STARTS, seed, guesses)
-    top = best.view.sigma(output)
-    if least.view is None or least.excess > KEPT:
+    top = best.assessment.sigma(output)
+    if least.assessment is None or least.excess > KEPT:
         return (0.1 * top, top), {count - 1: best}
     # Slightly above the least, where nothing is free any more.
-    return (min(1.01 * least.view.sigma(output), 0.99 * top), top), {0: least, count - 1: best}
+    return (min(1.01 * least.assessment.sigma(output), 0.99 * top), top), {
+        0: least,
+        count - 1: best,
+    }
 
 
 def _spaced(low: float, high: float, count: int, against: str) -> FloatArray:

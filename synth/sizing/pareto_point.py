@@ -12,7 +12,7 @@ from models.basics import SolverError
 from ..design import tuning_of
 from ..loop import Assessment
 from ..question import PAYLOAD, Problem
-from ..search import KEPT, Found, Solution, view_of
+from ..search import KEPT, Found, Solution, assessment_of
 from ..verify import Verification
 
 
@@ -54,9 +54,9 @@ class ParetoPoint:
 
     def verify(self) -> Verification:
         """Check the point by code that no search uses."""
-        view = view_of(self.problem, self.solved)
+        assessment = assessment_of(self.problem, self.solved)
         return tuning_of(
-            self.problem, Found(solved=self.solved, view=view, excess=self.excess)
+            self.problem, Found(solved=self.solved, assessment=assessment, excess=self.excess)
         ).verify()
 
 
@@ -65,7 +65,7 @@ def point_of(
     name: str,
     bound: float,
     solved: Solution,
-    view: Assessment | None = None,
+    assessment: Assessment | None = None,
     made_with: float | None = None,
 ) -> ParetoPoint:
     """Return the point of an answer; `name` is the limit whose bound moves, if there is one.
@@ -73,16 +73,16 @@ def point_of(
     `made_with` is the bound that the programme of the answer was made with: its prices are per
     share of that one.
     """
-    view = view_of(problem, solved) if view is None else view
-    payload, torque = _sigmas(view, (PAYLOAD, "motor.torque"))
-    measured = {limit.name: limit.measure(view) for limit in problem.limits}
+    assessment = assessment_of(problem, solved) if assessment is None else assessment
+    payload, torque = _sigmas(assessment, (PAYLOAD, "motor.torque"))
+    measured = {limit.name: limit.measure(assessment) for limit in problem.limits}
     uses = [limit.use(measured[limit.name]) - 1.0 for limit in problem.limits]
     return ParetoPoint(
         bound=bound,
         value=measured.get(name, bound),
         payload_rms=payload,
         parameters=problem.law.named([float(v) for v in solved.values]),
-        max_sensitivity=view.max_sensitivity,
+        max_sensitivity=assessment.max_sensitivity,
         torque_rms=torque,
         price=float(solved.prices.get(name, 0.0) * bound / (made_with or bound or 1.0)),
         excess=float(max(uses, default=0.0)),
@@ -91,11 +91,11 @@ def point_of(
     )
 
 
-def _sigmas(view: Assessment, outputs: Sequence[str]) -> list[float]:
+def _sigmas(assessment: Assessment, outputs: Sequence[str]) -> list[float]:
     """Return the standard deviations of outputs, on one set of nodes for all."""
     try:
-        nodes = view.quadrature(outputs)
+        nodes = assessment.quadrature(outputs)
     except SolverError:
         return [np.inf for _ in outputs]
-    found = [nodes.integrate(view.spectrum(output, nodes.omega)) for output in outputs]
+    found = [nodes.integrate(assessment.spectrum(output, nodes.omega)) for output in outputs]
     return [float(np.sqrt(variance)) for variance in found]

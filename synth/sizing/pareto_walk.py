@@ -27,11 +27,11 @@ from ..search import (
     Pace,
     Programme,
     Solution,
+    assessment_of,
     cost_nodes,
     margin_nodes,
     polish,
     thinned,
-    view_of,
 )
 from .pareto_point import ParetoPoint, point_of
 
@@ -73,7 +73,7 @@ class Walk:
         self.steps = [(b / limit.bound - 1.0) * (1 if limit.at_least else -1) for b in bounds]
         self.reference = np.zeros(0)
         self._held: deque[FloatArray] = deque(maxlen=_REMEMBERED)
-        self._views: list[Assessment] = []
+        self._assessments: list[Assessment] = []
         self._renewed = 0
 
     def go(self, tell: Progress) -> None:
@@ -81,9 +81,11 @@ class Walk:
         problem = self.problem
         stable = [b for b in self.begins if problem.stable(b[1], b[2])]
         self.reference = min((b[1] for b in stable), key=problem.abscissa)
-        self._views = [_looked(problem, values, coefficient) for _, values, coefficient in stable]
-        poles = [view.poles for view in self._views[:4]]
-        nodes = cost_nodes(problem, self._views[:_VIEWS], rtol=1e-5)
+        self._assessments = [
+            _assessed(problem, values, coefficient) for _, values, coefficient in stable
+        ]
+        poles = [assessment.poles for assessment in self._assessments[:4]]
+        nodes = cost_nodes(problem, self._assessments[:_VIEWS], rtol=1e-5)
         dense = margin_nodes(problem, poles, _DENSE)
         self._dense = Programme(problem, nodes, dense, reference=self.reference)
         self._state_again()
@@ -116,7 +118,7 @@ class Walk:
 
     def _state_again(self) -> None:
         self.programme = local_programme(
-            self.problem, self._views, list(self._held), self.reference, rtol=1e-5
+            self.problem, self._assessments, list(self._held), self.reference, rtol=1e-5
         )
 
     def _along(self, order: Sequence[int], x: FloatArray) -> None:
@@ -166,16 +168,16 @@ class Walk:
             solved = self._answer(x, ahead, last, {self.name: step})
             if solved is None:
                 return None
-            view = self._leaking(solved, own, step)
-            if view is None:
+            assessment = self._leaking(solved, own, step)
+            if assessment is None:
                 return solved
             if self._renewed >= _RENEWALS:
                 return None
             # It slipped through between the nodes: where it did becomes a node.
             self._renewed += 1
             # Only what is merely close may be thinned out.
-            near = thinned([limit.critical(view) for limit in loop], _CRITICAL)
-            self._held.append(np.concatenate([near, *(limit.worst(view) for limit in loop)]))
+            near = thinned([limit.critical(assessment) for limit in loop], _CRITICAL)
+            self._held.append(np.concatenate([near, *(limit.worst(assessment) for limit in loop)]))
             self._state_again()
         return None
 
@@ -200,20 +202,20 @@ class Walk:
         return None
 
     def _leaking(self, solved: Solution, own: Problem, step: float) -> Assessment | None:
-        """Return a look at an answer that leaks through a limit, None if it does not."""
+        """Return the assessment of an answer that leaks through a limit, None if it does not."""
         x = self._dense.pack(solved.values, solved.coefficient)
         rows = self._dense.violations(x, {self.name: step})[1]
         loop = [limit for limit in own.limits if not limit.drive]
         if all(rows[limit.name] < _SUSPECT for limit in loop):
             return None
-        view = view_of(own, solved)
-        leaks = any(lim.use(lim.measure(view)) >= 1.0 + _LEAK for lim in loop)
-        return view if leaks else None
+        assessment = assessment_of(own, solved)
+        leaks = any(lim.use(lim.measure(assessment)) >= 1.0 + _LEAK for lim in loop)
+        return assessment if leaks else None
 
 
 def local_programme(
     problem: Problem,
-    views: Sequence[Assessment],
+    assessments: Sequence[Assessment],
     held: Sequence[FloatArray],
     reference: FloatArray,
     rtol: float,
@@ -225,7 +227,7 @@ def local_programme(
     ----------
     problem, reference
         The problem with the bound that its programmes are made with, and a briskly stable point.
-    views
+    assessments
         Loops whose poles and critical frequencies make nodes.
     held
         Further margin nodes [rad/s].
@@ -234,9 +236,9 @@ def local_programme(
     per_decade
         Margin nodes where nothing is known to be critical.
     """
-    chosen = list(views)[:_VIEWS]
-    critical = [limit.critical(view) for view in chosen for limit in problem.limits]
-    omega = margin_nodes(problem, [view.poles for view in chosen[:4]], per_decade)
+    chosen = list(assessments)[:_VIEWS]
+    critical = [limit.critical(assessment) for assessment in chosen for limit in problem.limits]
+    omega = margin_nodes(problem, [assessment.poles for assessment in chosen[:4]], per_decade)
     return Programme(
         problem,
         cost_nodes(problem, chosen, rtol=rtol),
@@ -267,7 +269,7 @@ def _from(order: Sequence[int], first: int) -> list[int]:
     return listed[listed.index(first) :]
 
 
-def _looked(problem: Problem, values: FloatArray, coefficient: float | None) -> Assessment:
+def _assessed(problem: Problem, values: FloatArray, coefficient: float | None) -> Assessment:
     return Assessment(
         problem.plant,
         problem.law.controller([float(v) for v in values]),
@@ -305,7 +307,7 @@ class _Stretch:
             solved = walk.best[i]
             assert solved is not None
             self._solved[i] = solved
-        self._views = {i: view_of(self._own[i], self._solved[i]) for i in indices}
+        self._assessments = {i: assessment_of(self._own[i], self._solved[i]) for i in indices}
         self._hairs: dict[int, dict[str, float]] = {i: {} for i in indices}
         self._worst: list[FloatArray] = []
 
@@ -325,7 +327,7 @@ class _Stretch:
             self._walk.name,
             float(self._walk.bounds[index]),
             self._solved[index],
-            self._views[index],
+            self._assessments[index],
             self._walk.bound,
         )
 
@@ -336,13 +338,13 @@ class _Stretch:
         critical = []
         for i in looked:
             for limit in self._own[i].limits:
-                critical.append(limit.critical(self._views[i]))
-                self._worst.append(limit.worst(self._views[i]))
+                critical.append(limit.critical(self._assessments[i]))
+                self._worst.append(limit.worst(self._assessments[i]))
         some = list(dict.fromkeys([looked[0], looked[len(looked) // 2], looked[-1]]))
-        views: list[Assessment] = [self._views[i] for i in some]
+        assessments: list[Assessment] = [self._assessments[i] for i in some]
         held = [thinned(critical, _STRETCH_CRITICAL), *self._worst]
         return local_programme(
-            self._walk.problem, views, held, self._walk.reference, _RTOL, _PER_DECADE
+            self._walk.problem, assessments, held, self._walk.reference, _RTOL, _PER_DECADE
         )
 
     def _solve_again(self, left: Sequence[int], programme: Programme) -> None:
@@ -356,7 +358,7 @@ class _Stretch:
             for pace in (Pace.NEAR, Pace.FAR, None):
                 if again is not None and self._sound(again):
                     self._solved[i] = last = again
-                    self._views[i] = view_of(self._own[i], again)
+                    self._assessments[i] = assessment_of(self._own[i], again)
                     break
                 if pace is not None:
                     again = programme.solve(x, tighten=tighten, pace=pace)
@@ -369,7 +371,7 @@ class _Stretch:
         """Return the largest relative excess; what is broken by a hair is tightened by it."""
         largest = 0.0
         for limit in self._own[index].limits:
-            over = limit.use(limit.measure(self._views[index])) - 1.0
+            over = limit.use(limit.measure(self._assessments[index])) - 1.0
             largest = max(largest, over)
             if 0.5 * KEPT < over < mends:
                 hairs = self._hairs[index]
@@ -382,6 +384,6 @@ def _alone(walk: Walk, index: int) -> ParetoPoint | None:
     own = with_bound(walk.problem, walk.name, float(walk.bounds[index]))
     solved = walk.best[index]
     assert solved is not None
-    again, view, _ = polish(own, solved, walk.reference)
-    point = point_of(own, walk.name, float(walk.bounds[index]), again, view)
+    again, assessment, _ = polish(own, solved, walk.reference)
+    point = point_of(own, walk.name, float(walk.bounds[index]), again, assessment)
     return point if point.ok else None

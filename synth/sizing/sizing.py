@@ -394,9 +394,12 @@ def _why_not(sizing: Sizing, free: Answer) -> str:
     if sizing.unlimited_rms > sizing.target:
         binding = [n for n, use in free.uses().items() if use > 1.0 - 5e-3]
         binding.sort(key=lambda n: -abs(free.solved.prices[n]))
-        view = free.view
+        assessment = free.assessment
         for d in free.problem.disturbances:
-            share = Assessment(view.plant, view.controller, [d]).sigma(PAYLOAD) / free.payload_rms
+            share = (
+                Assessment(assessment.plant, assessment.controller, [d]).sigma(PAYLOAD)
+                / free.payload_rms
+            )
             if d.name != HOOK and share**2 > 0.5:
                 binding.insert(0, SOURCE_NAMES.get(d.name, d.name))
         stops = " and ".join(binding) or "the structure itself"

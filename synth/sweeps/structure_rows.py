@@ -73,22 +73,22 @@ class StructureRows:
         found: dict[str, Any] = {m.name: np.full(len(rows), np.nan) for m in self.metrics}
         found["stable"] = np.zeros(len(rows), dtype=bool)
         for k, row in enumerate(rows):
-            view = self._view(row)
+            assessment = self._assessment(row)
             try:
-                stable = view.stable
+                stable = assessment.stable
             except SolverError:  # no drag makes it stable
                 stable = False
             found["stable"][k] = stable
             if stable:
                 for metric in self.metrics:
-                    found[metric.name][k] = self._measure(metric, view, row)
+                    found[metric.name][k] = self._measure(metric, assessment, row)
         return found
 
     def loop_gain(self, rows: FloatArray, omega: FloatArray) -> npt.NDArray[np.complex128]:
         """Return L(i omega) of rows, (n, k), at frequencies above zero [rad/s]."""
-        return np.stack([self._view(row).loop_gain(omega) for row in rows])
+        return np.stack([self._assessment(row).loop_gain(omega) for row in rows])
 
-    def _view(self, row: FloatArray) -> Assessment:
+    def _assessment(self, row: FloatArray) -> Assessment:
         case = self.spread.case_at(row)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PhysicsWarning)  # the design's case has told its own
@@ -103,25 +103,25 @@ class StructureRows:
             coefficient=self.spread.drag(row) if problem.drag is not None else None,
         )
 
-    def _measure(self, metric: Metric, view: Assessment, row: FloatArray) -> float:
-        static = view.plant.static
+    def _measure(self, metric: Metric, assessment: Assessment, row: FloatArray) -> float:
+        static = assessment.plant.static
         if metric.name == "max_sensitivity":
-            return view.max_sensitivity
+            return assessment.max_sensitivity
         if metric.name == "drag":
             fixed = self.spread.case_at(row).payload.fixed_drag
-            return view.coefficient if fixed is None else fixed
+            return assessment.coefficient if fixed is None else fixed
         if metric.kind == "static":
             return static["motor.torque" if metric.name == "static_torque" else "rope.tension"]
         output = metric.output
-        if output == "drive.command" and output not in view.plant.outputs:
+        if output == "drive.command" and output not in assessment.plant.outputs:
             output = "motor.voltage"
-        if output not in view.plant.outputs:
+        if output not in assessment.plant.outputs:
             raise InputError(f"sweep: {metric.name} is not known of this plant")
         if metric.kind == "rms":
-            return view.sigma(output)
+            return assessment.sigma(output)
         if metric.kind == "period":
-            return view.mean_period(output)
+            return assessment.mean_period(output)
         time = self.spread.case_at(row).limits.exposure_time
-        swing = peak_factor(view.mean_period(output), time) * view.sigma(output)
+        swing = peak_factor(assessment.mean_period(output), time) * assessment.sigma(output)
         rest = static.get(output, 0.0)
         return abs(rest) + swing if metric.kind == "peak" else rest - swing

@@ -98,7 +98,7 @@ def test_the_mean_is_not_above_the_worst_and_the_worst_not_above_the_means():
 def test_every_loop_keeps_the_margin():
     _, found = tune_family(scenarios([MaxSensitivity(bound=1.05)]), starts=4)
     assert found.excess <= 1e-5
-    assert max(view.max_sensitivity for view in found.views) <= 1.05 * (1.0 + 1e-5)
+    assert max(view.max_sensitivity for view in found.assessments) <= 1.05 * (1.0 + 1e-5)
 
 
 def test_pressure_lies_on_the_scenarios_that_decide():

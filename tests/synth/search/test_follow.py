@@ -8,7 +8,7 @@ import pytest
 from models import load_case
 from models.basics import one_thread
 from synth.question import pose
-from synth.search import Pace, Programme, cost_nodes, margin_nodes, search, view_of
+from synth.search import Pace, Programme, assessment_of, cost_nodes, margin_nodes, search
 
 CASES = {
     "one spring": ("thesis-1975", {}),
@@ -24,7 +24,7 @@ def solved(request):
         found = search(problem, 3, 0)
         assert found.solved is not None
         values = found.solved.values
-        views = [view_of(problem, found.solved)]
+        views = [assessment_of(problem, found.solved)]
         programme = Programme(
             problem,
             cost_nodes(problem, views, rtol=1e-6),
@@ -86,6 +86,6 @@ def test_what_it_says_is_stable_and_keeps_the_limits_on_the_nodes(solved):
     with one_thread():
         followed = programme.follow(_start(programme, answer, (1.02, 1.02, 0.99)))
         assert followed is not None
-        assert view_of(programme.problem, followed).stable
+        assert assessment_of(programme.problem, followed).stable
         x = programme.pack(followed.values, followed.coefficient)
         assert all(row <= 1e-8 for row in programme.violations(x)[1].values())

@@ -56,9 +56,9 @@ def by_differences(answers, path):
     up, down = (answers.with_number(path, np.exp(sign * STEP)) for sign in (1.0, -1.0))
     if up is None:  # at the end of its range
         more = answers.with_number(path, np.exp(-2.0 * STEP))
-        here, less, least = (figures(a.view()) for a in (answers, down, more))
+        here, less, least = (figures(a.assessment()) for a in (answers, down, more))
         return (1.5 * here - 2.0 * less + 0.5 * least) / STEP
-    return (figures(up.view()) - figures(down.view())) / (2.0 * STEP)
+    return (figures(up.assessment()) - figures(down.assessment())) / (2.0 * STEP)
 
 
 @pytest.fixture(scope="module", params=["thesis", "crane"])
@@ -77,10 +77,10 @@ def test_every_elasticity_is_that_of_finite_differences(study):
 
 @pytest.mark.ci
 def test_numbers_without_effect_have_none(study):
-    view = figures(study._fixed.view())
+    view = figures(study._fixed.assessment())
     for path in study.without_effect:
         other = study._fixed.with_number(path, 1.01)
-        assert other is None or figures(other.view()) == pytest.approx(view, abs=1e-9), path
+        assert other is None or figures(other.assessment()) == pytest.approx(view, abs=1e-9), path
 
 
 def test_every_number_of_the_case_is_in_one_of_the_two_lists(study):
