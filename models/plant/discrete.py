@@ -8,13 +8,12 @@ disturbances are held constant over it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
-from ..basics import FloatArray, read_only
+from ..basics import ComplexArray, FloatArray, read_only
 
 
 def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
@@ -40,21 +39,9 @@ def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class DiscretePlant:
-    """x[k+1] = A x + B u + E w; y = C x + D u + F w; z = Cz x + Dz u + Fz w.
+class StateSpace:
+    """Matrices and names of a plant, sampled or not; `LinearPlant` says what they are."""
 
-    Shapes and names as in `LinearPlant`.  Measurement delays are not folded in: `delays`
-    [s] says by how much y is late, and whoever samples it decides on the buffer.
-
-    Parameters
-    ----------
-    dt
-        Sample time [s].
-    rates
-        Disturbances that are the time derivative of another one, by name.
-    """
-
-    dt: float
     A: FloatArray
     B: FloatArray
     E: FloatArray
@@ -70,15 +57,31 @@ class DiscretePlant:
     measurements: tuple[str, ...]
     outputs: tuple[str, ...]
     delays: tuple[float, ...]
-    rates: Mapping[str, str] = field(default_factory=dict)
+    rates: Mapping[str, str]
 
     def __post_init__(self) -> None:
         for name in ("A", "B", "E", "C", "D", "F", "Cz", "Dz", "Fz"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
-    def poles(self) -> npt.NDArray[np.complex128]:
-        """Return the eigenvalues of A, inside the unit circle when stable [-]."""
+    def poles(self) -> ComplexArray:
+        """Return the eigenvalues of A, (n,): [1/s], of a sampled plant [-]; delays have none."""
         return np.asarray(np.linalg.eigvals(self.A), dtype=np.complex128)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DiscretePlant(StateSpace):
+    """x[k+1] = A x + B u + E w; y = C x + D u + F w; z = Cz x + Dz u + Fz w.
+
+    Shapes and names as in `LinearPlant`.  Measurement delays are not folded in: `delays`
+    [s] says by how much y is late, and whoever samples it decides on the buffer.
+
+    Parameters
+    ----------
+    dt
+        Sample time [s].
+    """
+
+    dt: float
 
     def __str__(self) -> str:
         """Return a small tree of sizes."""

@@ -13,7 +13,7 @@ Any plant with named signals will do, a user's own included::
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -34,7 +34,7 @@ from ..basics import (
     signal_names,
     signal_rates,
 )
-from .discrete import DiscretePlant, zero_order_hold
+from .discrete import DiscretePlant, StateSpace, zero_order_hold
 from .pade import pade_bank
 from .response import PlantResponse
 
@@ -46,7 +46,7 @@ _CHUNK = 512  # points solved at a time: keeps the stacked (n, k, columns) state
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, init=False)
-class LinearPlant:
+class LinearPlant(StateSpace):
     """A linear, time-invariant plant with named signals and delayed measurements.
 
     Parameters
@@ -77,22 +77,6 @@ class LinearPlant:
         delay is negative.
     """
 
-    A: FloatArray
-    B: FloatArray
-    E: FloatArray
-    C: FloatArray
-    D: FloatArray
-    F: FloatArray
-    Cz: FloatArray
-    Dz: FloatArray
-    Fz: FloatArray
-    states: tuple[str, ...]
-    inputs: tuple[str, ...]
-    disturbances: tuple[str, ...]
-    measurements: tuple[str, ...]
-    outputs: tuple[str, ...]
-    delays: tuple[float, ...]
-    rates: Mapping[str, str]
     units: Mapping[str, str]
     static: Mapping[str, float]
 
@@ -242,9 +226,14 @@ class LinearPlant:
         T, Q = scipy.linalg.schur(balanced, output="complex")
         return np.asarray(T), Q.conj().T / scale, scale[:, None] * Q
 
-    def poles(self) -> ComplexArray:
-        """Return the eigenvalues of A [1/s], (n,); delays have none."""
-        return np.asarray(np.linalg.eigvals(self.A), dtype=np.complex128)
+    def _with(self, **changes: Any) -> LinearPlant:
+        """Return it with changes that need no check: they follow from what has been checked."""
+        plant = object.__new__(LinearPlant)
+        for field in fields(self):
+            value = changes.get(field.name, getattr(self, field.name))
+            object.__setattr__(plant, field.name, value)
+        StateSpace.__post_init__(plant)
+        return plant
 
     def select(
         self,
@@ -264,8 +253,7 @@ class LinearPlant:
         z = pick(_OWNER, "output", self.outputs, outputs)
         y = pick(_OWNER, "measurement", self.measurements, measurements)
         known = {*self.states, *self.inputs, *self.disturbances, *outputs, *measurements}
-        return replace(
-            self,
+        return self._with(
             C=self.C[y],
             D=self.D[y],
             F=self.F[y],
@@ -275,8 +263,8 @@ class LinearPlant:
             outputs=outputs,
             measurements=measurements,
             delays=tuple(self.delays[i] for i in y),
-            units={k: v for k, v in self.units.items() if k in known},
-            static={k: v for k, v in self.static.items() if k in known},
+            units=MappingProxyType({k: v for k, v in self.units.items() if k in known}),
+            static=MappingProxyType({k: v for k, v in self.static.items() if k in known}),
         )
 
     def without_delays(self, pade_order: int = 6, *, at: str = "auto") -> LinearPlant:
@@ -309,14 +297,13 @@ class LinearPlant:
                 f"{_OWNER}: delays can stand at the inputs only if they are equal, got "
                 f"{self.delays} s"
             )
-        plain = replace(self, delays=(0.0,) * ny)
+        plain = self._with(delays=(0.0,) * ny)
         if pade_order == 0 or not any(self.delays):
             return plain
         if at == "inputs" or (at == "auto" and equal and nu < ny):
             late = (self.delays[0],) * nu
             A2, B2, C2, D2 = pade_bank(late, pade_order)
-            return replace(
-                plain,
+            return plain._with(
                 A=np.block([[self.A, self.B @ C2], [np.zeros((len(A2), len(self.A))), A2]]),
                 B=np.vstack([self.B @ D2, B2]),
                 E=np.vstack([self.E, np.zeros((len(A2), self.E.shape[1]))]),
@@ -327,8 +314,7 @@ class LinearPlant:
                 states=(*self.states, *_delay_states(self.inputs, late, pade_order)),
             )
         A2, B2, C2, D2 = pade_bank(self.delays, pade_order)
-        return replace(
-            plain,
+        return plain._with(
             A=np.block([[self.A, np.zeros((len(self.A), len(A2)))], [B2 @ self.C, A2]]),
             B=np.vstack([self.B, B2 @ self.D]),
             E=np.vstack([self.E, B2 @ self.F]),
@@ -351,8 +337,8 @@ class LinearPlant:
         Ad, BEd = zero_order_hold(self.A, np.hstack([self.B, self.E]), dt)
         same: dict[str, Any] = {
             field.name: getattr(self, field.name)
-            for field in fields(DiscretePlant)
-            if field.name not in ("dt", "A", "B", "E")
+            for field in fields(StateSpace)
+            if field.name not in ("A", "B", "E")
         }
         nu = self.B.shape[1]
         return DiscretePlant(dt=float(dt), A=Ad, B=BEd[:, :nu], E=BEd[:, nu:], **same)

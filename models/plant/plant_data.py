@@ -24,30 +24,6 @@ if TYPE_CHECKING:
 DEFAULT_BANDWIDTH = 40.0  # [rad/s]
 MODE_TOLERANCE = 0.05  # a mode is "in the model" if its frequency is met this well [-]
 
-_POSITIVE = {
-    "axial_stiffness": "N",
-    "rope_length": "m",
-    "payload_mass": "kg",
-    "payload_weight": "N",
-    "drum_radius": "m",
-    "gear_ratio": "-",
-    "inertia": "kg m2",
-    "friction_speed": "rad/s",
-    "torque_constant": "N m/A",
-}
-_NOT_NEGATIVE = {
-    "mass_per_length": "kg/m",
-    "rope_weight": "N/m",
-    "quadratic_drag": "N s2/m2",
-    "viscous_friction": "N m s/rad",
-    "coulomb_friction": "N m",
-    "back_emf_constant": "V s/rad",
-    "inductance": "H",
-    "speed_gain": "N m s/rad",
-    "delay": "s",
-}
-_BANDWIDTHS = ("torque_bandwidth", "sensor_bandwidth", "telemetry_bandwidth")
-
 
 @dataclass(frozen=True, kw_only=True)
 class PlantData:
@@ -90,10 +66,9 @@ class PlantData:
     delay
         Delay of the payload's signals [s].
 
-    Raises
-    ------
-    InputError
-        If a number is out of its range.
+    Notes
+    -----
+    Nothing is checked here: the numbers come from a case (`from_case`), which has checked them.
     """
 
     axial_stiffness: float
@@ -123,32 +98,6 @@ class PlantData:
     sensor_bandwidth: float = math.inf
     telemetry_bandwidth: float = math.inf
     delay: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name, unit in _POSITIVE.items():
-            check_range("plant", name, getattr(self, name), low=0.0, unit=unit, open_low=True)
-        for name, unit in _NOT_NEGATIVE.items():
-            check_range("plant", name, getattr(self, name), low=0.0, unit=unit)
-        for name in _BANDWIDTHS:
-            if getattr(self, name) != math.inf:
-                check_range(
-                    "plant", name, getattr(self, name), low=0.0, unit="rad/s", open_low=True
-                )
-        check_range("plant", "damping_ratio", self.damping_ratio, low=0.0, high=1.0)
-        check_range(
-            "plant", "gear_efficiency", self.gear_efficiency, low=0.0, high=1.0, open_low=True
-        )
-        if self.masses is not None:
-            check_range("plant", "masses", self.masses, low=1, high=MAX_MASSES)
-        if self.motor == "dc":
-            check_range("plant", "resistance", self.resistance, low=0.0, unit="ohm", open_low=True)
-        elif self.motor != "ac":
-            raise InputError(f"plant: motor must be 'dc' or 'ac', got {self.motor!r}")
-        elif self.torque_constant != 1.0:
-            raise InputError(
-                "plant: torque_constant of an AC motor must be 1 (its current is its torque), "
-                f"got {self.torque_constant!r}"
-            )
 
     @property
     def stiffness(self) -> float:
