@@ -67,6 +67,7 @@ if TYPE_CHECKING:
     from .units import units_of as units_of
     from .water import GRAVITY as GRAVITY
     from .water import SEA_WATER_DENSITY as SEA_WATER_DENSITY
+    from .water import wave_frequency as wave_frequency
     from .water import wave_number as wave_number
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

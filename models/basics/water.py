@@ -1,4 +1,4 @@
-"""Gravity, sea water, and the wave number of a linear wave at any depth.
+"""Gravity, sea water, and the dispersion of linear waves at any depth.
 
 Source: omega^2 = g k tanh(k d), Airy's theory.  The start is Guo's explicit formula (2002), within
 0.75 % at any depth; three Newton steps then reach the last digit.
@@ -18,6 +18,12 @@ GRAVITY = 9.80665
 
 SEA_WATER_DENSITY = 1025.0
 """Density of sea water [kg/m3]."""
+
+
+def wave_frequency(number: npt.ArrayLike, depth: float = math.inf) -> FloatArray:
+    """Return the frequency [rad/s] of waves of a number [rad/m], same shape, at a depth [m]."""
+    k = np.asarray(number, dtype=np.float64)
+    return np.sqrt(GRAVITY * k * (1.0 if math.isinf(depth) else np.tanh(k * depth)))
 
 
 def wave_number(omega: npt.ArrayLike, depth: float = math.inf) -> FloatArray:

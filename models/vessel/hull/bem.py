@@ -27,7 +27,7 @@ from ...basics import (
     SolverError,
     check_ascending,
     check_range,
-    wave_number,
+    wave_frequency,
 )
 from ..raos import MODES
 from .froude_krylov import froude_krylov
@@ -171,17 +171,8 @@ def capytaine_mesh(hull: Hull) -> Any:
 
 
 def _mesh(panels: FloatArray, name: str) -> Any:
-    corners = panels.reshape(-1, 3)
-    size = float(np.ptp(corners, axis=0).max())
-    _, first, index = np.unique(
-        np.round(corners / (1e-7 * size)).astype(np.int64),
-        axis=0,
-        return_index=True,
-        return_inverse=True,
-    )
-    return capytaine().Mesh(
-        vertices=corners[first], faces=index.reshape(-1, 4), name=name, auto_check=False
-    )
+    # Corners that two panels share are found, and merged, by Capytaine.
+    return capytaine().Mesh.from_list_of_faces(panels.tolist(), name=name, auto_check=False)
 
 
 def _row(
@@ -212,15 +203,7 @@ def _row(
 
 def shortest_wave(hull: Hull, depth: float = math.inf) -> float:
     """Return the frequency of a wave that is four panels long, the shortest to trust [rad/s]."""
-    wanted = 2.0 * math.pi / (4.0 * hull.panel_size)
-    low, high = 1e-3, 50.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if float(wave_number(middle, depth)) < wanted:
-            low = middle
-        else:
-            high = middle
-    return low
+    return float(wave_frequency(2.0 * math.pi / (4.0 * hull.panel_size), depth))
 
 
 @contextlib.contextmanager

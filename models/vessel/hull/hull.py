@@ -17,7 +17,6 @@ import hashlib
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from operator import itemgetter
 from types import MappingProxyType
 
 import numpy as np
@@ -141,7 +140,8 @@ def volumes(panels: FloatArray) -> FloatArray:
     panels
         Corners (n, 4, 3) [m].
     """
-    return np.array([panel_integral(panels, itemgetter((..., axis)))[axis] for axis in range(3)])
+    points, normals = quadrature_rule(panels)
+    return np.asarray((points * normals).sum(axis=0))
 
 
 def quadrature_rule(panels: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -164,13 +164,6 @@ def quadrature_rule(panels: FloatArray) -> tuple[FloatArray, FloatArray]:
             points.append(0.5 * middle)
             normals.append(normal / 3.0)
     return np.concatenate(points), np.concatenate(normals)
-
-
-def panel_integral(panels: FloatArray, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """Return the integral of a function (q, 3) -> (q,) times the outward normal (3,)."""
-    points, normals = quadrature_rule(panels)
-    total: FloatArray = function(points) @ normals
-    return total
 
 
 def panel_areas(panels: FloatArray) -> FloatArray:

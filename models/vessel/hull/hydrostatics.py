@@ -15,13 +15,12 @@ and the moment of long waves balance whatever the panels; taken from elsewhere, 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...basics import GRAVITY, SEA_WATER_DENSITY, FloatArray, InputError, check_range
-from .hull import Hull, panel_integral
+from .hull import Hull, quadrature_rule
 
 Point = tuple[float, float, float]
 
@@ -62,25 +61,20 @@ class Waterplane:
         The waterplane closes the surface, so that integrals of n_z over it are those over the
         hull with the sign turned.
         """
-
-        def vertical(function: Callable[[FloatArray], FloatArray]) -> float:
-            return float(panel_integral(hull.panels, function)[2])
-
-        volume = vertical(lambda p: p[..., 2])
+        points, normals = quadrature_rule(hull.panels)
+        x, y, z = points.T
+        n = normals[:, 2]
+        volume = float(z @ n)
         return cls(
             volume=volume,
             centre_of_buoyancy=(
-                vertical(lambda p: p[..., 0] * p[..., 2]) / volume,
-                vertical(lambda p: p[..., 1] * p[..., 2]) / volume,
-                vertical(lambda p: 0.5 * p[..., 2] ** 2) / volume,
+                float((x * z) @ n) / volume,
+                float((y * z) @ n) / volume,
+                float(0.5 * z**2 @ n) / volume,
             ),
-            area=-vertical(lambda p: np.ones(p.shape[:-1])),
-            first=(-vertical(lambda p: p[..., 0]), -vertical(lambda p: p[..., 1])),
-            second=(
-                -vertical(lambda p: p[..., 0] ** 2),
-                -vertical(lambda p: p[..., 1] ** 2),
-                -vertical(lambda p: p[..., 0] * p[..., 1]),
-            ),
+            area=-float(n.sum()),
+            first=(-float(x @ n), -float(y @ n)),
+            second=(-float(x**2 @ n), -float(y**2 @ n), -float((x * y) @ n)),
             length=hull.length,
             beam=hull.beam,
             draught=hull.draught,
