@@ -36,8 +36,8 @@ from synthesis import machine, markdown, plain, write_into
 import stillhook as sh
 from models.case import Case
 from models.spread import Spread
+from stillhook.controllers import recipe_of
 from stillhook.sweeps import sweep, usual_spread
-from stillhook.sweeps.pilots import pilot_of
 from stillhook.sweeps.store import Draw
 from stillhook.sweeps.time_cases import CaseResult, CaseTask, TimeBench, TimeQuestion
 from stillhook.sweeps.time_metrics import METRICS
@@ -107,10 +107,10 @@ def costs(count: int) -> list[Row]:
         ),
         ("mpc, rope of many masses, 10 min", nominal, "mpc", DURATION, max(2, count // 4)),
     ]
-    for name, own, pilot, duration, cases in asked:
+    for name, own, wanted, duration, cases in asked:
         spread = usual_spread(own, "time").on(own)
         question = TimeQuestion(
-            case=own, pilot=pilot_of(pilot), metrics=tuple(METRICS), duration=duration
+            case=own, recipe=recipe_of(wanted, "sweep"), metrics=tuple(METRICS), duration=duration
         )
         bench, table = question.bench(), spread.sample(cases)
         for repeat in range(2):  # the first compiles what is not in the cache yet
@@ -164,7 +164,7 @@ def idle(
     spread = Spread({"payload.mass": "10 %"}).on(nominal)
     question = sweep_workers.Idle(
         case=nominal,
-        pilot=pilot_of("feed-forward"),
+        recipe=recipe_of("feed-forward", "sweep"),
         metrics=tuple(METRICS),
         duration=DURATION,
         sleep=sleep,

@@ -25,8 +25,8 @@ from models.run import ERROR, Run
 from models.sensing import holds_brake
 from models.simulation import EASE, Progress, SimulationOptions
 
-from ..controllers import Contender, StoredDesign
-from ..runs import TRIPS, Series, controller_of
+from ..controllers import Contender, StoredDesign, controller_of
+from ..runs import TRIPS, Series
 from .mismatch import Mismatch
 
 TRACED = (
@@ -198,10 +198,10 @@ class Prepared:
     def __init__(
         self, question: Question, contender: Contender, height: float, law: StoredDesign | None
     ) -> None:
-        if contender.make is None:
+        if contender.recipe is None:
             raise InputError("the floor is no controller")
         self._contender, self._height = contender, height
-        controller = contender.make(question.known(height), law)
+        controller = contender.recipe.controller(question.known(height), law)
         true = question.true(height)
         sea = SpectrumMotion.from_case(true).hook
         self._settle = question.settle

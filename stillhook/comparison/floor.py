@@ -88,7 +88,7 @@ def prepare(
         With the reason, if it cannot take part: no gains, no design, not stable, no such thing.
     """
     try:
-        if contender.make is None:
+        if contender.recipe is None:
             return Floor(question, contender, height)
         return Prepared(question, contender, height, law)
     except StillhookError:

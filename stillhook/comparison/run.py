@@ -56,9 +56,9 @@ def compare(
     case
         Vessel, sea, rope, payload, winch and sensors.
     controllers
-        Names of `stillhook.controllers.contenders.CONTENDERS`, designs, controllers, and pairs of a
+        Names of `stillhook.controllers.CONTENDERS`, designs, controllers, and pairs of a
         name and one of these or of a function of the case that returns a controller; by default
-        `stillhook.controllers.contenders.DEFAULTS`.
+        `stillhook.controllers.DEFAULTS`.
     seeds
         How many seas of each height, or their seeds.  The same seed is the same motion of the
         hook for every contender, and the same noise for those with the same sample time.

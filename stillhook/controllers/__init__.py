@@ -1,4 +1,8 @@
-"""From a name or a design to a controller in time."""
+"""From a name or a design to a controller in time.
+
+In come names, designs, objects and functions of the case; out go controllers, or recipes for them
+that another process can follow and a store can keep.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -9,10 +13,13 @@ if TYPE_CHECKING:
     from .contenders import DEFAULTS as DEFAULTS
     from .contenders import Contender as Contender
     from .contenders import contenders_of as contenders_of
-    from .controllers import PREDICTIVE as PREDICTIVE
-    from .controllers import controller_by_name as controller_by_name
-    from .controllers import known_controllers as known_controllers
-    from .makers import given as given
+    from .named import PREDICTIVE as PREDICTIVE
+    from .named import controller_by_name as controller_by_name
+    from .named import controller_of as controller_of
+    from .named import known_controllers as known_controllers
+    from .recipe import Recipe as Recipe
+    from .recipe import recipe_from as recipe_from
+    from .recipe import recipe_of as recipe_of
     from .stored_design import StoredDesign as StoredDesign
     from .stored_design import design_law as design_law
 else:

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from .runs import Runs as Runs
     from .runs import keep_worst as keep_worst
     from .series import Series as Series
-    from .series import controller_of as controller_of
     from .simulation import simulate as simulate
     from .terminal import Ticker as Ticker
     from .terminal import run_progress as run_progress

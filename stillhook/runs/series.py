@@ -8,12 +8,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.basics import InputError
 from models.case import Case
 from models.operation import Scenario, SpectrumMotion
 from models.run import Quantity, Run
@@ -25,15 +24,9 @@ from models.simulation import (
     prepare,
     run_simulation,
 )
-from synth.controllers import LinearFeedback
-from synth.design import GainDesign, Tuning
 
-from ..controllers import controller_by_name
 from .runs import Runs, stays
 from .window import error_of
-
-_FEEDBACK_SAMPLE = 0.01  # [s]
-_PROTOCOL = ("name", "sample_time", "reset", "step")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,45 +76,6 @@ class Series:
             scenario=simulation.scenario,
             lock_limit=simulation.options.lock_limit,
         )
-
-
-def controller_of(
-    controller: str | GainDesign | Tuning | Controller,
-    case: Case,
-    *,
-    design: GainDesign | Tuning | None = None,
-    gains: Mapping[str, float] | None = None,
-    sample_time: float | None = None,
-) -> Controller:
-    """Return the controller that is meant: by its name, of a design, or the object itself.
-
-    Raises
-    ------
-    InputError
-        If it is none of these, or what is given with it does not belong to it.
-    """
-    if isinstance(controller, str):
-        return controller_by_name(
-            controller, case, design=design, gains=gains, sample_time=sample_time
-        )
-    if design is not None or gains is not None:
-        raise InputError("simulate: design and gains are for a controller by its name")
-    if isinstance(controller, GainDesign | Tuning):
-        own = _FEEDBACK_SAMPLE if sample_time is None else sample_time
-        return LinearFeedback.from_design(controller, case=case, sample_time=own)
-    lacking = [name for name in _PROTOCOL if not hasattr(controller, name)]
-    if lacking:
-        raise InputError(
-            "simulate: controller must be a name, a design, or an object with "
-            f"{', '.join(_PROTOCOL)}; got {type(controller).__name__}, which has no "
-            f"{' and no '.join(lacking)}"
-        )
-    if sample_time is not None:
-        raise InputError(
-            f"simulate: sample_time is for a controller by its name; {controller.name} has its "
-            f"own, {controller.sample_time:g} s"
-        )
-    return controller
 
 
 def _default_lock_limit(simulation: Simulation) -> float | None:

@@ -20,8 +20,9 @@ from models.sensing import Controller
 from models.simulation import Progress, SimulationOptions
 from synth.design import GainDesign, Tuning
 
+from ..controllers import controller_of
 from .runs import Runs, keep_worst
-from .series import Series, controller_of
+from .series import Series
 
 if TYPE_CHECKING:
     from models.operation import MotionSource
@@ -59,9 +60,9 @@ def simulate(
     case
         Vessel, sea, rope, payload, winch and sensors.
     controller
-        The name of a controller (`stillhook.controllers.controllers`); a design, whose feedback is
-        meant; or any object with ``name``, ``sample_time``, ``reset()`` and ``step(measurement,
-        time)`` (`models.sensing.control.Controller`).
+        The name of a controller (`stillhook.controllers.known_controllers`); a design, whose
+        feedback is meant; or any object with ``name``, ``sample_time``, ``reset()`` and
+        ``step(measurement, time)`` (`models.sensing.control.Controller`).
     scenario, options
         An operation, or the name of one and its options: numbers in SI, or texts with a unit
         (`models.operation.scenarios`).

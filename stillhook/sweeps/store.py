@@ -24,9 +24,9 @@ from models.basics import BoolArray, InputError
 from models.case import Case
 from models.spread import Spread
 
+from ..controllers import recipe_from
 from ..keeper import Journal, question_in, versions
 from .export import ENDINGS, check_writable
-from .pilots import pilot_from
 from .time_cases import TimeQuestion
 from .time_metrics import STATUS
 
@@ -72,7 +72,7 @@ def header_of(question: TimeQuestion, spread: Spread, draw: Draw) -> dict[str, A
     found: dict[str, Any] = {
         "mode": "time",
         "case": question.case.to_dict(),
-        "controller": question.pilot.to_dict(),
+        "controller": question.recipe.to_dict(),
         "spread": spread.to_dict(),
         "samples": draw.samples,
         "first": draw.first,
@@ -144,10 +144,10 @@ def question_from(header: Mapping[str, Any], source: str) -> tuple[TimeQuestion,
     """
     try:
         case = Case.from_dict(header["case"], source=source)
-        pilot = pilot_from(header["controller"])
+        recipe = recipe_from(header["controller"])
         question = TimeQuestion(
             case=case,
-            pilot=pilot,
+            recipe=recipe,
             metrics=tuple(header["metrics"]),
             duration=float(header["duration"]),
             settle=header["settle"],
@@ -159,7 +159,7 @@ def question_from(header: Mapping[str, Any], source: str) -> tuple[TimeQuestion,
             weighed=header["weighed"],
             starts=header["starts"],
         )
-        spread = Spread.from_dict(header["spread"], source=source).on(case, pilot.gains)
+        spread = Spread.from_dict(header["spread"], source=source).on(case, recipe.gains)
         draw = Draw(
             samples=int(header["samples"]),
             sampling=header["sampling"],

@@ -140,18 +140,18 @@ def sweep(
         return _in_frequency(
             design, given, nominal, int(wanted), sampling, seed, metrics, chunk, store, progress
         )
-    from .pilots import pilot_of
+    from ..controllers import recipe_of
     from .store import Draw
     from .time_cases import TimeQuestion
     from .time_metrics import names_of
     from .time_sweep import run_sweep
 
     del accessor
-    pilot = pilot_of(design)
+    recipe = recipe_of(design, "sweep")
     lasting = _seconds("duration", duration)
     question = TimeQuestion(
         case=nominal,
-        pilot=pilot,
+        recipe=recipe,
         metrics=names_of(metrics),
         duration=lasting,
         settle=None if settle is None else _seconds("settle", settle),
@@ -163,7 +163,7 @@ def sweep(
         weighed=weighed,
         starts=int(check_range("sweep", "starts", starts, low=1, high=4096)),
     )
-    own = given.on(nominal, pilot.gains or None)
+    own = given.on(nominal, recipe.gains or None)
     count = own.count(None if sampling == "given" else int(wanted), sampling)
     check_range("sweep", "first", first, low=0, high=1e12)
     if first and sampling not in ("sobol", "random"):

@@ -25,8 +25,8 @@ from models.run import Run
 from models.sensing import Controller
 from models.simulation import Progress, SimulationOptions
 
+from ..controllers import Recipe
 from ..runs import Series
-from .pilots import Pilot
 from .time_metrics import numbers_of, status_of
 from .trim import Shift, shift_between, static_of, trimmed
 
@@ -95,8 +95,8 @@ class TimeQuestion:
     ----------
     case
         The nominal case, which the controller is made for unless it follows.
-    pilot
-        Who flies.
+    recipe
+        How the controller is made.
     metrics
         What is kept, names of `time_metrics.METRICS`.
     duration, settle
@@ -114,7 +114,7 @@ class TimeQuestion:
     """
 
     case: Case
-    pilot: Pilot
+    recipe: Recipe
     metrics: tuple[str, ...]
     duration: float
     settle: float | None = None
@@ -202,14 +202,14 @@ class TimeBench:
 
     def controller(self, case: Case, task: CaseTask) -> Controller:
         """Return the controller of a case: made for the nominal one, or for this one."""
-        question, pilot = self._question, self._question.pilot
+        question, recipe = self._question, self._question.recipe
         if question.design_follows:
-            return pilot.follow(case, question.starts)
+            return recipe.follow(case, question.starts)
         if task.gains:
-            own = pilot.controller(question.case, task.gains)
+            own = recipe.with_gains(task.gains).controller(question.case)
         else:
             if self._own is None:
-                self._own = pilot.controller(question.case)
+                self._own = recipe.controller(question.case)
             own = self._own
         if not (question.weighed and task.changes):
             return own

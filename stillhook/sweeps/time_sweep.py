@@ -91,7 +91,7 @@ def run_sweep(
         missing = np.flatnonzero(~keeper.done)
         done, total = len(rows) - len(missing), len(rows)
         if missing.size and not question.design_follows:
-            question.pilot.controller(question.case)  # one that cannot be made is told at once
+            question.recipe.controller(question.case)  # one that cannot be made is told at once
         tasks = tasks_of(spread, draw, rows, missing)
         with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as stack:
             tell("starting", done, total)
@@ -102,7 +102,7 @@ def run_sweep(
                     task, result = answered
                     if isinstance(result, Died):
                         result = _died(question, task, result.reason)
-                    keeper.put(task.index - draw.first, row_of(result))
+                    keeper.put(task.index, row_of(result))
                     wall += result.wall if result.status != "died" else 0.0
                     done += 1
                     if result.message and len(messages) < _TOLD:
@@ -178,9 +178,9 @@ def template_of(question: TimeQuestion, spread: Spread, draw: Draw, rows: FloatA
         variables[name] = ("case", np.full(n, np.nan), told)
     header = header_of(question, spread, draw)
     attributes = {
-        "title": f"{question.pilot.name} on {n} cases about {question.case.name}, in time",
+        "title": f"{question.recipe.name} on {n} cases about {question.case.name}, in time",
         "case_name": question.case.name,
-        "controller": question.pilot.name,
+        "controller": question.recipe.name,
         "mode": "time",
         "sampling": draw.sampling,
         "source": f"Stillhook {header['versions']['stillhook']}",
@@ -216,7 +216,7 @@ def engine_of(wanted: str | Pool | None, question: TimeQuestion, jobs: int | Non
     InputError
         If there is no such engine, or the controller cannot be sent to it.
     """
-    stays = not question.pilot.portable
+    stays = not question.recipe.portable
     found: Pool
     if isinstance(wanted, Pool):
         found = wanted
@@ -236,7 +236,7 @@ def engine_of(wanted: str | Pool | None, question: TimeQuestion, jobs: int | Non
         )
     if stays and not isinstance(found, Alone):
         raise InputError(
-            f"sweep: the controller {question.pilot.name} cannot be sent to another process "
+            f"sweep: the controller {question.recipe.name} cannot be sent to another process "
             '(it was made at a prompt or in a script); put it in a module, or take engine="serial"'
         )
     return found
@@ -259,8 +259,8 @@ def _check(question: TimeQuestion, spread: Spread) -> None:
         )
     if gains and question.design_follows:
         raise InputError(f"sweep: {gains[0]} cannot vary where the design follows the case")
-    if gains and not question.pilot.gains:
-        raise InputError(f"sweep: {question.pilot.name} has no gains that could vary ({gains[0]})")
+    if gains and not question.recipe.gains:
+        raise InputError(f"sweep: {question.recipe.name} has no gains that could vary ({gains[0]})")
     if any(path.startswith(PREFIX) for path in spread.paths):
         own = spread.distributions.get("fault.at")
         latest = FAULTS["at"].nominal if own is None else own.ends[1]

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 
 from models.basics import StillhookError, SynthesisError
 
+from ...controllers import controller_of
 from ...runs import (
     RunFolder,
     Runs,
     Series,
     Ticker,
-    controller_of,
     headline_of,
     keep_worst,
     run_progress,

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 import stillhook as sh
 from models.basics import InputError
 from models.spread import Spread, Uniform
+from stillhook.controllers import recipe_of
 from stillhook.keeper import Cluster, Processes
 from stillhook.runs import simulate
 from stillhook.sweeps import STATUS, sweep
-from stillhook.sweeps.pilots import pilot_of
 from stillhook.sweeps.time_cases import CaseTask, TimeQuestion, seed_of
 from stillhook.sweeps.time_metrics import METRICS
 from stillhook.sweeps.trim import shift_between, static_of, trimmed
@@ -222,7 +222,7 @@ def test_the_controller_is_made_for_the_nominal_case_unless_it_follows():
     for follows, mass in ((False, CASE.payload.mass), (True, case.payload.mass)):
         question = TimeQuestion(
             case=CASE,
-            pilot=pilot_of(("told", sweep_pilots.told)),
+            recipe=recipe_of(("told", sweep_pilots.told), "sweep"),
             metrics=("payload_rms",),
             duration=5.0,
             design_follows=follows,
@@ -343,6 +343,6 @@ def test_a_controller_without_a_case_wants_one():
 
 
 def test_an_object_cannot_follow_the_case():
-    pilot = pilot_of(LinearFeedback(CASE, GAINS))
+    recipe = recipe_of(LinearFeedback(CASE, GAINS), "sweep")
     with pytest.raises(InputError, match="as an object cannot follow the case"):
-        pilot.follow(CASE, starts=1)
+        recipe.follow(CASE, starts=1)

@@ -1,6 +1,6 @@
-"""Every controller by its name, linear and predictive: what `simulate` and the command line offer.
+"""Controllers by name, linear and predictive, and of designs: what `simulate` takes.
 
-    name, case [, design, gains] --> synth.controllers.controllers or mpc --> controller
+    name, case [, design, gains] --> synth.controllers or mpc --> controller
 
 `synth` and `mpc` do not know each other; here the names of both meet.  The predictive ones are
 imported when one is made, as they bring a solver along.
@@ -18,6 +18,11 @@ from models.sensing import Controller
 
 if TYPE_CHECKING:
     from synth.design import GainDesign, Tuning
+
+PROTOCOL = ("name", "sample_time", "reset", "step")
+"""What a controller has."""
+
+_FEEDBACK_SAMPLE = 0.01  # of a design, unless told otherwise [s]
 
 #: Predictive controllers and what each is, in a line.
 PREDICTIVE: Mapping[str, str] = MappingProxyType(
@@ -82,3 +87,45 @@ def controller_by_name(
     if name == "mpc":
         return LinearMPC(case, sample_time=T)
     return LinearMPC(case, sample_time=T, predictor="ar" if name == "mpc-ar" else "preview")
+
+
+def controller_of(
+    controller: str | GainDesign | Tuning | Controller,
+    case: Case,
+    *,
+    design: GainDesign | Tuning | None = None,
+    gains: Mapping[str, float] | None = None,
+    sample_time: float | None = None,
+) -> Controller:
+    """Return the controller that is meant: by its name, of a design, or the object itself.
+
+    Raises
+    ------
+    InputError
+        If it is none of these, or what is given with it does not belong to it.
+    """
+    from synth.controllers import LinearFeedback
+    from synth.design import GainDesign, Tuning
+
+    if isinstance(controller, str):
+        return controller_by_name(
+            controller, case, design=design, gains=gains, sample_time=sample_time
+        )
+    if design is not None or gains is not None:
+        raise InputError("simulate: design and gains are for a controller by its name")
+    if isinstance(controller, GainDesign | Tuning):
+        own = _FEEDBACK_SAMPLE if sample_time is None else sample_time
+        return LinearFeedback.from_design(controller, case=case, sample_time=own)
+    lacking = [name for name in PROTOCOL if not hasattr(controller, name)]
+    if lacking:
+        raise InputError(
+            "simulate: controller must be a name, a design, or an object with "
+            f"{', '.join(PROTOCOL)}; got {type(controller).__name__}, which has no "
+            f"{' and no '.join(lacking)}"
+        )
+    if sample_time is not None:
+        raise InputError(
+            f"simulate: sample_time is for a controller by its name; {controller.name} has its "
+            f"own, {controller.sample_time:g} s"
+        )
+    return controller
