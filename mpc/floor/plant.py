@@ -190,10 +190,8 @@ def record_plant(
     Raises
     ------
     InputError
-        If `hold` is unknown, or the drive has no finite peak torque or cannot hold the load.
+        If the drive has no finite peak torque or cannot hold the load.
     """
-    if hold not in HOLDS:
-        raise InputError(f"{_OWNER}: hold must be one of {', '.join(HOLDS)}, got {hold!r}")
     limits = DriveLimits.from_case(case) if limits is None else limits
     plant = build_plant(case, masses)
     linear, rest, data = plant.linearise(drag=drag), plant.operating_point(MEAN_LOSSES), plant.data

@@ -12,7 +12,7 @@ import math
 import numpy as np
 import scipy.linalg
 
-from models.basics import FloatArray, check_range, solve_discrete_riccati
+from models.basics import FloatArray, solve_discrete_riccati
 
 from ..programme import LQRegulator, lq_regulator
 from .prediction import PredictionModel
@@ -30,12 +30,9 @@ def regulator(model: PredictionModel, weight: float) -> LQRegulator:
 
     Raises
     ------
-    InputError
-        If the weight is not above zero.
     SolverError
         If the Riccati equation has no solution.
     """
-    check_range("regulator", "weight", weight, low=0.0, open_low=True)
     winch, nh = model.winch, model.sea.order
     heave = float(np.sqrt(_stationary(model)[0, 0]))
     rho = (weight * heave / winch.case.winch.drive.torque_peak) ** 2
