@@ -229,11 +229,13 @@ class NonlinearMPC(WinchMPC):
         if forecast is not None:
             known = shooting.along(known, forecast.displacement, forecast.velocity)
             ends = np.array([forecast.displacement[:2], forecast.velocity[:2]]).T.ravel()
-        else:
+        else:  # of the estimator's own sea, at both ends of this sample
             ends = self._ends @ chi[self.model.sea_at]
         speed = self.estimator.speed
         low, high = self.hard_bounds(speed + self._gain_of_speed(chi, ends), self._cap(shown))
         move: float | None = None
+        # The first step is on what was prepared after the last sample; only further ones have to
+        # linearise while the drive waits.
         for k in range(self.iterations):
             if k > 0:
                 self._prepare()
@@ -248,6 +250,7 @@ class NonlinearMPC(WinchMPC):
         self._asked = torque + winch.rest_torque
         command = min(max(command, -self._window.voltage), self._window.voltage)
         answered = clock.perf_counter()
+        # The command is known; the rest needs no measurement, and has what is left of the time.
         self.prepare()
         done = clock.perf_counter()
         self.seconds = {"feedback": answered - began, "preparation": done - answered}
@@ -309,6 +312,8 @@ class NonlinearMPC(WinchMPC):
             return winch.command(torque, speed)
         window, rest = self._window, winch.rest_torque
         peak = min(window.peak, window.power / max(abs(speed), 1e-9))
+        # A held command lets the torque fall with the speed; where it starts beyond the peak, the
+        # drive cuts it, and what it then does is no longer linear in the command.
         asked = winch.command(start_torque(torque + rest, over, peak) - rest, speed)
         same = winch.command(torque + over, speed)
         if asked != same:
@@ -360,6 +365,8 @@ class NonlinearMPC(WinchMPC):
         count = len(self.products.rows)
         rows[:count] = S[self.shooting.rows]
         if len(rows) > count:
+            # (tau_0 + d) omega is a product of two things that the moves change: linearised at the
+            # plan's torques and speeds, over the power.
             power = self._window.power
             torque = self.model.winch.rest_torque + p.unit * self._moves
             rows[count:] = (torque[1:, None] / power) * S[self.shooting.speeds][1:]

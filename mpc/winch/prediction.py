@@ -202,15 +202,20 @@ def prediction_model(
     for name in LATE:
         first[name], end = end, end + depth[name]
 
+    # Displacement and velocity of the hook are outputs of the sea's state, and so everything that
+    # the hook moves is linear in it.
     shown = np.vstack([sea.C, sea.C @ sea.A])
     now = _present(winch, shown, sea_at, error_at, constants_at, end)
     A = np.zeros((end, end))
     A[:n, :n] = winch.A
+    # The winch feels the hook at both ends of the sample; that at the end is where the sea's state
+    # goes, but for the noise that comes in between (in G).
     A[:n, sea_at] = winch.from_hook[:, :2] @ shown + winch.from_hook[:, 2:] @ shown @ sea_A
     A[sea_at, sea_at] = sea_A
     A[error_at, error_at] = scipy.linalg.block_diag(error_A, _slow_error(hook, T)[0])
     A[:n, constants_at.start : constants_at.start + 2] = winch.from_constants
     A[constants_at, constants_at] = np.eye(len(CONSTANTS))
+    # A shift register for each late signal: the present value enters, the others move on.
     for k, name in enumerate(LATE):
         if depth[name]:
             A[first[name]] = now[k]
@@ -229,6 +234,7 @@ def prediction_model(
     other[-1, constants_at.start + 3] = 1.0
     sea_root, error_root = root_of(sea_Q), root_of(error_Q)
     G = np.zeros((end, sea_root.shape[1] + error_root.shape[1]))
+    # What a sample adds to the sea moves the hook at its end, and with it the winch.
     G[sea_at, : sea_root.shape[1]] = sea_root
     G[:n, : sea_root.shape[1]] = winch.from_hook[:, 2:] @ shown @ sea_root
     G[error_at.start : error_at.start + 2, sea_root.shape[1] :] = error_root

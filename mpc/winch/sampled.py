@@ -205,6 +205,7 @@ def sampled_winch(
     hook = [known["hook.heave"], known["hook.heave_rate"]]
     rows = {name: k for k, name in enumerate(plant.outputs)}
     speed = plant.Cz[rows["motor.speed"]]
+    # Command and constant forces are held over a sample, which is exact; the hook is not.
     held = np.column_stack([plant.B[:, 0], plant.E[:, known["payload.force"]]])
     A, inputs = zero_order_hold(plant.A, held, T)
     tension = rows["rope.tension"]

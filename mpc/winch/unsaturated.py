@@ -55,6 +55,16 @@ class Unsaturated:
         return read_only(kalman_gain(self.model.C, self.model.R, self.covariance))
 
     @cached_property
+    def _feedback(self) -> FloatArray:
+        """Row F of d = -F chi, (n,)."""
+        return feedback_row(self.regulator, self.model)
+
+    @cached_property
+    def _kept(self) -> FloatArray:
+        """I - L C: what of the prediction is left in the estimate, (n, n)."""
+        return np.asarray(np.eye(self.model.size) - self.gain @ self.model.C)
+
+    @cached_property
     def controller(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return (A, B, C, D) of u = C(z) y, with x the one-step prediction."""
         return self._throttled(1.0)
@@ -62,11 +72,10 @@ class Unsaturated:
     def _throttled(self, share: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return that of a drive which gives a share of the torque asked for, and says so."""
         model, winch = self.model, self.model.winch
-        row = share * feedback_row(self.regulator, model)
+        row, kept = share * self._feedback, self._kept
         ahead = model.A - model.B @ row[None, :]
         command = -row / winch.gain
         command[: winch.size] += winch.back * winch.speed
-        kept = np.eye(model.size) - self.gain @ model.C
         return ahead @ kept, ahead @ self.gain, (command @ kept)[None, :], command[None] @ self.gain
 
     def poles(self, plant: PredictionModel | None = None, *, share: float = 1.0) -> ComplexArray:
@@ -108,17 +117,17 @@ class Unsaturated:
         plant
             The plant; by default that of the model.
         """
-        model, winch = self.model, self.model.winch
-        true = model if plant is None else plant
-        z = np.exp(1j * np.asarray(omega, dtype=np.float64) * winch.sample_time)
+        true = self.model if plant is None else plant
+        step = self.model.winch.sample_time
+        z = np.exp(1j * np.asarray(omega, dtype=np.float64) * step)
         A, B, C = _plant(true)
         Ac, Bc, Cc, Dc = self.controller
         if at == "torque":
+            # The model's own input: what the back-EMF takes away is part of its A.
             kept = _reached(true)
             A, B = true.A[np.ix_(kept, kept)], true.B[kept]
-            row = -feedback_row(self.regulator, model)
-            held = np.eye(model.size) - self.gain @ model.C
-            Cc, Dc = (row @ held)[None, :], (row @ self.gain)[None, :]
+            row = -self._feedback
+            Cc, Dc = (row @ self._kept)[None, :], (row @ self.gain)[None, :]
         through = C @ np.linalg.solve(_pencil(A, z), np.broadcast_to(B, (z.size, *B.shape)))
         back = Cc @ np.linalg.solve(_pencil(Ac, z), np.broadcast_to(Bc, (z.size, *Bc.shape))) + Dc
         return np.asarray(1.0 / (1.0 - (back @ through)[:, 0, 0]))

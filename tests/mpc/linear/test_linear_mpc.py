@@ -17,7 +17,7 @@ from models.sensing import Measurement
 from models.sensing.control import MEASURED
 from models.simulation import prepare
 from mpc.linear import WATCHED, LinearMPC, path_of_sea, sea_at_end
-from mpc.programme import SoftQP, default_blocking, kkt_residual
+from mpc.programme import SoftQP, kkt_residual
 from mpc.winch.regulation import feedback_row
 
 _NAN = float("nan")
@@ -213,16 +213,6 @@ def test_cold_and_warm_starts_agree():
             linear=controller.qp.linear,
         ).solve(*question)
         assert cold.v == pytest.approx(warm, abs=1e-9)
-
-
-def test_blocks_grow_and_fill_the_horizon():
-    for horizon in (0.2, 1.0, 3.0, 6.0, 8.0, 10.0, 20.0):
-        blocks = default_blocking("test", horizon, 0.05)
-        assert sum(blocks) == round(horizon / 0.05)
-        assert blocks[0] == 1
-    assert len(default_blocking("test", 8.0, 0.05)) < 35
-    with pytest.raises(sh.InputError, match=r"horizon must be in \[0.2, 100\] s, got 0.1"):
-        default_blocking("test", 0.1, 0.05)
 
 
 def test_the_path_tells_the_state_of_the_sea_at_its_end():
