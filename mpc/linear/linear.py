@@ -208,12 +208,10 @@ class LinearMPC(WinchMPC):
             gradient, free = products.along(gradient, free, forecast)
         speed, cap = self.estimator.speed, self._cap(shown)
         # Only its own limits does the drive keep by itself.
-        leaning = cap >= self._window.peak and self._at_most == math.inf
-        low, high = self._window.bounds(
-            speed, self._speeds, cap, self._changes if leaning else None
-        )
+        leaning = cap >= self.window.peak and self._at_most == math.inf
+        low, high = self.window.bounds(speed, self._speeds, cap, self._changes if leaning else None)
         if self._at_most < math.inf:
-            low, high = self._window.within(
+            low, high = self.window.within(
                 low, high, self._asked - winch.rest_torque, self._at_most
             )
         # The bounds at speeds of the last plan make a convex programme of one that is not: torque
@@ -228,14 +226,14 @@ class LinearMPC(WinchMPC):
         # At the edge of its window the drive is asked for more than its peak, so that it holds it
         # though the speed rises over the sample; the estimator is told so at the next one.
         if leaning:
-            torque, self._kept = self._window.asked(
+            torque, self._kept = self.window.asked(
                 move, float(low[0]), float(high[0]), float(self._changes[0])
             )
         else:
             torque, self._kept = min(max(move, low[0]), high[0]) * self.programme.unit, math.nan
         command = winch.command(torque, speed)
-        self._asked = min(max(torque + winch.rest_torque, -self._window.peak), self._window.peak)
-        return min(max(command, -self._window.voltage), self._window.voltage)
+        self._asked = min(max(torque + winch.rest_torque, -self.window.peak), self.window.peak)
+        return min(max(command, -self.window.voltage), self.window.voltage)
 
     def _held(self, torque: float) -> float:
         """Return the torque that the drive has held over the last sample, NaN if it did not.
@@ -243,6 +241,6 @@ class LinearMPC(WinchMPC):
         It was asked to hold its peak, and shows that it still did at the end [N m].
         """
         rest = self.model.winch.rest_torque
-        if abs(torque - rest - self._kept) < _SAME * self._window.peak:
+        if abs(torque - rest - self._kept) < _SAME * self.window.peak:
             return self._kept
         return math.nan

@@ -78,6 +78,8 @@ class WinchMPC(ABC):
         from: None for the estimator's own sea.
     soft_limits
         Lowest and highest deviation from rest by signal.
+    window
+        What torque the drive can give, as bounds on the moves.
     programme, products, qp
         The condensed programme, what of a step does not change, and the solver.
     question, solved
@@ -145,7 +147,7 @@ class WinchMPC(ABC):
         # the estimator knows it at the start.
         self._sea_covariance = None if self.predictor is None else self.estimator.sea_covariance
         unit = case.winch.drive.torque_peak
-        self._window = DriveWindow(self.model.winch, limits, len(blocks), unit)
+        self.window = DriveWindow(self.model.winch, limits, len(blocks), unit)
         self._deadline = math.inf if deadline is None else deadline
         self._prove = prove
         self._budget = TorqueBudget(case, T, self.horizon) if thermal else None

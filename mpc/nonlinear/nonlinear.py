@@ -188,7 +188,7 @@ class NonlinearMPC(WinchMPC):
             self._sea_covariance,
             self.estimator.model,
         )
-        powers = len(p.blocks) - 1 if self._window.power < math.inf else 0
+        powers = len(p.blocks) - 1 if self.window.power < math.inf else 0
         self._low = np.concatenate([products.low, -np.ones(powers)])
         self._high = np.concatenate([products.high, np.ones(powers)])
         self._ends = path_of_sea(self.model, 1)
@@ -248,7 +248,7 @@ class NonlinearMPC(WinchMPC):
         torque = min(max(move, float(low[0])), float(high[0])) * self.programme.unit
         command = self._command(torque, speed, chi, ends)
         self._asked = torque + winch.rest_torque
-        command = min(max(command, -self._window.voltage), self._window.voltage)
+        command = min(max(command, -self.window.voltage), self.window.voltage)
         answered = clock.perf_counter()
         # The command is known; the rest needs no measurement, and has what is left of the time.
         self.prepare()
@@ -291,17 +291,12 @@ class NonlinearMPC(WinchMPC):
             moves = self._moves
         raise SolverError(f"{_OWNER}: the moves have not settled in {iterations} iterations")
 
-    @property
-    def power(self) -> float:
-        """Highest power of the drive [W]; infinite where there is no such limit."""
-        return self._window.power
-
     def hard_bounds(self, speed: float, cap: float = math.inf) -> tuple[FloatArray, FloatArray]:
         """Return the lowest and highest moves (nb,) at a motor speed [rad/s] and a cap [N m].
 
         The power of later moves has rows of its own.
         """
-        return self._window.bounds(speed, np.zeros(len(self.programme.blocks)), cap)
+        return self.window.bounds(speed, np.zeros(len(self.programme.blocks)), cap)
 
     def _command(self, torque: float, speed: float, chi: FloatArray, ends: FloatArray) -> float:
         """Return the drive command that gives a move [N m]."""
@@ -310,7 +305,7 @@ class NonlinearMPC(WinchMPC):
         self._cut = None
         if over == 0.0 or not math.isfinite(over):
             return winch.command(torque, speed)
-        window, rest = self._window, winch.rest_torque
+        window, rest = self.window, winch.rest_torque
         peak = min(window.peak, window.power / max(abs(speed), 1e-9))
         # A held command lets the torque fall with the speed; where it starts beyond the peak, the
         # drive cuts it, and what it then does is no longer linear in the command.
@@ -367,7 +362,7 @@ class NonlinearMPC(WinchMPC):
         if len(rows) > count:
             # (tau_0 + d) omega is a product of two things that the moves change: linearised at the
             # plan's torques and speeds, over the power.
-            power = self._window.power
+            power = self.window.power
             torque = self.model.winch.rest_torque + p.unit * self._moves
             rows[count:] = (torque[1:, None] / power) * S[self.shooting.speeds][1:]
             later = np.arange(1, len(p.blocks))
@@ -383,7 +378,7 @@ class NonlinearMPC(WinchMPC):
         free = o[shooting.rows]
         if len(self._low) > len(free):
             # (tau0 + d) omega, linearised, over the power
-            rest, power = self.model.winch.rest_torque, self._window.power
+            rest, power = self.model.winch.rest_torque, self.window.power
             moves, speeds = p.unit * self._moves[1:], self._speeds[1:]
             value = (rest + moves) * o[shooting.speeds][1:] - moves * speeds
             free = np.concatenate([free, value / power])

@@ -198,7 +198,7 @@ def _rows(
             value = ca.dot(ca.DM(of), states[j])
         rows.append(float(factor) * value)
     low, high = np.array(controller.products.low), np.array(controller.products.high)
-    power = controller.power
+    power = controller.window.power
     if np.isfinite(power):
         starts = np.cumsum((0, *p.blocks[:-1]))[1:].tolist()
         for j in starts:

@@ -38,7 +38,7 @@ def question_of(controller: LinearMPC, chi: np.ndarray):
     _, gradient, free = controller.products.known(chi)
     speed = float(controller.model.winch.speed @ chi[: controller.model.winch.size])
     moves = len(controller.programme.blocks)
-    low, high = controller._window.bounds(speed, np.zeros(moves), math.inf)
+    low, high = controller.window.bounds(speed, np.zeros(moves), math.inf)
     return controller.products.question(gradient, free, low, high), low, high
 
 
@@ -467,7 +467,7 @@ def test_without_a_plan_it_goes_on_with_the_last_and_then_holds_the_drum():
         command = controller.step(calm, 0.05 * k)
         given = winch.torque(command, controller.estimator.speed) / controller.programme.unit
         if k + 1 < len(blocks):
-            low, high = controller._window.bounds(
+            low, high = controller.window.bounds(
                 controller.estimator.speed, np.zeros(len(plan.v)), math.inf, controller._changes
             )
             kept = min(max(blocks[k + 1], low[0]), high[0])
