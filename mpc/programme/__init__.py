@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .kalman import corrected as corrected
     from .kalman import end_of_record as end_of_record
     from .kalman import kalman_gain as kalman_gain
+    from .kalman import prediction_covariance as prediction_covariance
     from .qp import QPSolution as QPSolution
     from .qp import SoftQP as SoftQP
     from .qp import kkt_residual as kkt_residual

@@ -11,7 +11,33 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import FloatArray
+from models.basics import FloatArray, solve_discrete_riccati
+
+
+def prediction_covariance(
+    A: FloatArray, C: FloatArray, G: FloatArray, R: FloatArray, scale: FloatArray
+) -> FloatArray:
+    """Return the covariance of the steady one-step prediction, (n, n).
+
+    Parameters
+    ----------
+    A, C, G, R
+        The process with noise G n, n white and of variance one, its outputs, and the variances of
+        their errors.
+    scale
+        Size of each state, for the numerics, (n,).
+
+    Raises
+    ------
+    SolverError
+        If there is none.
+    """
+    P = solve_discrete_riccati(
+        A / scale[:, None] * scale,
+        C * scale / np.sqrt(R)[:, None],
+        (G / scale[:, None]) @ (G / scale[:, None]).T,
+    )
+    return np.asarray(P * np.outer(scale, scale))
 
 
 def kalman_gain(

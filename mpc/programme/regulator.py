@@ -23,12 +23,13 @@ of what lies beyond a horizon.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
 
-from models.basics import FloatArray, SolverError, read_only
+from models.basics import FloatArray, SolverError, read_only, solve_discrete_riccati
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,32 +67,42 @@ class LQRegulator:
 def lq_regulator(
     A: FloatArray,
     B: FloatArray,
-    P: FloatArray,
+    output: FloatArray,
     *,
     weight: float,
+    scale: FloatArray,
     Gamma: FloatArray,
     Phi: FloatArray,
     steady: FloatArray,
 ) -> LQRegulator:
-    """Return the regulator of a plant whose Riccati equation P solves.
+    """Return the regulator of a plant.
 
     Parameters
     ----------
-    A, B, P
-        (nx, nx), (nx, 1), (nx, nx).
+    A, B, output
+        (nx, nx), (nx, 1), and the row q, (nx,).
     weight, Gamma, Phi, steady
         As for `LQRegulator`.
+    scale
+        Size of each state, for the numerics of the Riccati equation, (nx,).
 
     Raises
     ------
     SolverError
-        If the regulated plant is not stable.
+        If the Riccati equation has no solution, or the regulated plant is not stable.
     """
+    scaled = output * scale
+    P = solve_discrete_riccati(
+        (A / scale[:, None] * scale).T,
+        (B / scale[:, None]).T / math.sqrt(weight),
+        np.outer(scaled, scaled),
+    )
+    P = P / np.outer(scale, scale)
     bend = float((B.T @ P @ B)[0, 0]) + weight
     K = (B.T @ P @ A)[0] / bend
     closed = A - B @ K[None, :]
     if np.abs(np.linalg.eigvals(closed)).max() >= 1.0 - 1e-12:
-        raise SolverError("regulator: the regulated winch is not stable")
+        raise SolverError("regulator: the regulated plant is not stable")
     shifted = Gamma + np.outer(B[:, 0], steady)
     N = _cross(closed, P @ shifted, Phi)
     K_zeta = (B.T @ (P @ shifted + N @ Phi))[0] / bend

@@ -16,12 +16,12 @@ import math
 
 import numpy as np
 
-from models.basics import FloatArray, read_only, solve_discrete_riccati
+from models.basics import FloatArray, read_only
 from models.plant import MEASUREMENTS
 from models.sensing import MEASURED, Measurement
 from models.sensing.control import MEASURED as HEARD
 
-from ..programme import corrected, kalman_gain
+from ..programme import corrected, kalman_gain, prediction_covariance
 from .prediction import PredictionModel, constant_scales
 
 _AT = np.array([HEARD.index(name) for name in MEASURED])
@@ -228,13 +228,7 @@ def kalman_covariance(model: PredictionModel) -> FloatArray:
     SolverError
         If there is none.
     """
-    s = model.scale
-    A = model.A / s[:, None] * s
-    G = model.G / s[:, None]
-    # Each measurement in units of its own error.
-    C = model.C * s / np.sqrt(model.R)[:, None]
-    P = solve_discrete_riccati(A, C, G @ G.T)
-    return read_only(P * np.outer(s, s))
+    return read_only(prediction_covariance(model.A, model.C, model.G, model.R, model.scale))
 
 
 def _first_gains(model: PredictionModel, P: FloatArray) -> list[FloatArray]:

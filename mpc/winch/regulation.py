@@ -7,12 +7,10 @@ the payload's displacement as the output, and the input that holds the load agai
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import scipy.linalg
 
-from models.basics import FloatArray, solve_discrete_riccati
+from models.basics import FloatArray
 
 from ..programme import LQRegulator, lq_regulator
 from .prediction import PredictionModel
@@ -39,15 +37,12 @@ def regulator(model: PredictionModel, weight: float) -> LQRegulator:
     # In units of the hook's rms and the peak torque, so that the equation is well scaled.
     scale = np.maximum(np.abs(winch.moved).max(axis=1), 1e-9)
     scale[scale == 1e-9] = 1.0
-    A = winch.A / scale[:, None] * scale
-    B = winch.B / scale[:, None]
-    Q = np.outer(winch.payload * scale, winch.payload * scale)
-    P = solve_discrete_riccati(A.T, B.T / math.sqrt(rho), Q)
     return lq_regulator(
         np.asarray(winch.A),
         np.asarray(winch.B),
-        P / np.outer(scale, scale),
+        winch.payload,
         weight=rho,
+        scale=scale,
         Gamma=np.hstack([model.A[: winch.size, model.sea_at], winch.from_constants]),
         Phi=scipy.linalg.block_diag(model.A[model.sea_at, model.sea_at], np.eye(2)),
         steady=np.concatenate([np.zeros(nh), winch.steady]),

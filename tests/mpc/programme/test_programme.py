@@ -20,6 +20,7 @@ from mpc.programme import (
     kalman_gain,
     kkt_residual,
     lq_regulator,
+    prediction_covariance,
 )
 
 N, NX, NW, NC, NH = 9, 3, 2, 2, 4
@@ -67,7 +68,6 @@ def sea(rng):
 @pytest.fixture
 def regulator(horizon, output, sea):
     A, B = np.asarray(horizon.A), np.asarray(horizon.B)
-    P = scipy.linalg.solve_discrete_are(A, B, np.outer(output, output), [[WEIGHT]])
     Phi, shown = sea
     over = scipy.linalg.block_diag(Phi, np.eye(NC))
     moved = horizon.from_path[:, :NW] @ shown + horizon.from_path[:, NW:] @ shown @ Phi
@@ -77,8 +77,9 @@ def regulator(horizon, output, sea):
     return lq_regulator(
         A,
         B,
-        P,
+        output,
         weight=WEIGHT,
+        scale=np.array([1.0, 10.0, 0.1]),
         Gamma=np.hstack([moved, horizon.from_constants]),
         Phi=over,
         steady=np.concatenate([np.zeros(NH), held[-1]]),
@@ -161,6 +162,12 @@ def test_without_blocks_and_limits_its_first_move_is_the_regulators(
     assert UNIT * v[0] == pytest.approx(wanted, rel=1e-9)
 
 
+def test_the_regulators_value_function_is_that_of_the_riccati_equation(horizon, regulator, output):
+    A, B = np.asarray(horizon.A), np.asarray(horizon.B)
+    P = scipy.linalg.solve_discrete_are(A, B, np.outer(output, output), [[WEIGHT]])
+    np.testing.assert_allclose(regulator.P, P, rtol=1e-9, atol=1e-9 * np.abs(P).max())
+
+
 def test_blocks_grow_and_fill_the_horizon():
     for horizon in (0.2, 1.0, 3.0, 6.0, 8.0, 10.0, 20.0):
         blocks = default_blocking("test", horizon, 0.05)
@@ -190,6 +197,15 @@ def test_the_end_of_a_record_is_the_mean_given_all_of_it(rng):
     np.testing.assert_allclose(from_record, gain, atol=1e-10)
     rest = np.linalg.matrix_power(A, steps) - gain @ expected
     np.testing.assert_allclose(from_estimate, rest, atol=1e-10)
+
+
+def test_the_covariance_of_the_prediction_is_that_of_the_recursion(rng):
+    A, C, G, R = stable(rng, NX), matrix(rng, 2, NX), matrix(rng, NX, 2), np.array([0.2, 3.0])
+    P = np.eye(NX)
+    for _ in range(2000):
+        P = A @ corrected(P, C, R, kalman_gain(C, R, P)) @ A.T + G @ G.T
+    found = prediction_covariance(A, C, G, R, np.array([1.0, 30.0, 0.2]))
+    np.testing.assert_allclose(found, P, rtol=1e-9, atol=1e-9 * np.abs(P).max())
 
 
 def test_what_is_missing_has_no_gain_and_leaves_that_of_the_others(rng):
