@@ -42,7 +42,6 @@ from models.spread import LogNormal, Normal, Spread, Uniform
 from synth import GainDesign, evaluate_gains
 from synth.question import pose
 from synth.sweeps import FrequencyEngine
-from synth.sweeps.frequency import frequency_chunks
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -187,9 +186,10 @@ def disagreement(engine: FrequencyEngine, peer: PythonControl, rows: FloatArray)
 
 def peak_memory(design: GainDesign, count: int) -> float:
     """Return the most memory of a sweep that keeps nothing but the chunk at hand [MB]."""
-    list(frequency_chunks(design, SPRING, samples=64, metrics=["payload_rms"]))  # modules, caches
+    engine = FrequencyEngine(design, SPRING, metrics=["payload_rms"])
+    list(engine.chunks(samples=64))  # modules, caches
     tracemalloc.start()
-    for _ in frequency_chunks(design, SPRING, samples=count, metrics=["payload_rms"]):
+    for _ in engine.chunks(samples=count):
         pass
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()

@@ -1,8 +1,7 @@
 """Sweeps in the frequency domain: one design on thousands to millions of plants at once.
 
-    design + Spread -> rows of numbers -> chunks -> rms values, stability, M_s -> xarray.Dataset
-
-`synth.sweeps.frequency.frequency_sweep` is the way in.
+A design and a spread come in; rms values, stability and M_s of every case go out as an
+xarray.Dataset (`frequency_sweep`) or as columns for given rows (`FrequencyEngine`).
 """
 
 from typing import TYPE_CHECKING

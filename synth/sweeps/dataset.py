@@ -1,4 +1,4 @@
-"""Results of a sweep as an xarray.Dataset that says what it answers, and back to cases.
+"""Dataset of a sweep, which says what it answers, and the way back to its cases.
 
 One dimension, "case"; a coordinate for every path that varied, with its unit; a variable for
 every metric; case, design and spread as YAML and JSON in the attributes, so that a file of it is

@@ -2,7 +2,8 @@
 
 frequency_sweep(design, spread, samples=..) -> xarray.Dataset along "case"
 FrequencyEngine(design, spread).evaluate(rows) -> columns, for whoever brings rows
-frequency_chunks(..) -> dataset after dataset, for more cases than memory holds
+FrequencyEngine(design, spread).chunks(samples=..) -> dataset after dataset, for more cases than
+    memory holds
 """
 
 from __future__ import annotations
@@ -158,6 +159,39 @@ class FrequencyEngine:
             },
         )
 
+    def chunks(
+        self,
+        *,
+        samples: int | None,
+        sampling: str = "sobol",
+        seed: int = 0,
+        chunk: int | None = None,
+        start: int = 0,
+        progress: Progress | None = None,
+    ) -> Iterator[xr.Dataset]:
+        """Yield the datasets of one chunk of cases after the other, from case `start` on.
+
+        Nothing but the chunk at hand is kept, so that the number of cases has no bound but time.
+        Parameters are those of `frequency_sweep`.
+
+        Raises
+        ------
+        InputError
+            If the samples or a case are not valid.
+        """
+        size = int(check_range("sweep", "chunk", chunk or _CHUNK, low=1))
+        total = self.spread.count(samples, sampling)
+        notes = {"sampling": sampling, "seed": seed, "samples": total}
+        for at in range(start, total, size):
+            stop = min(at + size, total)
+            rows = self.spread.sample(samples, sampling, seed, start=at, stop=stop)
+
+            def tell(stage: str, done: int, _: int, before: int = at) -> None:
+                if progress is not None:
+                    progress(stage, before + done, total)
+
+            yield self.dataset(rows, first=at, notes=notes, progress=tell)
+
 
 @one_thread()
 def frequency_sweep(
@@ -210,61 +244,12 @@ def frequency_sweep(
     """
     import xarray as xr
 
+    engine = FrequencyEngine(design, spread, metrics=metrics, accuracy=accuracy, nodes=nodes)
     parts = list(
-        frequency_chunks(
-            design,
-            spread,
-            samples=samples,
-            sampling=sampling,
-            seed=seed,
-            metrics=metrics,
-            chunk=chunk,
-            progress=progress,
-            accuracy=accuracy,
-            nodes=nodes,
-        )
+        engine.chunks(samples=samples, sampling=sampling, seed=seed, chunk=chunk, progress=progress)
     )
     if len(parts) == 1:
         return parts[0]
     # The counts of the last chunk are those of all.
     whole = xr.concat(parts, dim="case", combine_attrs="override")
     return whole.assign_attrs(parts[-1].attrs)
-
-
-def frequency_chunks(
-    design: Design,
-    spread: Spread,
-    *,
-    samples: int | None,
-    sampling: str = "sobol",
-    seed: int = 0,
-    metrics: Sequence[str] | None = None,
-    chunk: int | None = None,
-    start: int = 0,
-    progress: Progress | None = None,
-    accuracy: float = ACCURACY,
-    nodes: Quadrature | None = None,
-) -> Iterator[xr.Dataset]:
-    """Yield the datasets of one chunk of cases after the other, from case `start` on.
-
-    Nothing but the chunk at hand is kept, so that the number of cases has no bound but time.
-    Parameters are those of `frequency_sweep`.
-
-    Raises
-    ------
-    InputError
-        If the design, the spread or a case is not valid.
-    """
-    size = int(check_range("sweep", "chunk", chunk or _CHUNK, low=1))
-    engine = FrequencyEngine(design, spread, metrics=metrics, accuracy=accuracy, nodes=nodes)
-    total = engine.spread.count(samples, sampling)
-    notes = {"sampling": sampling, "seed": seed, "samples": total}
-    for at in range(start, total, size):
-        stop = min(at + size, total)
-        rows = engine.spread.sample(samples, sampling, seed, start=at, stop=stop)
-
-        def tell(stage: str, done: int, _: int, before: int = at) -> None:
-            if progress is not None:
-                progress(stage, before + done, total)
-
-        yield engine.dataset(rows, first=at, notes=notes, progress=tell)

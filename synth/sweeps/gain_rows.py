@@ -22,16 +22,14 @@ from models.plant import lump_rope
 from models.spread import GAINS, Spread
 
 from ..design import GainDesign
-from .calming import calming_drag
 from .chain import ChainLoops
 from .drag_rows import Velocity, agreeing_drag
-from .kernel import SpringLoops
+from .kernel import SpringLoops, spring_peaks
 from .metrics import Metric, finished
 from .numbers import PlantNumbers, numbers_of
-from .peaks import spring_peaks
 from .sea_rows import SeaRows
 from .sweep_nodes import SweepNodes, sweep_nodes
-from .winding_count import count_unstable, light_poles, peak_sensitivity
+from .winding_count import calming_drag, count_unstable, light_poles, peak_sensitivity
 
 Index = npt.NDArray[np.intp]
 Loops = SpringLoops | ChainLoops

@@ -1,4 +1,4 @@
-"""What a sweep reports of every case: names, units, and which outputs of the plant they need."""
+"""Metrics of a sweep: names, units, and the outputs of the plant that they need."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 
 from models.basics import FloatArray, InputError
 from models.casefile import suggestion
+
+DEFAULT = ("payload_rms", "torque_rms", "speed_rms", "max_sensitivity")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,8 +152,6 @@ METRICS: Mapping[str, Metric] = _listed(
     ),
 )
 """Every metric by its name; `stable` is always there."""
-
-DEFAULT = ("payload_rms", "torque_rms", "speed_rms", "max_sensitivity")
 
 
 def chosen_metrics(names: Sequence[str] | None, *, dc: bool) -> tuple[Metric, ...]:

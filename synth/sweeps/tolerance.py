@@ -1,4 +1,4 @@
-"""Gains off by their components' tolerance, against the exact radius of stability.
+"""Tolerance of gains by their components', against the exact radius of stability.
 
 A sweep of gains shows what errors do to the motion; whether any of them is unstable needs no
 samples at all: `synth.robust.perturbation` knows the least errors that are, exactly.  Here the two

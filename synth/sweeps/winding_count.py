@@ -1,4 +1,4 @@
-r"""Unstable poles and the peak of |S| of many loops at once, by their phase along a contour.
+r"""Unstable poles, peak of |S| and calming drag of many loops at once, by their phase.
 
 The function `closed` has the loop's poles as its zeros and no pole in the right half plane.  Up
 the imaginary axis from 0 to iR its phase changes by so much, along the arc from R to iR by so
@@ -10,6 +10,13 @@ All loops begin with the same kind of grid, eight points for each axial mode of 
 phase or size jumps between neighbours, the interval is halved, for all loops in one call, as
 `synth.verify.winding.trace` does for one.  So delays, waves and light damping are followed exactly;
 a phase that cannot be followed means a pole on the axis, and counts as unstable.
+
+From which linear drag on a loop is stable (`calming_drag`): the characteristic function is affine
+in the drag, closed = c0 + C c1, so a pole is on the axis at i omega for the C that makes it zero
+there, C = -c0/c1, wherever that is real and positive.  The largest of them is the boundary: with
+more drag no pole is on the axis any more, and with drag without end the payload stands still and
+the loop is open, which is stable.  All but a slow drift: where closed(0) is not above zero, a real
+pole is in the right half plane whatever the drag.
 """
 
 from __future__ import annotations
@@ -21,6 +28,8 @@ import numpy as np
 import numpy.typing as npt
 
 from models.basics import ComplexArray, FloatArray
+
+from .chain import ChainLoops
 
 Index = npt.NDArray[np.intp]
 Follow = Callable[[Index, ComplexArray], ComplexArray]
@@ -35,6 +44,7 @@ _STEP = 64  # loops at once
 _GOLDEN = 0.5 * (3.0 - 5.0**0.5)
 _SOUGHT = 4  # light poles of one loop
 _NEAR = 1.5  # local minima up to so much above the least are looked into
+_CALMING_ROUNDS = 50  # of halving, where a pole is on the axis
 
 
 class Loops(Protocol):
@@ -120,6 +130,8 @@ def _count(loops: Loops, rows: Index) -> npt.NDArray[np.intp]:
     def closed(at: Index, s: ComplexArray) -> ComplexArray:
         return loops.responses(at, s)[0]
 
+    # The first quadrant's contour: up the imaginary axis, and along the arc from the real one, on
+    # which `closed` is real and its phase takes no part.
     axis = _follow(closed, rows, _imaginary(_grid(loops, rows, radius)))
     angle = np.linspace(0.0, 0.5 * np.pi, _ARC)
     points = np.asarray(radius[:, None] * np.exp(1j * angle), dtype=np.complex128)
@@ -176,6 +188,7 @@ def _follow(
     values = function(rows, points)
     turn, smooth = _steps(values[:, :-1], values[:, 1:])
     total = np.asarray(np.where(smooth, turn, 0.0).sum(axis=1), dtype=np.float64)
+    # All intervals of all loops that are not smooth are halved in one call, until none is left.
     loop, k = np.nonzero(~smooth)
     a, b = points[loop, k], points[loop, k + 1]
     va, vb = values[loop, k], values[loop, k + 1]
@@ -266,6 +279,7 @@ def _least(
             found = (_abs2(closed) / _abs2(free))[:, 0]
         return np.where(np.isfinite(found), found, np.inf)
 
+    # Golden section on arrays, a bracket for each minimum: SciPy's would do them one by one.
     x1, x2 = low + _GOLDEN * (high - low), high - _GOLDEN * (high - low)
     f1, f2 = value(x1), value(x2)
     for _ in range(24):
@@ -281,3 +295,46 @@ def _least(
 
 def _abs2(values: ComplexArray) -> FloatArray:
     return np.asarray(values.real**2 + values.imag**2)
+
+
+def calming_drag(loops: ChainLoops) -> FloatArray:
+    """Return the drag beyond which each loop is stable, (n,) [N s/m]; 0 if it needs none.
+
+    Infinite where no drag makes it so.
+    """
+    found = np.zeros(len(loops))
+    bare, unit = loops.with_drag(np.zeros(1)), loops.scale
+    more = loops.with_drag(np.array([unit]))
+
+    def parts(rows: Index, omega: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return Im(c0 conj c1), zero where C is real, and that C."""
+        s = np.asarray(1j * omega, dtype=np.complex128)
+        c0 = bare.responses(rows, s)[0]
+        c1 = (more.responses(rows, s)[0] - c0) / unit
+        both = c0 * c1.conj()
+        with np.errstate(all="ignore"):
+            size = c1.real**2 + c1.imag**2
+            return np.asarray(both.imag), np.asarray(-both.real / size)
+
+    for at in range(0, len(loops), _STEP):
+        rows = np.arange(at, min(at + _STEP, len(loops)))
+        omega = frequencies(bare, rows)
+        turn, C = parts(rows, omega)
+        change = (turn[:, :-1] > 0.0) != (turn[:, 1:] > 0.0)
+        # Only what might beat the others: C hardly changes within an interval.
+        change &= np.maximum(C[:, :-1], C[:, 1:]) > 0.0
+        loop, k = np.nonzero(change)
+        low, high = omega[loop, k], omega[loop, k + 1]
+        left = turn[loop, k] > 0.0
+        for _ in range(_CALMING_ROUNDS):
+            if not loop.size:
+                break
+            middle = 0.5 * (low + high)
+            same = (parts(rows[loop], middle[:, None])[0][:, 0] > 0.0) == left
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        if loop.size:
+            value = parts(rows[loop], high[:, None])[1][:, 0]
+            np.maximum.at(found, rows[loop], np.where(np.isfinite(value), value, 0.0))
+        drift = bare.responses(rows, np.zeros(1, dtype=np.complex128))[0][:, 0].real
+        found[rows[drift <= 0.0]] = np.inf
+    return found

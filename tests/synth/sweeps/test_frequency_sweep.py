@@ -29,7 +29,6 @@ from synth.sweeps import (
     gain_tolerance,
     spread_of,
 )
-from synth.sweeps.frequency import frequency_chunks
 from synth.sweeps.metrics import DEFAULT
 from synth.sweeps.numbers import numbers_of
 
@@ -257,7 +256,7 @@ def test_chunks_and_order_do_not_matter(rope_design: GainDesign) -> None:
         pieces = frequency_sweep(design, spread, samples=60, seed=3, chunk=7)
         for name in whole.variables:
             np.testing.assert_allclose(pieces[name], whole[name], rtol=1e-9, equal_nan=True)
-        last = list(frequency_chunks(design, spread, samples=60, seed=3, start=50))[-1]
+        last = list(FrequencyEngine(design, spread).chunks(samples=60, seed=3, start=50))[-1]
         assert last["case"].values.tolist() == list(range(50, 60))
         np.testing.assert_allclose(last["payload_rms"], whole["payload_rms"][50:], rtol=1e-9)
 

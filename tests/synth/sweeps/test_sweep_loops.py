@@ -17,12 +17,11 @@ from synth.loop import closed_loop_poles
 from synth.question import pose
 from synth.structures import PayloadFeedback
 from synth.sweeps import FrequencyEngine
-from synth.sweeps.calming import calming_drag
 from synth.sweeps.chain import ChainLoops
 from synth.sweeps.kernel import hurwitz
 from synth.sweeps.numbers import numbers_of
 from synth.sweeps.sweep_nodes import sweep_nodes
-from synth.sweeps.winding_count import count_unstable, peak_sensitivity
+from synth.sweeps.winding_count import calming_drag, count_unstable, peak_sensitivity
 from synth.verify import LawMatrices
 from synth.verify.winding import count_unstable as wind_one
 
