@@ -14,12 +14,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..basics import ComplexArray, FloatArray, InputError
-from .raos import VesselRaos
+from .raos import MIRRORED, VesselRaos
 
 SYMMETRIES = ("none", "xz plane", "yz plane", "xz and yz planes", "circular")
 """What a vessel may be symmetric about."""
 
-PORT_STARBOARD = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 FORE_AFT = np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
 
 _SAME = 1e-7  # rad: two headings that are one
@@ -50,7 +49,7 @@ def completed(raos: VesselRaos, symmetry: str) -> VesselRaos:
         raise InputError(f"{raos.source}: symmetry must be one of {SYMMETRIES}, got {symmetry!r}")
     found = raos
     if "xz" in symmetry:
-        found = _joined(found, -found.heading, found.values * PORT_STARBOARD)
+        found = _joined(found, -found.heading, found.values * MIRRORED)
     if "yz" in symmetry:
         found = _joined(found, math.pi - found.heading, found.values * FORE_AFT)
     return found

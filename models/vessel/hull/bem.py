@@ -29,13 +29,13 @@ from ...basics import (
     check_range,
     wave_frequency,
 )
+from ..crane import Point
 from ..raos import MODES
 from .froude_krylov import froude_krylov
 from .hull import Hull
 from .hydrodynamics import Hydrodynamics
 from .lid import waterplane_lid
 
-Point = tuple[float, float, float]
 Progress = Callable[[int, int], None]
 
 _NAMES = tuple(mode.capitalize() for mode in MODES)

@@ -16,18 +16,21 @@ import math
 import os
 import zipfile
 import zlib
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 
 from ...basics import GRAVITY, FloatArray, InputError, cache_folder, replace_atomically
-from .bem import Point, Progress, solve_hull, versions
+from ..crane import Point
+from .bem import Progress, solve_hull, versions
 from .hull import Hull
 from .hydrodynamics import Hydrodynamics
 
 KEPT = 64
 """Computations kept; the ones longest unused go first."""
 
+_ARRAYS = ("omega", "heading", "added_mass", "damping", "excitation")
 _FORMAT = 3  # goes up when what is computed from the same inputs changes
 
 
@@ -111,30 +114,16 @@ def digest_of(
 
 def _write(place: Path, solved: Hydrodynamics) -> None:
     with place.open("wb") as file:  # by an open file: numpy would add its own ending to the name
-        np.savez_compressed(
-            file,
-            omega=solved.omega,
-            heading=solved.heading,
-            added_mass=solved.added_mass,
-            damping=solved.damping,
-            excitation=solved.excitation,
-            point=np.array(solved.point),
-            depth=np.array(solved.depth),
-            density=np.array(solved.density),
-        )
+        np.savez_compressed(file, **{f.name: getattr(solved, f.name) for f in fields(solved)})
 
 
 def _read(place: Path) -> Hydrodynamics | None:
     """Return what is in a file of the cache, or nothing if it is not whole."""
     try:
         with place.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-            x, y, z = (float(v) for v in file["point"])
+            x, y, z = file["point"].tolist()
             return Hydrodynamics(
-                omega=file["omega"],
-                heading=file["heading"],
-                added_mass=file["added_mass"],
-                damping=file["damping"],
-                excitation=file["excitation"],
+                **{name: file[name] for name in _ARRAYS},
                 point=(x, y, z),
                 depth=float(file["depth"]),
                 density=float(file["density"]),

@@ -22,8 +22,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ...basics import FloatArray, InputError, check_finite, check_range, read_only
-
-Point = tuple[float, float, float]
+from ..crane import Point
 
 _OPEN = 0.02  # of the volume by which its three expressions may differ for the surface to be closed
 

@@ -19,7 +19,7 @@ same about any point.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -34,10 +34,9 @@ from ...basics import (
     check_range,
     read_only,
 )
-from ..raos import MODES
+from ..crane import Point
+from ..raos import MIRRORED, MODES
 from .hydrostatics import moved, undamped_period
-
-Point = tuple[float, float, float]
 
 _ROLL = MODES.index("roll")
 
@@ -126,15 +125,12 @@ class Hydrodynamics:
         check_range("hydrodynamics", "omega", wanted[0], low=low - slack, unit="rad/s")
         check_range("hydrodynamics", "omega", wanted[-1], high=high + slack, unit="rad/s")
         at = np.clip(wanted, low, high)
-        return Hydrodynamics(
+        return replace(
+            self,
             omega=wanted,
-            heading=self.heading,
             added_mass=CubicSpline(self.omega, self.added_mass)(at),
             damping=CubicSpline(self.omega, self.damping)(at),
             excitation=CubicSpline(self.omega, self.excitation)(at),
-            point=self.point,
-            depth=self.depth,
-            density=self.density,
         )
 
     def energy_error(self, roll_damping: float = 0.0) -> float:
@@ -190,7 +186,7 @@ class Hydrodynamics:
         tolerance
             Two headings closer than this are the same [rad].
         """
-        sign = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+        sign = MIRRORED
         other = np.mod(-self.heading, 2.0 * math.pi)
         apart = np.abs(np.exp(1j * other)[:, None] - np.exp(1j * self.heading)[None, :])
         new = apart.min(axis=1) > tolerance
@@ -201,15 +197,12 @@ class Hydrodynamics:
         heading = np.concatenate([self.heading, other[new]])
         order = np.argsort(heading)
         coupled = np.where(np.outer(sign, sign) > 0.0, 1.0, 0.0)
-        return Hydrodynamics(
-            omega=self.omega,
+        return replace(
+            self,
             heading=heading[order],
             added_mass=self.added_mass * coupled,
             damping=self.damping * coupled,
             excitation=force[:, order],
-            point=self.point,
-            depth=self.depth,
-            density=self.density,
         )
 
 

@@ -20,9 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...basics import GRAVITY, SEA_WATER_DENSITY, FloatArray, InputError, check_range
+from ..crane import Point
 from .hull import Hull, quadrature_rule
-
-Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)

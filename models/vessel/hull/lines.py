@@ -20,7 +20,7 @@ themselves, so that the displacement is what was asked whatever the number of pa
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from scipy.optimize import brentq
@@ -118,17 +118,7 @@ class ShipLines:
         return Hull(
             name=name or f"ship {self.length:g} x {self.beam:g} x {self.draught:g} m",
             panels=self._surface(fineness, panels),
-            inputs={
-                "shape": "ship",
-                "length": self.length,
-                "beam": self.beam,
-                "draught": self.draught,
-                "block": self.block,
-                "midship": self.midship,
-                "transom_width": self.transom_width,
-                "transom_depth": self.transom_depth,
-                "panels": int(panels),
-            },
+            inputs={"shape": "ship", **asdict(self), "panels": int(panels)},
         )
 
     def _surface(self, fineness: float, panels: int) -> FloatArray:

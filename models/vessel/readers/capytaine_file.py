@@ -20,11 +20,10 @@ import numpy.typing as npt
 
 from ...basics import ComplexArray, FloatArray, InputError, check_finite, check_range
 from ..assemble import finished
+from ..crane import Point
 from ..hull import FloatingBody, Hydrodynamics, centre_of_mass, solved_motions
 from ..raos import MODES, VesselRaos
 from .capytaine_dataset import CapytaineData, mode_of
-
-Point = tuple[float, float, float]
 
 _ROLL = MODES.index("roll")
 
