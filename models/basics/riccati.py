@@ -73,6 +73,8 @@ def solve_riccati(
     X = size * _from_schur(free, size * inputs @ inputs.T, rest / size)
     plain = A / scale[:, None] * scale
     change = np.inf
+    # The Schur form loses digits where noises are ten decades apart.  Newton's steps win them back,
+    # each a Lyapunov equation of the loop closed so far, which must be stable for it to mean much.
     for _ in range(_REFINEMENTS):
         gain = -(inputs.T @ X + cross.T)
         weight = given + cross @ gain + gain.T @ cross.T + gain.T @ gain

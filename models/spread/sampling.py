@@ -59,6 +59,7 @@ def unit_points(
 
     count = stop - start
     if method == "sobol":
+        # Points lie at the lower ends of cells of 2^-32; half a cell on, none is at zero.
         sampler = qmc.Sobol(columns, scramble=True, bits=_BITS, seed=seed)
         with warnings.catch_warnings():
             # Balance wants a power of two; whoever asks for another number gets it.
@@ -71,6 +72,7 @@ def unit_points(
         every = qmc.LatinHypercube(columns, seed=seed).random(samples)
         return _open(np.asarray(every, dtype=np.float64)[start:stop])
     if method == "random":
+        # A generator that counts: it goes to any row without drawing those before it.
         steps = -(-columns // _WORDS)
         bits = np.random.Philox(key=seed)
         bits.advance(start * steps)

@@ -75,6 +75,7 @@ def _joined(raos: VesselRaos, heading: FloatArray, values: ComplexArray) -> Vess
     """Return the table with those of the new headings that it does not have."""
     turn = 2.0 * math.pi
     new = np.mod(heading, turn)
+    # Rounding leaves a heading just short of the full circle, which is the heading zero.
     new = np.where(turn - new < _SAME, 0.0, new)
     away = np.abs(new[:, None] - raos.heading)
     fresh = np.flatnonzero(np.all(np.minimum(away, turn - away) > _SAME, axis=1))

@@ -187,6 +187,7 @@ def _row(
     """Return added mass, damping (6, 6) and diffraction force (h, 6) at one frequency."""
     given = {"omega": frequency, "water_depth": depth, "rho": density, "g": GRAVITY, "body": body}
     added, damping = np.empty((6, 6)), np.empty((6, 6))
+    # Short waves are told in our own words, once for the hull and not once a problem.
     for j, name in enumerate(_NAMES):
         problem = cpt.RadiationProblem(radiating_dof=name, **given)
         result = solver.solve(problem, keep_details=False, _check_wavelength=False)

@@ -196,6 +196,7 @@ class Hydrodynamics:
         force = np.concatenate([force, sign * self.excitation[:, new]], axis=1)
         heading = np.concatenate([self.heading, other[new]])
         order = np.argsort(heading)
+        # Two like sides never couple a motion that the mirror keeps with one that it turns round.
         coupled = np.where(np.outer(sign, sign) > 0.0, 1.0, 0.0)
         return replace(
             self,
@@ -274,6 +275,7 @@ class FloatingBody:
         stiffness = float(moved(self.stiffness, water.point, self.centre)[mode, mode])
         added = moved(water.added_mass, water.point, self.centre)[:, mode, mode]
         inertia = mass + float(added[0])
+        # The added mass is that of the frequency which it decides: a few rounds settle the two.
         for _ in range(50):
             period = undamped_period(inertia, stiffness)
             frequency = 2.0 * math.pi / period

@@ -204,6 +204,7 @@ def _six(
     """Return one body with six motions; one that the file lacks has mass alone."""
     there = [i for i, c in enumerate(columns) if c is not None]
     picked = [c for c in columns if c is not None]
+    # Mass one where the file has none: the motion is then zero, and the matrix not singular.
     M, C = np.eye(6), np.zeros((6, 6))
     A, B = np.zeros((omega.size, 6, 6)), np.zeros((omega.size, 6, 6))
     F = np.zeros((omega.size, heading.size, 6), dtype=np.complex128)

@@ -223,6 +223,7 @@ def file_format_of(owner: str, data: bytes) -> str:
             f"{owner}: this is a binary file of no kind that is known here (formats: {known})"
         )
     text = text_of(owner, data)
+    # From the most to the least telling: a WAMIT file is bare numbers, as others' tables are.
     looks = {
         "orcaflex": looks_like_orcaflex,
         "csv": looks_like_csv,
