@@ -35,7 +35,9 @@ if TYPE_CHECKING:
     from .rope import lump_rope as lump_rope
     from .rope import lumped_modes as lumped_modes
     from .shaping import ShapingFilter as ShapingFilter
+    from .shaping import controllable_form as controllable_form
     from .shaping import fit_shaping_filter as fit_shaping_filter
+    from .shaping import sampled_density as sampled_density
     from .surroundings import Deck as Deck
     from .surroundings import Seabed as Seabed
     from .surroundings import SplashZone as SplashZone

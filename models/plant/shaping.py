@@ -101,14 +101,8 @@ def fit_shaping_filter(
     """
     if order not in (4, 6, 8):
         raise InputError(f"shaping filter: order must be 4, 6 or 8, got {order!r}")
-    low = check_range("shaping filter", "band[0]", band[0], low=0.0, unit="rad/s", open_low=True)
-    high = check_range("shaping filter", "band[1]", band[1], low=low, unit="rad/s", open_low=True)
-    edges = np.geomspace(low, high, _NODES + 1)
-    omega, width = np.sqrt(edges[1:] * edges[:-1]), np.diff(edges)
-    target = np.asarray(density(omega), dtype=np.float64)
-    variance = float(target @ width)
-    if not (np.isfinite(variance) and variance > 0.0):
-        raise InputError(f"shaping filter: the band must hold variance, got {variance:g}")
+    omega, width, target, variance = sampled_density("shaping filter", density, band, _NODES)
+    low, high = band
     cumulated = np.cumsum(target * width) / variance
     peak = float(omega[np.argmax(target)])
     sections = order // 2
@@ -149,7 +143,8 @@ def fit_shaping_filter(
     if not fits:
         raise SolverError("shaping filter: no fit converged")
     _, zeros, values = min(fits, key=lambda fit: fit[0])
-    A, B, C = _companion(values[:sections], values[damping_range], zeros)
+    poles = np.exp(values[:-1]).reshape(2, -1).T
+    A, B, C = controllable_form(poles, np.empty((0, 2)), zeros)
     spectrum = variance * shape(values, zeros) ** 2 / width
     gain = np.exp(values[-1]) * np.sqrt(variance)
     return ShapingFilter(
@@ -162,18 +157,53 @@ def fit_shaping_filter(
     )
 
 
-def _companion(
-    log_frequency: FloatArray, log_damping: FloatArray, zeros: int
+def sampled_density(
+    owner: str,
+    density: Callable[[FloatArray], FloatArray],
+    band: tuple[float, float],
+    nodes: int,
+) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Return nodes of a band evenly in the logarithm, their widths, the density, its variance.
+
+    Raises
+    ------
+    InputError
+        If the band is empty or holds no variance.
+    """
+    low = check_range(owner, "band[0]", band[0], low=0.0, unit="rad/s", open_low=True)
+    high = check_range(owner, "band[1]", band[1], low=low, unit="rad/s", open_low=True)
+    edges = np.geomspace(low, high, nodes + 1)
+    omega, width = np.sqrt(edges[1:] * edges[:-1]), np.diff(edges)
+    target = np.asarray(density(omega), dtype=np.float64)
+    variance = float(target @ width)
+    if not (np.isfinite(variance) and variance > 0.0):
+        raise InputError(f"{owner}: the band must hold variance, got {variance:g}")
+    return omega, width, target, variance
+
+
+def controllable_form(
+    poles: FloatArray, zeros: FloatArray, origin: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the controllable form of s^zeros over the product of the sections."""
-    polynomial = np.ones(1)
-    for at, damping in zip(np.exp(log_frequency), np.exp(log_damping), strict=True):
-        polynomial = np.polymul(polynomial, [1.0, 2.0 * damping * at, at**2])
-    order = polynomial.size - 1
+    """Return A, B, C of s^origin times sections of zeros over sections of poles.
+
+    Parameters
+    ----------
+    poles, zeros
+        Frequency [rad/s] and damping ratio of each second-order section, (., 2).
+    origin
+        Zeros at the origin.
+    """
+    below, above = np.ones(1), np.ones(1)
+    for at, damping in poles:
+        below = np.polymul(below, [1.0, 2.0 * damping * at, at**2])
+    for at, damping in zeros:
+        above = np.polymul(above, [1.0, 2.0 * damping * at, at**2])
+    above = np.concatenate([above, np.zeros(origin)])
+    order = below.size - 1
     A = np.eye(order, k=1)
-    A[-1] = -polynomial[:0:-1]
+    A[-1] = -below[:0:-1]
     B = np.zeros((order, 1))
     B[-1] = 1.0
     C = np.zeros((1, order))
-    C[0, zeros] = 1.0
+    C[0, : above.size] = above[::-1]
     return A, B, C

@@ -25,7 +25,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from models.basics import FloatArray, InputError, SolverError, check_range
-from models.plant import ShapingFilter
+from models.plant import ShapingFilter, controllable_form, sampled_density
 
 from ..loop import Disturbance
 
@@ -152,14 +152,7 @@ def fit_spectral_factor(
     check_range("spectral factor", "order", order, low=2, high=12)
     if order % 2:
         raise InputError(f"spectral factor: order must be even, 2 to 12, got {order!r}")
-    low = check_range("spectral factor", "band[0]", band[0], low=0.0, unit="rad/s", open_low=True)
-    high = check_range("spectral factor", "band[1]", band[1], low=low, unit="rad/s", open_low=True)
-    edges = np.geomspace(low, high, _NODES + 1)
-    omega, width = np.sqrt(edges[1:] * edges[:-1]), np.diff(edges)
-    target = np.asarray(density(omega), dtype=np.float64)
-    variance = float(target @ width)
-    if not (np.isfinite(variance) and variance > 0.0):
-        raise InputError(f"spectral factor: the band must hold variance, got {variance:g}")
+    omega, width, target, variance = sampled_density("spectral factor", density, band, _NODES)
     peak = float(omega[np.argmax(target * omega)])
     sections = order // 2
     x = omega / peak
@@ -192,7 +185,7 @@ def fit_spectral_factor(
     if not found:
         raise SolverError("spectral factor: no fit converged")
     _, origin, values = min(found, key=lambda entry: entry[0])
-    return _factor(values, sections, origin, peak, variance, (low, high), omega, target)
+    return _factor(values, sections, origin, peak, variance, band, omega, target)
 
 
 def _bounds(sections: int, size: int, ends: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -230,7 +223,7 @@ def _factor(
     target: FloatArray,
 ) -> SpectralFactor:
     poles, zeros = _split(values, sections)
-    A, B, C = _series(poles, zeros, origin)
+    A, B, C = controllable_form(poles, zeros, origin)
     order = np.argsort(omega)
     at, wanted = omega[order], target[order]
     inside = (at >= band[0]) & (at <= band[1])
@@ -253,26 +246,6 @@ def _factor(
         variance=variance,
         band=band,
     )
-
-
-def _series(
-    poles: FloatArray, zeros: FloatArray, origin: int
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the controllable form of the zeros over the poles."""
-    below, above = np.ones(1), np.ones(1)
-    for at, damping in poles:
-        below = np.polymul(below, [1.0, 2.0 * damping * at, at**2])
-    for at, damping in zeros:
-        above = np.polymul(above, [1.0, 2.0 * damping * at, at**2])
-    above = np.concatenate([above, np.zeros(origin)])
-    order = below.size - 1
-    A = np.eye(order, k=1)
-    A[-1] = -below[:0:-1]
-    B = np.zeros((order, 1))
-    B[-1] = 1.0
-    C = np.zeros((1, order))
-    C[0, : above.size] = above[::-1]
-    return A, B, C
 
 
 def _occupied(disturbance: Disturbance) -> tuple[float, float]:
