@@ -27,8 +27,7 @@ import numpy.typing as npt
 import scipy.integrate
 
 from models.plant import DriveLimits, Plant, build_plant
-from models.sensing import Measurement, recursion_of
-from models.sensing.control import MEASURED
+from models.sensing import HEARD, Measurement, recursion_of
 from models.simulation import Simulation
 
 __all__ = ["Answer", "Peer"]
@@ -100,8 +99,8 @@ class Peer:
         rate, measured, _ = plant.function(x, u, w, p)
         rhs = call(ca.Function("rate", [x, u, w, p], [rate]), self._p)
         look = call(ca.Function("look", [x, u, w, p], [measured]), self._p)
-        seen = np.zeros(len(MEASURED))
-        at = [MEASURED.index(name) for name in _PAYLOAD]
+        seen = np.zeros(len(HEARD))
+        at = [HEARD.index(name) for name in _PAYLOAD]
         controller.reset()
 
         def derivative(time: float, state: FloatArray) -> FloatArray:
@@ -126,9 +125,9 @@ class Peer:
         if recursion is None or recursion.initial.size:
             raise ValueError("the controller must be a recursion without states")
         x, u, w, p = _symbols(plant)
-        seen = ca.SX.zeros(len(MEASURED))
+        seen = ca.SX.zeros(len(HEARD))
         for at, value in zip(_PAYLOAD, ca.vertsplit(plant.function(x, 0, w, p)[1]), strict=True):
-            seen[MEASURED.index(at)] = value
+            seen[HEARD.index(at)] = value
         _, command = recursion.function(ca.SX(0, 1), seen)
         rate = plant.function(x, command, w, p)[0]
         rhs = _Bound(ca.Function("rate", [x, u, w, p], ca.cse([rate])), self._p)

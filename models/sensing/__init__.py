@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
+    from .control import HEARD as HEARD
     from .control import Controller as Controller
     from .control import Measurement as Measurement
     from .control import Recursion as Recursion

@@ -1,8 +1,8 @@
 """What a controller is: a measurement in, a drive command out, once in a sample.
 
-    MEASURED --> Measurement --> Controller.step --> command --> drive
+    HEARD --> Measurement --> Controller.step --> command --> drive
 
-A controller sees the vector `MEASURED` and nothing else: what sensors and telemetry made of
+A controller sees the vector `HEARD` and nothing else: what sensors and telemetry made of
 the world (`models/sensing/sensing.py`), not the world itself.  A controller that is a `Recursion`,
 a CasADi function of its state and that vector, becomes part of the compiled loop; any other object
 with `reset` and `step` is called from Python, one sample at a time.
@@ -46,9 +46,9 @@ MEASURED_UNITS: Mapping[str, str] = MappingProxyType(
 #: and `payload.valid` 1 where a message has just arrived.  `drive.applied` is the command that
 #: the drive has really followed over the last sample, within its limits.  The references are
 #: what the operator asks of the payload.
-MEASURED: tuple[str, ...] = tuple(MEASURED_UNITS)
+HEARD: tuple[str, ...] = tuple(MEASURED_UNITS)
 
-_AT = {name: i for i, name in enumerate(MEASURED)}
+_AT = {name: i for i, name in enumerate(HEARD)}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -58,7 +58,7 @@ class Measurement:
     Parameters
     ----------
     values
-        Values in the order of `MEASURED`, (16,); not copied, as a loop makes thousands.
+        Values in the order of `HEARD`, (16,); not copied, as a loop makes thousands.
 
     Examples
     --------
@@ -79,7 +79,7 @@ class Measurement:
         """
         at = _AT.get(name)
         if at is None:
-            at = pick("measurement", "signal", MEASURED, (name,))[0]
+            at = pick("measurement", "signal", HEARD, (name,))[0]
         return float(self.values[at])
 
     @classmethod
@@ -91,8 +91,8 @@ class Measurement:
         InputError
             If a name is unknown.
         """
-        values = np.zeros(len(MEASURED))
-        values[pick("measurement", "signal", MEASURED, tuple(named))] = list(named.values())
+        values = np.zeros(len(HEARD))
+        values[pick("measurement", "signal", HEARD, tuple(named))] = list(named.values())
         return cls(values)
 
 
@@ -131,7 +131,7 @@ class Recursion:
     ----------
     function
         casadi.Function of the state xc, (nxc, 1), which may be empty, and the measurements
-        m, (16, 1), in the order of `MEASURED`; returns the next state and the command.
+        m, (16, 1), in the order of `HEARD`; returns the next state and the command.
     initial
         State before the first sample, (nxc,).
 
@@ -148,7 +148,7 @@ class Recursion:
         initial = check_finite("recursion", "initial", self.initial)
         object.__setattr__(self, "initial", read_only(initial.reshape(-1)))
         f, n = self.function, self.initial.size
-        wanted = [[n, len(MEASURED)], [n, 1]]
+        wanted = [[n, len(HEARD)], [n, 1]]
         got = [
             [f.numel_in(i) for i in range(f.n_in())],
             [f.numel_out(i) for i in range(f.n_out())],

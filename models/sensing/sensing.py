@@ -31,7 +31,7 @@ from ..basics import (
     pick,
 )
 from ..rig import Encoder, LoadCell, PayloadSensor, Telemetry
-from .control import MEASURED
+from .control import HEARD
 from .draws import SENSOR_NOISE, draw
 from .mru import MruBlock
 from .telemetry import Late, TelemetryBlock, TelemetrySchedule
@@ -230,7 +230,7 @@ class SensorModel:
 
     @cached_property
     def function(self) -> ca.Function:
-        """casadi.Function (s, raw, row, applied) -> (s_next, m), m in the order of `MEASURED`.
+        """casadi.Function (s, raw, row, applied) -> (s_next, m), m in the order of `HEARD`.
 
         `applied` is the command that the drive has followed over the last sample.
         """
@@ -273,7 +273,7 @@ class SensorModel:
             [s, raw, row, applied],
             [
                 ca.densify(ca.vertcat(*(after[name] for name in self.states))),
-                ca.densify(ca.vertcat(*(seen[name] for name in MEASURED))),
+                ca.densify(ca.vertcat(*(seen[name] for name in HEARD))),
             ],
             ["s", "raw", "row", "applied"],
             ["s_next", "m"],

@@ -19,8 +19,7 @@ from typing_extensions import override
 from models.basics import check_range
 from models.case import Case
 from models.plant import DriveLimits
-from models.sensing import Measurement
-from models.sensing.control import MEASURED as HEARD
+from models.sensing import HEARD, Measurement
 
 from ..winch import Weights
 from .winch_mpc import WinchMPC

@@ -25,8 +25,7 @@ import numpy as np
 from models.basics import FloatArray, InputError, check_range
 from models.case import Case
 from models.plant import SPEED_BAND, DriveLimits
-from models.sensing import Measurement
-from models.sensing.control import MEASURED as HEARD
+from models.sensing import HEARD, Measurement
 
 from ..forecast import AdaptiveAR, PerfectPreview
 from ..programme import Condensed, QPSolution, SoftQP, default_blocking, kkt_residual

@@ -21,8 +21,7 @@ from typing_extensions import override
 from models.basics import FloatArray, SolverError, check_range
 from models.case import Case
 from models.plant import DriveLimits
-from models.sensing import Measurement
-from models.sensing.control import MEASURED as HEARD
+from models.sensing import HEARD, Measurement
 
 from ..linear import WinchMPC, path_of_sea
 from ..winch import Weights

@@ -18,8 +18,7 @@ import numpy as np
 
 from models.basics import FloatArray, read_only
 from models.plant import MEASUREMENTS
-from models.sensing import MEASURED, Measurement
-from models.sensing.control import MEASURED as HEARD
+from models.sensing import HEARD, MEASURED, Measurement
 
 from ..programme import corrected, kalman_gain, prediction_covariance
 from .prediction import PredictionModel, constant_scales

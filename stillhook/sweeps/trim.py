@@ -18,8 +18,7 @@ import numpy as np
 
 from models.case import Case
 from models.plant import MEAN_LOSSES, build_plant
-from models.sensing import Controller, Measurement, Recursion, holds_brake, recursion_of
-from models.sensing.control import MEASURED
+from models.sensing import HEARD, Controller, Measurement, Recursion, holds_brake, recursion_of
 from synth.structures import RecursiveController
 
 _SHIFTED = ("drive.applied", "rope.tension", "motor.torque")
@@ -85,11 +84,11 @@ def trimmed(controller: Controller, shift: Shift) -> Controller:
 def _shifted(recursion: Recursion, shift: Shift) -> Recursion:
     """Return the recursion with the shift as states: the compiled loop is the same for any."""
     n = recursion.initial.size
-    state, m = ca.SX.sym("xc", n + len(_SHIFTED)), ca.SX.sym("m", len(MEASURED))
+    state, m = ca.SX.sym("xc", n + len(_SHIFTED)), ca.SX.sym("m", len(HEARD))
     by = state[n:]
     seen = ca.SX(m)
     for i, name in enumerate(_SHIFTED):
-        seen[MEASURED.index(name)] = m[MEASURED.index(name)] - by[i]
+        seen[HEARD.index(name)] = m[HEARD.index(name)] - by[i]
     following, command = recursion.function(state[:n], seen)
     function = ca.Function(
         "trimmed",
@@ -106,7 +105,7 @@ class _Trimmed:
 
     def __init__(self, controller: Controller, shift: Shift) -> None:
         self._controller, self._shift = controller, shift
-        self._at = [MEASURED.index(name) for name in _SHIFTED]
+        self._at = [HEARD.index(name) for name in _SHIFTED]
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # while it is unpickled there is no controller yet

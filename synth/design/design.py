@@ -27,9 +27,6 @@ from .tuning import LimitUse
 if TYPE_CHECKING:
     from ..bound import DesignBound
 
-PAYLOAD = "payload.displacement"
-HOOK = "hook.heave"
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GainDesign:

@@ -7,7 +7,7 @@ the sea asked for and looks for the least factor on just those limits.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +15,8 @@ import numpy as np
 from models.basics import FloatArray
 
 from ..question import DesignQuestion, Goal, Problem
-from ..search import Solution, assessment_of, briskest, coarse_programme, polish
+from ..search import Progress, Solution, assessment_of, briskest, coarse_programme, polish
 from .tuning import Tuning
-
-Progress = Callable[[str, int, int], None]
 
 _BINDING = 5e-3  # a limit that is used up to this share of itself binds
 _KEPT = 1e-4  # relative excess over a limit that a polished answer may have

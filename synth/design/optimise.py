@@ -9,7 +9,7 @@ have to be.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,13 +18,11 @@ from models.basics import InputError, check_range, one_thread
 from models.case import Case
 
 from ..loop import Assessment
-from ..question import DesignQuestion, pose, with_masses
-from ..search import resume, search
-from .design import PAYLOAD, GainDesign
+from ..question import PAYLOAD, DesignQuestion, pose, with_masses
+from ..search import Progress, resume, search
+from .design import GainDesign
 from .infeasible import Shortfall, shortfall
 from .tuning import LimitUse, Tuning, limit_uses, tuning_of
-
-Progress = Callable[[str, int, int], None]
 
 _MODES = 5.0  # every rope mode below this many crossovers belongs in the design plant
 _MOST_MASSES = 40

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
+    from .case_limits import HOOK as HOOK
     from .case_limits import PAYLOAD as PAYLOAD
     from .case_limits import drive_limits as drive_limits
     from .case_limits import loop_limits as loop_limits

@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
+    from ..limits import HOOK as HOOK
+    from ..limits import PAYLOAD as PAYLOAD
     from .family_problem import FamilyLoop as FamilyLoop
     from .family_problem import FamilyProblem as FamilyProblem
     from .family_problem import Objective as Objective
     from .problem import Goal as Goal
     from .problem import Problem as Problem
     from .problem import Values as Values
-    from .question import HOOK as HOOK
-    from .question import PAYLOAD as PAYLOAD
     from .question import DesignQuestion as DesignQuestion
     from .question import assess_gains as assess_gains
     from .question import locked_response as locked_response

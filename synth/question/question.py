@@ -27,13 +27,10 @@ from models.plant import (
     rope_transfers,
 )
 
-from ..limits import Limit, RollOff, drive_limits, loop_limits, modelled_bandwidth
+from ..limits import HOOK, PAYLOAD, Limit, RollOff, drive_limits, loop_limits, modelled_bandwidth
 from ..loop import Assessment, DragElement, disturbances
 from ..structures import PayloadFeedback
 from .problem import Problem
-
-PAYLOAD = "payload.displacement"
-HOOK = "hook.heave"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

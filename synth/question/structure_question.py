@@ -20,11 +20,11 @@ from models.case import Case
 from models.plant import LinearPlant
 from models.sensing import SAMPLE_TIME, sensed_plant, sensed_spectra
 
-from ..limits import Limit, LowFrequency, drive_limits
+from ..limits import HOOK, PAYLOAD, Limit, LowFrequency, drive_limits
 from ..loop import disturbances
 from ..structures import LowOrderFeedback, ParametrisedController, WinchStructure, structure_named
 from .problem import Problem
-from .question import HOOK, PAYLOAD, DesignQuestion, pose, with_masses
+from .question import DesignQuestion, pose, with_masses
 
 _LATE = 0.2  # delay beyond which the guard's model of it needs a higher order [s]
 _HIGH_ORDER = 12

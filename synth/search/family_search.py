@@ -9,7 +9,7 @@ assessments.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,13 +20,11 @@ from ..loop import Assessment
 from ..question import FamilyProblem, Problem, Values
 from .family_polish import PER_DECADE, assessment_from, assessments_of, polish_family, shaken_by_all
 from .family_programme import FamilyProgramme, FamilySolved
-from .multistart import Start
+from .multistart import Progress, Start
 from .nodes import cost_nodes, margin_nodes
 from .polishing import KEPT, thinned
 from .programme import Pace
 from .starts import candidates, pick_spread, stabilise
-
-Progress = Callable[[str, int, int], None]
 
 _CANDIDATES = 512
 _TRIES = 3  # starts that are tried for each that is to arrive

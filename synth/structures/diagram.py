@@ -209,12 +209,6 @@ class DiagramLaw(ParametrisedController):
             values[:, at] = section.guess(points[:, at])
         return self.clipped(values)
 
-    def clipped(self, values: FloatArray) -> FloatArray:
-        """Return candidates within the bounds."""
-        low = [p.low for p in self.parameters]
-        high = [p.high for p in self.parameters]
-        return np.asarray(np.clip(values, low, high), dtype=np.float64)
-
     def index(self, name: str) -> int:
         """Return the position of a parameter."""
         return [p.name for p in self.parameters].index(name)

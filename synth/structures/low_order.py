@@ -210,7 +210,7 @@ class LowOrderLaw(ParametrisedController):
             names = plant.measurements, plant.inputs
             fast += [self.values(LinearController.static(gain, *names)) for gain in gains]
         found = self._family(plant, regulators, filters)
-        return self._clipped(np.vstack([found, *fast]))
+        return self.clipped(np.vstack([found, *fast]))
 
     @override
     def draw(self, points: FloatArray, omega: FloatArray, yu: ComplexArray) -> FloatArray:
@@ -236,12 +236,12 @@ class LowOrderLaw(ParametrisedController):
         signed = 2.0 * points[len(known) :, 4:] - 1.0
         if not len(known):  # no such design exists: any size, any sign
             spread = np.sign(signed) * 10.0 ** (4.0 * np.abs(signed) - 3.0)
-            return self._clipped(spread * scales)
+            return self.clipped(spread * scales)
         # The rest are the known ones with every parameter changed, more and more.
         rows = np.arange(len(signed))
         reach = np.linspace(0.1, 1.5, max(1, len(signed)))[:, None]
         near = known[rows % len(known)]
-        return self._clipped(np.vstack([known, near * np.exp(reach * signed)]))
+        return self.clipped(np.vstack([known, near * np.exp(reach * signed)]))
 
     def _swift(self, gain: FloatArray, pole: float) -> LinearController:
         """Return the most important directions of a static gain behind poles near -`pole`."""
@@ -272,12 +272,7 @@ class LowOrderLaw(ParametrisedController):
         found = [self.values(reduced(plant, regulators[i], filters[j], order)) for i, j in pairs]
         if not found:
             return np.zeros((0, len(self.parameters)))
-        return self._clipped(np.array(found))
-
-    def _clipped(self, values: FloatArray) -> FloatArray:
-        low = [p.low for p in self.parameters]
-        high = [p.high for p in self.parameters]
-        return np.asarray(np.clip(values, low, high), dtype=np.float64)
+        return self.clipped(np.array(found))
 
 
 @dataclass(frozen=True, kw_only=True)

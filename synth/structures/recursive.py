@@ -20,8 +20,7 @@ import numpy.typing as npt
 
 from models.basics import FloatArray, check_range
 from models.plant import OperatingPoint
-from models.sensing import Measurement, Recursion
-from models.sensing.control import MEASURED
+from models.sensing import HEARD, Measurement, Recursion
 
 Signals = Mapping[str, ca.SX]
 RecursiveLaw = Callable[[ca.SX, Signals], tuple[ca.SX, ca.SX]]
@@ -38,11 +37,11 @@ def make_recursion(initial: npt.ArrayLike, law: RecursiveLaw) -> Recursion:
         State before the first sample, (nxc,).
     law
         Called once, as law(state, measured) with symbols, `measured` by the names of
-        `MEASURED`; returns the next state, (nxc, 1), and the command.
+        `HEARD`; returns the next state, (nxc, 1), and the command.
     """
     start = np.atleast_1d(np.asarray(initial, dtype=np.float64))
-    state, vector = ca.SX.sym("xc", start.size), ca.SX.sym("m", len(MEASURED))
-    following, command = law(state, {name: vector[i] for i, name in enumerate(MEASURED)})
+    state, vector = ca.SX.sym("xc", start.size), ca.SX.sym("m", len(HEARD))
+    following, command = law(state, {name: vector[i] for i, name in enumerate(HEARD)})
     function = ca.Function(
         "controller",
         [state, vector],
@@ -73,7 +72,7 @@ class _Stepper:
         self._recursion = recursion
         self._state = np.array(recursion.initial if state is None else state)
         self._next, self._command = np.empty_like(self._state), np.empty(1)
-        self._seen = np.zeros(len(MEASURED))
+        self._seen = np.zeros(len(HEARD))
         # The arrays' addresses are bound once: a call then costs a microsecond, not fifty.
         buffer: Any  # CasADi's stubs ask for an address and a size
         buffer, self._evaluate = recursion.function.buffer()

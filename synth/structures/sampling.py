@@ -30,8 +30,7 @@ import scipy.linalg
 from models.basics import ComplexArray, FloatArray, check_finite, pick
 from models.case import Case
 from models.plant import MEAN_LOSSES, LinearPlant, Plant, zero_order_hold
-from models.sensing import Measurement, Recursion
-from models.sensing.control import MEASURED
+from models.sensing import HEARD, Measurement, Recursion
 
 from .recursive import at_rest
 
@@ -132,10 +131,10 @@ class SampledLoop:
         if corner > 0.0:
             shown *= s**2 / (s**2 + math.sqrt(2.0) * corner * s + corner**2)
         for name, value in zip(("mru.heave", "mru.heave_rate"), hook, strict=True):
-            measured[MEASURED.index(name)] = value * shown
+            measured[HEARD.index(name)] = value * shown
         if source != "hook.heave":
             for power, name in enumerate(REFERENCE):
-                measured[MEASURED.index(name)] = s**power
+                measured[HEARD.index(name)] = s**power
         # The integral of exp(A (T - t)) E hook e^{st} dt, by one exponential.
         n = w.continuous.shape[0]
         driven = np.zeros((n + 1, n + 1), dtype=np.complex128)
@@ -192,11 +191,11 @@ class SampledLoop:
             E=E,
             A=scipy.linalg.block_diag(Ad, np.eye(3 * late, k=-3), np.zeros((1, 1))),
             B=np.vstack([Bd, np.zeros((3 * late, 1)), np.ones((1, 1))]),
-            H=np.zeros((len(MEASURED), size)),
-            hook_measured=np.zeros((len(MEASURED), 2), dtype=np.complex128),
+            H=np.zeros((len(HEARD), size)),
+            hook_measured=np.zeros((len(HEARD), 2), dtype=np.complex128),
             hook_late=np.zeros((size, 2), dtype=np.complex128),
         )
-        place = {name: MEASURED.index(name) for name in MEASURED}
+        place = {name: HEARD.index(name) for name in HEARD}
         world.H[place["drive.applied"], -1] = 1.0
         for name, row in zip(WINCH, winch, strict=True):
             if name == "rope.tension" and math.isfinite(cell):

@@ -97,6 +97,12 @@ class ParametrisedController(ABC):
         """Return the closed loop's state matrix on `plant`, a rational model of the law's own."""
         return closed_loop_matrix(plant, self.controller(values))
 
+    def clipped(self, values: FloatArray) -> FloatArray:
+        """Return candidates, (m, number of parameters), within the bounds."""
+        low = [p.low for p in self.parameters]
+        high = [p.high for p in self.parameters]
+        return np.asarray(np.clip(values, low, high), dtype=np.float64)
+
     def named(self, values: Sequence[float]) -> dict[str, float]:
         """Return the parameters by name."""
         return {p.name: float(v) for p, v in zip(self.parameters, values, strict=True)}
@@ -244,7 +250,7 @@ class _GainLaw(ParametrisedController):
         mask[rows, columns] = True
         gains = [projected(plant, d, mask) for d in designs(plant, problem.minimise, omega)[0]]
         found = [gain[rows, columns] / self._factors for gain in gains]
-        return self._clipped(np.reshape(found, (-1, len(self._entries))))
+        return self.clipped(np.reshape(found, (-1, len(self._entries))))
 
     def draw(self, points: FloatArray, omega: FloatArray, yu: ComplexArray) -> FloatArray:
         # Every candidate picks a crossover and spreads its loop gain there over the entries:
@@ -258,12 +264,7 @@ class _GainLaw(ParametrisedController):
         usual = 1.0 / (np.array([p.scale for p in self.parameters]) * np.abs(self._factors))
         sizes = np.where(largest > 1e-6 * usual, np.maximum(sizes, 1e-12 * largest), usual)
         drawn = loop_gain / (sizes[at] * np.abs(self._factors))
-        return self._clipped(drawn)
-
-    def _clipped(self, values: FloatArray) -> FloatArray:
-        low = [p.low for p in self.parameters]
-        high = [p.high for p in self.parameters]
-        return np.asarray(np.clip(values, low, high), dtype=np.float64)
+        return self.clipped(drawn)
 
 
 def check_bounds(owner: str, bounds: Bounds, names: Sequence[str]) -> None:

@@ -9,8 +9,8 @@ from models import Case, load_case
 from models.basics import InputError, White
 from models.hook import HookMotion
 from models.plant import PlantData, build_plant
+from models.sensing import HEARD as SIMULATED
 from models.sensing import MEASURED, MruModel, SensorModel, sensed_plant, sensed_spectra
-from models.sensing.control import MEASURED as SIMULATED
 from models.sensing.plant import NOISES
 from synth.loop import disturbances
 

@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 
 from models import InputError, load_case
 from models.rig import MRU, Encoder, LoadCell, PayloadSensor, Telemetry
-from models.sensing import NOISE, MruModel, SensorModel, TelemetrySchedule
-from models.sensing.control import MEASURED
+from models.sensing import HEARD, NOISE, MruModel, SensorModel, TelemetrySchedule
 from models.sensing.sensing import RAW
 from models.sensing.telemetry import during
 
@@ -51,7 +50,7 @@ def see(model, schedule, raw, *, seed=0, mru=None, applied=0.0, references=0.0, 
     state = model.initial(raw[0] if start is None else start)
     series = model.function.mapaccum("series", n, 1)
     _, seen = series(state, raw.T, rows.T, np.full((1, n), applied))
-    return dict(zip(MEASURED, np.asarray(seen), strict=True))
+    return dict(zip(HEARD, np.asarray(seen), strict=True))
 
 
 def moving(n, omega=2.0):
@@ -113,7 +112,7 @@ class TestPerfect:
         f = model.function
         assert f.size_in(0)[0] == len(model.states) == f.size_out(0)[0]
         assert f.size_in(2)[0] == len(model.row)
-        assert f.size_out(1)[0] == len(MEASURED)
+        assert f.size_out(1)[0] == len(HEARD)
         assert f.sparsity_out(0).is_dense()
         assert f.sparsity_out(1).is_dense()
 
@@ -341,7 +340,7 @@ class TestRows:
         row = np.zeros(len(model.row))
         after, seen = model.function(start, raw[0], row, 0.0)
         np.testing.assert_allclose(np.asarray(after).ravel(), start, rtol=1e-15)
-        named = dict(zip(MEASURED, np.asarray(seen).ravel(), strict=True))
+        named = dict(zip(HEARD, np.asarray(seen).ravel(), strict=True))
         assert named["payload.displacement"] == pytest.approx(0.3)
         assert named["rope.tension"] == pytest.approx(4e5)
 

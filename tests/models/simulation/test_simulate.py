@@ -20,8 +20,7 @@ from models.operation.excitation import StillMotion
 from models.operation.profile import Move, Profile
 from models.plant import DriveLimits, fixed_top_modes
 from models.run import Run
-from models.sensing import Measurement
-from models.sensing.control import MEASURED
+from models.sensing import HEARD, Measurement
 from models.simulation import Simulation, prepare, run_simulation
 from synth.controllers import BrakeOn, LinearFeedback
 
@@ -448,8 +447,8 @@ def test_the_measurements_have_the_order_that_controllers_expect() -> None:
     run = simulate(case, Look(feedback(case, THESIS)), duration=40.0, store_step=0.01)
     table = np.array(seen)
     for name in ("payload.displacement", "payload.velocity", "drum.haul", "motor.speed"):
-        np.testing.assert_allclose(table[:, MEASURED.index(name)], run[name], atol=1e-12)
-    applied = table[1:, MEASURED.index("drive.applied")]
+        np.testing.assert_allclose(table[:, HEARD.index(name)], run[name], atol=1e-12)
+    applied = table[1:, HEARD.index("drive.applied")]
     np.testing.assert_allclose(applied, run["drive.applied"][:-1], atol=30.0)
 
 

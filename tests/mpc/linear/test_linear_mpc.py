@@ -13,8 +13,7 @@ from sea_predictor import SeaPredictor
 
 import stillhook as sh
 from models.plant import DriveLimits
-from models.sensing import Measurement
-from models.sensing.control import MEASURED
+from models.sensing import HEARD, Measurement
 from models.simulation import prepare
 from mpc.linear import WATCHED, LinearMPC, path_of_sea, sea_at_end
 from mpc.programme import SoftQP, kkt_residual
@@ -528,7 +527,7 @@ def test_the_torque_changes_no_faster_than_it_may():
 
 
 def test_the_names_of_what_it_hears_are_those_of_the_simulator():
-    assert len(MEASURED) == len(set(MEASURED))
+    assert len(HEARD) == len(set(HEARD))
     simulation = prepare(case_of("thesis-1975"), controller_of("thesis-1975"))
     assert simulation.controller.name == "mpc"
 

@@ -10,8 +10,7 @@ from ipopt_programme import nlp_oracle
 
 import stillhook as sh
 from models.plant import MEAN_LOSSES, DriveLimits, PlantData, build_plant
-from models.sensing import Measurement
-from models.sensing.control import MEASURED
+from models.sensing import HEARD, Measurement
 from mpc.linear import LinearMPC
 from mpc.nonlinear import NonlinearMPC
 from mpc.nonlinear.mean_torque import mean_torque, start_torque
@@ -279,10 +278,10 @@ def test_commands_are_finite_whatever_is_shown(crane: sh.Case) -> None:
     controller = NonlinearMPC(crane, weights=WEIGHTS, masses=1, horizon=3.0)
     rng = np.random.default_rng(7)
     for k in range(200):
-        values = rng.normal(size=len(MEASURED)) * 10.0 ** rng.integers(-1, 7)
-        spoilt = rng.random(len(MEASURED)) < 0.2
+        values = rng.normal(size=len(HEARD)) * 10.0 ** rng.integers(-1, 7)
+        spoilt = rng.random(len(HEARD)) < 0.2
         values[spoilt] = rng.choice([np.nan, np.inf, -np.inf], size=int(spoilt.sum()))
-        values[MEASURED.index("reference.displacement") :] = 0.0
+        values[HEARD.index("reference.displacement") :] = 0.0
         assert math.isfinite(controller.step(Measurement(values), 0.05 * k))
     assert controller.counts["steps"] == 200
 

@@ -9,8 +9,7 @@ from linear_runs import linear_run, still, swell
 from models import load_case
 from models.basics import InputError, SynthesisError
 from models.plant import MEAN_LOSSES, build_plant
-from models.sensing import Measurement
-from models.sensing.control import MEASURED
+from models.sensing import HEARD, Measurement
 from synth.controllers import ConstantTension
 from synth.structures.recursive import at_rest
 
@@ -21,7 +20,7 @@ def rest(name: str, **changes: float) -> Measurement:
     """What is measured at rest, some of it changed by so much."""
     m = at_rest(build_plant(load_case(name)).operating_point(MEAN_LOSSES)).values.copy()
     for key, change in changes.items():
-        m[MEASURED.index(key.replace("_", ".", 1))] += change
+        m[HEARD.index(key.replace("_", ".", 1))] += change
     return Measurement(m)
 
 

@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 from models import load_case
 from models.basics import InputError
 from models.plant import MEAN_LOSSES, build_plant
-from models.sensing import Controller, Measurement, Recursion, holds_brake, recursion_of
-from models.sensing.control import MEASURED
+from models.sensing import HEARD, Controller, Measurement, Recursion, holds_brake, recursion_of
 from models.simulation import Kernel
 from synth.controllers import (
     CONTROLLERS,
@@ -66,10 +65,10 @@ def seen_things(name: str, n: int, seed: int) -> list[Measurement]:
     """Measurements about those at rest, of the size of a rough sea, flags and ages included."""
     random, still = np.random.default_rng(seed), rest(name).values
     sizes = np.maximum(0.2 * np.abs(still), 1.0)
-    found = still + sizes * random.standard_normal((n, len(MEASURED)))
+    found = still + sizes * random.standard_normal((n, len(HEARD)))
     for flag in ("payload.valid", "mru.valid"):
-        found[:, MEASURED.index(flag)] = random.random(n) > 0.3
-    age = MEASURED.index("payload.age")
+        found[:, HEARD.index(flag)] = random.random(n) > 0.3
+    age = HEARD.index("payload.age")
     found[:, age] = 2.0 * random.random(n)
     return [Measurement(row) for row in found]
 
@@ -94,7 +93,7 @@ def test_reset_gives_the_same_commands_again(name: str, kind: str) -> None:
     controller, seen = made(name, kind), seen_things(name, 50, seed=1)
     first = commands(controller, seen)
     assert commands(controller, seen) == first
-    controller.step(Measurement(np.full(len(MEASURED), 7.0)), 99.0)
+    controller.step(Measurement(np.full(len(HEARD), 7.0)), 99.0)
     assert commands(controller, seen) == first
 
 
@@ -133,9 +132,7 @@ def test_at_rest_the_command_is_the_static_one_exactly(name: str, kind: str) -> 
 @pytest.mark.parametrize("kind", KINDS)
 @given(
     st.lists(
-        st.lists(
-            st.floats(-1e6, 1e6, allow_nan=False), min_size=len(MEASURED), max_size=len(MEASURED)
-        ),
+        st.lists(st.floats(-1e6, 1e6, allow_nan=False), min_size=len(HEARD), max_size=len(HEARD)),
         min_size=1,
         max_size=20,
     )
@@ -150,7 +147,7 @@ def test_what_is_not_a_number_is_forgotten_at_a_reset(name: str, kind: str) -> N
     controller, seen = made(name, kind), seen_things(name, 30, seed=4)
     clean = commands(controller, seen)
     for poison in (math.nan, math.inf):
-        controller.step(Measurement(np.full(len(MEASURED), poison)), 0.0)
+        controller.step(Measurement(np.full(len(HEARD), poison)), 0.0)
         assert commands(controller, seen) == clean
 
 
@@ -184,7 +181,7 @@ def test_an_order_that_the_drive_has_not_followed_does_not_run_away(name: str, k
     off = {"payload.displacement": 1.0, "drum.haul": 1.0, "motor.speed": 5.0}
     stuck = rest(name).values.copy()
     for signal, value in off.items():
-        stuck[MEASURED.index(signal)] += value
+        stuck[HEARD.index(signal)] += value
     samples = round(600.0 / controller.sample_time)
     asked = commands(controller, [Measurement(stuck)] * (samples + 1))
     middle, end = asked[len(asked) // 2], asked[-1]
@@ -226,7 +223,7 @@ def test_sample_time_is_the_controllers_own_unless_asked_for() -> None:
 def test_feedback_takes_gains_before_a_design_before_those_of_the_case() -> None:
     case = load_case("thesis-1975")  # A = 200, a2 = 100
     m = rest("thesis-1975").values.copy()
-    m[MEASURED.index("payload.displacement")] = 0.01
+    m[HEARD.index("payload.displacement")] = 0.01
     static = build_plant(case).operating_point(MEAN_LOSSES).command
 
     class Design:  # all that is asked of a Tuning
@@ -262,7 +259,7 @@ def test_unknown_controllers_are_told_with_those_that_there_are() -> None:
 
 def test_measurements_go_by_their_names() -> None:
     m = Measurement(np.arange(16.0))
-    assert [m[name] for name in MEASURED] == list(range(16))
+    assert [m[name] for name in HEARD] == list(range(16))
     with pytest.raises(InputError, match=r"no signal 'payload'; there are: payload\.acc"):
         m["payload"]
     with pytest.raises(InputError, match="no signal 'heave'"):
