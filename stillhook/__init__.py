@@ -94,6 +94,7 @@ if TYPE_CHECKING:
 
     from .comparison import Comparison as Comparison
     from .comparison import compare as compare
+    from .comparison import write_comparison as write_comparison
     from .designs import load_design as load_design
     from .designs import load_structure as load_structure
     from .designs import save_design as save_design

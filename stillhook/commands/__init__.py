@@ -11,5 +11,13 @@ if TYPE_CHECKING:
     from .given import gains_text as gains_text
     from .given import given_case as given_case
     from .given import parse_gains as parse_gains
+    from .working import Stop as Stop
+    from .working import conclude as conclude
+    from .working import counting as counting
+    from .working import interruptible as interruptible
+    from .working import kept_in as kept_in
+    from .working import stoppable as stoppable
+    from .working import tidy as tidy
+    from .working import working as working
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -6,11 +6,10 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .comparison import Comparison as Comparison
+    from .report import comparison_data as comparison_data
+    from .report import comparison_report as comparison_report
+    from .report import write_comparison as write_comparison
     from .run import compare as compare
-    from .words import HEADINGS as HEADINGS
-    from .words import LEGEND as LEGEND
-    from .words import headline_of as headline_of
-    from .words import left_out as left_out
-    from .words import rows_at as rows_at
+    from .words import sentences_of as sentences_of
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

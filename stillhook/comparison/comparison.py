@@ -1,6 +1,6 @@
 """`Comparison`: what contenders in the same seas came to, and how sure that is.
 
-    cells --> Comparison --> table, sentences, worst_moment --> figures, folder, terminal
+    cells --> Comparison --> table, worst_moment --> sentences, figures, report, folder
 
 A row of the table is one contender in seas of one height.  Means are over seeds, with Student's
 95 % interval; the pooled root mean square is that of all seeds together, and what is compared
@@ -15,7 +15,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -259,24 +258,15 @@ class Comparison:
         floor = self.pooled(self.floor.name, height, both)
         return (self.pooled(name, height, both) / floor) ** 2 if floor > 0.0 else math.nan
 
-    @cached_property
-    def sentences(self) -> tuple[str, ...]:
-        """What the numbers say, in plain sentences (`stillhook.comparison.words`)."""
-        from .words import sentences_of
-
-        return sentences_of(self)
-
-    def save(self, folder: str | Path, *, figures: bool = True) -> list[Path]:
-        """Write everything into a folder (`stillhook.comparison.report.write_comparison`)."""
-        from .report import write_comparison
-
-        return write_comparison(folder, self, figures=figures)
-
     def __str__(self) -> str:
-        """Return the main figures as a small table, and what they say."""
-        from .words import plain_table
-
-        return "\n".join([*plain_table(self), "", *self.sentences])
+        """Return the pooled rms of every contender as a small tree."""
+        lines = [f"{self.case.name}: {len(self.contenders)} contenders, {len(self.seeds)} seeds"]
+        for height in self.heights:
+            rms = [(each.name, self.pooled(each.name, height)) for each in self.contenders]
+            told = ", ".join(f"{name} {1e3 * x:.4g} mm" for name, x in rms if not math.isnan(x))
+            lines.append(f"H_s {height:.4g} m: {told}")
+        marks = ["", *["├ "] * (len(lines) - 2), "└ "]
+        return "\n".join(mark + line for mark, line in zip(marks, lines, strict=True))
 
 
 def _mean(values: Sequence[float]) -> float:

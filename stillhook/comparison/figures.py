@@ -21,12 +21,15 @@ from ..text import (
     HOOK,
     REFERENCE,
     count,
+    drawn,
     duration,
+    headline,
+    logarithmic,
     new_figure,
     number,
+    panel,
     quantity,
     scale,
-    styled,
     typeset,
 )
 
@@ -65,6 +68,7 @@ _FINE = 3e3  # an axis that spans less is marked at 2 and 5 too
 _SHOWN = 8  # contenders among the traces
 
 
+@drawn
 def heights(found: Comparison) -> Figure:
     """Return the payload's rms over the significant height, one line for each contender.
 
@@ -82,15 +86,14 @@ def heights(found: Comparison) -> Figure:
     if not known:
         raise InputError("comparison: there are no runs to draw")
     factor, unit = scale("m", math.sqrt(min(known) * max(known)))
-    with styled():
-        if len(found.heights) == 1:
-            figure = _dots(found, factor, unit)
-        else:
-            figure = _lines(found, factor, unit)
-        _title(figure, found, _finding(found))
-    return figure
+    if len(found.heights) == 1:
+        figure = _dots(found, factor, unit)
+    else:
+        figure = _lines(found, factor, unit)
+    return headline(figure, _finding(found), _about(found))
 
 
+@drawn
 def worst_moment(found: Comparison) -> Figure:
     """Return time traces around the worst moment of the best linear law, for the same seed.
 
@@ -105,65 +108,60 @@ def worst_moment(found: Comparison) -> Figure:
     shown = _chosen(found, height)
     hook = next((t for t in found.traces if "hook.heave" in t.signals), None)
     drive = found.case.winch.drive
-    with styled():
-        figure = new_figure(10.4, 7.6)
-        # Half-way between, a law that falls off would hide what all others do.
-        top, payload, torque, flags = figure.subplots(
-            4, 1, sharex=True, height_ratios=[0.8, 2.2, 1.3, 0.16 * len(shown) + 0.25]
+    figure = new_figure(10.4, 7.6)
+    # Half-way between, a law that falls off would hide what all others do.
+    top, payload, torque, flags = figure.subplots(
+        4, 1, sharex=True, height_ratios=[0.8, 2.2, 1.3, 0.16 * len(shown) + 0.25]
+    )
+    if hook is not None:
+        top.plot(hook.time, hook.signals["hook.heave"], color=HOOK)
+    top.set_ylabel("hook [m]")
+    reach = _reach(found, shown, height)
+    factor, unit = scale("m", reach)
+    for place, trace in enumerate(shown):
+        style = {"color": _colour(found, trace.contender), "linestyle": _line(trace.contender)}
+        at = trace.time
+        width = 2.2 if trace.contender == found.best(height, ("linear",)) else 1.5
+        payload.plot(
+            at,
+            trace.signals["payload.displacement"] / factor,
+            label=trace.contender,
+            linewidth=width,
+            **style,
         )
-        if hook is not None:
-            top.plot(hook.time, hook.signals["hook.heave"], color=HOOK)
-        top.set_ylabel("hook [m]")
-        reach = _reach(found, shown, height)
-        factor, unit = scale("m", reach)
-        for place, trace in enumerate(shown):
-            style = {"color": _colour(found, trace.contender), "linestyle": _line(trace.contender)}
-            at = trace.time
-            width = 2.2 if trace.contender == found.best(height, ("linear",)) else 1.5
-            payload.plot(
-                at,
-                trace.signals["payload.displacement"] / factor,
-                label=trace.contender,
-                linewidth=width,
-                **style,
+        if "motor.torque" in trace.signals and trace.contender != "none":
+            torque.plot(at, trace.signals["motor.torque"] / 1e3, linewidth=1.2, **style)
+        if "drive.saturated" in trace.signals:
+            full = trace.signals["drive.saturated"] > 0.5
+            flags.fill_between(
+                at, place + 0.1, place + 0.9, where=full, color=style["color"], linewidth=0.0
             )
-            if "motor.torque" in trace.signals and trace.contender != "none":
-                torque.plot(at, trace.signals["motor.torque"] / 1e3, linewidth=1.2, **style)
-            if "drive.saturated" in trace.signals:
-                full = trace.signals["drive.saturated"] > 0.5
-                flags.fill_between(
-                    at, place + 0.1, place + 0.9, where=full, color=style["color"], linewidth=0.0
-                )
-        payload.set_ylim(-1.1 * reach / factor, 1.1 * reach / factor)
-        payload.set_ylabel(f"payload [{unit}]")
-        for sign in (-1.0, 1.0):
-            torque.axhline(sign * drive.torque_peak / 1e3, color=BROKEN, linewidth=0.9)
-        torque.set_ylabel("motor torque\n[kN m]")
-        flags.set_ylim(len(shown), 0)
-        flags.set_yticks(
-            [place + 0.5 for place in range(len(shown))], [t.contender for t in shown], fontsize=8.0
-        )
-        flags.grid(visible=False, axis="y")
-        flags.set_title("drive saturated", fontsize=9.0, color="#555555", pad=2.0)
-        flags.set_xlabel("time [s]")
-        flags.set_xlim(float(shown[0].time[0]), float(shown[0].time[-1]))
-        payload.axvline(moment, color=REFERENCE, linewidth=0.8, linestyle=":")
-        figure.legend(loc="outside right center")
-        name = found.best(height, ("linear",))
-        worst = max(
-            (c.quantities["tracking error largest"] for c in found.of(str(name), height)),
-            default=math.nan,
-        )
-        text = f"The worst moment of {name}: {quantity(worst, 'm')} off, H_s {height:.4g} m"
-        figure.suptitle(typeset(text), x=0.012, ha="left", fontsize=11.0, fontweight="bold")
-        about = f"{found.case.name}, seed {seed}, all contenders in the same sea"
-        top.set_title(about, fontsize=9.5, color="#555555")
-    return figure
+    payload.set_ylim(-1.1 * reach / factor, 1.1 * reach / factor)
+    payload.set_ylabel(f"payload [{unit}]")
+    for sign in (-1.0, 1.0):
+        torque.axhline(sign * drive.torque_peak / 1e3, color=BROKEN, linewidth=0.9)
+    torque.set_ylabel("motor torque\n[kN m]")
+    flags.set_ylim(len(shown), 0)
+    flags.set_yticks(
+        [place + 0.5 for place in range(len(shown))], [t.contender for t in shown], fontsize=8.0
+    )
+    flags.grid(visible=False, axis="y")
+    flags.set_title("drive saturated", fontsize=9.0, color="#555555", pad=2.0)
+    flags.set_xlabel("time [s]")
+    flags.set_xlim(float(shown[0].time[0]), float(shown[0].time[-1]))
+    payload.axvline(moment, color=REFERENCE, linewidth=0.8, linestyle=":")
+    figure.legend(loc="outside right center")
+    name = found.best(height, ("linear",))
+    worst = max(
+        (c.quantities["tracking error largest"] for c in found.of(str(name), height)),
+        default=math.nan,
+    )
+    text = f"The worst moment of {name}: {quantity(worst, 'm')} off, H_s {height:.4g} m"
+    return headline(figure, text, f"{found.case.name}, seed {seed}, all contenders in the same sea")
 
 
 def _lines(found: Comparison, factor: float, unit: str) -> Figure:
-    figure = new_figure(8.6, 5.4)
-    axes = figure.add_subplot()
+    figure, axes = panel(8.6, 5.4)
     wide = found.heights[-1] - found.heights[0]
     several = max(1, len(found.contenders) - 1)
     fell = False
@@ -210,7 +208,7 @@ def _lines(found: Comparison, factor: float, unit: str) -> Figure:
     if fell:
         axes.plot([], [], "x", color=BROKEN, markeredgewidth=2.2, label="first loses the load")
     _span(axes, found, factor)
-    _logarithmic(axes, "y")
+    logarithmic(axes, "y", _marks_of(axes.get_ylim()))
     axes.set_xticks(found.heights, [f"{h:.4g}" for h in found.heights])
     axes.set_xlabel(typeset("H_s [m]"))
     axes.set_ylabel(f"payload, rms over all seeds [{unit}]")
@@ -235,8 +233,7 @@ def _span(axes: Axes, found: Comparison, factor: float) -> None:
 def _dots(found: Comparison, factor: float, unit: str) -> Figure:
     height = found.heights[0]
     shown = [c for c in found.contenders if math.isfinite(found.pooled(c.name, height))]
-    figure = new_figure(7.6, 1.6 + 0.36 * len(shown))
-    axes = figure.add_subplot()
+    figure, axes = panel(7.6, 1.6 + 0.36 * len(shown))
     labels = []
     for place, each in enumerate(shown):
         colour = _colour(found, each.name)
@@ -258,7 +255,7 @@ def _dots(found: Comparison, factor: float, unit: str) -> Figure:
     # The floor may be next to nothing: its edge shows that it is there, or it is far away.
     finite = [c.rms for c in found.cells if math.isfinite(c.rms) and c.rms > 0.0]
     axes.set_xlim(0.6 * min(finite) / factor, 1.6 * max(finite) / factor)
-    _logarithmic(axes, "x")
+    logarithmic(axes, "x", _marks_of(axes.get_xlim()))
     axes.set_yticks(range(len(shown)), labels)
     axes.set_ylim(len(shown) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
@@ -266,28 +263,16 @@ def _dots(found: Comparison, factor: float, unit: str) -> Figure:
     return figure
 
 
-def _logarithmic(axes: Axes, which: str) -> None:
-    """Make an axis logarithmic, marked in plain numbers."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    axis = axes.yaxis if which == "y" else axes.xaxis
-    (axes.set_yscale if which == "y" else axes.set_xscale)("log")
-    low, high = axes.get_ylim() if which == "y" else axes.get_xlim()
-    subs = (1.0, 2.0, 5.0) if high < _FINE * low else (1.0,)
-    axis.set_major_locator(LogLocator(subs=subs, numticks=20))
-    axis.set_minor_formatter(NullFormatter())
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+def _marks_of(ends: tuple[float, float]) -> tuple[float, ...]:
+    return (1.0, 2.0, 5.0) if ends[1] < _FINE * ends[0] else (1.0,)
 
 
-def _title(figure: Figure, found: Comparison, finding: str) -> None:
-    figure.suptitle(typeset(finding), x=0.012, ha="left", fontsize=11.0, fontweight="bold")
+def _about(found: Comparison) -> str:
     seeds = f"{count(len(found.seeds), 'seed')} x {duration(found.question.duration)}"
     about = f"{found.case.name}, {seeds}, same seas and same noise for all"
     if found.question.mismatch.text:
         about += f"; plant off by {found.question.mismatch.text}"
-    if len(found.heights) == 1:
-        about = f"H_s {found.heights[0]:.4g} m: {about}"
-    figure.axes[0].set_title(typeset(about), fontsize=9.5, fontweight="normal", color="#555555")
+    return f"H_s {found.heights[0]:.4g} m: {about}" if len(found.heights) == 1 else about
 
 
 def _finding(found: Comparison) -> str:

@@ -1,6 +1,6 @@
-"""A folder with everything that a comparison has to say: tables, words, figures, traces.
+"""The report of a comparison, and a folder with all of it: tables, words, figures, traces.
 
-    Comparison --> summary.md, summary.json, table.csv, runs.csv, traces.csv, figures
+    Comparison --> Report --> summary.md, summary.json, table.csv, runs.csv, traces.csv, figures
 
 Beside these lies `cells.jsonl`, from which the comparison goes on (`stillhook.comparison.store`).
 Every file is written whole or not at all.
@@ -8,28 +8,60 @@ Every file is written whole or not at all.
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from models.basics import InputError
-
-from ..text import OutputFolder
+from ..text import (
+    Column,
+    Drawing,
+    OutputFolder,
+    Report,
+    Section,
+    Table,
+    csv_text,
+    data_table,
+    json_data,
+    json_text,
+    markdown,
+)
 from .comparison import COLUMNS, Comparison
+from .figures import heights, worst_moment
 from .store import question_of
-from .words import HEADINGS, LEGEND, headline_of, left_out, rows_at
+from .words import LEGEND, about_of, left_out, sentences_of, table_at
 
 _FORMAT = 1
-_FIGURES = {
-    "heights": "The payload's motion with each contender",
-    "worst": "Time traces around the worst moment of the best linear law",
-}
-_KINDS = ("svg", "png")
 _DIGITS = 10  # of times in files
+_SAME = (
+    "Every contender meets the same hook motion for the same seed, on the same nonlinear plant "
+    f"with the drive's limits.  {LEGEND}, pooled over seeds.  `table.csv` has all columns, "
+    "`runs.csv` every run, `summary.json` both for programs; `cells.jsonl` is what the comparison "
+    "goes on from."
+)
+
+
+def comparison_report(found: Comparison) -> Report:
+    """Return what contenders came to: sentences, figures, a table for each height."""
+    stopped = "stopped before the end: only the runs that were made are counted"
+    caption = "Time traces around the worst moment of the best linear law"
+    drawings = [
+        Drawing("heights", "The payload's motion with each contender", lambda: heights(found)),
+        Drawing("worst", caption, lambda: worst_moment(found)),
+    ]
+    tables = [table_at(found, height) for height in found.heights]
+    return Report(
+        name=found.case.name,
+        about=about_of(found),
+        status="" if found.complete else stopped,
+        ok=not any(cell.status in ("failed", "died") for cell in found.cells),
+        sections=[
+            Section("", [*sentences_of(found), *drawings]),
+            Section("", [*(table for table in tables if table.rows), LEGEND]),
+            Section("", left_out(found)),
+        ],
+    )
 
 
 def write_comparison(folder: str | Path, found: Comparison, *, figures: bool = True) -> list[Path]:
@@ -50,28 +82,27 @@ def write_comparison(folder: str | Path, found: Comparison, *, figures: bool = T
         If a file cannot be written.
     """
     place = OutputFolder.prepare(folder)
+    report = comparison_report(found)
     written = [
         place.write("case.yaml", found.case.to_yaml()),
         place.write("table.csv", found.table.to_csv(index=False, lineterminator="\n")),
-        place.write("runs.csv", _runs_text(found)),
-        place.write(
-            "summary.json", json.dumps(summary_of(found), indent=1, allow_nan=False) + "\n"
-        ),
+        place.write("runs.csv", csv_text(_runs(found))),
+        place.write("summary.json", json_text(comparison_data(found))),
     ]
     if found.traces:
-        written.append(place.write("traces.csv", _traces_text(found)))
+        written.append(place.write("traces.csv", csv_text(_traces(found))))
     else:
         place.discard("traces.csv")
-    drawn = _draw(place, found, written) if figures else []
-    for name in _FIGURES:
-        for kind in _KINDS:
-            if name not in drawn:
-                place.discard(f"{name}.{kind}")
-    written.append(place.write("summary.md", _markdown(found, drawn)))
-    return written
+    drawn = place.draw(report.drawings) if figures else []
+    for drawing in report.drawings:
+        for kind in ("svg", "png"):
+            if place.path / f"{drawing.name}.{kind}" not in drawn:
+                place.discard(f"{drawing.name}.{kind}")
+    text = markdown(_with_contenders(report, found), [path.stem for path in drawn])
+    return [*written, *drawn, place.write("summary.md", f"{text}\n{_SAME}\n")]
 
 
-def summary_of(found: Comparison) -> dict[str, Any]:
+def comparison_data(found: Comparison) -> dict[str, Any]:
     """Return a comparison as plain data: what was asked, who took part, the table, every run.
 
     Numbers are in SI; null stands for what did not occur or has no end.
@@ -79,7 +110,7 @@ def summary_of(found: Comparison) -> dict[str, Any]:
     table = found.table.to_dict("records")
     return {
         "stillhook_comparison": _FORMAT,
-        "question": _plain(question_of(found.question)),
+        "question": json_data(question_of(found.question)),
         "heights": list(found.heights),
         "seeds": list(found.seeds),
         "complete": found.complete,
@@ -88,111 +119,67 @@ def summary_of(found: Comparison) -> dict[str, Any]:
             each.name: {"what": each.what, "knows": each.knows, "group": each.group}
             for each in found.contenders
         },
-        "sentences": list(found.sentences),
-        "table": _plain(table),
+        "sentences": list(sentences_of(found)),
+        "table": table,
         "designs": [
-            {"contender": name, "height": height, **_plain(law.to_dict())}
+            {"contender": name, "height": height, **law.to_dict()}
             for (name, height), law in found.laws.items()
         ],
-        "runs": [_plain(cell.to_dict()) for cell in found.cells],
+        "runs": [cell.to_dict() for cell in found.cells],
     }
 
 
-def _draw(place: OutputFolder, found: Comparison, written: list[Path]) -> list[str]:
-    from ..text import picture
-    from .figures import heights, worst_moment
-
-    drawn = []
-    for name, make in (("heights", heights), ("worst", worst_moment)):
-        try:
-            figure = make(found)
-        except InputError:
-            continue  # stopped before there was anything to show
-        written += [place.write(f"{name}.{kind}", picture(figure, kind)) for kind in _KINDS]
-        drawn.append(name)
-    return drawn
-
-
-def _runs_text(found: Comparison) -> str:
-    """Return every run as a line of CSV."""
-    names = list(dict.fromkeys(name for cell in found.cells for name in cell.quantities))
-    fixed = ("contender", "height", "seed", "status", "message", "sample_time", "wall")
-    target = io.StringIO()
-    table = csv.writer(target, lineterminator="\n")
-    steps = ("median", "p99", "max")
-    table.writerow([*fixed, *names, *(f"step {name}" for name in steps), "trips", "fallbacks"])
-    for cell in found.cells:
-        row = [getattr(cell, name) for name in fixed]
-        row += [cell.quantities.get(name, math.nan) for name in names]
-        row += [cell.step.get(name, math.nan) for name in steps]
-        row += [_pairs(cell.trips), _pairs(cell.fallbacks)]
-        table.writerow([repr(value) if isinstance(value, float) else value for value in row])
-    return target.getvalue()
-
-
-def _traces_text(found: Comparison) -> str:
-    """Return the traces as CSV, one line for each contender and time."""
-    names = list(dict.fromkeys(name for trace in found.traces for name in trace.signals))
-    target = io.StringIO()
-    table = csv.writer(target, lineterminator="\n")
-    table.writerow(["contender", "time [s]", *names])
-    for trace in found.traces:
-        columns = [trace.signals.get(name) for name in names]
-        for k, time in enumerate(trace.time):
-            values = ["" if column is None else f"{column[k]:.6g}" for column in columns]
-            table.writerow([trace.contender, f"{time:.{_DIGITS}g}", *values])
-    return target.getvalue()
-
-
-def _markdown(found: Comparison, drawn: Sequence[str]) -> str:
-    parts = [f"# {found.case.name}: controllers compared", f"{headline_of(found)}."]
-    if not found.complete:
-        parts.append("**Stopped before the end**: only the runs that were made are counted.")
-    parts += ["\n".join(f"- {sentence}" for sentence in found.sentences)]
-    parts += [f"![{_FIGURES[name]}]({name}.svg)" for name in drawn]
-    for height in found.heights:
-        rows = rows_at(found, height)
-        parts += [f"## H_s {height:.4g} m", _table(HEADINGS, rows)]
-    parts += ["## Who takes part"]
+def _with_contenders(report: Report, found: Comparison) -> Report:
+    """Return the report with who took part, what they know, and how their designs came about."""
     about = [(each.name, each.what, each.knows) for each in found.contenders]
-    parts.append(_table(("", "what it is", "what it knows"), about))
+    columns = (Column("contender", ""), Column("what", "what it is"), Column("what it knows"))
     notes = [
-        (each.name, f"{height:.4g}", found.note(each, height))
+        (each.name, height, found.note(each, height))
         for each in found.contenders
         for height in found.heights
         if found.note(each, height)
     ]
+    heads = (
+        Column("contender", ""),
+        Column("H_s [m]", write=lambda height: f"{height:.4g}"),
+        Column("note"),
+    )
+    tables = [Table(columns=columns, rows=about)]
     if notes:
-        parts.append(_table(("", "H_s [m]", "note"), notes))
-    parts += left_out(found)
-    parts.append(
-        "Every contender meets the same hook motion for the same seed, on the same nonlinear "
-        f"plant with the drive's limits.  {LEGEND}, pooled over seeds.  "
-        "`table.csv` has all columns, `runs.csv` every run, `summary.json` both for programs; "
-        "`cells.jsonl` is what the comparison goes on from."
-    )
-    return "\n\n".join(part for part in parts if part) + "\n"
+        tables.append(Table(columns=heads, rows=notes))
+    return replace(report, sections=[*report.sections, Section("Who takes part", tables)])
 
 
-def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [headings, ["---"] * len(headings), *rows]
-    return "\n".join(
-        "| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines
-    )
+def _runs(found: Comparison) -> Table:
+    """Return every run as data."""
+    names = list(dict.fromkeys(name for cell in found.cells for name in cell.quantities))
+    fixed = ("contender", "height", "seed", "status", "message", "sample_time", "wall")
+    steps = ("median", "p99", "max")
+    rows = [
+        [
+            *(getattr(cell, name) for name in fixed),
+            *(cell.quantities.get(name, math.nan) for name in names),
+            *(cell.step.get(name, math.nan) for name in steps),
+            _pairs(cell.trips),
+            _pairs(cell.fallbacks),
+        ]
+        for cell in found.cells
+    ]
+    ends = [*(f"step {name}" for name in steps), "trips", "fallbacks"]
+    return data_table([*fixed, *names, *ends], rows)
+
+
+def _traces(found: Comparison) -> Table:
+    """Return the traces as data, a row for each contender and time."""
+    names = list(dict.fromkeys(name for trace in found.traces for name in trace.signals))
+    rows = []
+    for trace in found.traces:
+        columns = [trace.signals.get(name) for name in names]
+        for k, time in enumerate(trace.time):
+            values = ["" if column is None else f"{column[k]:.6g}" for column in columns]
+            rows.append([trace.contender, f"{time:.{_DIGITS}g}", *values])
+    return data_table(["contender", "time [s]", *names], rows)
 
 
 def _pairs(counts: Mapping[str, float]) -> str:
     return " ".join(f"{name}={number}" for name, number in counts.items())
-
-
-def _plain(value: Any) -> Any:
-    """Return plain data as JSON holds it: null for NaN and infinity."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    if isinstance(value, bool) or value is None or isinstance(value, str | int):
-        return value
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return _plain(value.item()) if hasattr(value, "item") else str(value)

@@ -1,6 +1,6 @@
-"""What a comparison says, in words: where prediction helps, where it does not, who loses the load.
+"""Tables and sentences of a comparison: where prediction helps, where not, who loses the load.
 
-    Comparison --> headline, rows for the terminal, sentences computed from the numbers
+    Comparison --> tables, sentences computed from the numbers
 
 Contenders are compared seed by seed: the ratio of two of them in the same sea varies far less
 than either.  A difference is called one only where Student's 95 % interval of the mean log ratio
@@ -15,41 +15,37 @@ from typing import TYPE_CHECKING
 
 from models.basics import mean_interval
 
-from ..text import count, duration, number, quantity, scale
+from ..text import Column, Table, Written, count, duration, listed, number, quantity, scale
 
 if TYPE_CHECKING:
     from .comparison import Comparison
 
-HEADINGS = ("", "rms", "95 % interval", "largest", "sat.", "lost", "/ floor")
 LEGEND = (
     "sat.: of the time at the drive's limits; lost: runs in which the payload left its place by "
     "more than the hook's significant height, or the brake stepped in; / floor: mean square over "
     "the clairvoyant's"
 )
-"""What the headings mean."""
+"""What the headings of the table mean."""
 
 _NOTHING = 1e-12  # [m]
 _EVEN = math.log(1.25)  # an interval of the log ratio within this says "no difference"
 _MANY = 1000.0  # beyond that a ratio says no more
 
 
-def headline_of(found: Comparison) -> str:
+def about_of(found: Comparison) -> str:
     """Return what was compared."""
     seas = f"{count(len(found.seeds), 'seed')} of {duration(found.question.duration)}"
     heights = ", ".join(f"{height:.4g}" for height in found.heights)
-    text = (
-        f"{found.case.name}: {count(len(found.contenders), 'contender')}, H_s {heights} m, {seas}"
-    )
+    text = f"{count(len(found.contenders), 'contender')}, H_s {heights} m, {seas}"
     off = found.question.mismatch.text
     return f"{text}; the plant is off by {off}" if off else text
 
 
-def rows_at(found: Comparison, height: float) -> list[tuple[str, ...]]:
-    """Return the cells of the table at a height, as in `HEADINGS`, one row for each contender."""
-    rows: list[tuple[str, ...]] = []
-    known = [found.pooled(each.name, height) for each in found.contenders]
-    sizes = [value for value in known if math.isfinite(value)]
-    factor, unit = scale("m", max(sizes, default=1.0))
+def table_at(found: Comparison, height: float) -> Table:
+    """Return the table at a height, one row for each contender that has runs."""
+    sizes = [found.pooled(each.name, height) for each in found.contenders]
+    factor, unit = scale("m", max((s for s in sizes if math.isfinite(s)), default=1.0))
+    every, rows = found.table, []
     for each in found.contenders:
         cells = found.of(each.name, height)
         if not cells:
@@ -58,20 +54,29 @@ def rows_at(found: Comparison, height: float) -> list[tuple[str, ...]]:
         between = ""
         if math.isfinite(mean.low):
             between = f"{number(max(mean.low, 0.0) / factor)} to {number(mean.high / factor)}"
-        table = found.table
-        row = table[(table["contender"] == each.name) & (table["height"] == height)].iloc[0]
+        row = every[(every["contender"] == each.name) & (every["height"] == height)].iloc[0]
+        lost = found.lost(each.name, height)
+        figures = (float(row[name]) for name in ("largest", "saturated"))
         rows.append(
             (
                 each.name,
-                "" if math.isnan(mean.mean) else f"{number(mean.mean / factor)} {unit}",
+                mean.mean,
                 between,
-                _short(row["largest"], factor),
-                "" if _missing(row["saturated"]) else f"{row['saturated']:.3g} %",
-                f"{found.lost(each.name, height)}/{len(cells)}",
-                "" if _missing(row["of the floor"]) else number(row["of the floor"]),
+                *figures,
+                Written(lost, f"{lost}/{len(cells)}"),
+                float(row["of the floor"]),
             )
         )
-    return rows
+    columns = (
+        Column("contender", f"H_s {height:.4g} m"),
+        Column("rms", write=lambda value: f"{number(value / factor)} {unit}"),
+        Column("interval", "95 % interval"),
+        Column("largest", write=lambda value: number(value / factor)),
+        Column("saturated", "sat.", write=lambda share: f"{share:.3g} %"),
+        Column("lost"),
+        Column("of_the_floor", "/ floor"),
+    )
+    return Table(columns=columns, rows=rows)
 
 
 def left_out(found: Comparison) -> list[str]:
@@ -89,23 +94,6 @@ def left_out(found: Comparison) -> list[str]:
             where = f" at H_s {', '.join(f'{height:.4g}' for height in heights)} m"
         lines.append(f"{name} did not take part{where}: {reason}")
     return lines
-
-
-def plain_table(found: Comparison) -> list[str]:
-    """Return headline, tables and who was left out as lines of text."""
-    lines = [headline_of(found)]
-    for height in found.heights:
-        cells_at = rows_at(found, height)
-        used = [i for i in range(len(HEADINGS)) if i == 0 or any(row[i] for row in cells_at)]
-        rows = [(f"H_s {height:.4g} m", *(HEADINGS[i] for i in used[1:]))]
-        rows += [tuple(row[i] for i in used) for row in cells_at]
-        widths = [max(len(row[i]) for row in rows) for i in range(len(used))]
-        lines.append("")
-        for row in rows:
-            cells = [row[0].ljust(widths[0])]
-            cells += [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
-            lines.append("  ".join(cells).rstrip())
-    return [*lines, *left_out(found)]
 
 
 def sentences_of(found: Comparison) -> tuple[str, ...]:
@@ -197,7 +185,7 @@ def _lost(found: Comparison, height: float) -> str:
         for each in found.contenders
         if found.lost(each.name, height)
     ]
-    return f"the load is lost by {_listed(told)} of {len(found.seeds)}" if told else ""
+    return f"the load is lost by {listed(told)} of {len(found.seeds)}" if told else ""
 
 
 def _overall(found: Comparison) -> Sequence[str]:
@@ -222,7 +210,7 @@ def _overall(found: Comparison) -> Sequence[str]:
         else:
             verdicts["cannot be told from so few seeds"].append(height)
     parts = [
-        f"it {verdict} at H_s {_listed([f'{h:.4g}' for h in heights])} m"
+        f"it {verdict} at H_s {listed([f'{h:.4g}' for h in heights])} m"
         for verdict, heights in verdicts.items()
         if heights
     ]
@@ -233,15 +221,3 @@ def _overall(found: Comparison) -> Sequence[str]:
             )
         return ()
     return (f"Prediction against the best linear law: {'; '.join(parts)}.",)
-
-
-def _listed(parts: Sequence[str]) -> str:
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
-
-
-def _short(value: float, factor: float) -> str:
-    return "" if _missing(value) else number(value / factor)
-
-
-def _missing(value: float) -> bool:
-    return value is None or math.isnan(value)

@@ -1,30 +1,36 @@
-"""Designs as files, figures and reports."""
+"""Designs and studies of designs as files, figures and reports.
+
+A design, a front, a sizing or a study of `synth` comes in; out come a `Report` for the terminal and
+for files, figures, and design files that load again.
+"""
 
 from typing import TYPE_CHECKING
 
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
+    from .bound_text import bound_sentence as bound_sentence
     from .design_file import design_text as design_text
     from .design_file import load_design as load_design
     from .design_file import save_design as save_design
-    from .indices_plot import indices_figure as indices_figure
-    from .pareto_plot import finding as finding
-    from .pareto_plot import pareto_figure as pareto_figure
-    from .pareto_plot import value_text as value_text
+    from .pareto import pareto_report as pareto_report
+    from .report import design_report as design_report
     from .report import write_report as write_report
-    from .robust_plot import robust_figure as robust_figure
-    from .robust_plot import schedule_figure as schedule_figure
-    from .size_plot import size_figure as size_figure
-    from .size_plot import step_text as step_text
-    from .size_plot import worth_figure as worth_figure
+    from .robust import robust_report as robust_report
+    from .robust import scenario_table as scenario_table
+    from .robust import schedule_report as schedule_report
+    from .sensitivity import Wide as Wide
+    from .sensitivity import indices_table as indices_table
+    from .sensitivity import moved_table as moved_table
+    from .sensitivity import sensitivity_report as sensitivity_report
+    from .sizing import co_design_report as co_design_report
+    from .sizing import size_report as size_report
+    from .sizing import worth_report as worth_report
     from .structure_file import load_structure as load_structure
     from .structure_file import save_structure as save_structure
     from .structure_file import structure_text as structure_text
-    from .structure_plot import structures as structures
-    from .structure_table import HEADINGS as HEADINGS
-    from .structure_table import markdown as markdown
-    from .structure_table import structure_rows as structure_rows
-    from .tornado_plot import tornado_figure as tornado_figure
+    from .structures import structures_report as structures_report
+    from .structures import structures_table as structures_table
+    from .summary import AT_LEAST as AT_LEAST
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -1,7 +1,4 @@
-"""The bound beside a design in words: for the summary, the table of structures and its figure.
-
-    design.bound -> a sentence for `stillhook.text.summary`, a cell for
-    `stillhook.designs.structure_table`
+"""The bound beside a design in words: for its summary, the table of structures and their figure.
 
 A case whose sensors are exact has no bound worth printing, and none is computed.
 """
@@ -14,7 +11,7 @@ from typing import TYPE_CHECKING
 from models.basics import StillhookError
 from synth.bound import DesignBound, exact_sensors
 
-from .quantities import number, quantity
+from ..text import number, quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

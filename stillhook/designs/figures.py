@@ -7,7 +7,6 @@ of limits) is left out.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,26 +18,26 @@ from ..text import (
     AFTER,
     BEFORE,
     BROKEN,
+    DASHED,
     DRUM,
     HOOK,
-    PAYLOAD,
     REFERENCE,
-    LimitRow,
-    MotionView,
+    Bar,
+    Table,
     annotate,
     decibels,
+    drawn,
     headline,
-    highest,
-    limit_rows,
     new_figure,
     number,
+    panel,
     quantity,
-    styled,
     typeset,
 )
-from ..text.motion import DRUM as DRUM_HAUL
-from ..text.motion import HOOK as HOOK_HEAVE
-from .nyquist_plot import nyquist
+from .motion import DRUM as DRUM_HAUL
+from .motion import HOOK as HOOK_HEAVE
+from .motion import PAYLOAD, MotionView, highest
+from .summary import about_of, limit_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,6 +49,7 @@ _PERIODS = (20.0, 12.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5)  # marks on
 _CUT = 2.0  # use of a limit at which its bar is cut off
 
 
+@drawn
 def payload_spectrum(design: GainDesign) -> Figure:
     """Return the spectra of hook and payload, with the drum held and with the gains.
 
@@ -76,25 +76,23 @@ def payload_spectrum(design: GainDesign) -> Figure:
     peaks = [float(density[np.isfinite(density)].max()) for _, _, density, _ in curves]
     bottom = max(1e-3 * min(peaks), 1e-10 * max(peaks))
     shown = omega <= right
-    with styled():
-        figure = new_figure()
-        axes = figure.add_subplot()
-        for label, colour, density, rms in curves:
-            heights = np.clip(density[shown], 1e-3 * bottom, None)
-            text = f"{label}: {quantity(rms, 'm')} rms"
-            axes.semilogy(omega[shown], heights, color=colour, label=text)
-        if view.compensated:
-            axes.fill_between(omega[shown], 1e-3 * bottom, heights, color=AFTER, alpha=0.12)
-        axes.set_ylim(bottom, 3.0 * max(peaks))
-        axes.set_xlim(0.0, right)
-        axes.set_xlabel("frequency [rad/s]")
-        axes.set_ylabel("variance density [m² s/rad]")
-        _period_axis(axes, right)
-        axes.legend(loc="upper right")
-        headline(axes, _spectrum_finding(design), design)
-    return figure
+    figure, axes = panel()
+    for label, colour, density, rms in curves:
+        heights = np.clip(density[shown], 1e-3 * bottom, None)
+        text = f"{label}: {quantity(rms, 'm')} rms"
+        axes.semilogy(omega[shown], heights, color=colour, label=text)
+    if view.compensated:
+        axes.fill_between(omega[shown], 1e-3 * bottom, heights, color=AFTER, alpha=0.12)
+    axes.set_ylim(bottom, 3.0 * max(peaks))
+    axes.set_xlim(0.0, right)
+    axes.set_xlabel("frequency [rad/s]")
+    axes.set_ylabel("variance density [m² s/rad]")
+    _period_axis(axes, right)
+    axes.legend(loc="upper right")
+    return headline(figure, _spectrum_finding(design), about_of(design))
 
 
+@drawn
 def responses(design: GainDesign) -> Figure:
     """Return |P/Z| with the drum held and with the gains, and |X/Z|.
 
@@ -114,30 +112,29 @@ def responses(design: GainDesign) -> Figure:
     omega = np.unique(np.concatenate([np.geomspace(low, high, 700), omega]))
     omega = omega[(omega >= low) & (omega <= high)]
     held = np.abs(view.held_response(omega))
-    with styled():
-        figure = new_figure(7.2, 6.2)
-        if view.compensated:
-            upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-            payload = np.abs(design.assessment.response(PAYLOAD, HOOK_HEAVE, omega))
-            upper.loglog(omega, payload, color=AFTER, label="with the gains", zorder=3)
-            _range(upper, np.concatenate([held, payload]), 2.0)
-            drum = np.abs(design.assessment.response(DRUM_HAUL, HOOK_HEAVE, omega))
-            lower.loglog(omega, drum, color=DRUM)
-            _range(lower, drum, 4.0)
-            _mark_peak(design, lower, low, high)
-            _frame(view, lower, "drum over hook |X/Z| [m/m]")
-        else:
-            upper = lower = figure.add_subplot()
-        upper.loglog(omega, held, color=BEFORE, label="drum held")
-        _frame(view, upper, "payload over hook |P/Z| [m/m]")
-        _slow_limit(design, upper, low)
-        upper.set_xlim(low, high)
-        upper.legend(loc="best")
-        lower.set_xlabel("frequency [rad/s]   (shaded: 90 % of the hook's motion)")
-        headline(upper, _response_finding(view), design)
-    return figure
+    figure = new_figure(7.2, 6.2)
+    if view.compensated:
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        payload = np.abs(design.assessment.response(PAYLOAD, HOOK_HEAVE, omega))
+        upper.loglog(omega, payload, color=AFTER, label="with the gains", zorder=3)
+        _range(upper, np.concatenate([held, payload]), 2.0)
+        drum = np.abs(design.assessment.response(DRUM_HAUL, HOOK_HEAVE, omega))
+        lower.loglog(omega, drum, color=DRUM)
+        _range(lower, drum, 4.0)
+        _mark_peak(design, lower, low, high)
+        _frame(view, lower, "drum over hook |X/Z| [m/m]")
+    else:
+        upper = lower = figure.add_subplot()
+    upper.loglog(omega, held, color=BEFORE, label="drum held")
+    _frame(view, upper, "payload over hook |P/Z| [m/m]")
+    _slow_limit(design, upper, low)
+    upper.set_xlim(low, high)
+    upper.legend(loc="best")
+    lower.set_xlabel("frequency [rad/s]   (shaded: 90 % of the hook's motion)")
+    return headline(figure, _response_finding(view), about_of(design))
 
 
+@drawn
 def limits(design: GainDesign) -> Figure:
     """Return the use of each limit as a bar.
 
@@ -156,44 +153,32 @@ def limits(design: GainDesign) -> Figure:
     InputError
         If the design has no limits to show (an unstable loop).
     """
-    rows = limit_rows(design)
-    if not rows:
+    table = limit_table(design)
+    uses: list[Bar] = [row[3] for row in table.rows]
+    if not uses:
         raise InputError("limits: the loop is unstable, so there is no use of limits")
-    longest = min(max(1.1, *(1.02 * row.use for row in rows)), _CUT)
-    with styled():
-        figure = new_figure(7.6, 1.5 + 0.36 * len(rows))
-        axes = figure.add_subplot()
-        for place, row in enumerate(rows):
-            axes.barh(
-                place,
-                100.0 * min(row.use, longest),
-                height=0.62,
-                color=AFTER if row.kept else BROKEN,
-                alpha=1.0 if row.enforced else 0.45,
-                hatch=None if row.enforced else "///",
-                edgecolor="white",
-                linewidth=0.0,
-            )
-            _bar_text(axes, place, row, longest)
-        axes.axvline(100.0, color=REFERENCE, linewidth=1.2)
-        labels = [typeset(row.label) for row in rows]
-        axes.set_yticks(range(len(rows)), labels)
-        axes.invert_yaxis()
-        axes.set_xlim(0.0, 100.0 * longest)
-        axes.grid(visible=False, axis="y")
-        note = "" if all(row.enforced for row in rows) else "   (hatched: reported, not enforced)"
-        axes.set_xlabel(f"use of the limit [%]{note}")
-        headline(axes, _limits_finding(rows), design)
-    return figure
-
-
-FIGURES: dict[str, Callable[[GainDesign], Figure]] = {
-    "payload_spectrum": payload_spectrum,
-    "responses": responses,
-    "nyquist": nyquist,
-    "limits": limits,
-}
-"""All figures of a design by the names of their files."""
+    longest = min(max(1.1, *(1.02 * use.value for use in uses)), _CUT)
+    figure, axes = panel(7.6, 1.5 + 0.36 * len(uses))
+    for place, use in enumerate(uses):
+        axes.barh(
+            place,
+            100.0 * min(use.value, longest),
+            height=0.62,
+            color=AFTER if use.kept else BROKEN,
+            alpha=1.0 if use.enforced else 0.45,
+            hatch=None if use.enforced else "///",
+            edgecolor="white",
+            linewidth=0.0,
+        )
+        _bar_text(axes, place, table, longest)
+    axes.axvline(100.0, color=REFERENCE, linewidth=1.2)
+    axes.set_yticks(range(len(uses)), [typeset(row[0]) for row in table.rows])
+    axes.invert_yaxis()
+    axes.set_xlim(0.0, 100.0 * longest)
+    axes.grid(visible=False, axis="y")
+    note = "" if all(use.enforced for use in uses) else "   (hatched: reported, not enforced)"
+    axes.set_xlabel(f"use of the limit [%]{note}")
+    return headline(figure, _limits_finding(table), about_of(design))
 
 
 def _spectrum_finding(design: GainDesign) -> str:
@@ -216,13 +201,14 @@ def _response_finding(view: MotionView) -> str:
     return f"In the waves |P/Z| is {gains} with the gains, {before} with the drum held"
 
 
-def _limits_finding(rows: list[LimitRow]) -> str:
-    broken = [row.label for row in rows if not row.kept and row.enforced]
-    over = sum(not row.kept and not row.enforced for row in rows)
+def _limits_finding(table: Table) -> str:
+    uses: list[Bar] = [row[3] for row in table.rows]
+    broken = [row[0] for row in table.rows if not row[3].kept and row[3].enforced]
+    over = sum(not use.kept and not use.enforced for use in uses)
     if broken:
         text = f"Broken: {', '.join(broken)}"
     else:
-        used = sum(row.use > 0.999 for row in rows if row.enforced)
+        used = sum(use.value > 0.999 for use in uses if use.enforced)
         text = f"Every enforced limit is kept, {used or 'none'} used up"
     return f"{text}; {over} reported ones exceeded" if over else text
 
@@ -265,7 +251,7 @@ def _range(axes: Axes, values: FloatArray, room: float) -> None:
 def _frame(view: MotionView, axes: Axes, label: str) -> None:
     low, high = view.energetic_band
     axes.axvspan(low, high, color=HOOK, alpha=0.15, linewidth=0.0)
-    axes.axhline(1.0, color=REFERENCE, linewidth=0.9, linestyle=(0, (4, 3)))
+    axes.axhline(1.0, color=REFERENCE, linewidth=0.9, linestyle=DASHED)
     axes.set_ylabel(label)
 
 
@@ -290,16 +276,17 @@ def _slow_limit(design: GainDesign, axes: Axes, low: float) -> None:
     axes.plot(across, up, color=REFERENCE, linewidth=2.0, label=text)
 
 
-def _bar_text(axes: Axes, place: int, row: LimitRow, longest: float) -> None:
+def _bar_text(axes: Axes, place: int, table: Table, longest: float) -> None:
     """Write value, bound and price into a long bar, or behind a short one."""
-    text = f"{row.value}  ({row.bound})"
-    if row.price:
-        text += f"   price {row.price} per %"
-    shown = min(row.use, longest)
-    if row.use > longest:
-        text += f"   {100.0 * row.use:.0f} % ▸"
+    _, value, bound, use, price = table.rows[place]
+    text = f"{value.text}  ({bound.text})"
+    if price.value:
+        text += f"   price {price.text} per %"
+    shown = min(use.value, longest)
+    if use.value > longest:
+        text += f"   {100.0 * use.value:.0f} % ▸"
     inside = shown > 0.62 * longest
-    plain = row.enforced or not inside
+    plain = use.enforced or not inside
     axes.text(
         100.0 * shown + (-1.2 if inside else 1.2) * longest,
         place,
@@ -307,6 +294,6 @@ def _bar_text(axes: Axes, place: int, row: LimitRow, longest: float) -> None:
         horizontalalignment="right" if inside else "left",
         verticalalignment="center",
         fontsize=9.0,
-        color="white" if inside and row.enforced else REFERENCE,
+        color="white" if inside and use.enforced else REFERENCE,
         bbox=None if plain else {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
     )

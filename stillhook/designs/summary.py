@@ -1,22 +1,30 @@
-"""What there is to say about a design, in words and figures: one text for terminal and report.
+"""Tables and sentences of a design: motion, gains, margins, limits, and what they rest on.
 
-    GainDesign -> rows of text -> `stillhook.text.terminal` (tables, bars),
-    `stillhook.designs.report` (Markdown)
-
-Nothing here decides how it looks.
+GainDesign -> Tables -> `stillhook.designs.report`
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from models.rig import DCMotor
 from synth.design import GainDesign, LimitUse
 
+from ..text import (
+    Bar,
+    Column,
+    Table,
+    Written,
+    decibels,
+    duration,
+    number,
+    percent,
+    quantity,
+    remarks,
+    scale,
+)
 from .bound_text import bound_sentence
 from .motion import MotionView
-from .quantities import decibels, number, percent, quantity, scale
 
 _LABELS = {
     "max_sensitivity": "sensitivity peak M_s",
@@ -39,62 +47,6 @@ AT_LEAST = ("gain_margin_up", "delay_margin", "rope.tension.least")
 _PRICED = 1e-5  # a price below this share of the payload's rms is noise of the solver
 
 
-@dataclass(frozen=True, kw_only=True)
-class MotionRow:
-    """One motion as text: standard deviation, significant height, largest amplitude."""
-
-    label: str
-    rms: str
-    significant: str
-    largest: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class GainRow:
-    """One gain as text: its value, its product with the amplifier, the product's unit."""
-
-    name: str
-    acts_on: str
-    value: str
-    product: str
-    unit: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class LimitRow:
-    """One limit as text.
-
-    Attributes
-    ----------
-    name, label
-        Its name in the design, and what people call it.
-    value, bound
-        What the design does, and what it may do.
-    use
-        Share that is used; above 1 the limit is broken.
-    kept, enforced
-        Whether it is kept, and whether it had to be.
-    price
-        What the payload would gain, or nothing if the limit costs nothing.
-    """
-
-    name: str
-    label: str
-    value: str
-    bound: str
-    use: float
-    kept: bool
-    enforced: bool
-    price: str
-
-    @property
-    def remark(self) -> str:
-        """What is special about the limit, if anything."""
-        if not self.enforced:
-            return "reported"
-        return self.price if self.kept else "broken"
-
-
 def sea_text(design: GainDesign) -> str:
     """Return the sea that the figures hold for."""
     sea = design.case.sea
@@ -108,21 +60,25 @@ def sea_text(design: GainDesign) -> str:
     return f"{text}, {sea.spectrum}"
 
 
-def motion_rows(design: GainDesign) -> list[MotionRow]:
+def about_of(design: GainDesign) -> str:
+    """Return the case and its sea, as they stand below the title of a figure."""
+    return f"{design.case.name}: {sea_text(design)}"
+
+
+def motion_table(design: GainDesign) -> Table:
     """Return hook and payload motion, before and after."""
     view = MotionView(design)
     found = [("hook", view.hook_motion), ("payload, drum held", view.before)]
     if view.after is not None:
         found.append(("payload, with these gains", view.after))
-    return [
-        MotionRow(
-            label=label,
-            rms=quantity(motion.rms, "m"),
-            significant=quantity(motion.significant_height, "m"),
-            largest=quantity(motion.largest, "m"),
-        )
-        for label, motion in found
-    ]
+    columns = (
+        Column("motion", ""),
+        Column("rms", unit="m"),
+        Column("significant_height", "significant height", unit="m"),
+        Column("largest", f"largest in {duration(design.case.limits.exposure_time)}", unit="m"),
+    )
+    rows = [(name, m.rms, m.significant_height, m.largest) for name, m in found]
+    return Table(columns=columns, rows=rows)
 
 
 def effect(design: GainDesign) -> str:
@@ -146,7 +102,7 @@ def has_gains(design: GainDesign) -> bool:
     return any(design.gains[name] for name in ("a", "a1", "a2"))
 
 
-def gain_rows(design: GainDesign) -> list[GainRow]:
+def gain_table(design: GainDesign) -> Table:
     """Return the gains, as the law u = -A (a P'' + a1 P' + a2 P) has them."""
     amplifier = design.gains["A"]
     rows = []
@@ -156,16 +112,15 @@ def gain_rows(design: GainDesign) -> list[GainRow]:
         ("a2", "displacement", ("/m", "m")),
     ):
         value = design.gains[name]
-        rows.append(
-            GainRow(
-                name=name,
-                acts_on=acts_on,
-                value=number(value, 4),
-                product=number(amplifier * value, 4),
-                unit=_gain_unit(design, *per),
-            )
-        )
-    return rows
+        rows.append((name, acts_on, value, amplifier * value, _gain_unit(design, *per)))
+    columns = (
+        Column("gain"),
+        Column("acts_on", "on the payload's", left=True),
+        Column("value", digits=4),
+        Column("product", "A times it", digits=4),
+        Column("unit", "", left=True),
+    )
+    return Table(columns=columns, rows=rows)
 
 
 def command_text(design: GainDesign) -> str:
@@ -175,11 +130,11 @@ def command_text(design: GainDesign) -> str:
     return f"{what} [{unit}] = -A (a P'' + a1 P' + a2 P), A = {number(design.gains['A'], 4)}"
 
 
-def margin_rows(design: GainDesign) -> list[tuple[str, str, str]]:
-    """Return the margins: what, figure, and the same figure in other words."""
+def margin_table(design: GainDesign) -> Table | None:
+    """Return the margins: what, figure, and the same figure in other words; None without any."""
     margins = design.margins
     if margins is None:
-        return []
+        return None
     smallest = 1.0 / margins.max_sensitivity
     rows = [
         (
@@ -206,13 +161,25 @@ def margin_rows(design: GainDesign) -> list[tuple[str, str, str]]:
         rows.append(("phase", f"{number(math.degrees(margins.phase))} deg", ""))
         rows.append(("further delay", quantity(margins.delay, "s"), ""))
     rows.append(("disk margin", number(margins.disk), "gain and phase together"))
-    return rows
+    return remarks("", rows)
 
 
-def limit_rows(design: GainDesign) -> list[LimitRow]:
+def limit_table(design: GainDesign) -> Table:
     """Return the limits, those that bind the design first."""
     uses = sorted(design.limits.values(), key=lambda use: not use.enforced)
-    return [_limit_row(design, use) for use in uses]
+    rows = [_limit_row(design, use) for use in uses]
+    notes = []
+    priced = any(row[4].value for row in rows)
+    if priced:
+        notes.append("price: what the payload's rms would lose if the bound were 1 % looser")
+    if not all(use.enforced for use in uses):
+        notes.append("reported: the case asks for the figure only (limits.drive: report)")
+    columns = (
+        Column("limit", ""),
+        *(Column(name) for name in ("value", "bound", "use")),
+        Column("price", "price" if priced else ""),
+    )
+    return Table(columns=columns, rows=rows, notes=tuple(notes))
 
 
 def label_of(design: GainDesign, name: str) -> str:
@@ -250,28 +217,32 @@ def facts(design: GainDesign, *, bound: bool = True) -> list[tuple[str, str]]:
     return rows
 
 
-def required_rows(design: GainDesign) -> list[tuple[str, str, str]]:
-    """Return what each limit that breaks is and would have to be in the sea asked for."""
+def required_table(design: GainDesign) -> Table | None:
+    """Return what each limit that breaks is and would have to be in the sea asked for, if any."""
+    if not design.required:
+        return None
     rows = []
     for name, value in design.required.items():
         use = design.limits[name]
         needed = _measured(use, value, size=use.bound)
         rows.append((label_of(design, name), _measured(use, use.bound), needed))
-    return rows
+    wanted = f"needed in H_s {design.case.sea.significant_height:.3g} m"
+    columns = (Column("limit", "limit that breaks"), Column("is"), Column("needed", wanted))
+    note = f"All figures below are those in H_s {design.significant_height:.3g} m"
+    return Table(columns=columns, rows=rows, notes=(note,))
 
 
-def _limit_row(design: GainDesign, use: LimitUse) -> LimitRow:
+def _limit_row(design: GainDesign, use: LimitUse) -> tuple[str, Written, Written, Bar, Written]:
     sign = "≥" if use.name in AT_LEAST else "≤"
     worth = use.price > _PRICED * design.payload_rms and use.enforced
-    return LimitRow(
-        name=use.name,
-        label=label_of(design, use.name),
-        value=_measured(use, use.value, size=use.bound),
-        bound=f"{sign} {_measured(use, use.bound)}",
-        use=use.use,
-        kept=use.kept,
-        enforced=use.enforced,
-        price=quantity(use.price, "m", 2) if worth else "",
+    price = quantity(use.price, "m", 2) if worth else ""
+    remark = (price if use.kept else "broken") if use.enforced else "reported"
+    return (
+        label_of(design, use.name),
+        Written(use.value, _measured(use, use.value, size=use.bound)),
+        Written(use.bound, f"{sign} {_measured(use, use.bound)}"),
+        Bar(use.use, use.kept, use.enforced),
+        Written(use.price if worth else None, remark),
     )
 
 

@@ -22,12 +22,13 @@ from ..text import (
     HOOK,
     REFERENCE,
     decibels,
+    drawn,
     duration,
-    new_figure,
+    headline,
+    logarithmic,
+    panel,
     quantity,
     scale,
-    styled,
-    typeset,
 )
 from .runs import Runs
 from .strip import strip
@@ -60,6 +61,7 @@ def figures_of(runs: Runs) -> dict[str, Callable[[], Figure]]:
     return found
 
 
+@drawn
 def comparison(compared: Sequence[Runs]) -> Figure:
     """Return what is left of the motion with each controller: bars, intervals, a dot for each seed.
 
@@ -87,48 +89,46 @@ def comparison(compared: Sequence[Runs]) -> Figure:
     factor, unit = scale("m", float(known.max()))
     wide = float(known.max()) > 10.0 * float(known.min())
     colours = _colours(compared)
-    with styled():
-        figure = new_figure(max(7.2, 1.2 + 1.15 * len(compared)), 4.2)
-        axes = figure.add_subplot()
-        floor = 0.5 * float(known.min()) / factor if wide else 0.0
-        for place, (runs, found) in enumerate(zip(compared, values, strict=True)):
-            if found.size == 0:
-                continue
-            mean = runs.summary[name]
-            axes.bar(
-                place,
-                mean.mean / factor - floor,
-                bottom=floor,
-                width=0.62,
-                color=colours[place],
-                alpha=0.55,
-            )
-            if found.size > 1:
-                spread = place + _SCATTER * np.linspace(-1.0, 1.0, found.size)
-                axes.plot(spread, found / factor, ".", color=REFERENCE, markersize=4, alpha=0.7)
-            if math.isfinite(mean.low):
-                low = max(mean.low, 0.0 if not wide else floor * factor) / factor
-                axes.errorbar(
-                    place + 0.24,
-                    mean.mean / factor,
-                    yerr=[[mean.mean / factor - low], [mean.high / factor - mean.mean / factor]],
-                    color=REFERENCE,
-                    capsize=4,
-                    linewidth=1.4,
-                )
-        if wide:
-            _log_heights(axes)
-            axes.set_ylim(bottom=floor)
-        axes.set_xticks(
-            range(len(compared)), [runs.controller.replace("-", "-\n") for runs in compared]
+    figure, axes = panel(max(7.2, 1.2 + 1.15 * len(compared)), 4.2)
+    floor = 0.5 * float(known.min()) / factor if wide else 0.0
+    for place, (runs, found) in enumerate(zip(compared, values, strict=True)):
+        if found.size == 0:
+            continue
+        mean = runs.summary[name]
+        axes.bar(
+            place,
+            mean.mean / factor - floor,
+            bottom=floor,
+            width=0.62,
+            color=colours[place],
+            alpha=0.55,
         )
-        axes.set_xlim(-0.6, len(compared) - 0.4)
-        axes.grid(visible=False, axis="x")
-        axes.set_ylabel(f"{_WHAT[name]}, rms [{unit}]")
-        _title(axes, compared, _comparison_finding(compared, values))
-    return figure
+        if found.size > 1:
+            spread = place + _SCATTER * np.linspace(-1.0, 1.0, found.size)
+            axes.plot(spread, found / factor, ".", color=REFERENCE, markersize=4, alpha=0.7)
+        if math.isfinite(mean.low):
+            low = max(mean.low, 0.0 if not wide else floor * factor) / factor
+            axes.errorbar(
+                place + 0.24,
+                mean.mean / factor,
+                yerr=[[mean.mean / factor - low], [mean.high / factor - mean.mean / factor]],
+                color=REFERENCE,
+                capsize=4,
+                linewidth=1.4,
+            )
+    if wide:
+        logarithmic(axes)
+        axes.set_ylim(bottom=floor)
+    axes.set_xticks(
+        range(len(compared)), [runs.controller.replace("-", "-\n") for runs in compared]
+    )
+    axes.set_xlim(-0.6, len(compared) - 0.4)
+    axes.grid(visible=False, axis="x")
+    axes.set_ylabel(f"{_WHAT[name]}, rms [{unit}]")
+    return headline(figure, _comparison_finding(compared, values), _about(compared))
 
 
+@drawn
 def exceedance(compared: Sequence[Runs]) -> Figure:
     """Return how often the payload's crests reach a level, with Rayleigh's and Gumbel's lines.
 
@@ -161,42 +161,39 @@ def exceedance(compared: Sequence[Runs]) -> Figure:
     reach = max(
         compared[0].case.limits.exposure_time, *(float(t.max(initial=0)) for _, t, _ in curves)
     )
-    with styled():
-        figure = new_figure(7.2, 4.4)
-        axes = figure.add_subplot()
-        for runs, colour, (levels, times, law) in zip(compared, colours, curves, strict=True):
-            if not levels.size:
-                continue
-            label = runs.controller if several else "crests of the payload"
-            axes.plot(times, levels / factor, ".", color=colour, markersize=5, label=label)
-            deviation, period = law
-            reached = np.geomspace(2.0 * period, 1.2 * reach, 200)
-            rayleigh = np.array([deviation * peak_factor(period, float(t)) for t in reached])
-            axes.plot(
-                reached,
-                rayleigh / factor,
-                color=colour,
-                linewidth=1.2,
-                linestyle=(0, (4, 3)),
-                label=None if several else "Rayleigh",
-            )
-            _gumbel_line(axes, runs, colour, factor, reach, None if several else "Gumbel")
-        axes.set_xscale("log")
-        low = min(float(t.min()) for _, t, _ in curves if t.size)
-        axes.set_xlim(0.9 * low, 1.3 * reach)
-        marks = [mark for mark in _MARKS if low <= mark <= 1.3 * reach]
-        axes.set_xticks(marks, [duration(mark) for mark in marks])
-        axes.set_xticks([], minor=True)
-        if max(sizes) > 10.0 * min(sizes):
-            _log_heights(axes)
-            axes.set_ylim(bottom=0.2 * min(sizes) / factor)
-        else:
-            axes.set_ylim(bottom=0.0)
-        axes.set_xlabel("time in which the level is reached once")
-        axes.set_ylabel(f"payload above its place [{unit}]")
-        axes.legend(loc="upper left")
-        _title(axes, compared, _exceedance_finding(compared))
-    return figure
+    figure, axes = panel(7.2, 4.4)
+    for runs, colour, (levels, times, law) in zip(compared, colours, curves, strict=True):
+        if not levels.size:
+            continue
+        label = runs.controller if several else "crests of the payload"
+        axes.plot(times, levels / factor, ".", color=colour, markersize=5, label=label)
+        deviation, period = law
+        reached = np.geomspace(2.0 * period, 1.2 * reach, 200)
+        rayleigh = np.array([deviation * peak_factor(period, float(t)) for t in reached])
+        axes.plot(
+            reached,
+            rayleigh / factor,
+            color=colour,
+            linewidth=1.2,
+            linestyle=(0, (4, 3)),
+            label=None if several else "Rayleigh",
+        )
+        _gumbel_line(axes, runs, colour, factor, reach, None if several else "Gumbel")
+    axes.set_xscale("log")
+    low = min(float(t.min()) for _, t, _ in curves if t.size)
+    axes.set_xlim(0.9 * low, 1.3 * reach)
+    marks = [mark for mark in _MARKS if low <= mark <= 1.3 * reach]
+    axes.set_xticks(marks, [duration(mark) for mark in marks])
+    axes.set_xticks([], minor=True)
+    if max(sizes) > 10.0 * min(sizes):
+        logarithmic(axes)
+        axes.set_ylim(bottom=0.2 * min(sizes) / factor)
+    else:
+        axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("time in which the level is reached once")
+    axes.set_ylabel(f"payload above its place [{unit}]")
+    axes.legend(loc="upper left")
+    return headline(figure, _exceedance_finding(compared), _about(compared))
 
 
 def _gumbel_line(
@@ -221,14 +218,6 @@ def _gumbel_line(
         capsize=4,
         linewidth=1.4,
     )
-
-
-def _log_heights(axes: Axes) -> None:
-    """Make the axis of height logarithmic, marked in plain numbers."""
-    from matplotlib.ticker import FuncFormatter
-
-    axes.set_yscale("log")
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def _crests(runs: Runs) -> tuple[FloatArray, FloatArray, tuple[float, float]]:
@@ -263,15 +252,11 @@ def _colours(compared: Sequence[Runs]) -> list[str]:
     return [_COLOURS.get(runs.controller) or next(others) for runs in compared]
 
 
-def _title(axes: Axes, compared: Sequence[Runs], finding: str) -> None:
-    figure = axes.figure
-    figure.suptitle(typeset(finding), x=0.012, ha="left", fontsize=11.0, fontweight="bold")
+def _about(compared: Sequence[Runs]) -> str:
     runs = compared[0]
     seeds = f"{len(runs)} x " if len(runs) > 1 else ""
     about = f"{runs.case.name}, {runs.scenario.name}, {seeds}{duration(runs[0].duration)}"
-    if len(compared) == 1:
-        about += f", {runs.controller}"
-    axes.set_title(typeset(about), fontsize=9.5, fontweight="normal", color="#555555", pad=6.0)
+    return f"{about}, {runs.controller}" if len(compared) == 1 else about
 
 
 def _comparison_finding(compared: Sequence[Runs], values: Sequence[FloatArray]) -> str:

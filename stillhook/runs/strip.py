@@ -18,7 +18,18 @@ from models.basics import FloatArray, InputError
 from models.operation import Scenario
 from models.run import Run
 
-from ..text import AFTER, BROKEN, DRUM, HOOK, REFERENCE, new_figure, quantity, styled, typeset
+from ..text import (
+    AFTER,
+    BROKEN,
+    DASHED,
+    DRUM,
+    HOOK,
+    REFERENCE,
+    drawn,
+    headline,
+    panel,
+    quantity,
+)
 from .window import Window, moves, whole_of, window_of
 
 if TYPE_CHECKING:
@@ -126,6 +137,7 @@ class Scene:
         return float(self.hook.max()) + 0.12 * (float(self.hook.max()) - lowest)
 
 
+@drawn
 def strip(run: Run, scenario: Scenario | None = None, window: Window | None = None) -> Figure:
     """Return pictures of a run at some moments, side by side.
 
@@ -150,43 +162,37 @@ def strip(run: Run, scenario: Scenario | None = None, window: Window | None = No
     """
     window = _window(run) if window is None else window
     scene = Scene.of(run, window, scenario)
-    with styled():
-        figure = new_figure(10.4, 5.0)
-        axes = figure.add_subplot()
-        _background(axes, scene)
-        time = scene.time
-        axes.plot(time, scene.hook, color=HOOK, linewidth=1.0, alpha=0.7)
-        axes.plot(time, scene.payload, color=AFTER, linewidth=1.2, alpha=0.7)
-        if np.ptp(scene.asked) > 0.0:
-            axes.plot(time, scene.asked, color=REFERENCE, linewidth=1.0, linestyle=(0, (4, 3)))
-        span = float(time[-1] - time[0])
-        # Half a picture of room at both ends: the ship is to the left of its rope.
-        shots = np.linspace(time[0] + 0.09 * span, time[-1] - 0.02 * span, _SHOTS)
-        for at in np.searchsorted(time, shots):
-            draw_station(axes, float(time[at]), scene, int(at))
-            label = quantity(float(scene.tension[at]), "N")
-            # Clear of the box, of the ship, and of the place where the rope is broken.
-            middle = 0.4 * float(scene.hook[at]) + 0.6 * float(scene.payload[at])
-            axes.annotate(
-                "slack" if scene.slack[at] else label,
-                (time[at], middle),
-                xytext=(5, 0),
-                textcoords="offset points",
-                fontsize=9.0,
-                color=BROKEN if scene.slack[at] else REFERENCE,
-                verticalalignment="center",
-                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
-                zorder=6,
-            )
-        axes.set_xlim(float(time[0]), float(time[-1]) + 0.03 * span)
-        height_axis(axes, scene)
-        axes.set_xlabel("time [s]")
-        about = f"{run.case.name}, {run.scenario}, {run.controller}, seed {run.seed}"
-        axes.set_title(f"{about}: {window.why}", fontsize=9.5, color="#555555")
-        figure.suptitle(
-            typeset(_finding(scene)), x=0.012, ha="left", fontsize=11.0, fontweight="bold"
+    figure, axes = panel(10.4, 5.0)
+    _background(axes, scene)
+    time = scene.time
+    axes.plot(time, scene.hook, color=HOOK, linewidth=1.0, alpha=0.7)
+    axes.plot(time, scene.payload, color=AFTER, linewidth=1.2, alpha=0.7)
+    if np.ptp(scene.asked) > 0.0:
+        axes.plot(time, scene.asked, color=REFERENCE, linewidth=1.0, linestyle=DASHED)
+    span = float(time[-1] - time[0])
+    # Half a picture of room at both ends: the ship is to the left of its rope.
+    shots = np.linspace(time[0] + 0.09 * span, time[-1] - 0.02 * span, _SHOTS)
+    for at in np.searchsorted(time, shots):
+        draw_station(axes, float(time[at]), scene, int(at))
+        label = quantity(float(scene.tension[at]), "N")
+        # Clear of the box, of the ship, and of the place where the rope is broken.
+        middle = 0.4 * float(scene.hook[at]) + 0.6 * float(scene.payload[at])
+        axes.annotate(
+            "slack" if scene.slack[at] else label,
+            (time[at], middle),
+            xytext=(5, 0),
+            textcoords="offset points",
+            fontsize=9.0,
+            color=BROKEN if scene.slack[at] else REFERENCE,
+            verticalalignment="center",
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
+            zorder=6,
         )
-    return figure
+    axes.set_xlim(float(time[0]), float(time[-1]) + 0.03 * span)
+    height_axis(axes, scene)
+    axes.set_xlabel("time [s]")
+    about = f"{run.case.name}, {run.scenario}, {run.controller}, seed {run.seed}"
+    return headline(figure, _finding(scene), f"{about}: {window.why}")
 
 
 def draw_station(axes: Axes, x: float, scene: Scene, at: int) -> list[Artist]:
@@ -215,7 +221,7 @@ def draw_station(axes: Axes, x: float, scene: Scene, at: int) -> list[Artist]:
         "linestyle": ":" if slack else "-",
     }
     spokes = [turned + k * 2.0 * math.pi / 3.0 for k in range(3)]
-    drawn: list[Artist] = [
+    artists: list[Artist] = [
         Line2D([x, x], [hook, payload], linewidth=1.2, zorder=3, **rope),
         Rectangle((-0.05, -0.03), 0.1, 0.06, color="white", transform=broken, zorder=3),
         *(
@@ -272,10 +278,10 @@ def draw_station(axes: Axes, x: float, scene: Scene, at: int) -> list[Artist]:
             zorder=5,
         ),
     ]
-    for artist in drawn:
+    for artist in artists:
         axes.add_artist(artist)
         artist.set_clip_on(False)
-    return drawn
+    return artists
 
 
 def height_axis(axes: Axes, scene: Scene) -> None:

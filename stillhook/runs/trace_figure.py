@@ -20,16 +20,17 @@ from models.run import ERROR, Event, Run
 from ..text import (
     AFTER,
     BROKEN,
+    DASHED,
     DRUM,
     HOOK,
     REFERENCE,
+    drawn,
     duration,
+    headline,
     new_figure,
     percent,
     quantity,
     scale,
-    styled,
-    typeset,
 )
 from .window import Window, envelope, error_of, moves, runs_of_true, window_of
 
@@ -43,7 +44,6 @@ _SMALL = 0.25  # of the hook's motion: a payload that moves less has a scale of 
 _EVENTS = 12  # told below the figure
 _SLACK = 1.0  # tension below which the rope is slack [N]
 _REACH = 1.6  # a limit farther away than so many times the signal is not drawn
-_DASHED = (0, (4, 3))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +58,7 @@ class _Panel:
     slack: bool = False
 
 
+@drawn
 def traces(run: Run, window: Window | None = None) -> Figure:
     """Return the time traces of a run.
 
@@ -84,41 +85,37 @@ def traces(run: Run, window: Window | None = None) -> Figure:
     panels = _panels(run)
     split = window.end - window.start < 0.95 * float(run.time[-1])
     told = run.events[:_EVENTS]
-    with styled():
-        figure = new_figure(10.4, 1.75 * len(panels) + 1.7 + 0.17 * len(told))
-        grid = figure.subplots(
-            len(panels) + 1,
-            2 if split else 1,
-            sharex="col",
-            squeeze=False,
-            height_ratios=[1.0] * len(panels) + [0.42],
-            width_ratios=[1.15, 1.0] if split else [1.0],
-        )
-        columns = [None, window] if split else [None]
-        for column, part in enumerate(columns):
-            for row, panel in enumerate(panels):
-                _draw(grid[row][column], run, panel, part)
-            _states(grid[-1][column], run, part)
-            _mark_events(list(grid[:, column]), told, part)
-            grid[-1][column].set_xlabel("time [s]")
-        if split:
-            for axes in grid[:-1, 0]:
-                axes.axvspan(window.start, window.end, color="#f0e442", alpha=0.2, linewidth=0.0)
-            grid[0][1].set_title(_close_up(window), fontsize=9.5, color="#555555")
-        for row in range(len(panels)):
-            grid[row][0].set_ylabel(f"{panels[row].title}\n[{_scale(run, panels[row])[1]}]")
-        about = f"{run.case.name}, {run.scenario}, {run.controller}, seed {run.seed}"
-        lasting = duration(round(float(run.time[-1]), 3))
-        grid[0][0].set_title(f"{about}: {lasting}", fontsize=9.5, color="#555555")
-        figure.align_ylabels(grid[:, 0])
-        figure.suptitle(
-            typeset(_finding(run)), x=0.012, ha="left", fontsize=11.0, fontweight="bold"
-        )
-        handles, labels = grid[0][-1].get_legend_handles_labels()
-        if len(labels) > 1:
-            figure.legend(handles, labels, loc="upper right", ncols=3, borderpad=0.1)
-        if told:
-            figure.supxlabel(_events_text(run), x=0.012, ha="left", fontsize=9.0)
+    figure = new_figure(10.4, 1.75 * len(panels) + 1.7 + 0.17 * len(told))
+    grid = figure.subplots(
+        len(panels) + 1,
+        2 if split else 1,
+        sharex="col",
+        squeeze=False,
+        height_ratios=[1.0] * len(panels) + [0.42],
+        width_ratios=[1.15, 1.0] if split else [1.0],
+    )
+    columns = [None, window] if split else [None]
+    for column, part in enumerate(columns):
+        for row, panel in enumerate(panels):
+            _draw(grid[row][column], run, panel, part)
+        _states(grid[-1][column], run, part)
+        _mark_events(list(grid[:, column]), told, part)
+        grid[-1][column].set_xlabel("time [s]")
+    if split:
+        for axes in grid[:-1, 0]:
+            axes.axvspan(window.start, window.end, color="#f0e442", alpha=0.2, linewidth=0.0)
+        grid[0][1].set_title(_close_up(window), fontsize=9.5, color="#555555")
+    for row in range(len(panels)):
+        grid[row][0].set_ylabel(f"{panels[row].title}\n[{_scale(run, panels[row])[1]}]")
+    about = f"{run.case.name}, {run.scenario}, {run.controller}, seed {run.seed}"
+    lasting = duration(round(float(run.time[-1]), 3))
+    figure.align_ylabels(grid[:, 0])
+    headline(figure, _finding(run), f"{about}: {lasting}")
+    handles, labels = grid[0][-1].get_legend_handles_labels()
+    if len(labels) > 1:
+        figure.legend(handles, labels, loc="upper right", ncols=3, borderpad=0.1)
+    if told:
+        figure.supxlabel(_events_text(run), x=0.012, ha="left", fontsize=9.0)
     return figure
 
 
@@ -186,14 +183,14 @@ def _draw(axes: Axes, run: Run, panel: _Panel, window: Window | None) -> None:
         values = _signal(run, name)[rows] / factor
         at, low, high = envelope(time, values, _BINS)
         if label == "asked":  # it is smooth, and a line shows it best
-            axes.plot(at, low, color=colour, label=label, linestyle=_DASHED, linewidth=1.2)
+            axes.plot(at, low, color=colour, label=label, linestyle=DASHED, linewidth=1.2)
         elif at is time or window is not None:
             axes.plot(time, values, color=colour, label=label, linewidth=1.5)
         else:
             axes.fill_between(at, low, high, color=colour, alpha=0.75, linewidth=0.5, label=label)
     _shade_limits(axes, panel, factor)
     if panel.rest is not None:
-        axes.axhline(panel.rest / factor, color=REFERENCE, linewidth=0.8, linestyle=_DASHED)
+        axes.axhline(panel.rest / factor, color=REFERENCE, linewidth=0.8, linestyle=DASHED)
     if panel.slack and "rope.minimum_tension" in run:
         slack = run["rope.minimum_tension"][rows] <= _SLACK
         for start, end in runs_of_true(time, slack):

@@ -10,7 +10,7 @@ import numpy as np
 from models.basics import GRAVITY, FloatArray
 from synth.operability import AtDepth, Criterion, Operability
 
-from ..text import REFERENCE, quantity, typeset
+from ..text import REFERENCE, headline, quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -122,23 +122,11 @@ def periods_axis(axes: Axes, periods: FloatArray) -> None:
         axes.set_xlim(periods[0], periods[-1])
 
 
-def headline(
-    figure: Figure, axes: Axes, study: Operability, at: AtDepth | None, finding: str
-) -> None:
-    """Set what the figure found as its title, and what it is about in small below.
+def titled(figure: Figure, study: Operability, at: AtDepth | None, finding: str) -> Figure:
+    """Set what the figure found as its title, and what it is about in small below; return it.
 
-    Parameters
-    ----------
-    figure, axes
-        Where.
-    study
-        The study.
-    at
-        The length of rope; None where the figure shows several.
-    finding
-        The title.
+    `at` is the length of rope; None where the figure shows several.
     """
-    figure.suptitle(typeset(finding), x=0.012, ha="left", fontsize=11.0, fontweight="bold")
     gamma = f", gamma {study.case.sea.gamma}" if study.case.sea.spectrum == "jonswap" else ""
     about = f"{study.case.name}: {study.case.sea.spectrum}{gamma}"
     if at is not None:
@@ -146,4 +134,4 @@ def headline(
     if study.headings is not None:
         h = own_heading(study, study.depths[0].main)
         about += f", heading {float(study.headings[h]) * DEGREES:.0f} deg"
-    axes.set_title(about, fontsize=9.5, fontweight="normal", color="#555555", pad=6.0)
+    return headline(figure, finding, about)

@@ -12,6 +12,10 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .export import write_result as write_result
     from .figures import sweep_figures as sweep_figures
+    from .report import place_of as place_of
+    from .report import sweep_data as sweep_data
+    from .report import sweep_report as sweep_report
+    from .report import write_sweep as write_sweep
     from .store import ATTRIBUTE as ATTRIBUTE
     from .store import stored_question as stored_question
     from .sweeping import resume_sweep as resume_sweep

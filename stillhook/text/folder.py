@@ -9,10 +9,13 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from models.basics import InputError
+
+from .table import Drawing
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,47 @@ class OutputFolder:
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
         return target
+
+    def draw(
+        self,
+        drawings: Sequence[Drawing],
+        *,
+        kinds: Sequence[str] = ("svg", "png"),
+        progress: Callable[[str, int, int], None] | None = None,
+    ) -> list[Path]:
+        """Draw figures and write them; return their files.
+
+        Where there is nothing to draw a file of that name that an earlier run left is removed.
+
+        Parameters
+        ----------
+        drawings
+            The figures.
+        kinds
+            Endings of their files.
+        progress
+            Called as progress("figures", done, total).
+
+        Raises
+        ------
+        InputError
+            If a file cannot be written.
+        """
+        from . import style
+
+        written: list[Path] = []
+        for done, drawing in enumerate(drawings):
+            if progress is not None:
+                progress("figures", done, len(drawings))
+            try:
+                figure = drawing.draw()
+            except InputError:  # a run that was cut short, say, has nothing to show
+                for kind in kinds:
+                    self.discard(f"{drawing.name}.{kind}")
+                continue
+            for kind in kinds:
+                written.append(self.write(f"{drawing.name}.{kind}", style.picture(figure, kind)))
+        return written
 
     def discard(self, name: str) -> None:
         """Remove a file of an earlier run, if there is one."""

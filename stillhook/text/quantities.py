@@ -7,6 +7,7 @@ the report: torques in kN m, motor speeds in rpm, small motions in mm.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 # The largest factor that leaves a figure of at least one is taken; the last entry otherwise.
 _SCALES: dict[str, tuple[tuple[float, str], ...]] = {
@@ -122,3 +123,14 @@ def count(number_of: int, noun: str) -> str:
     """
     plural = f"{noun}es" if noun.endswith("s") else f"{noun}s"
     return f"{number_of} {noun if number_of == 1 else plural}"
+
+
+def listed(parts: Sequence[str]) -> str:
+    """Return things as a sentence lists them.
+
+    Examples
+    --------
+    >>> listed(["mass"]), listed(["mass", "drag", "delay"])
+    ('mass', 'mass, drag and delay')
+    """
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"

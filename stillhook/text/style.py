@@ -11,14 +11,15 @@ import contextlib
 import io
 import logging
 import re
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Sequence
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from synth.design import GainDesign
+P = ParamSpec("P")
 
 HOOK = "#7f7f7f"
 BEFORE = "#d55e00"
@@ -26,6 +27,7 @@ AFTER = "#0072b2"
 DRUM = "#009e73"
 REFERENCE = "#222222"
 BROKEN = "#d55e00"
+DASHED = (0, (4, 3))
 
 _STYLE: Any = {
     "font.size": 10.0,
@@ -70,20 +72,48 @@ def new_figure(width: float = 7.2, height: float = 4.4) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def headline(axes: Axes, finding: str, design: GainDesign) -> None:
-    """Set what the figure found as its title, and what it is about in small below."""
-    from .summary import sea_text
+def panel(width: float = 7.2, height: float = 4.4) -> tuple[Figure, Axes]:
+    """Return an empty figure [inch] with one set of axes."""
+    figure = new_figure(width, height)
+    return figure, figure.add_subplot()
 
-    figure = axes.get_figure()
-    if figure is not None:
-        figure.suptitle(typeset(finding), x=0.012, ha="left", fontsize=11.0, fontweight="bold")
-    about = f"{design.case.name}: {sea_text(design)}"
-    axes.set_title(typeset(about), fontsize=9.5, fontweight="normal", color="#555555", pad=6.0)
+
+def drawn(make: Callable[P, Figure]) -> Callable[P, Figure]:
+    """Make a function draw in the style of all figures."""
+
+    @wraps(make)
+    def inside(*args: P.args, **kwargs: P.kwargs) -> Figure:
+        with styled():
+            return make(*args, **kwargs)
+
+    return inside
+
+
+def headline(figure: Figure, finding: str, about: str = "") -> Figure:
+    """Set what a figure found as its title, and what it is about in small below; return it."""
+    figure.suptitle(typeset(finding), x=0.012, ha="left", fontsize=11.0, fontweight="bold")
+    if about:
+        small: Any = {"fontsize": 9.5, "fontweight": "normal", "color": "#555555"}
+        figure.axes[0].set_title(typeset(about), pad=6.0, **small)
+    return figure
+
+
+def logarithmic(
+    axes: Axes, which: Literal["x", "y"] = "y", subs: Sequence[float] = (1.0, 2.0, 5.0)
+) -> None:
+    """Make an axis logarithmic, marked in plain numbers that begin with some digits."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    (axes.set_yscale if which == "y" else axes.set_xscale)("log")
+    axis = axes.yaxis if which == "y" else axes.xaxis
+    axis.set_major_locator(LogLocator(subs=subs, numticks=20))
+    axis.set_minor_formatter(NullFormatter())
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def typeset(text: str) -> str:
-    """Return a text with H_s, T_p, T_S and M_s as matplotlib's mathematics."""
-    return re.sub(r"\b(H_s|T_p|T_S|M_s)\b", r"$\1$", text)
+    """Return a text with H_s, T_p, T_z, T_S and M_s as matplotlib's mathematics."""
+    return re.sub(r"\b(H_s|T_p|T_z|T_S|M_s)\b", r"$\1$", text)
 
 
 def annotate(axes: Axes, text: str, at: tuple[float, float], offset: tuple[float, float]) -> None:

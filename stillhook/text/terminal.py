@@ -1,4 +1,4 @@
-"""The terminal: a summary that fits 80 columns, a progress bar, and where warnings go.
+"""The terminal: reports that fit 80 columns, a progress bar, and where warnings go.
 
 Results go to standard output; progress, warnings and errors to standard error, so that a
 result can be piped.  Colour and progress appear only where a person looks at a terminal; rich
@@ -8,6 +8,7 @@ takes care of that, and of `NO_COLOR`.  It is imported where it is used, as it s
 from __future__ import annotations
 
 import contextlib
+import io
 import re
 import sys
 import warnings
@@ -16,26 +17,11 @@ from typing import TYPE_CHECKING
 
 from models.basics import PhysicsWarning
 
-from .quantities import duration, percent
-from .summary import (
-    LimitRow,
-    command_text,
-    effect,
-    facts,
-    gain_rows,
-    has_gains,
-    limit_rows,
-    margin_rows,
-    motion_rows,
-    required_rows,
-)
+from .table import Bar, Drawing, Report, Table
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
     from rich.text import Text
-
-    from synth.design import GainDesign
 
 Progress = Callable[[str, int, int], None]
 
@@ -48,6 +34,7 @@ _STAGES = {
     "bound": "comparing with the best possible",
 }
 _BAR = 10  # cells
+_WIDE = 9  # columns that leave no room for an indent
 _PATH = re.compile(r"^[a-z_]+(\.[\w\[\]]+)+$")
 
 
@@ -59,53 +46,78 @@ def console(*, stderr: bool = False) -> Console:
     return Console(stderr=stderr, markup=False, highlight=False, emoji=False)
 
 
-def show_design(design: GainDesign, out: Console, *, bound: bool = True) -> None:
-    """Write the summary of a design, with the bound beside it if it is wanted."""
-    _status(design, out)
-    out.print()
-    table = _table("motion", "rms", "significant height", _largest(design))
-    for row in motion_rows(design):
-        table.add_row(row.label, row.rms, row.significant, row.largest)
-    _put(table, out)
-    out.print(f"  {effect(design)}")
-    out.print()
-    if has_gains(design):
-        out.print(f"  {command_text(design)}")
-        table = _table("gain", "on the payload's", "value", "A times it", "", left=(0, 1, 4))
-        for gain in gain_rows(design):
-            table.add_row(gain.name, gain.acts_on, gain.value, gain.product, gain.unit)
-        _put(table, out)
-        out.print()
-    if design.margins is not None:
-        table = _table("margin", "", "", left=(0, 2))
-        for cells in margin_rows(design):
-            table.add_row(*cells)
-        _put(table, out)
-        out.print()
-    if design.limits:
-        _show_limits(design, out)
-        out.print()
-    pairs(facts(design, bound=bound), out)
+def show(item: Report | Table, out: Console) -> None:
+    """Write a report or a table."""
+    if isinstance(item, Report):
+        _show_report(item, out)
+        return
+    from rich.padding import Padding
+    from rich.table import Table as Grid
+    from rich.text import Text
+
+    bare = not any(item.headings)
+    wide = len(item.columns) >= _WIDE
+    grid = Grid(box=None, pad_edge=False, padding=(0, 1 if wide else 2, 0, 0), header_style="bold")
+    grid.show_header = not bare
+    if item.title and item.title != item.headings[0]:
+        out.print(item.title, style="bold", soft_wrap=True)
+    for k, (column, heading) in enumerate(zip(item.columns, item.headings, strict=True)):
+        # The last words give way where the line is full.
+        words = column.left and k == len(item.columns) - 1
+        grid.add_column(
+            heading,
+            justify="left" if column.left or k == 0 else "right",
+            no_wrap=not words,
+            overflow="fold" if words else "ellipsis",
+            style="dim" if bare and k == 0 else None,
+        )
+    for k in item.shown:
+        cells: list[str | Text] = list(item.cells(k))
+        for at, cell in enumerate(item.rows[k]):
+            if isinstance(cell, Bar):
+                cells[at] = _bar(cell)
+        grid.add_row(*cells, style="red" if k in item.broken else None)
+    indent = (0, 0, 0, 0 if wide else 2)
+    out.print(Padding(grid, indent, expand=False))
+    for note in item.notes:
+        out.print(Padding(Text(note), indent, expand=False))
 
 
-def pairs(rows: Sequence[tuple[str, str]], out: Console) -> None:
-    """Write labels and texts in two columns."""
-    from rich.table import Table
+def terminal_text(item: Report | Table, width: int = 80) -> str:
+    """Return what `show` writes, without colour."""
+    from rich.console import Console
 
-    table = Table.grid(padding=(0, 2))
-    table.add_column(style="dim", no_wrap=True)
-    table.add_column(overflow="fold")
-    for label, text in rows:
-        table.add_row(label, text)
-    _put(table, out)
+    target = io.StringIO()
+    plain = {"markup": False, "highlight": False, "emoji": False, "no_color": True}
+    show(item, Console(file=target, width=width, **plain))  # type: ignore[arg-type]
+    return target.getvalue()
 
 
-def table_of(title: str, rows: Sequence[tuple[str, str, str]], out: Console) -> None:
-    """Write a titled table of label, figure and remark."""
-    table = _table(title, "", "", left=(0, 2))
-    for cells in rows:
-        table.add_row(*cells)
-    _put(table, out)
+def _show_report(report: Report, out: Console) -> None:
+    """Write title, verdict and sections, a line between them; drawings have files of their own."""
+    from rich.padding import Padding
+    from rich.text import Text
+
+    about = f": {report.about}" if report.about else ""
+    out.print(Text.assemble((report.name, "bold"), about))
+    if report.status:
+        mark = report.verdict_mark
+        style = "bold green" if mark == "ok" else "bold red"
+        verdict = Text.assemble((mark, style), f": {report.status}") if mark else report.status
+        out.print(verdict, soft_wrap=True)
+    for section in report.sections:
+        items = [item for item in section.items if not isinstance(item, Drawing)]
+        if items:
+            out.print()
+        if items and section.title:
+            out.print(section.title, style="bold", soft_wrap=True)
+        for k, item in enumerate(items):
+            if isinstance(item, str):
+                out.print(Padding(Text(item.strip("`")), (0, 0, 0, 2), expand=False))
+                continue
+            if k and isinstance(items[k - 1], Table):
+                out.print()
+            show(item, out)
 
 
 def commands(rows: Sequence[tuple[str, str]], out: Console) -> None:
@@ -117,13 +129,18 @@ def commands(rows: Sequence[tuple[str, str]], out: Console) -> None:
 
 
 @contextlib.contextmanager
-def progress(*, shown: bool) -> Iterator[Progress]:
+def progress(
+    *, shown: bool, pace: Callable[[float], str] | None = None
+) -> Iterator[Callable[[str, float, float], None]]:
     """Show a progress bar on standard error while a computation runs.
 
     Parameters
     ----------
     shown
         Whether to show it at all; on anything but a terminal it is not shown in any case.
+    pace
+        Words for what is done in a second: shown beside the time that is left.  Otherwise it is the
+        time since the beginning that is shown.
 
     Yields
     ------
@@ -134,22 +151,33 @@ def progress(*, shown: bool) -> Iterator[Progress]:
     if not (shown and out.is_terminal):
         yield lambda stage, done, total: None
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
-    from rich.progress import Progress as Bars
+    from rich import progress as bars
+    from rich.text import Text
 
+    class Pace(bars.TextColumn):
+        def render(self, task: bars.Task) -> Text:
+            return Text(pace(task.speed) if pace is not None and task.speed else "")
+
+    clock = [bars.TimeElapsedColumn()] if pace is None else [Pace(""), bars.TimeRemainingColumn()]
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(bar_width=30),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
+        bars.TextColumn("{task.description}"),
+        bars.BarColumn(bar_width=30 if pace is None else 20),
+        bars.MofNCompleteColumn() if pace is None else bars.TaskProgressColumn(),
+        *clock,
     )
-    with Bars(*columns, console=out, transient=True) as bars:
-        task = bars.add_task("building the plant", total=None)
+    # The pace is that of minutes: designs and predictive controllers come in lumps.
+    shows = bars.Progress(*columns, console=out, transient=True, speed_estimate_period=300.0)
+    with shows:
+        task = shows.add_task("building the plant", total=None)
+        seen = -1.0
 
-        def tell(stage: str, done: int, total: int) -> None:
+        def tell(stage: str, done: float, total: float) -> None:
+            nonlocal seen
             # One bar for all stages, so that its clock shows the whole time.
-            name = _STAGES.get(stage, stage)
-            bars.update(task, description=name, completed=done, total=total)
+            shows.update(task, description=_STAGES.get(stage, stage or "waiting"), total=total)
+            if done != seen or pace is None:  # the pace is of what is done, not of looks
+                seen = done
+                shows.update(task, completed=done)
 
         yield tell
 
@@ -180,71 +208,13 @@ def told_once() -> Iterator[None]:
         yield
 
 
-def _status(design: GainDesign, out: Console) -> None:
-    """Write the case and the verdict, the bad news first."""
+def _bar(use: Bar) -> Text:
+    """Return a bar of the use and its figure; one that runs over has an arrow at its end."""
     from rich.text import Text
 
-    about = " ".join(design.case.description.split())
-    out.print(Text.assemble((design.case.name, "bold"), f": {about}" if about else ""))
-    mark, style = ("ok", "bold green") if design.ok else ("NOT OK", "bold red")
-    out.print(Text.assemble((mark, style), f": {design.status}"))
-    rows = required_rows(design)
-    if rows:
-        out.print()
-        wanted = f"needed in H_s {design.case.sea.significant_height:.3g} m"
-        table = _table("limits that break", "is", wanted)
-        for cells in rows:
-            table.add_row(*cells)
-        _put(table, out)
-        out.print(f"  All figures below are those in H_s {design.significant_height:.3g} m.")
-
-
-def _largest(design: GainDesign) -> str:
-    return f"largest in {duration(design.case.limits.exposure_time)}"
-
-
-def _show_limits(design: GainDesign, out: Console) -> None:
-    rows = limit_rows(design)
-    heading = "price" if any(row.price for row in rows) else ""
-    table = _table("limit", "value", "bound", "use", "", heading, left=(0, 3))
-    for row in rows:
-        cells = row.label, row.value, row.bound, _bar(row), percent(row.use), row.remark
-        table.add_row(*cells)
-    _put(table, out)
-    if heading:
-        out.print("  price: what the payload's rms would lose if the bound were 1 % looser")
-    if not all(row.enforced for row in rows):
-        out.print("  reported: the case asks for the figure only (limits.drive: report)")
-
-
-def _bar(row: LimitRow) -> Text:
-    """Return a bar of the use; one that runs over has an arrow at its end."""
-    from rich.text import Text
-
-    filled = min(_BAR, max(0, round(_BAR * min(row.use, 1.0))))
-    style = "red" if not row.kept else "yellow" if row.use > 0.95 else "green"
-    bar = "█" * (_BAR - 1) + "▶" if not row.kept else "█" * filled
-    return Text.assemble(
-        (bar, style if row.enforced else f"dim {style}"), ("░" * (_BAR - len(bar)), "dim")
-    )
-
-
-def _table(*headings: str, left: Sequence[int] = (0,)) -> Table:
-    """Return a table without lines; figures to the right, the columns `left` to the left."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
-    for index, heading in enumerate(headings):
-        last = index == len(headings) - 1
-        table.add_column(
-            heading,
-            justify="left" if index in left else "right",
-            no_wrap=not (last and index in left),
-        )
-    return table
-
-
-def _put(table: Table, out: Console) -> None:
-    from rich.padding import Padding
-
-    out.print(Padding(table, (0, 0, 0, 2), expand=False))
+    filled = min(_BAR, max(0, round(_BAR * min(use.value, 1.0))))
+    style = "red" if not use.kept else "yellow" if use.value > 0.95 else "green"
+    bar = "█" * (_BAR - 1) + "▶" if not use.kept else "█" * filled
+    rest = "░" * (_BAR - len(bar))
+    shade = style if use.enforced else f"dim {style}"
+    return Text.assemble((bar, shade), (rest, "dim"), f" {use.text:>6}")

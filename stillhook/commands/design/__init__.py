@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .optimise import interruptible as interruptible
     from .robust_arguments import add_pareto_arguments as add_pareto_arguments
     from .robust_arguments import add_robust_arguments as add_robust_arguments
     from .size_arguments import add_size_arguments as add_size_arguments

@@ -25,17 +25,10 @@ def run(arguments: argparse.Namespace) -> int:
         tell("bound", 0, 1)
         found = bound_for(case, masses=arguments.masses, measurements=heard, faint=arguments.faint)
         tell("bound", 1, 1)
-    out = console()
-    if arguments.quiet:
-        out.print(str(found).partition("\n")[0], soft_wrap=True, highlight=False)
-        return 0 if found.feasible else 1
-    out.print(str(found), soft_wrap=True, highlight=False)
-    words = case_words(arguments, None)
-    commands(
-        [
-            ("gains of payload feedback", f"stillhook optimise {words}"),
-            ("other structures", f"stillhook structures {words}"),
-        ],
-        out,
-    )
+    out, words = console(), case_words(arguments, None)
+    text = str(found).partition("\n")[0] if arguments.quiet else str(found)
+    out.print(text, soft_wrap=True)
+    if not arguments.quiet:
+        gains = ("gains of payload feedback", f"stillhook optimise {words}")
+        commands([gains, ("other structures", f"stillhook structures {words}")], out)
     return 0 if found.feasible else 1

@@ -6,8 +6,9 @@ import argparse
 
 from models.basics import InputError
 
-from ...text import OutputFolder, commands, console, progress, show_design
+from ...text import OutputFolder, progress
 from ..given import case_words, given_case, parse_gains
+from ..working import conclude
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -25,20 +26,14 @@ def run(arguments: argparse.Namespace) -> int:
     folder = None if arguments.out is None else OutputFolder.prepare(arguments.out)
     from synth import evaluate_gains
 
+    from ...designs import design_report, write_report
+
+    written = []
     with progress(shown=not arguments.quiet) as tell:
         design = evaluate_gains(case, gains)
         if folder is not None:
-            from ...designs import write_report
-
-            write_report(folder.path, design=design, bound=arguments.bound, progress=tell)
-    out = console()
-    if arguments.quiet:
-        out.print(f"{case.name}: {design.status}", soft_wrap=True)
-        return 0 if design.ok else 1
-    show_design(design, out, bound=arguments.bound)
-    out.print()
-    if folder is not None:
-        out.print(f"Written to {folder.path}: summary.md, design.yaml, figures", soft_wrap=True)
+            written = write_report(folder.path, design=design, bound=arguments.bound, progress=tell)
     words = case_words(arguments, None if folder is None else str(folder.path / "case.yaml"))
-    commands([("the best gains for this case", f"stillhook optimise {words}")], out)
-    return 0 if design.ok else 1
+    again = [("the best gains for this case", f"stillhook optimise {words}")]
+    report = design_report(design, bound=arguments.bound and not arguments.quiet)
+    return conclude(report, arguments, written=written, following=lambda: again)

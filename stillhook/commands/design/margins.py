@@ -6,10 +6,10 @@ import argparse
 
 from models.basics import InputError, check_range
 
-from ...text import commands, console, progress
+from ...text import Report, Section
 from ..design_argument import given_design
 from ..given import case_words, given_case
-from .optimise import interruptible
+from ..working import conclude, working
 
 _USUAL = {"payload.mass": 0.3, "stiffness": 0.2, "drag": 0.5}
 
@@ -22,27 +22,24 @@ def run(arguments: argparse.Namespace) -> int:
     design = given_design(case, arguments)
     from synth.robust import robustness
 
-    with progress(shown=not arguments.quiet) as tell, interruptible() as check:
-
-        def step(stage: str, done: int, total: int) -> None:
-            check()
-            tell(stage, done, total)
-
+    with working(arguments) as step:
         found = robustness(design, off, draws=arguments.draws, progress=step)
-    out = console()
-    if arguments.quiet:
-        out.print(f"{case.name}: {found.status}", soft_wrap=True)
-        return 0 if found.ok else 1
-    out.print(str(found), soft_wrap=True)
     words = case_words(arguments, None)
     vary = " ".join(
         f"--vary {d.path}={max(d.at(-1.0), 0.0):.5g}..{d.at(1.0):.5g}"
         for d in found.doubts
         if "." in d.path
     )
-    if vary:
-        commands([("gains for the whole range", f"stillhook robust {words} {vary}")], out)
-    return 0 if found.ok else 1
+    again = [("gains for the whole range", f"stillhook robust {words} {vary}")] if vary else []
+    first, *rest = str(found).splitlines()
+    report = Report(
+        name=case.name,
+        about=first,
+        status=found.status,
+        ok=found.ok,
+        sections=[Section("", rest)],
+    )
+    return conclude(report, arguments, following=lambda: again)
 
 
 def parse_off(texts: list[str]) -> dict[str, float | str]:

@@ -3,30 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import math
 import shlex
-import signal
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...text import (
-    AT_LEAST,
-    OutputFolder,
-    Progress,
-    commands,
-    console,
-    folder_name,
-    number,
-    progress,
-    show_design,
-)
+from ...designs import AT_LEAST
+from ...text import OutputFolder, folder_name, number, progress
 from ..given import case_words, gains_text, given_case
+from ..working import conclude, interruptible, kept_in
 
 if TYPE_CHECKING:
-    from models import Case
     from synth.design import GainDesign
 
 # Where a limit stands in the case file, to suggest a change of it.
@@ -47,7 +35,6 @@ _FIELDS = {
     "rope.tension.peak": "limits.rope_tension_peak",
     "rope.tension.least": "limits.minimum_tension",
 }
-_AGAIN = 0.25  # s between two attempts to interrupt
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -59,83 +46,34 @@ def run(arguments: argparse.Namespace) -> int:
     case = given_case(arguments)
     folder = OutputFolder.prepare(arguments.out or Path("out") / folder_name(case.name))
     folder.write("case.yaml", case.to_yaml())
+    from synth import optimise_gains
+
+    from ...designs import design_report, write_report
+
     design: GainDesign | None = None
     try:
         with progress(shown=not arguments.quiet) as tell:
-            design = _optimised(case, arguments, tell)
-            _report(folder, design, tell, bound=arguments.bound)
+            with interruptible() as check:
+
+                def step(stage: str, done: int, total: int) -> None:
+                    check()
+                    tell(stage, done, total)
+
+                starts, seed = arguments.starts, arguments.seed
+                design = optimise_gains(case, starts=starts, seed=seed, progress=step)
+            # Outside, as a report that is interrupted leaves whole files.
+            written = write_report(folder.path, design=design, bound=arguments.bound, progress=tell)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(_kept(folder, design)) from None
-    out = console()
-    if arguments.quiet:
-        out.print(f"{case.name}: {design.status}", soft_wrap=True)
-    else:
-        show_design(design, out, bound=arguments.bound)
-        out.print()
-        out.print(f"Written to {folder.path}: summary.md, design.yaml, figures", soft_wrap=True)
-        commands(_next(design, arguments, folder), out)
-    return 0 if design.ok else 1
-
-
-def _optimised(case: Case, arguments: argparse.Namespace, tell: Progress) -> GainDesign:
-    from synth import optimise_gains
-
-    with interruptible() as check:
-
-        def step(stage: str, done: int, total: int) -> None:
-            check()
-            tell(stage, done, total)
-
-        return optimise_gains(case, starts=arguments.starts, seed=arguments.seed, progress=step)
-
-
-def _report(folder: OutputFolder, design: GainDesign, tell: Progress, *, bound: bool) -> None:
-    from ...designs import write_report
-
-    write_report(folder.path, design=design, bound=bound, progress=tell)
-
-
-@contextlib.contextmanager
-def interruptible() -> Iterator[Callable[[], None]]:
-    """Make Ctrl-C end a computation that swallows it.
-
-    CasADi turns an interrupt within IPOPT into a solve that failed, and the search goes on
-    with the next start.  So an interrupt is remembered, and raised again until it gets
-    through: by a timer where there is one, and by the function that is yielded, which the
-    computation's progress calls.
-    """
-    asked = False
-
-    def interrupt(number: int, frame: object) -> None:
-        nonlocal asked
-        del number, frame
-        asked = True
-        if hasattr(signal, "setitimer"):
-            signal.setitimer(signal.ITIMER_REAL, _AGAIN)
-        raise KeyboardInterrupt
-
-    def check() -> None:
-        if asked:
-            raise KeyboardInterrupt
-
-    if threading.current_thread() is not threading.main_thread():
-        yield check  # only the main thread may handle signals
-        return
-    alarm = getattr(signal, "SIGALRM", None)
-    before = signal.signal(signal.SIGINT, interrupt)
-    before_alarm = signal.SIG_DFL if alarm is None else signal.signal(alarm, interrupt)
-    try:
-        yield check
-    finally:
-        if alarm is not None:
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
-            signal.signal(alarm, before_alarm)
-        signal.signal(signal.SIGINT, before)
+    report = design_report(design, bound=arguments.bound and not arguments.quiet)
+    return conclude(
+        report, arguments, written=written, following=lambda: _next(design, arguments, folder)
+    )
 
 
 def _kept(folder: OutputFolder, design: GainDesign | None) -> str:
     """Return what an interrupted run leaves behind: whole files, some of them perhaps old."""
-    kept = sorted(path.name for path in folder.path.iterdir() if not path.name.startswith("."))
+    kept = kept_in(folder.path)
     names = ", ".join(kept)
     if design is not None:
         return f"the design is finished, its report is not; kept in {folder.path}: {names}"

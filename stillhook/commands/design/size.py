@@ -10,28 +10,15 @@ from typing import TYPE_CHECKING
 
 from models.basics import InputError, check_range
 
-from ...text import (
-    OutputFolder,
-    Progress,
-    commands,
-    console,
-    folder_name,
-    number,
-    pairs,
-    progress,
-    quantity,
-)
-from ...text.terminal import _put, _table
+from ...text import OutputFolder, folder_name
 from ..given import case_words, given_case
-from .optimise import interruptible
+from ..working import conclude, working
 from .vary import parse_range
 
 if TYPE_CHECKING:
     from models import Case
     from synth.design import StructureDesign
-    from synth.sizing import CoDesign, Sizing
-
-_ROWS = 14  # of the table on the terminal
+    from synth.sizing import Sizing
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -54,16 +41,11 @@ def run(arguments: argparse.Namespace) -> int:
     case = given_case(arguments)
     structure_named(arguments.family_structure, case)
     folder = OutputFolder.prepare(arguments.out or Path("out") / f"{folder_name(case.name)}-size")
-    with progress(shown=not arguments.quiet) as tell, interruptible() as check:
+    if arguments.co_design:
+        return _co_designed(case, arguments, gear, radius, folder)
+    from synth.sizing import size_winch
 
-        def step(stage: str, done: int, total: int) -> None:
-            check()
-            tell(stage, done, total)
-
-        if arguments.co_design:
-            return _co_designed(case, arguments, gear, radius, folder, step)
-        from synth.sizing import size_winch
-
+    with working(arguments) as step:
         sizing = size_winch(
             case,
             target=arguments.target,
@@ -76,95 +58,28 @@ def run(arguments: argparse.Namespace) -> int:
             seed=arguments.seed,
             progress=step,
         )
-    return _told(sizing, arguments, folder)
+    from ...designs import size_report
 
-
-def _told(sizing: Sizing, arguments: argparse.Namespace, folder: OutputFolder) -> int:
-    written = _write(sizing, folder)
-    out = console()
-    name = sizing.case.name
-    if arguments.quiet:
-        out.print(f"{name}: {sizing.status}", soft_wrap=True)
-        return 0 if sizing.ok else 1
-    height = f"{sizing.case.sea.significant_height:.3g} m"
-    target = quantity(sizing.target, "m")
-    out.print(f"{name}: payload {target} rms in H_s {height}, {sizing.structure}", style="bold")
-    out.print(f"{'ok' if sizing.ok else 'NOT OK'}: {sizing.status}", soft_wrap=True)
-    out.print()
-    if sizing.points:
-        _show(sizing)
-        out.print()
-    given = sizing.given_rms
-    highest = sizing.highest_height
-    pairs(
-        [
-            ("whatever the motor", f"payload {quantity(sizing.unlimited_rms, 'm')} rms"),
-            (
-                "with the winch as it is",
-                f"payload {quantity(given, 'm')} rms"
-                if math.isfinite(given)
-                else "its limits cannot be kept in this sea",
-            ),
-            (
-                "the winch as it is meets the target",
-                f"up to H_s {highest:.3g} m" if highest > 0.0 else "in no sea looked at",
-            ),
-        ],
-        out,
-    )
-    out.print()
-    if written:
-        out.print(f"Written to {folder.path}: {', '.join(written)}", soft_wrap=True)
-    commands(_next(sizing, arguments, folder), out)
-    return 0 if sizing.ok else 1
-
-
-def _write(sizing: Sizing, folder: OutputFolder) -> list[str]:
-    from ...designs import structure_text
-    from ...text import picture
-
-    written = ["case.yaml"]
-    folder.write("case.yaml", sizing.case.to_yaml())
+    report, written = size_report(sizing), [folder.write("case.yaml", sizing.case.to_yaml())]
     for stale in ("size.csv", "size.svg", "size.png", "sized.yaml", "design.yaml"):
         folder.discard(stale)
     if sizing.points:
-        folder.write("size.csv", sizing.to_csv())
-        written.append("size.csv")
-    if sizing.chosen is not None:
-        from ...designs import size_figure
+        written.append(folder.write("size.csv", sizing.to_csv()))
+    written += folder.draw(report.drawings)
+    written += _sized(folder, sizing.sized_case, sizing.design)
+    return conclude(
+        report, arguments, written=written, following=lambda: _next(sizing, arguments, folder)
+    )
 
-        figure = size_figure(sizing)
-        for kind in ("svg", "png"):
-            folder.write(f"size.{kind}", picture(figure, kind))
-            written.append(f"size.{kind}")
-    if sizing.sized_case is not None:
-        folder.write("sized.yaml", sizing.sized_case.to_yaml())
-        written.append("sized.yaml")
-    if sizing.design is not None:
-        folder.write("design.yaml", structure_text(sizing.design))
-        written.append("design.yaml")
+
+def _sized(folder: OutputFolder, case: Case | None, design: StructureDesign | None) -> list[Path]:
+    """Write the case with its new winch, and the design for it."""
+    from ...designs import structure_text
+
+    written = [] if case is None else [folder.write("sized.yaml", case.to_yaml())]
+    if design is not None:
+        written.append(folder.write("design.yaml", structure_text(design)))
     return written
-
-
-def _show(sizing: Sizing) -> None:
-    table = _table("gear", "power", "continuous", "peak", "inertia", "limited by", left=(5,))
-    every = max(1, -(-len(sizing.points) // _ROWS))
-    best = sizing.chosen.gear if sizing.chosen is not None else None
-    for k, point in enumerate(sizing.points):
-        if k % every and point.gear != best:
-            continue
-        motor = point.motor
-        mark = " *" if point.gear == best else ""
-        figures = ["-"] * 4
-        if motor is not None:
-            figures = [
-                quantity(motor.power, "W"),
-                quantity(motor.torque_continuous, "N m"),
-                quantity(motor.torque_peak, "N m"),
-                quantity(motor.inertia, "kg m2"),
-            ]
-        table.add_row(number(point.gear) + mark, *figures, ", ".join(point.binding[:2]))
-    _put(table, console())
 
 
 def _next(
@@ -192,53 +107,28 @@ def _co_designed(
     gear: tuple[float, float] | None,
     radius: tuple[float, float] | None,
     folder: OutputFolder,
-    step: Progress,
 ) -> int:
     from synth.sizing import co_design
 
-    from ...designs import structure_text
+    from ...designs import co_design_report
 
-    found: CoDesign = co_design(
-        case,
-        gear=gear,
-        radius=radius,
-        structure=arguments.family_structure,
-        starts=arguments.starts,
-        seed=arguments.seed,
-        progress=step,
-    )
-    folder.write("case.yaml", case.to_yaml())
-    folder.write("gears.csv", found.to_csv())
-    written = ["case.yaml", "gears.csv"]
-    if found.best_case is not None:
-        folder.write("sized.yaml", found.best_case.to_yaml())
-        written.append("sized.yaml")
-    design: StructureDesign | None = found.design
-    if design is not None:
-        folder.write("design.yaml", structure_text(design))
-        written.append("design.yaml")
-    out = console()
-    if arguments.quiet:
-        out.print(f"{case.name}: {found.status}", soft_wrap=True)
-        return 0 if found.ok else 1
-    out.print(f"{case.name}: gear and gains together, {found.structure}", style="bold")
-    out.print(f"{'ok' if found.ok else 'NOT OK'}: {found.status}", soft_wrap=True)
-    out.print()
-    table = _table("gear", "drum", "payload rms", "limited by", left=(3,))
-    every = max(1, -(-len(found.points) // _ROWS))
-    for k, p in enumerate(found.points):
-        if k % every and p.gear != found.gear:
-            continue
-        rms = quantity(p.payload_rms, "m", 4) if math.isfinite(p.payload_rms) else "-"
-        mark = " *" if (p.gear, p.radius) == (found.gear, found.radius) else ""
-        table.add_row(
-            number(p.gear, 4) + mark, quantity(p.radius, "m"), rms, ", ".join(p.binding[:2])
+    with working(arguments) as step:
+        found = co_design(
+            case,
+            gear=gear,
+            radius=radius,
+            structure=arguments.family_structure,
+            starts=arguments.starts,
+            seed=arguments.seed,
+            progress=step,
         )
-    _put(table, out)
-    out.print()
-    out.print(f"Written to {folder.path}: {', '.join(written)}", soft_wrap=True)
-    if found.best_case is not None:
-        sized = shlex.quote(str(folder.path / "sized.yaml"))
-        again = f"stillhook worth {sized} --structure {found.structure}"
-        commands([("what would make it better", again)], out)
-    return 0 if found.ok else 1
+    written = [
+        folder.write("case.yaml", case.to_yaml()),
+        folder.write("gears.csv", found.to_csv()),
+        *_sized(folder, found.best_case, found.design),
+    ]
+    sized = shlex.quote(str(folder.path / "sized.yaml"))
+    again = ("what would make it better", f"stillhook worth {sized} --structure {found.structure}")
+    following = [] if found.best_case is None else [again]
+    report = co_design_report(found)
+    return conclude(report, arguments, written=written, following=lambda: following)

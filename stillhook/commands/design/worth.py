@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 
 from models.basics import check_range
 
-from ...text import OutputFolder, commands, console, folder_name, number, progress, quantity
-from ...text.terminal import _put, _table
+from ...text import OutputFolder, folder_name
 from ..given import case_words, given_case
-from .optimise import interruptible
+from ..working import conclude, working
 
 if TYPE_CHECKING:
     from synth.sizing import Worth
@@ -30,12 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     structure_named(arguments.family_structure, case)
     folder = OutputFolder.prepare(arguments.out or Path("out") / f"{folder_name(case.name)}-worth")
     folder.write("case.yaml", case.to_yaml())
-    with progress(shown=not arguments.quiet) as tell, interruptible() as check:
-
-        def step(stage: str, done: int, total: int) -> None:
-            check()
-            tell(stage, done, total)
-
+    with working(arguments) as step:
         result = worth(
             case,
             structure=arguments.family_structure,
@@ -43,73 +37,31 @@ def run(arguments: argparse.Namespace) -> int:
             seed=arguments.seed,
             progress=step,
         )
-    return _told(result, arguments, folder)
+    from ...designs import worth_report
 
-
-def _told(result: Worth, arguments: argparse.Namespace, folder: OutputFolder) -> int:
-    from ...designs import worth_figure
-    from ...text import picture
-
+    report, written = worth_report(result), []
     for stale in ("worth.csv", "worth.svg", "worth.png"):
         folder.discard(stale)
     if result.rows:
-        figure = worth_figure(result)
-        folder.write("worth.csv", result.to_csv())
-        for kind in ("svg", "png"):
-            folder.write(f"worth.{kind}", picture(figure, kind))
-    out = console()
-    if arguments.quiet:
-        out.print(f"{result.case.name}: {result.status}", soft_wrap=True)
-        return 0 if result.ok else 1
-    out.print(f"{result.case.name}: what is worth buying, {result.structure}", style="bold")
-    out.print(f"{'ok' if result.ok else 'NOT OK'}: {result.status}", soft_wrap=True)
+        written = [folder.write("worth.csv", result.to_csv()), *folder.draw(report.drawings)]
+    status = conclude(
+        report, arguments, written=written, following=lambda: _next(result, arguments, folder)
+    )
+    return status if result.rows else 1
+
+
+def _next(
+    result: Worth, arguments: argparse.Namespace, folder: OutputFolder
+) -> list[tuple[str, str]]:
     words = case_words(arguments, str(folder.path / "case.yaml"))
     structure = f" --structure {result.structure}"
+    target = shlex.quote(f"{1e3 * result.payload_rms:.3g} mm")
+    size = f"stillhook size {words} --target {target}{structure}"
     if not result.rows:
-        target = f"{1e3 * result.payload_rms:.3g} mm"
         rows = [("the controller itself", f"stillhook optimise {words}{structure}")]
         if math.isfinite(result.payload_rms) and result.payload_rms > 0.0:
-            again = f"stillhook size {words} --target {shlex.quote(target)}{structure}"
-            rows.append(("a motor that can do it", again))
-        commands(rows, out)
-        return 1
-    out.print()
-    _show(result)
-    out.print()
-    out.print(f"Written to {folder.path}: worth.csv, worth.svg, worth.png", soft_wrap=True)
+            rows.append(("a motor that can do it", size))
+        return rows
     if result.case.limits.drive == "enforce":
-        target = f"{1e3 * result.payload_rms:.3g} mm"
-        again = f"stillhook size {words} --target {shlex.quote(target)}{structure}"
-        commands([("the smallest motor that does as well", again)], out)
-    else:
-        again = f"stillhook size {words} --co-design{structure}"
-        commands([("the best gear", again)], out)
-    return 0
-
-
-def _show(result: Worth) -> None:
-    from ...designs import step_text
-    from ...designs.size_plot import value_text
-
-    out = console()
-    table = _table("", "is", "1 % of it", "per step", "twice as good")
-    idle = []
-    for row in result.rows:
-        if row.elasticity == 0.0 and row.gain == 0.0 and row.item.value != 0.0:
-            idle.append(row.item.name)
-            continue
-        share = row.elasticity if math.isfinite(row.elasticity) else row.price
-        better = -1.0 if row.factor < 1.0 else 1.0
-        table.add_row(
-            row.item.name + ("" if row.item.sold else " *"),
-            value_text(row.item.value, row.item.unit),
-            f"{number(better * share, 2)} %" if math.isfinite(share) else "-",
-            step_text(row),
-            quantity(row.twice_rms, "m") if math.isfinite(row.twice_rms) else "-",
-        )
-    _put(table, out)
-    out.print("  1 % of it: what the payload's rms changes by if the figure gets 1 % better")
-    if any(not row.item.sold for row in result.rows):
-        out.print("  *: a margin is given away, not bought; the gear is chosen")
-    if idle:
-        out.print(f"  worth nothing here: {', '.join(idle)}", soft_wrap=True)
+        return [("the smallest motor that does as well", size)]
+    return [("the best gear", f"stillhook size {words} --co-design{structure}")]

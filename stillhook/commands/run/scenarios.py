@@ -8,7 +8,7 @@ from models.basics import KINDS
 from models.operation import Choice, Option, scenario_names, scenario_options
 
 from ...controllers import PREDICTIVE
-from ...text import commands, console, pairs, quantity
+from ...text import commands, console, pairs, quantity, show
 
 CONTROLLER_TEXTS = {
     "feedback": "the gains of a design, on what comes up from the payload",
@@ -30,11 +30,11 @@ def run(arguments: argparse.Namespace) -> int:
     from synth.controllers import CONTROLLERS
 
     out.print("Scenarios (--scenario)", style="bold")
-    pairs(list(scenario_names().items()), out)
+    show(pairs(list(scenario_names().items())), out)
     out.print()
     out.print("Controllers (--controller)", style="bold")
     texts = {name: CONTROLLER_TEXTS.get(name, "") for name in CONTROLLERS}
-    pairs(list({**texts, **PREDICTIVE}.items()), out)
+    show(pairs(list({**texts, **PREDICTIVE}.items())), out)
     out.print()
     commands(
         [
@@ -50,7 +50,7 @@ def _options(name: str) -> None:
     options = scenario_options(name)  # an unknown name ends here
     out = console()
     out.print(f"{name}: {scenario_names()[name]}", style="bold", soft_wrap=True)
-    pairs([(key, _text(option)) for key, option in options.items()], out)
+    show(pairs([(key, _text(option)) for key, option in options.items()]), out)
     out.print()
     key, option = next(iter(options.items()))
     command = f"stillhook simulate CASE --scenario {name} --option '{key}={_example(option)}'"

@@ -31,7 +31,7 @@ from ...runs import (
 )
 from ...text import OutputFolder, commands, console, count, folder_name, progress
 from ..given import case_words
-from .interrupts import Stop, stoppable
+from ..working import Stop, stoppable
 from .simulate_given import Asked, again, asked_of
 
 if TYPE_CHECKING:

@@ -15,15 +15,15 @@ import numpy as np
 
 from models.basics import InputError, parse_quantity
 
-from ...text import OutputFolder, Progress, commands, console, folder_name, progress
-from ..design import interruptible
+from ...text import OutputFolder, Progress, folder_name
 from ..design_argument import given_design
 from ..given import case_words, gains_text, given_case
+from ..working import conclude, working
 
 if TYPE_CHECKING:
     from models import Case
     from synth.design import GainDesign, StructureDesign
-    from synth.operability import ContourCheck, Operability
+    from synth.operability import Operability
 
 _FINEST = 400  # points of an axis
 
@@ -41,12 +41,9 @@ def run(arguments: argparse.Namespace) -> int:
     folder = OutputFolder.prepare(arguments.out or Path("out") / name)
     from synth.operability import operability
 
-    with progress(shown=not arguments.quiet) as tell, interruptible() as check:
+    from ...seas import operability_report, write_operability
 
-        def step(stage: str, done: int, total: int) -> None:
-            check()
-            tell(stage, done, total)
-
+    with working(arguments) as step:
         source = case if arguments.held else _design(case, arguments, step)
         study = operability(
             source,
@@ -65,8 +62,11 @@ def run(arguments: argparse.Namespace) -> int:
         step("verify", 0, 1)
         checks = study.verify()
         step("figures", 0, 1)
-        written = write_operability(study, folder)
-    return _told(study, checks, written, arguments, folder)
+        written = write_operability(folder.path, study)
+    report = operability_report(study, checks)
+    return conclude(
+        report, arguments, written=written, following=lambda: _next(study, arguments, folder)
+    )
 
 
 def parse_axis(name: str, text: str, step: float | None) -> list[float]:
@@ -115,41 +115,6 @@ def parse_axis(name: str, text: str, step: float | None) -> list[float]:
     return values
 
 
-def write_operability(study: Operability, folder: OutputFolder) -> list[str]:
-    """Write a study: case, tables, figures; return the names of the files."""
-    from ...seas import (
-        capability_figure,
-        contour_figure,
-        depth_figure,
-        heading_figure,
-        netcdf,
-        scatter_figure,
-        workable_csv,
-    )
-    from ...text import picture
-
-    folder.write("case.yaml", study.case.to_yaml())
-    folder.write("operability.csv", study.to_csv())
-    folder.write("operability.nc", netcdf(study.dataset))
-    written = ["operability.csv", "operability.nc"]
-    drawn = {"contour": contour_figure(study), "capability": capability_figure(study)}
-    if study.headings is not None and study.headings.size > 1:
-        drawn["headings"] = heading_figure(study)
-    if len(study.depths) > 1:
-        drawn["depths"] = depth_figure(study)
-    folder.discard("workable.csv")
-    if study.scatter is not None:
-        drawn["scatter"] = scatter_figure(study)
-        folder.write("workable.csv", workable_csv(study))
-        written.append("workable.csv")
-    for name in ("contour", "capability", "headings", "depths", "scatter"):
-        for kind in ("svg", "png"):
-            folder.discard(f"{name}.{kind}")
-            if name in drawn:
-                folder.write(f"{name}.{kind}", picture(drawn[name], kind))
-    return [*written, *(f"{name}.svg" for name in drawn)]
-
-
 def _design(
     case: Case, arguments: argparse.Namespace, step: Progress
 ) -> GainDesign | StructureDesign:
@@ -159,27 +124,6 @@ def _design(
 
         return optimise_gains(case, progress=step)
     return given_design(case, arguments)
-
-
-def _told(
-    study: Operability,
-    checks: tuple[ContourCheck, ...],
-    written: list[str],
-    arguments: argparse.Namespace,
-    folder: OutputFolder,
-) -> int:
-    from ...seas import show_operability
-
-    works = any(float(at.main.limit.max()) > 0.0 for at in study.depths)
-    good = works and all(check.ok for check in checks)
-    out = console()
-    if arguments.quiet:
-        out.print(f"{study.case.name}: {study.status}", soft_wrap=True)
-        return 0 if good else 1
-    show_operability(study, checks, out)
-    out.print(f"Written to {folder.path}: {', '.join(written)}", soft_wrap=True)
-    commands(_next(study, arguments, folder), out)
-    return 0 if good else 1
 
 
 def _next(

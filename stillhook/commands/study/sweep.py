@@ -7,58 +7,40 @@ Ctrl-C; what was run in time until then is kept, and the same command, or --resu
 from __future__ import annotations
 
 import argparse
-import contextlib
 import shlex
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from models.basics import InputError, check_range
 
-from ...text import OutputFolder, console, count, folder_name
+from ...text import OutputFolder, count, folder_name
 from ..design_argument import given_design
-from ..given import given_case
-from ..run import stoppable
+from ..given import case_words, given_case
+from ..working import counting, tidy
+from .sweep_output import Swept, conclude_sweep
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from models import Case
     from models.spread import Spread
 
 _MOST = 100  # of the worst cases that are told
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Swept:
-    """A sweep that was made: its case, what varied, and what came of it."""
-
-    case: Case
-    design: object
-    spread: Spread
-    result: xr.Dataset
-    folder: Path
-    words: str
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Sweep, show and save; return the exit status."""
-    from .sweep_output import show, write
-
     check_range("sweep", "--worst", arguments.worst, low=0, high=_MOST)
     swept = _resumed(arguments) if arguments.resume else _swept(arguments)
     result = swept.result
     complete = int(result.attrs.get("complete", 1)) == 1
     if not complete and not (result["status"] >= 0).any():
         raise KeyboardInterrupt("no case was finished")
-    written = write(swept, arguments)
-    show(swept, written, arguments, console())
+    status = conclude_sweep(swept, arguments)
     if not complete:
         there = count(int((result["status"] >= 0).sum()), "case")
         raise KeyboardInterrupt(
             f"{there} kept; stillhook sweep --resume {shlex.quote(str(swept.folder))} goes on"
         )
-    return 0 if bool((result["stable"] == 1).all()) else 1
+    return status
 
 
 def _swept(arguments: argparse.Namespace) -> Swept:
@@ -73,27 +55,24 @@ def _swept(arguments: argparse.Namespace) -> Swept:
     design = given_pilot(case, arguments)
     spread = given_spread(case, arguments)
     place = Path(arguments.out or Path("out") / f"{folder_name(case.name)}-sweep")
-    made = [path for path in (place, *place.parents) if not path.exists()]
-    folder = OutputFolder.prepare(place).path
-    options: dict[str, Any] = {}
-    if arguments.mode == "time":
-        options = {
-            "duration": arguments.duration,
-            "settle": arguments.settle,
-            "scenario": arguments.scenario,
-            "options": _options(arguments.options),
-            "masses": arguments.masses,
-            "design_follows": arguments.follow,
-            "common_seed": arguments.common_seed,
-            "first": arguments.first,
-            "engine": arguments.cluster,
-            "jobs": arguments.jobs,
-            "store": folder,
-        }
-    from .compare import _progress
-
-    try:
-        with stoppable() as stop, _progress(stop, shown=not arguments.quiet) as tell:
+    with tidy(place):
+        folder = OutputFolder.prepare(place).path
+        options: dict[str, Any] = {}
+        if arguments.mode == "time":
+            options = {
+                "duration": arguments.duration,
+                "settle": arguments.settle,
+                "scenario": arguments.scenario,
+                "options": _options(arguments.options),
+                "masses": arguments.masses,
+                "design_follows": arguments.follow,
+                "common_seed": arguments.common_seed,
+                "first": arguments.first,
+                "engine": arguments.cluster,
+                "jobs": arguments.jobs,
+                "store": folder,
+            }
+        with counting(arguments) as step:
             result = sweep(
                 design,
                 spread,
@@ -102,16 +81,9 @@ def _swept(arguments: argparse.Namespace) -> Swept:
                 sampling=arguments.sampling,
                 seed=arguments.seed,
                 mode=arguments.mode,
-                progress=tell,
+                progress=step,
                 **options,
             )
-    except InputError:
-        for path in made:  # a question that was wrong leaves no empty folders behind
-            with contextlib.suppress(OSError):
-                path.rmdir()
-        raise
-    from ..given import case_words
-
     return Swept(
         case=case,
         design=design,
@@ -129,7 +101,6 @@ def _resumed(arguments: argparse.Namespace) -> Swept:
     from models.basics import PhysicsWarning
 
     from ...sweeps import resume_sweep, stored_question
-    from .compare import _progress
 
     if arguments.case is not None:
         raise InputError(
@@ -137,9 +108,9 @@ def _resumed(arguments: argparse.Namespace) -> Swept:
         )
     warnings.simplefilter("ignore", PhysicsWarning)  # told when it was begun
     question, spread, _ = stored_question(arguments.resume)
-    with stoppable() as stop, _progress(stop, shown=not arguments.quiet) as tell:
+    with counting(arguments) as step:
         result = resume_sweep(
-            arguments.resume, engine=arguments.cluster, jobs=arguments.jobs, progress=tell
+            arguments.resume, engine=arguments.cluster, jobs=arguments.jobs, progress=step
         )
     return Swept(
         case=question.case,

@@ -1,11 +1,11 @@
-"""What `stillhook sweep` prints and writes: summary, table, worst cases as case files, commands."""
+"""What `stillhook sweep` prints and writes: report, folder, figures, commands to go on with."""
 
 from __future__ import annotations
 
 import argparse
 import json
-import math
 import shlex
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,71 +14,53 @@ from models.spread import Spread
 from ...sweeps import (
     ATTRIBUTE,
     STATUS,
-    SweepSummary,
-    case_at,
+    place_of,
+    sweep_figures,
+    sweep_report,
     varied_paths,
     worst_cases,
-    write_result,
+    write_sweep,
 )
-from ...text import OutputFolder, commands, count, number, quantity, scale
-from ...text.terminal import _put, _table
+from ...text import OutputFolder, console, picture, show
+from ..working import conclude
 
 if TYPE_CHECKING:
     import xarray as xr
-    from rich.console import Console
 
-    from .sweep import Swept
-
-_FEW = 20_000  # cases up to which a CSV file is written too
-_ROWS = (
-    "payload_rms",
-    "payload_significant",
-    "velocity_rms",
-    "torque_rms",
-    "speed_rms",
-    "max_sensitivity",
-    "saturated_share",
-    "tension_largest",
-    "snap_load",
-    "energy_per_hour",
-)
-_SHOWN = 12  # rows of the table at most
+    from models import Case
 
 
-def write(swept: Swept, arguments: argparse.Namespace) -> list[Path]:
-    """Write what there is into the folder; return the files, the case file of the worst first."""
-    folder, result = OutputFolder(swept.folder), swept.result
-    written = []
-    worst = worst_cases(result, arguments.worst) if arguments.worst else []
-    for stale in folder.path.glob("worst*.yaml"):
-        folder.discard(stale.name)
-    for place, case_number in enumerate(worst):
-        name = "worst.yaml" if place == 0 else f"worst-{place + 1}.yaml"
-        text = _heading(result, case_number) + case_at(result, case_number, swept.case).to_yaml()
-        written.append(folder.write(name, text))
-    spread = swept.spread
-    if ATTRIBUTE in result.attrs:  # in plain numbers, as it was drawn
-        spread = Spread.from_dict(json.loads(result.attrs[ATTRIBUTE])["spread"])
-    written.append(folder.write("spread.yaml", spread.to_yaml()))
-    summary = SweepSummary.of(result)
-    text = json.dumps(_summary_dict(summary, result, worst), indent=2)
-    written.append(folder.write("summary.json", text + "\n"))
-    written.append(write_result(result, swept.folder / "cases.parquet"))
-    if result.sizes["case"] <= _FEW:
-        written.append(write_result(result, swept.folder / "cases.csv"))
-    if result.attrs.get("mode") != "time":
-        written.append(write_result(result, swept.folder / "result.nc"))
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Swept:
+    """A sweep that was made: its case, what varied, and what came of it."""
+
+    case: Case
+    design: object
+    spread: Spread
+    result: xr.Dataset
+    folder: Path
+    words: str
+
+
+def conclude_sweep(swept: Swept, arguments: argparse.Namespace) -> int:
+    """Write and print what the sweep says; return the exit status."""
+    result, most = swept.result, arguments.worst
+    written = write_sweep(swept.folder, result, swept.case, swept.spread, worst=most)
     if arguments.figures:
         written += _figures(swept)
-    return written
+    report = sweep_report(result, swept.case.name, worst=most)
+    if arguments.quiet:
+        show(replace(report, sections=report.sections[:1]), console())
+        return 0 if report.ok else 1
+    worst = worst_cases(result, most) if most else []
+    return conclude(
+        report, arguments, written=written, following=lambda: _next(swept, worst, arguments)
+    )
 
 
 def _figures(swept: Swept) -> list[Path]:
     """Draw and write the figures; return their files."""
     from synth.design import GainDesign, StructureDesign
-
-    from ...sweeps import sweep_figures
-    from ...text import picture
 
     linear = isinstance(swept.design, GainDesign | StructureDesign)
     in_time = swept.result.attrs.get("mode") == "time"
@@ -91,105 +73,6 @@ def _figures(swept: Swept) -> list[Path]:
     return [folder.write(f"{n}.png", picture(f, "png")) for n, f in figures.items()]
 
 
-def show(swept: Swept, written: list[Path], arguments: argparse.Namespace, out: Console) -> None:
-    """Print what the sweep says."""
-    result = swept.result
-    summary = SweepSummary.of(result)
-    told = ", ".join(varied_paths(result))
-    title = f"{swept.case.name}: {count(summary.cases, 'case')}, varying {told}"
-    out.print(title, style="bold", soft_wrap=True)
-    for sentence in summary.sentences:
-        out.print(sentence, soft_wrap=True)
-    for message in list(result.attrs.get("messages", []))[:3]:
-        out.print(message, style="dim", soft_wrap=True)
-    if arguments.quiet:
-        return
-    out.print()
-    names = [name for name in _ROWS if name in summary.quantiles]
-    names += [name for name in summary.quantiles if name not in names]
-    those = "of those that hold" if summary.in_time else "of those stable"
-    table = _table(those, "5 %", "median", "95 %", "largest", "unit", left=(0, 5))
-    for name in names[:_SHOWN]:
-        values, unit = summary.quantiles[name], summary.units[name]
-        factor, shown = scale(unit, max(abs(value) for value in values))
-        figures = (number(value / factor) for value in values)
-        table.add_row(name.replace("_", " "), *figures, "" if unit == "1" else shown)
-    _put(table, out)
-    worst = worst_cases(result, arguments.worst) if arguments.worst else []
-    if worst:
-        out.print()
-        _show_worst(result, worst, out)
-    out.print()
-    more = len([p for p in written if p.name.startswith("worst")])
-    files = [p.name for p in written if not p.name.startswith("worst-")]
-    also = f" to worst-{more}.yaml" if more > 1 else ""
-    listed = ", ".join(name + also if name == "worst.yaml" else name for name in files)
-    out.print(f"Written to {swept.folder}: {listed}", soft_wrap=True)
-    commands(_next(swept, worst, arguments), out)
-
-
-def _show_worst(result: xr.Dataset, worst: list[int], out: Console) -> None:
-    """Write the worst cases, a line each."""
-    out.print("The worst:", style="bold")
-    for case_number in worst:
-        at = _at(result, case_number)
-        rms = float(result["payload_rms"].to_numpy()[at])
-        values = []
-        for path in varied_paths(result):
-            unit = str(result[path].attrs.get("units", "")).removeprefix("1")
-            shown = quantity(float(result[path].to_numpy()[at]), unit)
-            values.append(f"{path.rpartition('.')[2].replace('_', ' ')} {shown}")
-        moves = "" if math.isnan(rms) else f", payload {quantity(rms, 'm')} rms"
-        told = f"{_status_of(result, at)}{moves}: {', '.join(values)}"
-        out.print(f"  case {case_number}: {told}", soft_wrap=True)
-
-
-def _status_of(result: xr.Dataset, at: int) -> str:
-    if "status" in result:
-        code = int(result["status"].to_numpy()[at])
-        return next(name for name, value in STATUS.items() if value == code)
-    return "stable" if int(result["stable"].to_numpy()[at]) == 1 else "unstable"
-
-
-def _at(result: xr.Dataset, case_number: int) -> int:
-    return int((result["case"].to_numpy() == case_number).argmax())
-
-
-def _heading(result: xr.Dataset, case_number: int) -> str:
-    """Return the first lines of a case file: which case it is, and how it is run again."""
-    at = _at(result, case_number)
-    lines = [f"# Case {case_number} of a sweep: {_status_of(result, at)}."]
-    if "seed" in result.coords:
-        lines.append(f"# Its run has the seed {int(result['seed'].to_numpy()[at])}.")
-    other = [p for p in varied_paths(result) if p.startswith("fault.")]
-    for path in other:
-        value = float(result[path].to_numpy()[at])
-        lines.append(f"# Not part of a case file: {path} = {value:.8g}")
-    return "\n".join(lines) + "\n"
-
-
-def _summary_dict(summary: SweepSummary, result: xr.Dataset, worst: list[int]) -> dict[str, Any]:
-    stable = summary.stable
-    return {
-        "cases": summary.cases,
-        "stable": {
-            "count": stable.count,
-            "share": stable.value,
-            "low_95": stable.low,
-            "high_95": stable.high,
-        },
-        "statuses": dict(summary.statuses),
-        "quantiles": {
-            name: dict(zip(("q05", "q50", "q95", "largest"), values, strict=True))
-            | {"unit": summary.units[name]}
-            for name, values in summary.quantiles.items()
-        },
-        "worst": worst,
-        "seconds": result.attrs.get("seconds"),
-        "seconds_in_cases": result.attrs.get("seconds_in_cases"),
-    }
-
-
 def _next(swept: Swept, worst: list[int], arguments: argparse.Namespace) -> list[tuple[str, str]]:
     """Return the commands to go on with."""
     folder = swept.folder
@@ -198,7 +81,7 @@ def _next(swept: Swept, worst: list[int], arguments: argparse.Namespace) -> list
         file = shlex.quote(str(folder / "worst.yaml"))
         found.append(("what the worst case would take", f"stillhook optimise {file}"))
         if swept.result.attrs.get("mode") == "time":
-            at = _at(swept.result, worst[0])
+            at = place_of(swept.result, worst[0])
             seed = int(swept.result["seed"].to_numpy()[at])
             words = ["stillhook simulate", file, *_controller_words(swept, arguments)]
             words.append(f"--first-seed {seed} --duration '{_duration(swept.result):g} s'")

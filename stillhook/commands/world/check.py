@@ -11,7 +11,19 @@ import math
 import shlex
 from typing import TYPE_CHECKING
 
-from ...text import commands, console, duration, number, percent, quantity, table_of
+from ...text import (
+    Report,
+    Section,
+    commands,
+    console,
+    duration,
+    heading_words,
+    number,
+    percent,
+    quantity,
+    remarks,
+    show,
+)
 from ..given import case_words, given_case
 
 if TYPE_CHECKING:
@@ -27,43 +39,31 @@ def run(arguments: argparse.Namespace) -> int:
 
     case = given_case(arguments)
     hook = HookMotion.from_case(case)
-    tables = derived_figures(case, hook)
+    report = check_report(case, hook)
+    words = case_words(arguments)
+    following = [("the gains for it", f"stillhook optimise {words}")]
+    if case.gains is not None:
+        following.append(("the gains in use", f"stillhook evaluate {words}"))
+    sea = f"stillhook check {shlex.quote(arguments.case)} --set sea.significant_height=1.5"
+    following.append(("another sea", sea))
     out = console()
-    about = " ".join(case.description.split())
-    out.print(f"{case.name}: {about}" if about else case.name)
-    for title, rows in tables.items():
-        out.print()
-        table_of(title, rows, out)
+    show(report, out)
     out.print()
     out.print(f"{arguments.case}: no errors", soft_wrap=True)
-    words = case_words(arguments)
-    rows_next = [("the gains for it", f"stillhook optimise {words}")]
-    if case.gains is not None:
-        rows_next.append(("the gains in use", f"stillhook evaluate {words}"))
-    rows_next.append(
-        (
-            "another sea",
-            f"stillhook check {shlex.quote(arguments.case)} --set sea.significant_height=1.5",
-        )
-    )
-    commands(rows_next, out)
+    commands(following, out)
     return 0
 
 
-def derived_figures(case: Case, hook: HookMotion) -> dict[str, Rows]:
-    """Return tables of label, figure and remark by their titles.
-
-    Parameters
-    ----------
-    case, hook
-        The case, and its hook's motion.
-    """
-    return {
-        "sea and hook": _sea(case, hook),
-        "rope and payload": _rope(case, hook),
-        "winch": _winch(case, hook),
-        "sensors and limits": _limits(case),
-    }
+def check_report(case: Case, hook: HookMotion) -> Report:
+    """Return what follows from a case, as tables of label, figure and remark."""
+    tables = [
+        remarks("sea and hook", _sea(case, hook)),
+        remarks("rope and payload", _rope(case, hook)),
+        remarks("winch", _winch(case, hook)),
+        remarks("sensors and limits", _limits(case)),
+    ]
+    about = " ".join(case.description.split())
+    return Report(name=case.name, about=about, sections=[Section("", tables)])
 
 
 def _sea(case: Case, hook: HookMotion) -> Rows:
@@ -110,8 +110,6 @@ def _sea(case: Case, hook: HookMotion) -> Rows:
 def _vessel(case: Case) -> Rows:
     """Return the vessel, the heading of the waves and the hook's place, where the case has them."""
     from models.vessel import place_text, vessel_raos
-
-    from ...text import heading_words
 
     vessel, place = case.vessel, case.vessel.hook_point
     if place is None or vessel.heading is None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from models import bundled_cases, case_schema, template_text, write_text_atomically
 from models.basics import InputError
 
-from ...text import commands, console, pairs
+from ...text import commands, console, pairs, show
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -21,8 +21,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _cases(arguments: argparse.Namespace) -> None:
     del arguments
-    out = console()
-    pairs(bundled_cases(), out)
+    show(pairs(bundled_cases()), console())
 
 
 def _new(arguments: argparse.Namespace) -> None:

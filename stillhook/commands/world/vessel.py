@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from importlib import import_module
 
-from ...text import commands, console, pairs
+from ...text import commands, console, pairs, show
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -21,7 +21,7 @@ def _list() -> int:
 
     out = console()
     found = bundled_vessels()
-    pairs(found, out)
+    show(pairs(found), out)
     rows = [("look at one", f"stillhook vessel import {name}") for name, _ in found[:1]]
     rows.append(("a vessel from its main dimensions", "stillhook vessel hull --help"))
     commands(rows, out)

@@ -14,23 +14,13 @@ import numpy as np
 from models.basics import InputError, check_range
 from models.vessel.readers import check_long_waves, write_raos
 
-from ...text import (
-    OutputFolder,
-    commands,
-    console,
-    folder_name,
-    number,
-    pairs,
-    percent,
-    progress,
-    quantity,
-    table_of,
-)
+from ...seas import hull_report
+from ...text import OutputFolder, folder_name, progress
 from ..design import parse_range
-from .vessel_import import _largest, _show_check, _verdict
+from ..working import conclude
 
 if TYPE_CHECKING:
-    from models.vessel.hull import Hull, HullVessel
+    from models.vessel.hull import Hull
 
 _STAGE = "computing waves on the hull"
 
@@ -70,9 +60,18 @@ def run(arguments: argparse.Namespace) -> int:
             cache=arguments.cache,
             progress=lambda done, of: tell(_STAGE, done, of),
         )
-        written = _write(vessel, folder, table)
-    _show(vessel, arguments, table, written)
-    return 0
+        report = hull_report(vessel, check_long_waves(vessel.raos), stem=table.stem)
+        written = [write_raos(table, vessel.raos), *folder.draw(report.drawings)]
+    file = shlex.quote(str(table))
+    following = [
+        (
+            "the hook of a crane at x = -25 m, y = -15 m in its seas",
+            f"stillhook motion subsea-crane --set vessel.raos={file} "
+            "--set vessel.hook.x=-25 --set vessel.hook.y=-15",
+        ),
+        ("the table again, with what it was made from", f"stillhook vessel import {file}"),
+    ]
+    return conclude(report, arguments, written=written, following=lambda: following)
 
 
 def _hull(arguments: argparse.Namespace) -> Hull:
@@ -143,127 +142,3 @@ def _command(arguments: argparse.Namespace) -> str:
         if action.nargs != 0:
             words.append(f"{value:g}" if isinstance(value, float) else str(value))
     return shlex.join(words)
-
-
-def _write(vessel: HullVessel, folder: OutputFolder, table: Path) -> list[Path]:
-    """Write the table and the pictures; return their paths."""
-    from ...seas import hull_figure, rao_figure
-    from ...text import picture
-
-    written = [write_raos(table, vessel.raos)]
-    for name, figure in (
-        (table.stem, rao_figure(vessel.raos)),
-        ("hull" if table.stem == "raos" else f"{table.stem}-hull", hull_figure(vessel)),
-    ):
-        written += [
-            folder.write(f"{name}.{kind}", picture(figure, kind)) for kind in ("svg", "png")
-        ]
-    return written
-
-
-def _show(
-    vessel: HullVessel, arguments: argparse.Namespace, table: Path, written: list[Path]
-) -> None:
-    out = console()
-    check = check_long_waves(vessel.raos)
-    if arguments.quiet:
-        out.print(f"{vessel.raos.name}: {_verdict(check)}", soft_wrap=True)
-        return
-    out.print(f"{vessel.raos.name}: {vessel.raos.source}", style="bold", soft_wrap=True)
-    out.print(f"{'ok' if check.ok else 'DOUBTFUL'}: {_verdict(check)}", soft_wrap=True)
-    out.print()
-    table_of("afloat", _afloat(vessel), out)
-    out.print()
-    table_of("motions", _motions(vessel), out)
-    out.print()
-    pairs(_about(vessel), out)
-    out.print()
-    _show_check(check)
-    for warning in vessel.warnings:
-        out.print(f"note: {warning}", soft_wrap=True)
-    out.print()
-    out.print(f"Written: {', '.join(str(path) for path in written)}", soft_wrap=True)
-    file = shlex.quote(str(table))
-    commands(
-        [
-            (
-                "the hook of a crane at x = -25 m, y = -15 m in its seas",
-                f"stillhook motion subsea-crane --set vessel.raos={file} "
-                "--set vessel.hook.x=-25 --set vessel.hook.y=-15",
-            ),
-            ("the table again, with what it was made from", f"stillhook vessel import {file}"),
-        ],
-        out,
-    )
-
-
-def _afloat(vessel: HullVessel) -> list[tuple[str, str, str]]:
-    plane, load = vessel.waterplane, vessel.loading
-    keel = plane.draught
-    roll, pitch = vessel.metacentric_heights
-    buoyancy = plane.centre_of_buoyancy
-    return [
-        ("displacement", quantity(load.mass, "kg", 4), f"{number(plane.volume, 4)} m3"),
-        (
-            "length x beam x draught",
-            f"{number(plane.length)} x {number(plane.beam)} x {number(plane.draught)} m",
-            f"block coefficient {number(plane.block)}",
-        ),
-        ("waterplane", f"{number(plane.area, 4)} m2", ""),
-        (
-            "centre of gravity, KG",
-            f"{load.centre[2] + keel:.2f} m",
-            f"x {load.centre[0]:+.2f} m, above the centre of buoyancy",
-        ),
-        ("KB + BM", f"{buoyancy[2] + keel:.2f} + {plane.metacentric_radii[0]:.2f} m", ""),
-        ("metacentric height, GM", f"{roll:.2f} m", f"of pitch {pitch:.0f} m"),
-        (
-            "radii of gyration",
-            ", ".join(f"{r:.2f}" for r in load.radii) + " m",
-            "roll, pitch, yaw",
-        ),
-    ]
-
-
-def _motions(vessel: HullVessel) -> list[tuple[str, str, str]]:
-    periods = vessel.natural_periods
-    omega = vessel.body.hydrodynamics.omega
-    rows = []
-    for name in ("heave", "roll", "pitch"):
-        period = getattr(periods, name)
-        inside = omega[0] <= 2.0 * math.pi / period <= omega[-1]
-        rows.append(
-            (
-                f"natural period of {name}",
-                quantity(period, "s"),
-                "" if inside else "beyond the frequencies computed",
-            )
-        )
-    rows.append(
-        (
-            "damping of roll added",
-            percent(vessel.body.roll_damping),
-            f"of critical, {vessel.body.critical_roll_damping / 1e6:.4g} MN m s",
-        )
-    )
-    return rows
-
-
-def _about(vessel: HullVessel) -> list[tuple[str, str]]:
-    raos, body = vessel.raos, vessel.body
-    error = body.hydrodynamics.energy_error(body.roll_damping * body.critical_roll_damping)
-    found = [
-        (
-            "table",
-            f"{raos.omega.size} frequencies, {raos.omega[0]:.3g} to {raos.omega[-1]:.3g} rad/s, "
-            f"{raos.heading.size} headings",
-        ),
-        (
-            "panels",
-            f"{vessel.hull.count}" + (", kept from an earlier run" if vessel.kept else ""),
-        ),
-        ("largest heave, roll, pitch", _largest(raos)),
-    ]
-    if math.isfinite(error):
-        found.insert(2, ("waves made and felt", f"agree within {percent(error)}"))
-    return found

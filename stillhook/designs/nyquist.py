@@ -20,14 +20,15 @@ from synth.design import GainDesign
 from ..text import (
     AFTER,
     BROKEN,
+    DASHED,
     REFERENCE,
     annotate,
-    has_gains,
+    drawn,
     headline,
-    new_figure,
     number,
-    styled,
+    panel,
 )
+from .summary import about_of, has_gains
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,6 +61,7 @@ class Window:
         return np.asarray(inside)
 
 
+@drawn
 def nyquist(design: GainDesign) -> Figure:
     """Return the Nyquist curve of the loop gain L with the circle of M_s around -1.
 
@@ -82,33 +84,30 @@ def nyquist(design: GainDesign) -> Figure:
         raise InputError("nyquist: all gains are zero, so there is no loop")
     window = _window(design)
     gain = _smooth(design.assessment.loop_gain, design.assessment.grid, window)
-    with styled():
-        figure = new_figure(6.4, 5.7)
-        axes = figure.add_subplot()
-        turn = np.linspace(0.0, 2.0 * np.pi, 361)
-        axes.plot(np.cos(turn), np.sin(turn), color="#999999", linewidth=0.9, label="|L| = 1")
-        _circles(design, axes)
-        axes.plot(gain.real, gain.imag, color=AFTER, label="L(iω), ω > 0")
-        axes.plot(
-            gain.real,
-            -gain.imag,
-            color=AFTER,
-            linewidth=0.9,
-            linestyle=(0, (4, 3)),
-            alpha=0.7,
-            label="ω < 0",
-        )
-        axes.plot(-1.0, 0.0, "+", color=REFERENCE, markersize=13, markeredgewidth=2.0)
-        _arrows(axes, gain, window)
-        _remarks(design, axes, window)
-        axes.set_xlim(window.left, window.right)
-        axes.set_ylim(-window.high, window.high)
-        axes.set_aspect("equal")
-        axes.set_xlabel("real part of L [-]")
-        axes.set_ylabel("imaginary part of L [-]")
-        axes.legend(loc="best")
-        headline(axes, _finding(design), design)
-    return figure
+    figure, axes = panel(6.4, 5.7)
+    turn = np.linspace(0.0, 2.0 * np.pi, 361)
+    axes.plot(np.cos(turn), np.sin(turn), color="#999999", linewidth=0.9, label="|L| = 1")
+    _circles(design, axes)
+    axes.plot(gain.real, gain.imag, color=AFTER, label="L(iω), ω > 0")
+    axes.plot(
+        gain.real,
+        -gain.imag,
+        color=AFTER,
+        linewidth=0.9,
+        linestyle=DASHED,
+        alpha=0.7,
+        label="ω < 0",
+    )
+    axes.plot(-1.0, 0.0, "+", color=REFERENCE, markersize=13, markeredgewidth=2.0)
+    _arrows(axes, gain, window)
+    _remarks(design, axes, window)
+    axes.set_xlim(window.left, window.right)
+    axes.set_ylim(-window.high, window.high)
+    axes.set_aspect("equal")
+    axes.set_xlabel("real part of L [-]")
+    axes.set_ylabel("imaginary part of L [-]")
+    axes.legend(loc="best")
+    return headline(figure, _finding(design), about_of(design))
 
 
 def _finding(design: GainDesign) -> str:

@@ -11,16 +11,16 @@ import numpy.typing as npt
 from models.basics import FloatArray
 from synth.operability import AtDepth, Operability
 
-from ..text import AFTER, BEFORE, DRUM, HOOK, new_figure, styled
+from ..text import AFTER, BEFORE, DRUM, HOOK, drawn, headline, new_figure
 from .operability_axes import (
     draw_steepest,
-    headline,
     limit_text,
     own_heading,
     pale,
     periods_axis,
     shade,
     steepest,
+    titled,
 )
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+@drawn
 def heading_figure(study: Operability, at: AtDepth | None = None) -> Figure:
     """Return two roses over heading, the bow up: the limiting H_s, and the limit that binds.
 
@@ -47,44 +48,43 @@ def heading_figure(study: Operability, at: AtDepth | None = None) -> Figure:
     # Where the waves come from, seen from the deck: head seas at the top.
     edges, rows = _around(contour.headings)
     rings = _edges(contour.periods)
-    with styled():
-        figure = new_figure(9.6, 5.6)
-        left = figure.add_subplot(1, 2, 1, projection="polar")
-        right = figure.add_subplot(1, 2, 2, projection="polar")
-        # Above the steepest seas of a period there is nothing to be limited.
-        limit = np.minimum(contour.limit[rows], steepest(contour.periods))
-        levels = _levels(float(limit.max()))
-        bands = BoundaryNorm(levels, 256, extend="neither")
-        mesh = left.pcolormesh(edges, rings, limit.T, cmap="viridis", norm=bands)
-        bar = figure.colorbar(mesh, ax=left, shrink=0.8, pad=0.08, location="bottom")
-        bar.set_label(r"limiting $H_s$ [m], up to the steepest seas")
-        real = contour.limit < steepest(contour.periods)
-        binding = np.where(real, contour.binding, "")
-        names = [str(n) for n in np.unique(binding)]
-        number = np.searchsorted(names, binding[rows])
-        colours = [pale(name) for name in names]
-        right.pcolormesh(
-            edges, rings, number.T, cmap=ListedColormap(colours), vmin=-0.5, vmax=len(names) - 0.5
-        )
-        labels = {c.name: limit_text(c) for c in contour.criteria}
-        right.legend(
-            handles=[
-                Patch(color=colour, label=labels.get(name, "nothing below the steepest seas"))
-                for name, colour in zip(names, colours, strict=True)
-            ],
-            loc="upper center",
-            bbox_to_anchor=(0.5, -0.14),
-            fontsize=8.5,
-        )
-        for axes, text in ((left, r"limiting $H_s$"), (right, "what binds")):
-            _rose(axes, contour.periods)
-            axes.set_title(text, fontsize=10.0, loc="center", pad=12.0)
-        best = float(np.degrees(contour.headings[int(limit.mean(axis=1).argmax())]))
-        finding = f"Best on average at a heading of {best:.0f} deg; rings are $T_p$, the bow is up"
-        figure.suptitle(finding, x=0.012, ha="left", fontsize=11.0, fontweight="bold")
-    return figure
+    figure = new_figure(9.6, 5.6)
+    left = figure.add_subplot(1, 2, 1, projection="polar")
+    right = figure.add_subplot(1, 2, 2, projection="polar")
+    # Above the steepest seas of a period there is nothing to be limited.
+    limit = np.minimum(contour.limit[rows], steepest(contour.periods))
+    levels = _levels(float(limit.max()))
+    bands = BoundaryNorm(levels, 256, extend="neither")
+    mesh = left.pcolormesh(edges, rings, limit.T, cmap="viridis", norm=bands)
+    bar = figure.colorbar(mesh, ax=left, shrink=0.8, pad=0.08, location="bottom")
+    bar.set_label(r"limiting $H_s$ [m], up to the steepest seas")
+    real = contour.limit < steepest(contour.periods)
+    binding = np.where(real, contour.binding, "")
+    names = [str(n) for n in np.unique(binding)]
+    number = np.searchsorted(names, binding[rows])
+    colours = [pale(name) for name in names]
+    right.pcolormesh(
+        edges, rings, number.T, cmap=ListedColormap(colours), vmin=-0.5, vmax=len(names) - 0.5
+    )
+    labels = {c.name: limit_text(c) for c in contour.criteria}
+    right.legend(
+        handles=[
+            Patch(color=colour, label=labels.get(name, "nothing below the steepest seas"))
+            for name, colour in zip(names, colours, strict=True)
+        ],
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.14),
+        fontsize=8.5,
+    )
+    for axes, text in ((left, r"limiting $H_s$"), (right, "what binds")):
+        _rose(axes, contour.periods)
+        axes.set_title(text, fontsize=10.0, loc="center", pad=12.0)
+    best = float(np.degrees(contour.headings[int(limit.mean(axis=1).argmax())]))
+    finding = f"Best on average at a heading of {best:.0f} deg; rings are $T_p$, the bow is up"
+    return headline(figure, finding)
 
 
+@drawn
 def scatter_figure(study: Operability, at: AtDepth | None = None) -> Figure:
     """Return the scatter diagram with the limits across it, and the share of each month if known.
 
@@ -101,57 +101,55 @@ def scatter_figure(study: Operability, at: AtDepth | None = None) -> Figure:
     months = at.workable["held"].by_month
     main = "loop" if "loop" in at.contours else "held"
     h = own_heading(study, at.main)
-    with styled():
-        figure = new_figure(9.6 if months else 7.2, 4.6)
-        grid = figure.add_gridspec(1, 2 if months else 1, width_ratios=(3, 2) if months else None)
-        axes = figure.add_subplot(grid[0, 0])
-        seas = np.column_stack([scatter.peak_period, scatter.significant_height])
-        states, place = np.unique(np.round(seas, 6), axis=0, return_inverse=True)
-        share = np.bincount(place.ravel(), weights=scatter.occurrence)
-        visible = share > 2e-5
-        size = 260.0 * np.sqrt(share[visible] / share.max())
-        x, y = states[visible].T
-        axes.scatter(x, y, s=size, color=HOOK, alpha=0.45, linewidths=0.0, zorder=2)
-        top = 1.05 * float(states[visible, 1].max())
-        for name, colour, text in (
-            ("held", BEFORE, "drum held"),
-            ("loop", AFTER, "with the design"),
-            ("reoptimised", DRUM, "gains anew for each sea"),
-        ):
-            if name not in at.contours:
-                continue
-            contour = at.contours[name]
-            limit = np.minimum(contour.limit[h], 2.0 * top)
-            worked = at.workable[name].share
-            label = f"{text}: {100.0 * worked:.0f} % of the year"
-            if name == main:
-                shade(axes, contour.periods, contour.limit[h])
-            axes.plot(contour.periods, limit, color=colour, label=label, zorder=3)
-            best = at.workable[name].best_heading
-            if best is not None:
-                axes.plot(
-                    contour.periods,
-                    np.minimum(contour.weathervaning, 2.0 * top),
-                    color=colour,
-                    linestyle=(0, (4, 2)),
-                    label=f"... best heading: {100.0 * best:.0f} %",
-                    zorder=3,
-                )
-        draw_steepest(axes, at.main.periods, top)
-        axes.set_ylim(0.0, top)
-        periods_axis(axes, at.main.periods)
-        axes.set_ylabel(r"$H_s$ [m]")
-        figure.legend(loc="outside lower center", ncols=3, fontsize=8.5)
-        if months:
-            _months(figure.add_subplot(grid[0, 1]), at)
-        gain = at.workable[main].share - at.workable["held"].share
-        finding = f"Workable {100.0 * at.workable[main].share:.0f} % of the year"
-        if main == "loop":
-            finding += f", {100.0 * at.workable['held'].share:.0f} % with the drum held"
-            if abs(gain) < 5e-3:
-                finding = "Compensation makes no more of the year workable"
-        headline(figure, axes, study, at, finding)
-    return figure
+    figure = new_figure(9.6 if months else 7.2, 4.6)
+    grid = figure.add_gridspec(1, 2 if months else 1, width_ratios=(3, 2) if months else None)
+    axes = figure.add_subplot(grid[0, 0])
+    seas = np.column_stack([scatter.peak_period, scatter.significant_height])
+    states, place = np.unique(np.round(seas, 6), axis=0, return_inverse=True)
+    share = np.bincount(place.ravel(), weights=scatter.occurrence)
+    visible = share > 2e-5
+    size = 260.0 * np.sqrt(share[visible] / share.max())
+    x, y = states[visible].T
+    axes.scatter(x, y, s=size, color=HOOK, alpha=0.45, linewidths=0.0, zorder=2)
+    top = 1.05 * float(states[visible, 1].max())
+    for name, colour, text in (
+        ("held", BEFORE, "drum held"),
+        ("loop", AFTER, "with the design"),
+        ("reoptimised", DRUM, "gains anew for each sea"),
+    ):
+        if name not in at.contours:
+            continue
+        contour = at.contours[name]
+        limit = np.minimum(contour.limit[h], 2.0 * top)
+        worked = at.workable[name].share
+        label = f"{text}: {100.0 * worked:.0f} % of the year"
+        if name == main:
+            shade(axes, contour.periods, contour.limit[h])
+        axes.plot(contour.periods, limit, color=colour, label=label, zorder=3)
+        best = at.workable[name].best_heading
+        if best is not None:
+            axes.plot(
+                contour.periods,
+                np.minimum(contour.weathervaning, 2.0 * top),
+                color=colour,
+                linestyle=(0, (4, 2)),
+                label=f"... best heading: {100.0 * best:.0f} %",
+                zorder=3,
+            )
+    draw_steepest(axes, at.main.periods, top)
+    axes.set_ylim(0.0, top)
+    periods_axis(axes, at.main.periods)
+    axes.set_ylabel(r"$H_s$ [m]")
+    figure.legend(loc="outside lower center", ncols=3, fontsize=8.5)
+    if months:
+        _months(figure.add_subplot(grid[0, 1]), at)
+    gain = at.workable[main].share - at.workable["held"].share
+    finding = f"Workable {100.0 * at.workable[main].share:.0f} % of the year"
+    if main == "loop":
+        finding += f", {100.0 * at.workable['held'].share:.0f} % with the drum held"
+        if abs(gain) < 5e-3:
+            finding = "Compensation makes no more of the year workable"
+    return titled(figure, study, at, finding)
 
 
 def _months(axes: Axes, at: AtDepth) -> None:

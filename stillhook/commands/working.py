@@ -1,0 +1,173 @@
+"""The course of a command: its progress, Ctrl-C in it, the folder that it fills, and its end.
+
+A computation that has something to keep is `stoppable`, one that swallows Ctrl-C `interruptible`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from models.basics import StillhookError
+
+from ..text import Progress, Report, commands, console, number, progress, show
+
+_AGAIN = 0.25  # s between two attempts to interrupt
+
+Stop = Callable[[], bool]
+"""Whether the user has asked to stop."""
+
+
+@contextlib.contextmanager
+def stoppable() -> Iterator[Stop]:
+    """Remember the first Ctrl-C instead of raising, so that what runs can end and be kept.
+
+    The computation asks between two steps.  A second Ctrl-C raises KeyboardInterrupt as always.
+
+    Yields
+    ------
+    Stop
+        To be asked.
+    """
+    asked = False
+
+    def remember(number: int, frame: object) -> None:
+        nonlocal asked
+        del number, frame
+        if asked:
+            raise KeyboardInterrupt
+        asked = True
+
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: asked  # only the main thread may handle signals
+        return
+    before = signal.signal(signal.SIGINT, remember)
+    try:
+        yield lambda: asked
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextlib.contextmanager
+def interruptible() -> Iterator[Callable[[], None]]:
+    """Make Ctrl-C end a computation that swallows it.
+
+    CasADi turns an interrupt within IPOPT into a solve that failed, and the search goes on
+    with the next start.  So an interrupt is remembered, and raised again until it gets
+    through: by a timer where there is one, and by the function that is yielded, which the
+    computation's progress calls.
+    """
+    asked = False
+
+    def interrupt(number: int, frame: object) -> None:
+        nonlocal asked
+        del number, frame
+        asked = True
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+        raise KeyboardInterrupt
+
+    def check() -> None:
+        if asked:
+            raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield check  # only the main thread may handle signals
+        return
+    alarm = getattr(signal, "SIGALRM", None)
+    before = signal.signal(signal.SIGINT, interrupt)
+    before_alarm = signal.SIG_DFL if alarm is None else signal.signal(alarm, interrupt)
+    try:
+        yield check
+    finally:
+        if alarm is not None:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(alarm, before_alarm)
+        signal.signal(signal.SIGINT, before)
+
+
+@contextlib.contextmanager
+def working(arguments: argparse.Namespace) -> Iterator[Progress]:
+    """Show the progress of a computation, unless asked to be quiet, and let Ctrl-C end it."""
+    with progress(shown=not arguments.quiet) as tell, interruptible() as check:
+
+        def step(stage: str, done: int, total: int) -> None:
+            check()
+            tell(stage, done, total)
+
+        yield step
+
+
+@contextlib.contextmanager
+def counting(arguments: argparse.Namespace) -> Iterator[Progress]:
+    """Show how many cases are done, and how fast, until Ctrl-C ends it in order."""
+    shown = not arguments.quiet
+    with stoppable() as stop, progress(shown=shown, pace=_a_minute) as tell:
+
+        def step(what: str, done: int, total: int) -> None:
+            if stop():
+                raise KeyboardInterrupt
+            tell(what, done, total)
+
+        yield step
+
+
+def _a_minute(speed: float) -> str:
+    return f"{number(60.0 * speed, 2)}/min"
+
+
+@contextlib.contextmanager
+def tidy(place: Path) -> Iterator[None]:
+    """Take the folders of a path away again if a question was wrong: no empty ones stay behind."""
+    made = [path for path in (place, *place.parents) if not path.exists()]
+    try:
+        yield
+    except StillhookError:
+        for path in made:
+            with contextlib.suppress(OSError):
+                path.rmdir()
+        raise
+
+
+def kept_in(folder: Path) -> list[str]:
+    """Return the names of the files of a folder."""
+    return sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
+
+
+def conclude(
+    report: Report,
+    arguments: argparse.Namespace,
+    *,
+    written: Sequence[Path] = (),
+    following: Callable[[], Sequence[tuple[str, str]]] = tuple,
+) -> int:
+    """Print a report, the files that were written, and what to do next; return the exit status.
+
+    Parameters
+    ----------
+    report
+        What came of the command.
+    arguments
+        If they ask to be quiet the verdict alone is printed.
+    written
+        The files.
+    following
+        Returns commands to go on with, each with what it does.
+    """
+    out = console()
+    if arguments.quiet:
+        out.print(f"{report.name}: {report.status}", soft_wrap=True)
+        return 1 if report.ok is False else 0
+    show(report, out)
+    out.print()
+    if written:
+        twice = {path.with_suffix(".png") for path in written if path.suffix == ".svg"}
+        names = ", ".join(path.name for path in written if path not in twice)
+        out.print(f"Written to {written[0].parent}: {names}", soft_wrap=True)
+    if rows := following():
+        commands(rows, out)
+    return 1 if report.ok is False else 0

@@ -1,0 +1,305 @@
+"""Sizing, co-design and worth as figures and reports: which motor and gear, what to buy first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from synth.sizing import CoDesign, Sizing, Worth, WorthRow
+
+from ..text import (
+    AFTER,
+    BEFORE,
+    DRUM,
+    HOOK,
+    REFERENCE,
+    Column,
+    Drawing,
+    Item,
+    Report,
+    Section,
+    Table,
+    Written,
+    annotate,
+    drawn,
+    headline,
+    number,
+    pairs,
+    panel,
+    quantity,
+    scale,
+    typeset,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_MARKS = ("o", "s", "^", "D", "v", "P", "X")
+_ROWS = 14  # of the bar figure
+_POINTS = 14  # of a table on the terminal
+
+
+@drawn
+def size_figure(sizing: Sizing) -> Figure:
+    """Return the smallest motor over the gear ratio, marked by the limit that binds.
+
+    Parameters
+    ----------
+    sizing
+        With at least one gear behind which a motor meets the target.
+    """
+    points = [p for p in sizing.points if p.feasible and p.motor is not None]
+    lost = [p for p in sizing.points if not p.feasible]
+    power = [p.motor.power for p in points if p.motor is not None]
+    factor, unit = scale("W", min(power))
+    figure, axes = panel()
+    axes.plot([p.gear for p in points], [v / factor for v in power], color=AFTER, zorder=1)
+    names = list(dict.fromkeys(_limit(p.binding) for p in points))
+    for k, name in enumerate(names):
+        at = [i for i, p in enumerate(points) if _limit(p.binding) == name]
+        axes.plot(
+            [points[i].gear for i in at],
+            [power[i] / factor for i in at],
+            linestyle="none",
+            color=(AFTER, DRUM, BEFORE, HOOK, REFERENCE)[k % 5],
+            marker=_MARKS[k % len(_MARKS)],
+            markersize=5.0,
+            label=f"bound by {name}",
+        )
+    for k, p in enumerate(lost):
+        axes.axvline(
+            p.gear,
+            color=HOOK,
+            linewidth=0.8,
+            linestyle=":",
+            label=f"no motor: {', '.join(dict.fromkeys(q.binding[0] for q in lost))}"
+            if k == 0
+            else None,
+        )
+    chosen = sizing.chosen
+    if chosen is not None and chosen.motor is not None:
+        text = f"{quantity(chosen.motor.power, 'W')} at {chosen.gear:g}"
+        annotate(axes, text, (chosen.gear, chosen.motor.power / factor), (-40.0, 36.0))
+    axes.set_xscale("log")
+    ticks = sorted({p.gear for p in sizing.points})
+    chosen_ticks = _thinned(ticks)
+    axes.set_xticks(chosen_ticks, [f"{t:.3g}" for t in chosen_ticks])
+    axes.set_xticks([], minor=True)
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("gear ratio")
+    axes.set_ylabel(f"rated power of the smallest motor [{unit}]")
+    axes.legend(loc="best")
+    finding = f"The smallest motor for {quantity(sizing.target, 'm')} rms at the payload"
+    height = sizing.case.sea.significant_height
+    about = f"{sizing.case.name}: H_s {height:.3g} m, {sizing.structure}"
+    return headline(figure, finding, about)
+
+
+@drawn
+def worth_figure(result: Worth) -> Figure:
+    """Return what each figure takes off the payload's rms if it gets twice as good, as bars.
+
+    Parameters
+    ----------
+    result
+        With at least one row.
+    """
+    rows = [r for r in result.rows if r.gain > 0.0][:_ROWS] or list(result.rows[:1])
+    size, unit = scale("m", result.payload_rms)
+    figure, axes = panel(height=1.6 + 0.34 * len(rows))
+    top = result.payload_rms / size
+    least = min(row.twice_rms / size for row in rows)
+    for k, row in enumerate(rows):
+        colour = AFTER if row.item.sold else HOOK
+        after = row.twice_rms / size
+        axes.barh(k, after - top, left=top, color=colour, height=0.62)
+        inside = top - after > 0.3 * (top - least)  # of a long bar, else to its left
+        axes.annotate(
+            quantity(row.twice_rms, "m"),
+            (after, k),
+            xytext=(4.0 if inside else -4.0, 0.0),
+            textcoords="offset points",
+            ha="left" if inside else "right",
+            va="center",
+            color="white" if inside else REFERENCE,
+            fontsize=9.0,
+        )
+    labels = [f"{typeset(row.item.name)}  {_change(row)}" for row in rows]
+    axes.set_yticks(range(len(rows)), labels)
+    axes.invert_yaxis()
+    axes.axvline(top, color=REFERENCE, linewidth=1.0)
+    axes.set_xlim(max(0.0, least - 0.18 * (top - least) - 0.02 * top), top * 1.01)
+    axes.set_xlabel(f"payload rms [{unit}]")
+    axes.grid(axis="y", visible=False)
+    bought, given = _handles()
+    kinds = {row.item.sold for row in rows}
+    handles = [h for h, sold in ((bought, True), (given, False)) if sold in kinds]
+    axes.legend(handles=handles, loc="lower left")
+    first = result.first
+    finding = f"Buy first: {first.item.name}" if first is not None else "Nothing is worth it"
+    about = f"{result.case.name}, {result.structure}: one thing twice as good, gains anew"
+    return headline(figure, finding, about)
+
+
+def size_report(sizing: Sizing) -> Report:
+    """Return the smallest motors over the gear ratio, the chosen one marked."""
+    target, height = quantity(sizing.target, "m"), sizing.case.sea.significant_height
+    given, highest = sizing.given_rms, sizing.highest_height
+    items: list[Item] = [_motors(sizing)] if sizing.points else []
+    if sizing.chosen is not None:
+        caption = "The smallest motor over the gear"
+        items.append(Drawing("size", caption, lambda: size_figure(sizing)))
+    own = f"payload {quantity(given, 'm')} rms"
+    around = [
+        ("whatever the motor", f"payload {quantity(sizing.unlimited_rms, 'm')} rms"),
+        (
+            "with the winch as it is",
+            own if math.isfinite(given) else "its limits cannot be kept in this sea",
+        ),
+        (
+            "the winch as it is meets the target",
+            f"up to H_s {highest:.3g} m" if highest > 0.0 else "in no sea looked at",
+        ),
+    ]
+    return Report(
+        name=sizing.case.name,
+        about=f"payload {target} rms in H_s {height:.3g} m, {sizing.structure}",
+        status=sizing.status,
+        ok=sizing.ok,
+        sections=[Section("", items), Section("", [pairs(around)])],
+    )
+
+
+def co_design_report(found: CoDesign) -> Report:
+    """Return what the payload moves over gear and drum, the best pair marked."""
+    columns = (
+        Column("gear", digits=4),
+        Column("drum", unit="m"),
+        Column("payload_rms", "payload rms", unit="m", digits=4),
+        Column("limited_by", "limited by", left=True),
+    )
+    rows = [
+        (
+            p.gear,
+            p.radius,
+            p.payload_rms if math.isfinite(p.payload_rms) else "-",
+            _bound_by(p.binding),
+        )
+        for p in found.points
+    ]
+    best = (found.gear, found.radius)
+    marked = tuple(k for k, p in enumerate(found.points) if (p.gear, p.radius) == best)
+    table = Table(columns=columns, rows=rows, marked=marked, most=_POINTS)
+    return Report(
+        name=found.case.name,
+        about=f"gear and gains together, {found.structure}",
+        status=found.status,
+        ok=found.ok,
+        sections=[Section("", [table])],
+    )
+
+
+def worth_report(result: Worth) -> Report:
+    """Return what each figure of the case is worth."""
+    head: Any = {"name": result.case.name, "about": f"what is worth buying, {result.structure}"}
+    if not result.rows:
+        return Report(status=result.status, ok=result.ok, **head)
+    rows, idle = [], []
+    for row in result.rows:
+        if row.elasticity == 0.0 and row.gain == 0.0 and row.item.value != 0.0:
+            idle.append(row.item.name)
+            continue
+        share = row.elasticity if math.isfinite(row.elasticity) else row.price
+        better = (-1.0 if row.factor < 1.0 else 1.0) * share
+        rows.append(
+            (
+                row.item.name + ("" if row.item.sold else " *"),
+                Written(row.item.value, _value_text(row.item.value, row.item.unit)),
+                f"{number(better, 2)} %" if math.isfinite(share) else "-",
+                step_text(row),
+                row.twice_rms if math.isfinite(row.twice_rms) else "-",
+            )
+        )
+    notes = ["1 % of it: what the payload's rms changes by if the figure gets 1 % better"]
+    if any(not row.item.sold for row in result.rows):
+        notes.append("*: a margin is given away, not bought; the gear is chosen")
+    if idle:
+        notes.append(f"worth nothing here: {', '.join(idle)}")
+    columns = (
+        Column("item", ""),
+        Column("is"),
+        Column("one_per_cent", "1 % of it"),
+        Column("per_step", "per step"),
+        Column("twice_rms", "twice as good", unit="m"),
+    )
+    drawing = Drawing("worth", "What is worth buying", lambda: worth_figure(result))
+    items: list[Item] = [Table(columns=columns, rows=rows, notes=tuple(notes)), drawing]
+    return Report(status=result.status, ok=result.ok, sections=[Section("", items)], **head)
+
+
+def _motors(sizing: Sizing) -> Table:
+    rows = []
+    for point in sizing.points:
+        motor = point.motor
+        figures: tuple[float | str, ...] = ("-",) * 4
+        if motor is not None:
+            figures = (motor.power, motor.torque_continuous, motor.torque_peak, motor.inertia)
+        rows.append((point.gear, *figures, _bound_by(point.binding)))
+    best = sizing.chosen.gear if sizing.chosen is not None else None
+    columns = (
+        Column("gear"),
+        Column("power", unit="W"),
+        Column("torque_continuous", "continuous", unit="N m"),
+        Column("torque_peak", "peak", unit="N m"),
+        Column("inertia", unit="kg m2"),
+        Column("limited_by", "limited by", left=True),
+    )
+    marked = tuple(k for k, point in enumerate(sizing.points) if point.gear == best)
+    return Table(columns=columns, rows=rows, marked=marked, most=_POINTS)
+
+
+def _bound_by(binding: Sequence[str]) -> str:
+    return ", ".join(binding[:2])
+
+
+def _value_text(value: float, unit: str) -> str:
+    """Return the value of an item as people read it: motor speeds in rpm."""
+    return quantity(value, "rpm") if unit == "rad/s" else quantity(value, unit)
+
+
+def step_text(row: WorthRow) -> str:
+    """Return what the rms changes by per natural step, as ``-5.31 mm per 1.00 cm``."""
+    item = row.item
+    if math.isnan(row.per_step) or row.per_step == 0.0:
+        return "-"
+    step = _value_text(item.step, item.unit)
+    return f"{quantity(row.per_step, 'm')} per {step}"
+
+
+def _change(row: WorthRow) -> str:
+    item = row.item
+    return (
+        f"{_value_text(item.value, item.unit)} to {_value_text(item.value * row.factor, item.unit)}"
+    )
+
+
+def _limit(binding: tuple[str, ...]) -> str:
+    """Return the first limit of the drive that binds, of those that grow with the motor."""
+    motor = [name for name in binding if name.startswith("motor.") or name.startswith("the load")]
+    return motor[0] if motor else (binding[0] if binding else "nothing")
+
+
+def _thinned(ticks: list[float]) -> list[float]:
+    """Return ticks that are at least 12 % apart."""
+    found: list[float] = []
+    for tick in ticks:
+        if not found or tick > 1.12 * found[-1]:
+            found.append(tick)
+    return found
+
+
+def _handles() -> tuple[object, object]:
+    from matplotlib.patches import Patch
+
+    return Patch(color=AFTER, label="bought"), Patch(color=HOOK, label="given away, or chosen")

@@ -1,0 +1,238 @@
+"""Structures side by side as figure and table: how still the payload is, and what is in the way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from models.basics import InputError
+
+from ..text import (
+    AFTER,
+    BEFORE,
+    DRUM,
+    HOOK,
+    REFERENCE,
+    Column,
+    Drawing,
+    Report,
+    Section,
+    Table,
+    count,
+    drawn,
+    headline,
+    new_figure,
+    pairs,
+    percent,
+    quantity,
+    typeset,
+)
+from .bound_text import bound_cell, bound_figures, bounds_note
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from synth.design import StructureDesign
+
+SHARES = {"sea": ("hook.heave",), "MRU": ("mru.error",), "noise": ()}
+"""Which disturbances make up a share of the payload's variance, by its name."""
+
+_TORQUE = "motor.torque.peak"
+_COLOURS = {"sea": AFTER, "MRU": "#e69f00", "noise": "#cc79a7"}
+_MARKS: Mapping[str, Mapping[str, Any]] = {
+    "best with its sensors": {"marker": "|", "color": "black", "ms": 15.0, "mew": 2.2},
+    "best with all sensors": {"marker": "|", "color": "0.45", "ms": 15.0, "mew": 1.2},
+}
+_LABELS = {"sea": "from the sea", "MRU": "from the reference unit", "noise": "from other sensors"}
+
+
+@drawn
+def structures(designs: Sequence[StructureDesign], *, bound: bool = True) -> Figure:
+    """Return the comparison of some structures on a case.
+
+    Parameters
+    ----------
+    designs
+        Designs of one case; those without a stable controller get an empty row.
+    bound
+        Whether to compute and to mark the bounds beside them.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Left: payload rms on a logarithmic axis, coloured by shares of its variance, hatched
+        where the design is not ok; a mark at the least that any linear controller leaves with
+        the same sensors, a lighter one with all sensors of the case.  Right: M_s.
+
+    Raises
+    ------
+    InputError
+        If there is no design, or none of them is stable.
+    """
+    stable = [design for design in designs if math.isfinite(design.payload_rms)]
+    if not stable:
+        raise InputError("structures: there is no stable design to draw")
+    before, hook = 1e3 * stable[0].payload_rms_before, 1e3 * stable[0].hook_rms
+    values = [1e3 * design.payload_rms for design in stable]
+    marks = {d.structure: bound_figures(d) if bound else (math.nan, math.nan) for d in stable}
+    least = [1e3 * value for pair in marks.values() for value in pair if math.isfinite(value)]
+    low = 0.5 * min([*values, *least, hook])
+    high = 3.0 * max([*values, before])
+    figure = new_figure(9.2, 1.9 + 0.38 * len(designs))
+    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3.2, 1.0))
+    seen: set[str] = set()
+    for place, design in enumerate(designs):
+        rms = 1e3 * design.payload_rms
+        if not math.isfinite(rms):
+            left.text(1.1 * low, place, "no stable controller", va="center", fontsize=9.0)
+            continue
+        # Shares of the variance as shares of the bar's length on the page.
+        span, at = math.log(rms / low), 0.0
+        for name in SHARES:
+            share = share_of(design, name)
+            if share <= 0.0:
+                continue
+            begin, end = (low * math.exp(span * edge) for edge in (at, at + share))
+            left.barh(
+                place,
+                end - begin,
+                left=begin,
+                height=0.62,
+                color=_COLOURS[name],
+                alpha=1.0 if design.ok else 0.45,
+                hatch=None if design.ok else "///",
+                edgecolor="white",
+                linewidth=0.0,
+                label=_LABELS[name] if name not in seen else None,
+            )
+            seen.add(name)
+            at += share
+        left.text(
+            1.06 * rms,
+            place,
+            quantity(1e-3 * rms, "m"),
+            va="center",
+            fontsize=9.0,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
+        )
+        for value, (text, style) in zip(marks[design.structure], _MARKS.items(), strict=True):
+            if math.isfinite(value):
+                shown = text if text not in seen else None
+                left.plot([1e3 * value], [place], linestyle="none", label=shown, **style)
+                seen.add(text)
+        if design.margins is not None:
+            right.plot(design.margins.max_sensitivity, place, "o", color=DRUM)
+    for value, colour, text in ((before, BEFORE, "drum held"), (hook, HOOK, "hook")):
+        left.axvline(value, color=colour, linewidth=1.2, label=text)
+    _frame(left, right, designs, (low, high))
+    best = min(stable, key=lambda design: (not design.ok, design.payload_rms))
+    held = quantity(best.payload_rms, "m")
+    finding = f"{best.structure} holds the payload stillest: {held} rms"
+    return headline(figure, finding)
+
+
+def structures_table(designs: Sequence[StructureDesign], *, bound: bool = True) -> Table:
+    """Return the designs, one a row; `bound` asks for the bounds beside them too."""
+    columns = (
+        Column("structure"),
+        Column("payload_rms", "payload", unit="m"),
+        Column("over_best", "over best"),
+        *(Column(name, write=percent) for name in SHARES),
+        Column("max_sensitivity", "M_s"),
+        Column("delay", write=lambda s: "any" if math.isinf(s) else quantity(s, "s")),
+        Column("torque", write=percent),
+        Column("limited_by", "limited by", left=True),
+    )
+    return Table(
+        columns=columns,
+        rows=[_row(design, bound=bound) for design in designs],
+        notes=(bounds_note(designs),) if bound else (),
+        broken=tuple(k for k, design in enumerate(designs) if not design.ok),
+    )
+
+
+def structures_report(designs: Sequence[StructureDesign], *, bound: bool = True) -> Report:
+    """Return the comparison: a table, what limits each, and the figure."""
+    first = designs[0]
+    held, hook = (quantity(v, "m") for v in (first.payload_rms_before, first.hook_rms))
+    table = structures_table(designs, bound=bound)
+    # Below, not beside: the names of limits are too long for a column on 80.
+    limits = pairs([(row[0], row[-1]) for row in table.rows])
+    table = replace(table, columns=table.columns[:-1], rows=[row[:-1] for row in table.rows])
+    stable = any(math.isfinite(design.payload_rms) for design in designs)
+    caption = "The payload's motion with each structure"
+    drawing = Drawing("structures", caption, lambda: structures(designs, bound=bound))
+    failed = [f"{d.structure}: {d.status}" for d in designs if not d.ok]
+    return Report(
+        name=first.case.name,
+        about=count(len(designs), "structure"),
+        status=f"hook {hook} rms; with the drum held the payload moves {held} rms",
+        sections=[
+            Section("", [table, *([drawing] * stable)]),
+            Section("Limited by", [limits, *failed]),
+        ],
+    )
+
+
+def share_of(design: StructureDesign, name: str) -> float:
+    """Return the share of the payload's variance from ``sea``, ``MRU`` or ``noise``."""
+    squares = {source: rms**2 for source, rms in design.parts.items()}
+    total = sum(squares.values())
+    known = [source for names in SHARES.values() for source in names]
+    chosen = SHARES[name] or [source for source in squares if source not in known]
+    part = sum(squares.get(source, 0.0) for source in chosen)
+    return part / total if total > 0.0 else 0.0
+
+
+def limited_by(design: StructureDesign) -> str:
+    """Return what binds, or why the design is not ok."""
+    if not design.ok:
+        return design.status.partition(":")[0].partition(";")[0]
+    binding = ", ".join(design.binding)
+    if binding:
+        return binding
+    if design.at_bounds:
+        return f"bounds of {', '.join(design.at_bounds)}"
+    if not design.parts:
+        return "nothing"
+    # With no limit in the way it is what disturbs most that decides.
+    largest = max(SHARES, key=lambda name: share_of(design, name))
+    return {"sea": "the structure itself", "MRU": "the MRU's error", "noise": "noise"}[largest]
+
+
+def _row(design: StructureDesign, *, bound: bool) -> tuple[float | str, ...]:
+    margins, torque = design.margins, design.limits.get(_TORQUE)
+    found = math.isfinite(design.payload_rms)
+    return (
+        design.structure,
+        design.payload_rms if found else "-",
+        bound_cell(design) if bound else "-",
+        *(share_of(design, name) if found else "-" for name in SHARES),
+        margins.max_sensitivity if margins is not None else "-",
+        margins.delay if margins is not None else "-",
+        torque.use if torque is not None else "-",
+        limited_by(design),
+    )
+
+
+def _frame(
+    left: Axes,
+    right: Axes,
+    designs: Sequence[StructureDesign],
+    span: tuple[float, float],
+) -> None:
+    left.set_xscale("log")
+    left.set_xlim(*span)
+    left.set_yticks(range(len(designs)), [design.structure for design in designs])
+    left.invert_yaxis()
+    left.grid(visible=False, axis="y")
+    left.set_xlabel("payload motion [mm rms]   (hatched: not ok)")
+    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=4, frameon=False)
+    bounds = [d.limits["max_sensitivity"].bound for d in designs if "max_sensitivity" in d.limits]
+    if bounds:
+        right.axvline(bounds[0], color=REFERENCE, linewidth=1.2)
+    right.set_xlim(0.9, 1.05 * max([right.get_xlim()[1], *bounds]))
+    right.set_xlabel(typeset("M_s"))

@@ -1,0 +1,197 @@
+"""Operability as a report, and its tables as files."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from synth.operability import AtDepth, Operability
+
+from ..text import (
+    Column,
+    Drawing,
+    Item,
+    OutputFolder,
+    Report,
+    Section,
+    Table,
+    csv_text,
+    data_table,
+    pairs,
+    percent,
+)
+from .operability_figures import capability_figure, contour_figure, depth_figure
+from .operability_site import heading_figure, scatter_figure
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from synth.operability import Contour, ContourCheck
+
+_MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
+_WHO = {"held": "drum held", "loop": "design", "reoptimised": "anew", "perfect": "perfect"}
+_ROWS = 20
+_FIGURES = ("contour", "capability", "headings", "depths", "scatter")
+
+
+def operability_report(study: Operability, checks: Sequence[ContourCheck] = ()) -> Report:
+    """Return a study: a table for each length of rope, the shares of the year, the figures."""
+    sections = []
+    for at in study.depths:
+        margin = [study.margin_text(at)] if study.design is not None else []
+        sections.append(Section(f"rope {at.rope}", [*margin, _contours(at)]))
+    if study.headings is None:
+        note = "no headings: the vessel is given by the heave of its hook alone"
+        sections.insert(0, Section("", [note]))
+    if study.scatter is not None:
+        source = study.scatter.source
+        sections.append(Section(f"workable share of the year, {source}", _shares(study)))
+    rows = []
+    if checks:
+        worst = max(check.difference for check in checks)
+        good = "" if all(check.ok for check in checks) else ", which is NOT within 1e-06"
+        points = f"{len(checks)} points of the contour by single evaluations"
+        rows.append(("checked", f"{points}: the limit is met to {worst:.0e}{good}"))
+    if not study.wanted:
+        rows.append(("payload", "no bound on its motion was given: --payload-rms, --payload-max"))
+    rows.append(("perfect", "a winch that holds the rope's upper end still, by its own limits"))
+    sections.append(Section("", [pairs(rows), *_drawings(study)]))
+    works = any(float(at.main.limit.max()) > 0.0 for at in study.depths)
+    return Report(
+        name=study.case.name,
+        status=study.status,
+        ok=works and all(check.ok for check in checks),
+        sections=sections,
+    )
+
+
+def write_operability(folder: str | Path, study: Operability) -> list[Path]:
+    """Write a study into a folder, case, tables and figures; return the files.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written.
+    """
+    place = OutputFolder.prepare(folder)
+    written = [
+        place.write("case.yaml", study.case.to_yaml()),
+        place.write("operability.csv", study.to_csv()),
+        place.write("operability.nc", netcdf(study.dataset)),
+    ]
+    for name in _FIGURES:
+        for kind in ("svg", "png"):
+            place.discard(f"{name}.{kind}")
+    place.discard("workable.csv")
+    if study.scatter is not None:
+        written.append(place.write("workable.csv", csv_text(workable_table(study))))
+    return written + place.draw(_drawings(study))
+
+
+def workable_table(study: Operability) -> Table:
+    """Return the shares of the year as data: a row for each length of rope and system."""
+    head = ["rope_length_m", "system", "workable", "best_heading", "outside_the_contour"]
+    rows = [
+        (
+            *(at.rope.length, name, share.share, share.best_heading, share.outside),
+            *(share.by_month.get(month) for month in range(1, 13)),
+        )
+        for at in study.depths
+        for name, share in at.workable.items()
+    ]
+    return data_table([*head, *_MONTHS], rows)
+
+
+def netcdf(dataset: xr.Dataset) -> bytes:
+    """Return a data set as the bytes of a NetCDF file."""
+    plain = dataset.copy()
+    for name, variable in plain.variables.items():
+        if variable.dtype == object:
+            plain[name] = variable.astype(str)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the libraries below, on what nobody can change here
+        return bytes(plain.to_netcdf(engine="h5netcdf"))
+
+
+def _drawings(study: Operability) -> list[Drawing]:
+    found = [
+        Drawing("contour", "H_s over T_p", lambda: contour_figure(study)),
+        Drawing("capability", "What the winch can follow", lambda: capability_figure(study)),
+    ]
+    if study.headings is not None and study.headings.size > 1:
+        found.append(Drawing("headings", "Over the heading", lambda: heading_figure(study)))
+    if len(study.depths) > 1:
+        found.append(Drawing("depths", "At all lengths of rope", lambda: depth_figure(study)))
+    if study.scatter is not None:
+        found.append(Drawing("scatter", "Over the year", lambda: scatter_figure(study)))
+    return found
+
+
+def _contours(at: AtDepth) -> Table:
+    names = [n for n in _WHO if n in at.contours]
+    columns = [Column("peak_period", "T_p", write=lambda period: f"{period:.3g} s")]
+    for name in names:
+        columns.append(Column(name, _WHO[name]))
+        columns.append(Column(f"{name}_set_by", "set by", left=True))
+    rows = []
+    for p, period in enumerate(at.main.periods):
+        rows.append((float(period), *(c for n in names for c in _cells(at.contours[n], p))))
+    turns = "H_s [m] in the worst and the best heading; what binds in the worst"
+    notes = (turns,) if at.main.headings is not None else ()
+    return Table(columns=tuple(columns), rows=rows, notes=notes, most=_ROWS)
+
+
+def _cells(contour: Contour, p: int) -> tuple[str, str]:
+    worst = int(contour.limit[:, p].argmin())
+    ends = [float(contour.limit[worst, p]), float(contour.limit[:, p].max())]
+    texts = [f">{contour.highest:g}" if math.isinf(h) else f"{h:.2f}" for h in ends]
+    several = contour.limit.shape[0] > 1
+    return "..".join(texts if several else texts[:1]), _plain(str(contour.binding[worst, p]))
+
+
+def _plain(name: str) -> str:
+    """Return the name of a limit without the machine it belongs to."""
+    return name.removeprefix("motor.").removeprefix("rope.")
+
+
+def _shares(study: Operability) -> list[Item]:
+    first = study.depths[0]
+    names = [n for n in _WHO if n in first.workable]
+    rows: list[tuple[float | str, ...]] = []
+    for at in study.depths:
+        lost = at.workable["loop" if "loop" in names else "held"].binding
+        most = ", ".join(f"{_plain(n)} {percent(v)}" for n, v in list(lost.items())[:2])
+        rows.append((at.rope.length, *(at.workable[n].share for n in names), most))
+        if study.headings is not None:
+            best = [at.workable[n].best_heading or 0.0 for n in names]
+            rows.append(("  best heading", *best, ""))
+    columns = (
+        Column("rope", write=lambda length: f"{length:g} m"),
+        *(Column(n, _WHO[n], write=percent) for n in names),
+        Column("lost_to", "lost to", left=True),
+    )
+    outside = first.workable["held"].outside
+    beyond = f"{percent(outside)} of the time has periods outside the contour: not workable"
+    notes = (beyond,) if outside > 5e-4 else ()
+    items: list[Item] = [Table(columns=columns, rows=rows, notes=notes)]
+    months = {n: s.by_month for n, s in first.workable.items() if s.by_month}
+    if months:
+        known = sorted(next(iter(months.values())))
+        shares = [
+            (_WHO[n], *(months[n][m] for m in known))
+            for n in ("held", "loop", "reoptimised")
+            if n in months
+        ]
+        heads = [Column(_MONTHS[m - 1], write=lambda v: f"{100.0 * v:.0f}") for m in known]
+        note = f"% of each month with {first.rope.length:g} m of rope"
+        items.append(Table(columns=(Column("system", ""), *heads), rows=shares, notes=(note,)))
+    columns = (
+        Column("operation", "rules of thumb, 1975 thesis, Table 2"),
+        Column("safe", write=percent),
+        Column("marginal", "or marginal", write=percent),
+    )
+    rules = [(rule.operation, safe, marginal) for rule, safe, marginal in study.rules()]
+    return [*items, Table(columns=columns, rows=rules)]

@@ -1,0 +1,318 @@
+"""Tables and reports of results, and three of the forms they take: Markdown, CSV and JSON.
+
+    result --> Report(sections of tables, drawings, sentences) --> terminal, Markdown, JSON
+
+A study says what came of it as a `Report` and nothing else; the fourth form, the terminal, is in
+`stillhook.text.terminal`.  Figures are in SI units: a column says how they are written.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
+from typing import TYPE_CHECKING, Any
+
+from .quantities import percent, quantity
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Attributes
+    ----------
+    name
+        Its name in data: CSV, JSON.
+    label
+        What people call it; by default its name.
+    unit
+        SI unit of its figures, or what `quantities.scale` makes of it.
+    digits
+        Digits that count.
+    left
+        Whether it stands to the left, as words do.
+    write
+        Writes a figure, where unit and digits do not say how.
+    """
+
+    name: str
+    label: str | None = None
+    _: KW_ONLY
+    unit: str = ""
+    digits: int = 3
+    left: bool = False
+    write: Callable[[Any], str] | None = None
+
+    @property
+    def heading(self) -> str:
+        """What stands above it."""
+        return self.name if self.label is None else self.label
+
+    def text(self, cell: Any) -> str:
+        """Return a cell as people read it: nothing for None and NaN."""
+        if isinstance(cell, Written | Bar):
+            return cell.text
+        if cell is None or (isinstance(cell, float) and math.isnan(cell)):
+            return ""
+        if isinstance(cell, str):
+            return cell
+        if self.write is not None:
+            return self.write(cell)
+        whole = isinstance(cell, int) and not self.unit
+        return str(cell) if whole else quantity(float(cell), self.unit, self.digits)
+
+
+@dataclass(frozen=True)
+class Written:
+    """A figure in words of its own, as ``no bound`` for infinity."""
+
+    value: Any
+    text: str
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A share that is used of something, as a bar; broken above one, pale where none was asked."""
+
+    value: float
+    kept: bool = True
+    enforced: bool = True
+
+    @property
+    def text(self) -> str:
+        """The share in percent."""
+        return percent(self.value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """Rows of figures and words under headings.
+
+    Attributes
+    ----------
+    title
+        What it is about; the heading of the first column where that has none.
+    columns, rows
+        Columns, and for each row a cell for each of them: a number, a text, `Written`, `Bar`, or
+        None.
+    notes
+        Sentences that stand below it.
+    marked, broken
+        Rows that carry a star, and those that are not as they should be.
+    most
+        Rows on the terminal at most, the others are passed over evenly; all by default.
+    """
+
+    title: str = ""
+    columns: tuple[Column, ...]
+    rows: Sequence[Sequence[Any]]
+    notes: tuple[str, ...] = ()
+    marked: tuple[int, ...] = ()
+    broken: tuple[int, ...] = ()
+    most: int | None = None
+
+    @property
+    def headings(self) -> list[str]:
+        """Texts above the columns."""
+        first, *rest = (column.heading for column in self.columns)
+        return [first or self.title, *rest]
+
+    def cells(self, row: int) -> list[str]:
+        """Return a row as texts."""
+        texts = [c.text(v) for c, v in zip(self.columns, self.rows[row], strict=True)]
+        if row in self.marked:
+            texts[0] += " *"
+        return texts
+
+    @property
+    def shown(self) -> list[int]:
+        """The rows that the terminal shows."""
+        count = len(self.rows)
+        every = 1 if self.most is None else max(1, -(-count // self.most))
+        return [k for k in range(count) if k % every == 0 or k in self.marked]
+
+
+def pairs(rows: Sequence[tuple[str, str]], title: str = "") -> Table:
+    """Return a table of labels and texts."""
+    return Table(
+        title=title, columns=(Column("name", ""), Column("text", "", left=True)), rows=rows
+    )
+
+
+def remarks(title: str, rows: Sequence[tuple[str, str, str]]) -> Table:
+    """Return a table of labels, figures and remarks."""
+    columns = (Column("name", ""), Column("figure", ""), Column("remark", "", left=True))
+    return Table(title=title, columns=columns, rows=rows)
+
+
+def data_table(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> Table:
+    """Return a table whose columns have names and nothing more, to be written as data."""
+    return Table(columns=tuple(Column(name) for name in names), rows=rows)
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure by the name of its file, with what it shows and the function that draws it."""
+
+    name: str
+    caption: str
+    draw: Callable[[], Figure]
+
+
+Item = Table | Drawing | str
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a report: tables, drawings and sentences under a title."""
+
+    title: str
+    items: Sequence[Item]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """What came of a study.
+
+    Attributes
+    ----------
+    name
+        Name of the case, or of what was looked at.
+    about
+        What was asked.
+    status
+        The verdict, in a sentence.
+    ok
+        Whether all is well; None where that is not the question.
+    mark
+        What stands before the verdict instead of ok or NOT OK.
+    sections
+        All else, in the order in which it is read.
+    """
+
+    name: str
+    about: str = ""
+    status: str = ""
+    ok: bool | None = None
+    mark: str = ""
+    sections: Sequence[Section] = ()
+
+    @property
+    def verdict_mark(self) -> str:
+        """The word before the verdict."""
+        return self.mark or {True: "ok", False: "NOT OK", None: ""}[self.ok]
+
+    @property
+    def drawings(self) -> list[Drawing]:
+        """Every drawing."""
+        return [i for part in self.sections for i in part.items if isinstance(i, Drawing)]
+
+
+def markdown(item: Report | Table, drawn: Sequence[str] | None = None) -> str:
+    """Return a report or a table as Markdown.
+
+    Parameters
+    ----------
+    item
+        The report or the table.
+    drawn
+        Names of the drawings whose files lie beside it; by default all.
+    """
+    if isinstance(item, Table):
+        return "\n\n".join([_grid(item), *(f"{_sentence(note)}" for note in item.notes)]) + "\n"
+    parts = [f"# {item.name}", item.about]
+    if item.status:
+        mark = {"ok": "Ok", "NOT OK": "Not ok"}.get(item.verdict_mark, item.verdict_mark)
+        parts.append(f"**{mark}**: {item.status}." if mark else f"{item.status}.")
+    for section in item.sections:
+        there = [i for i in section.items if not isinstance(i, Drawing) or _is_in(i, drawn)]
+        parts += [f"## {section.title}"] * bool(section.title and there)
+        for one in there:
+            if isinstance(one, Drawing):
+                parts.append(f"![{one.caption}]({one.name}.svg)")
+            else:
+                parts.append(_sentence(one) if isinstance(one, str) else markdown(one).strip())
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def csv_text(table: Table) -> str:
+    """Return a table as CSV, SI units: the names of its columns with their units, and all rows."""
+    target = io.StringIO()
+    out = csv.writer(target, lineterminator="\n")
+    out.writerow([f"{c.name} [{c.unit}]" if c.unit else c.name for c in table.columns])
+    for row in table.rows:
+        plain = [cell.value if isinstance(cell, Written | Bar) else cell for cell in row]
+        out.writerow([repr(float(cell)) if isinstance(cell, float) else cell for cell in plain])
+    return target.getvalue()
+
+
+def json_data(item: Any) -> Any:
+    """Return anything as plain data that JSON can hold: null for NaN and infinity.
+
+    A report is ``name``, ``about``, ``ok``, ``status`` and ``sections``, each with ``title`` and
+    ``items``; of these a table is ``title``, ``columns`` with ``name``, ``label`` and ``unit``,
+    ``rows`` with a value for each name of a column, and ``notes``; a drawing is ``figure`` and
+    ``caption``; a sentence is a text.
+    """
+    if isinstance(item, Report):
+        head = {"name": item.name, "about": item.about, "ok": item.ok, "status": item.status}
+        return {**head, "sections": [json_data(section) for section in item.sections]}
+    if isinstance(item, Section):
+        return {"title": item.title, "items": [json_data(each) for each in item.items]}
+    if isinstance(item, Drawing):
+        return {"figure": item.name, "caption": item.caption}
+    if isinstance(item, Table):
+        names = [column.name for column in item.columns]
+        return {
+            "title": item.title,
+            "columns": [{"name": c.name, "label": c.heading, "unit": c.unit} for c in item.columns],
+            "rows": [dict(zip(names, map(json_data, row), strict=True)) for row in item.rows],
+            "notes": list(item.notes),
+        }
+    if isinstance(item, Written | Bar):
+        return json_data(item.value)
+    if isinstance(item, Mapping):
+        return {str(key): json_data(each) for key, each in item.items()}
+    if isinstance(item, list | tuple):
+        return [json_data(each) for each in item]
+    if item is None or isinstance(item, bool | str | int):
+        return item
+    if isinstance(item, float):
+        return float(item) if math.isfinite(item) else None
+    return json_data(item.item()) if hasattr(item, "item") else str(item)
+
+
+def json_text(item: Any) -> str:
+    """Return anything as JSON, see `json_data`."""
+    return json.dumps(json_data(item), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def _is_in(drawing: Drawing, drawn: Sequence[str] | None) -> bool:
+    return drawn is None or drawing.name in drawn
+
+
+def _grid(table: Table) -> str:
+    """Return rows in Markdown; a bar in a text would end its cell."""
+    lines = [table.headings, ["---"] * len(table.columns)]
+    lines += [table.cells(k) for k in range(len(table.rows))]
+    text = "\n".join(
+        "| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |"
+        for line in ([c.replace("-\n", "-").replace("\n", " ") for c in line] for line in lines)
+    )
+    # The title stands above, where the first heading is taken.
+    alone = table.title and table.title not in table.headings
+    return f"**{table.title}**\n\n{text}" if alone else text
+
+
+def _sentence(text: str) -> str:
+    """Return a text with a capital and a full stop; one that is code, or a list, as it is."""
+    if text[:1] in "`-*":
+        return text
+    return f"{text[:1].upper()}{text[1:]}{'' if text[-1:] in '.:`' else '.'}"
