@@ -297,9 +297,7 @@ def write(rows: list[Row], figures: dict[str, float]) -> None:
 
 def draw() -> None:
     """Draw the figures of docs/sweeps.md."""
-    from stillhook.sweeps.cloud_figure import nyquist_cloud
-    from stillhook.sweeps.figures import cumulative_share, violins
-    from stillhook.sweeps.scatter_figure import scatter_matrix
+    from stillhook.sweeps.figures import cumulative_share, nyquist_cloud, scatter_matrix, violins
     from stillhook.text import picture
     from synth.sweeps import frequency_sweep
 

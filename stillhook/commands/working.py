@@ -16,6 +16,7 @@ from models.basics import StillhookError
 
 from ..text import Progress, Report, commands, console, number, progress, show
 
+_NAMED = 3  # pictures that are named
 _AGAIN = 0.25  # s between two attempts to interrupt
 
 Stop = Callable[[], bool]
@@ -165,9 +166,10 @@ def conclude(
     show(report, out)
     out.print()
     if written:
-        twice = {path.with_suffix(".png") for path in written if path.suffix == ".svg"}
-        names = ", ".join(path.name for path in written if path not in twice)
-        out.print(f"Written to {written[0].parent}: {names}", soft_wrap=True)
+        pictures = [path for path in written if path.suffix in (".svg", ".png")]
+        names = [path.name for path in written if path not in pictures]
+        names += [path.name for path in pictures] if len(pictures) <= _NAMED else ["figures"]
+        out.print(f"Written to {written[0].parent}: {', '.join(names)}", soft_wrap=True)
     if rows := following():
         commands(rows, out)
     return 1 if report.ok is False else 0

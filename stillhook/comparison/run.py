@@ -22,7 +22,7 @@ from models.simulation import EASE
 
 from ..controllers import contenders_of
 from ..keeper import Processes, usable_cores
-from ..runs.simulation import _seeds_of
+from ..runs.simulation import seeds_of
 from .bench import Setup
 from .cell import Question
 from .comparison import Comparison
@@ -111,7 +111,7 @@ def compare(
     ([2, 2], True)
     """
     contenders = contenders_of(controllers)
-    numbers = _seeds_of(seeds)
+    numbers = seeds_of(seeds)
     lasting = _seconds("duration", duration)
     if design_at not in ("each", "case"):
         raise InputError(f"compare: design_at must be one of each, case; got {design_at!r}")

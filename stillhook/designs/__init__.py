@@ -12,7 +12,10 @@ if TYPE_CHECKING:
     from .bound_text import bound_sentence as bound_sentence
     from .design_file import design_text as design_text
     from .design_file import load_design as load_design
+    from .design_file import load_structure as load_structure
     from .design_file import save_design as save_design
+    from .design_file import save_structure as save_structure
+    from .design_file import structure_text as structure_text
     from .pareto import pareto_report as pareto_report
     from .report import design_report as design_report
     from .report import write_report as write_report
@@ -26,9 +29,6 @@ if TYPE_CHECKING:
     from .sizing import co_design_report as co_design_report
     from .sizing import size_report as size_report
     from .sizing import worth_report as worth_report
-    from .structure_file import load_structure as load_structure
-    from .structure_file import save_structure as save_structure
-    from .structure_file import structure_text as structure_text
     from .structures import structures_report as structures_report
     from .structures import structures_table as structures_table
     from .summary import AT_LEAST as AT_LEAST

@@ -1,6 +1,6 @@
-"""A design as a YAML file that loads again: the case, the gains, and every figure claimed.
+"""Designs as YAML files that load again: the case, the gains, and every figure claimed.
 
-The file mirrors `GainDesign`: one key for each field, dataclasses as sections, arrays as lists,
+A file mirrors `GainDesign` or `StructureDesign`: one key for each field, dataclasses as sections, arrays as lists,
 and the case as it stands in a case file.  What a field may hold is read from its annotation, so
 the file follows the classes without a second description of them.  Reading is strict: what is
 missing, unknown or of another kind is named with file, line and path.
@@ -21,13 +21,13 @@ import numpy as np
 from models.basics import InputError, write_text_atomically
 from models.case import Case
 from models.casefile import line_of, message_line, read_yaml, suggestion, yaml_text
-from synth.design import GainDesign
+from synth.design import GainDesign, StructureDesign
 from synth.verify import Verification
 
 FORMAT = 1
 """Version of the file's format."""
 
-_KEY = "stillhook_design"
+_KEY, _STRUCTURE = "stillhook_design", "stillhook_structure"
 _WRITER = "written_by"
 _GAINS = ("A", "a", "a1", "a2")
 Place = tuple[str | int, ...]
@@ -58,16 +58,11 @@ def save_design(design: GainDesign, path: str | Path) -> Path:
 
 def design_text(design: GainDesign) -> str:
     """Return a design as the YAML text that `load_design` reads."""
-    from .._version import __version__
-
-    content = {_KEY: FORMAT, _WRITER: f"stillhook {__version__}", **_encoded(design)}
-    # The case comes last: it is the longest, and the one part that is not an answer.
-    content["case"] = content.pop("case")
     heading = (
         f"# A design by Stillhook for the case {design.case.name}, in SI units.\n"
         "# stillhook.load_design reads it; the section `case` is a case file of its own.\n"
     )
-    return heading + yaml_text(content)
+    return heading + _content(_KEY, design)
 
 
 def load_design(path: str | Path) -> GainDesign:
@@ -93,21 +88,85 @@ def load_design(path: str | Path) -> GainDesign:
     PhysicsWarning
         For each implausible figure of its case, as when the case was loaded.
     """
-    source = str(path)
-    data, lines = read_yaml(_text(Path(path)), source)
-    if not isinstance(data, Mapping) or _KEY not in data:
-        raise InputError(f"{source}: is not a design file: it has no key `{_KEY}`")
-    if data[_KEY] != FORMAT:
-        line = lines.get((_KEY,), 0)
-        wanted = f"must be {FORMAT}, the format that this version reads, got {data[_KEY]!r}"
-        raise InputError(message_line(source, line, (_KEY,), wanted))
-    content = {key: value for key, value in data.items() if key not in (_KEY, _WRITER)}
-    reader = _Reader(source, lines)
+    content, reader = _opened(path, _KEY, "a design file")
     design: GainDesign = reader.value(GainDesign, content, ())
     for name in _GAINS:
         if name not in design.gains:
             raise reader.error(("gains", name), "is missing; it must be a number")
     return design
+
+
+def save_structure(design: StructureDesign, path: str | Path) -> Path:
+    """Write a structure's design to a YAML file, whole or not at all.
+
+    Parameters
+    ----------
+    design
+        The design.
+    path
+        The file; its folder must exist.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    return write_text_atomically(path, structure_text(design))
+
+
+def structure_text(design: StructureDesign) -> str:
+    """Return a design as the YAML text that `load_structure` reads."""
+    heading = (
+        f"# The structure {design.structure} by Stillhook for the case {design.case.name}, in SI\n"
+        "# units. stillhook.load_structure reads it; `case` is a case file of its own.\n"
+    )
+    return heading + _content(_STRUCTURE, design)
+
+
+def load_structure(path: str | Path) -> StructureDesign:
+    """Read a design from a file that `save_structure` wrote.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    StructureDesign
+        Equal to the one saved, to the last digit; `verify` checks it anew.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is not a structure's design, or a field is missing, unknown
+        or wrong.
+    """
+    content, reader = _opened(path, _STRUCTURE, "a structure's design")
+    design: StructureDesign = reader.value(StructureDesign, content, ())
+    return design
+
+
+def _content(key: str, design: GainDesign | StructureDesign) -> str:
+    from .._version import __version__
+
+    content = {key: FORMAT, _WRITER: f"stillhook {__version__}", **_encoded(design)}
+    # The case comes last: it is the longest, and the one part that is not an answer.
+    content["case"] = content.pop("case")
+    return yaml_text(content)
+
+
+def _opened(path: str | Path, key: str, kind: str) -> tuple[dict[str, Any], _Reader]:
+    """Return the fields of a file of a kind, and what reads them."""
+    source = str(path)
+    data, lines = read_yaml(_text(Path(path)), source)
+    if not isinstance(data, Mapping) or key not in data:
+        raise InputError(f"{source}: is not {kind}: it has no key `{key}`")
+    if data[key] != FORMAT:
+        wanted = f"must be {FORMAT}, the format that this version reads, got {data[key]!r}"
+        raise InputError(message_line(source, line_of((key,), lines), (key,), wanted))
+    fields = {name: value for name, value in data.items() if name not in (key, _WRITER)}
+    return fields, _Reader(source, lines)
 
 
 def _text(path: Path) -> str:

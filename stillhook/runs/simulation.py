@@ -110,7 +110,7 @@ def simulate(
     >>> len(runs), runs.completed, runs.summary["payload rms"].count
     (3, True, 3)
     """
-    numbers = _seeds_of(seeds)
+    numbers = seeds_of(seeds)
     if traces not in ("all", "worst"):
         raise InputError(f"simulate: traces must be one of all, worst; got {traces!r}")
     if isinstance(scenario, str):
@@ -155,7 +155,7 @@ def simulate(
     return series.runs(found)
 
 
-def _seeds_of(seeds: int | Sequence[int]) -> tuple[int, ...]:
+def seeds_of(seeds: int | Sequence[int]) -> tuple[int, ...]:
     """Return the seeds: 0 to n - 1, or those given.
 
     Raises

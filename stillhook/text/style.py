@@ -113,7 +113,7 @@ def logarithmic(
 
 def typeset(text: str) -> str:
     """Return a text with H_s, T_p, T_z, T_S and M_s as matplotlib's mathematics."""
-    return re.sub(r"\b(H_s|T_p|T_z|T_S|M_s)\b", r"$\1$", text)
+    return re.sub(r"(?<!\$)\b(H_s|T_p|T_z|T_S|M_s)\b", r"$\1$", text)
 
 
 def annotate(axes: Axes, text: str, at: tuple[float, float], offset: tuple[float, float]) -> None:

@@ -226,7 +226,7 @@ def markdown(item: Report | Table, drawn: Sequence[str] | None = None) -> str:
         Names of the drawings whose files lie beside it; by default all.
     """
     if isinstance(item, Table):
-        return "\n\n".join([_grid(item), *(f"{_sentence(note)}" for note in item.notes)]) + "\n"
+        return "\n\n".join([_grid(item), *(f"{note}." for note in item.notes)]) + "\n"
     parts = [f"# {item.name}", item.about]
     if item.status:
         mark = {"ok": "Ok", "NOT OK": "Not ok"}.get(item.verdict_mark, item.verdict_mark)

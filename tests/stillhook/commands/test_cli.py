@@ -20,9 +20,9 @@ from designs import infeasible_design, loopless_design, thesis_design, unstable_
 import stillhook as sh
 from models import SolverError, load_case, template_text
 from stillhook import cli
-from stillhook.commands import gains_text, parse_gains
-from stillhook.commands.design import optimise as optimise_command
-from stillhook.text import console, progress, show_design, told_once
+from stillhook.commands import gains_text, interruptible, parse_gains
+from stillhook.designs import design_report
+from stillhook.text import console, progress, show, told_once
 
 THESIS = "A=200,a=50,a1=100,a2=100"
 CASE = load_case("thesis-1975").to_yaml()
@@ -140,7 +140,7 @@ def test_an_infeasible_case_leads_with_the_verdict_and_ends_with_1(run, handed_o
     assert ending.status == 1
     assert ending.out.splitlines()[2].startswith("NOT OK: not feasible at H_s 2.44 m")
     assert re.search(r"motor torque, peak +11\.9 kN m +13\.0 kN m", ending.out)
-    assert "All figures below are those in H_s 0.5 m." in ending.out
+    assert "All figures below are those in H_s 0.5 m" in ending.out
     assert "stillhook optimise thesis-1975 --set sea.significant_height=0.500" in ending.out
     assert "stillhook optimise thesis-1975 --set winch.drive.torque_peak=13100" in ending.out
 
@@ -241,13 +241,13 @@ def test_printed_gains_are_read_back():
 def test_no_summary_is_wider_than_80_columns(make, name, capsys):
     design = make()
     case = design.case.replace({"name": name, "description": "word " * 60})
-    show_design(replace(design, case=case), console())
+    show(design_report(replace(design, case=case)), console())
     assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
 
 
 def test_names_are_not_read_as_markup(capsys):
     case = thesis_design().case.replace({"name": "[red]crane[/red] :warning:"})
-    show_design(replace(thesis_design(), case=case), console())
+    show(design_report(replace(thesis_design(), case=case)), console())
     assert capsys.readouterr().out.startswith("[red]crane[/red] :warning:: The 1975")
 
 
@@ -598,7 +598,7 @@ main_thread = pytest.mark.skipif(
 def test_an_interrupt_that_is_swallowed_comes_again():
     before = signal.getsignal(signal.SIGINT)
     swallowed = 0
-    with pytest.raises(KeyboardInterrupt), optimise_command.interruptible() as check:  # noqa: PT012
+    with pytest.raises(KeyboardInterrupt), interruptible() as check:  # noqa: PT012
         check()
         try:
             signal.raise_signal(signal.SIGINT)
@@ -735,7 +735,7 @@ def test_colour_is_for_terminals(monkeypatch):
     shown = rich.console.Console(
         file=target, force_terminal=True, width=80, markup=False, color_system="standard"
     )
-    show_design(thesis_design(), shown)
+    show(design_report(thesis_design()), shown)
     assert "\x1b[1;31mNOT OK" in target.getvalue()
 
 

@@ -58,7 +58,8 @@ def test_a_comparison_ends_well_and_fills_its_folder(run):
         "thesis-1975: 2 contenders, H_s 0.4, 0.6 m, 2 seeds of 30 s",
         "H_s 0.4 m",
         "H_s 0.6 m: the best linear law is feed-forward, ",
-        "Written to here: summary.md, summary.json, table.csv, runs.csv, figures",
+        "Written to here: case.yaml, table.csv, runs.csv, summary.json, traces.csv, summary.md, "
+        "figures",
     ):
         assert text in ending.out, text
     names = {path.name for path in Path("here").iterdir()}

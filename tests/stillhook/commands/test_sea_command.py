@@ -39,7 +39,7 @@ def test_a_file_of_records(buoy: Path, tmp_path: Path, capsys: pytest.CaptureFix
     records = read_seas(buoy)
     assert len(records) == 27
     highest = int(np.argmax(records.significant_height))
-    assert f"Record {highest}, {str(records.time[highest]).replace('T', ' ')} UTC:" in said
+    assert f"Record {highest}, {str(records.time[highest]).replace('T', ' ')} UTC" in said
     site = read_scatter(out / "scatter.csv")
     assert site.occurrence.sum() == pytest.approx(1.0)
     assert site.mean_significant_height == pytest.approx(
@@ -71,7 +71,7 @@ def test_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     assert main(["sea", "subsea-crane", "--out", str(out)]) == 0
     said = capsys.readouterr().out
-    assert "subsea-crane: jonswap" in said
+    assert said.startswith("subsea-crane\njonswap, H_s 2.00 m\n")
     assert "2.00 m" in said
     assert {path.name for path in out.iterdir()} == {"spectrum.svg", "spectrum.png"}
     assert main(["sea", "subsea-crane", "--out", str(out), "--quiet"]) == 0

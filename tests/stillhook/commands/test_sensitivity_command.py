@@ -6,8 +6,8 @@ from designs import thesis_design
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from stillhook.cli import main
-from stillhook.designs import tornado_figure
-from stillhook.designs.tornado_plot import finding
+from stillhook.designs import sensitivity_report
+from stillhook.designs.sensitivity import tornado_figure
 from stillhook.text import picture
 from synth.sensitivity import sensitivity
 
@@ -64,7 +64,10 @@ def test_quietly_it_says_one_sentence(tmp_path, capsys, study):
         main(["sensitivity", "thesis-1975", "--quiet", "--second", "0", "--out", str(tmp_path)])
         == 0
     )
-    assert capsys.readouterr().out.strip() == f"thesis-1975: {finding(study)}"
+    assert (
+        capsys.readouterr().out.strip()
+        == f"thesis-1975: {sensitivity_report(study, (), None).status}"
+    )
 
 
 @pytest.mark.parametrize(

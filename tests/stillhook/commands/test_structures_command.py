@@ -11,17 +11,9 @@ import pytest
 import stillhook as sh
 from models.basics import InputError
 from stillhook.cli import main
-from stillhook.designs import (
-    HEADINGS,
-    load_structure,
-    markdown,
-    save_structure,
-    structure_rows,
-    structure_text,
-    structures,
-)
-from stillhook.designs.structure_table import share_of
-from stillhook.text import picture
+from stillhook.designs import load_structure, save_structure, structure_text, structures_table
+from stillhook.designs.structures import share_of, structures
+from stillhook.text import markdown, picture
 
 FAST = ["--set", "sensors.telemetry.delay=25 ms", "--starts", "2"]
 NOISY = {"sensors.mru": {"noise_floor": 0.0, "noise_fraction": 0.02}}
@@ -76,16 +68,16 @@ def test_shares_of_the_variance_add_up(
 
 
 def test_table_says_what_limits(forward: sh.StructureDesign, feedback: sh.StructureDesign) -> None:
-    first, second = structure_rows([forward, feedback])
-    assert "max_sensitivity" in second.limited
-    assert first.shares[1].endswith("%")
-    assert len(first.cells) == len(HEADINGS)
-    text = markdown([forward, feedback], bound=False)
+    table = structures_table([forward, feedback])
+    first, second = table.cells(0), table.cells(1)
+    assert "max_sensitivity" in second[-1]
+    assert first[table.headings.index("MRU")].endswith("%")
+    text = markdown(structures_table([forward, feedback], bound=False))
     assert text.count("\n") == 4
-    assert markdown([forward, feedback]).count("\n") == 6  # and what "over best" means
+    assert markdown(table).count("\n") == 6  # and what "over best" means
     assert "payload-feedback" in text
     broken = replace(forward, ok=False, status="the drive is too small: much")
-    assert structure_rows([broken])[0].limited == "the drive is too small"
+    assert structures_table([broken]).rows[0][-1] == "the drive is too small"
 
 
 def test_figure_shows_every_design(

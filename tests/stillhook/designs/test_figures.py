@@ -13,9 +13,12 @@ import pytest
 from designs import infeasible_design, loopless_design, thesis_design, unstable_design
 
 from models import InputError
-from stillhook.designs.figures import FIGURES, limits, payload_spectrum, responses
-from stillhook.designs.nyquist_plot import nyquist
-from stillhook.text import MotionView, picture
+from stillhook.designs.figures import limits, payload_spectrum, responses
+from stillhook.designs.motion import MotionView
+from stillhook.designs.nyquist import nyquist
+from stillhook.text import picture
+
+FIGURES = {f.__name__: f for f in (payload_spectrum, responses, nyquist, limits)}
 
 LABELS = {
     "payload_spectrum": [("frequency [rad/s]", "variance density [m² s/rad]")],
@@ -190,7 +193,7 @@ def test_figures_leave_matplotlib_as_it_was_and_need_no_pyplot():
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True
     )
     assert run.stdout.strip() == "[]"  # matplotlib comes with the first figure
-    assert "matplotlib.pyplot" not in FIGURES["limits"].__globals__
+    assert "matplotlib.pyplot" not in limits.__globals__
 
 
 def test_the_same_design_gives_the_same_files():

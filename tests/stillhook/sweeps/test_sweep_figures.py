@@ -10,9 +10,7 @@ from designs import thesis_design, unstable_design
 from models.basics import InputError
 from models.spread import Spread
 from stillhook.sweeps import sweep_figures
-from stillhook.sweeps.cloud_figure import nyquist_cloud
-from stillhook.sweeps.figures import cumulative_share, violins
-from stillhook.sweeps.scatter_figure import scatter_matrix
+from stillhook.sweeps.figures import cumulative_share, nyquist_cloud, scatter_matrix, violins
 from stillhook.text import picture
 from synth.sweeps import frequency_sweep
 

@@ -11,8 +11,11 @@ import pytest
 
 import stillhook as sh
 from models.basics import InputError, SolverError
-from stillhook.designs import HEADINGS, markdown, structure_rows, structures
-from stillhook.text import bound_cell, bound_figures, bound_sentence, bounds_note, facts
+from stillhook.designs import bound_sentence, structures_table
+from stillhook.designs.bound_text import bound_cell, bound_figures, bounds_note
+from stillhook.designs.structures import structures
+from stillhook.designs.summary import facts
+from stillhook.text import markdown
 from synth.bound import DesignBound, bound_beside, exact_sensors, verify_bound
 from synth.loop import Assessment
 from synth.question import pose_structure
@@ -245,13 +248,13 @@ def test_a_structure_that_hears_noisy_sensors_only_has_one() -> None:
 def test_table_and_figure_show_the_bound() -> None:
     design = forward()
     lost = replace(design, structure="lost", payload_rms=np.inf, margins=None, ok=False)
-    rows = structure_rows([design, lost])
-    column = HEADINGS.index("over best")
-    assert rows[0].cells[column] == bound_cell(design) != "-"
-    assert rows[1].cells[column] == "-"
-    assert structure_rows([design], bound=False)[0].cells[column] == "-"
-    assert bounds_note([design]) in markdown([design])
-    assert "over best:" not in markdown([design], bound=False)
+    table, plain = structures_table([design, lost]), structures_table([design], bound=False)
+    column = table.headings.index("over best")
+    assert table.cells(0)[column] == bound_cell(design) != "-"
+    assert table.cells(1)[column] == "-"
+    assert plain.cells(0)[column] == "-"
+    assert bounds_note([design]) in markdown(structures_table([design]))
+    assert "over best:" not in markdown(plain)
     marks = [
         line
         for line in structures([design, lost]).axes[0].lines
@@ -259,8 +262,8 @@ def test_table_and_figure_show_the_bound() -> None:
     ]
     assert len(marks) == 1
     assert marks[0].get_xdata()[0] == pytest.approx(1e3 * design.bound.heard.value)
-    plain = structures([design], bound=False).axes[0].lines
-    assert all(line.get_label() != "best with its sensors" for line in plain)
+    lines = structures([design], bound=False).axes[0].lines
+    assert all(line.get_label() != "best with its sensors" for line in lines)
 
 
 def test_what_cannot_be_computed_is_said(monkeypatch: pytest.MonkeyPatch) -> None:

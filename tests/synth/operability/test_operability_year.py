@@ -23,9 +23,9 @@ from stillhook.seas import (
     contour_figure,
     depth_figure,
     heading_figure,
-    netcdf,
     scatter_figure,
 )
+from stillhook.seas.operability import netcdf
 from synth.operability import Contour, Operability, operability
 from synth.operability.contour import over_headings
 from synth.operability.criteria import STABILITY
