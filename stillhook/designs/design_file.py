@@ -1,9 +1,9 @@
 """Designs as YAML files that load again: the case, the gains, and every figure claimed.
 
-A file mirrors `GainDesign` or `StructureDesign`: one key for each field, dataclasses as sections, arrays as lists,
-and the case as it stands in a case file.  What a field may hold is read from its annotation, so
-the file follows the classes without a second description of them.  Reading is strict: what is
-missing, unknown or of another kind is named with file, line and path.
+A file mirrors `GainDesign` or `StructureDesign`: one key for each field, dataclasses as sections,
+arrays as lists, and the case as it stands in a case file.  What a field may hold is read from its
+annotation, so the file follows the classes without a second description of them.  Reading is strict:
+what is missing, unknown or of another kind is named with file, line and path.
 """
 
 from __future__ import annotations
