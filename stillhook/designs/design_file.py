@@ -2,7 +2,7 @@
 
 A file mirrors `GainDesign` or `StructureDesign`: one key for each field, dataclasses as sections,
 arrays as lists, and the case as it stands in a case file.  What a field may hold is read from its
-annotation, so the file follows the classes without a second description of them.  Reading is strict:
+annotation, so the file follows the classes without a second description.  Reading is strict:
 what is missing, unknown or of another kind is named with file, line and path.
 """
 
