@@ -14,7 +14,7 @@ import numpy as np
 
 from ..basics import FloatArray
 
-Law = Literal["normal", "uniform"]
+_Law = Literal["normal", "uniform"]
 
 SENSOR_NOISE, TELEMETRY, MRU_ERROR = 1, 2, 3  # purposes: second entry of the seed
 
@@ -22,7 +22,7 @@ _BLOCK = 65536
 
 
 def draw(
-    seed: int, purpose: int, start: int, count: int, columns: int, law: Law = "normal"
+    seed: int, purpose: int, start: int, count: int, columns: int, law: _Law = "normal"
 ) -> FloatArray:
     """Return rows `start` to `start + count` of an endless table of independent numbers.
 
@@ -54,7 +54,7 @@ def draw(
 
 
 @lru_cache(maxsize=6)
-def _block(seed: int, purpose: int, block: int, columns: int, law: Law) -> FloatArray:
+def _block(seed: int, purpose: int, block: int, columns: int, law: _Law) -> FloatArray:
     # numpy fills short seeds up with zeros: [seed, purpose, 0] would be [seed, purpose] again.
     generator = np.random.default_rng(np.random.SeedSequence([seed, purpose, block + 1]))
     size = (_BLOCK, columns)

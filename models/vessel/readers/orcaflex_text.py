@@ -51,8 +51,6 @@ def read_vessel_types(owner: str, text: str) -> tuple[list[dict[str, Any]], list
     from ruamel.yaml import YAML
     from ruamel.yaml.error import YAMLError
 
-    if not any(line.strip().startswith("VesselTypes:") for line in text.splitlines()):
-        raise InputError(f"{owner}: {_NO_TYPES}")
     pruned, tables = _pruned(owner, text)
     try:
         found = YAML(typ="safe", pure=True).load(pruned)
@@ -72,9 +70,11 @@ def _pruned(owner: str, text: str) -> tuple[str, list[FloatArray]]:
         raise InputError(f"{owner}: must have at most {_LONGEST} lines, got {len(lines)}")
     kept: list[str] = []
     tables: list[FloatArray] = []
-    i = _start(lines)
-    base = len(lines[i]) - len(lines[i].lstrip()) if i < len(lines) else 0
-    first = i
+    heads = (n for n, line in enumerate(lines) if line.strip().startswith("VesselTypes:"))
+    i = first = next(heads, -1)
+    if first < 0:
+        raise InputError(f"{owner}: {_NO_TYPES}")
+    base = len(lines[first]) - len(lines[first].lstrip())
     while i < len(lines):
         line = lines[i]
         indent = len(line) - len(line.lstrip())
@@ -103,14 +103,6 @@ def _pruned(owner: str, text: str) -> tuple[str, list[FloatArray]]:
             continue
         kept.append(f"{match['indent']}{_heading(key)}: {rest}" if "," in key else line)
     return "\n".join(kept), tables
-
-
-def _start(lines: list[str]) -> int:
-    """Return the line on which the vessel types begin; 0 if there is none."""
-    for number, line in enumerate(lines):
-        if line.strip().startswith("VesselTypes:"):
-            return number
-    return 0
 
 
 def _heading(key: str) -> str:

@@ -18,6 +18,7 @@ from models.vessel.hull import (
     Hydrodynamics,
     ShipLines,
     box_hull,
+    read_hull,
     usual_frequencies,
     vessel_from_hull,
 )
@@ -298,6 +299,9 @@ def test_without_capytaine_the_message_tells_what_to_install(
     monkeypatch.setenv("STILLHOOK_CACHE", str(tmp_path))
     with pytest.raises(InputError, match=r"pip install 'stillhook\[bem\]'"):
         vessel_from_hull(BOX, gm=1.5)
+    (tmp_path / "box.gdf").write_text("a box\n1 9.81\n0 0\n1\n", encoding="ascii")
+    with pytest.raises(InputError, match=r"pip install 'stillhook\[bem\]'"):
+        read_hull(tmp_path / "box.gdf")
 
 
 # --- with it ------------------------------------------------------------------------------------

@@ -297,6 +297,9 @@ def test_what_is_no_rao_file_is_said_to_be_none(tmp_path: Path) -> None:
         read_raos(put(tmp_path, "a.4", wamit_text(RAOS)), file_format="aqwa")
     with pytest.raises(InputError, match="draught says nothing about a wamit file"):
         read_raos(tmp_path / "a.4", draught="deep")
+    known = r"ulen says nothing .* \(its options: body, depth, length, origin, waves\)"
+    with pytest.raises(InputError, match=known):
+        read_raos(tmp_path / "a.4", ulen=80.0)
     with pytest.raises(InputError, match="there is no such file"):
         read_raos(tmp_path)
 
