@@ -152,7 +152,8 @@ def refine(floor: Clairvoyant, *, max_iterations: int = 300, tolerance: float = 
     plant = _plant(floor)
     advance, limits, lower = _functions(floor, plant)
     y = rollout(problem, floor.solution.start, floor.solution.inputs)
-    # deviations from the motion that holds the payload still, in the linear plant's units
+    # Deviations from the motion that holds the payload still, in the linear plant's units: next to
+    # zero where no limit binds.
     still = problem.still.T
     ends = np.stack([problem.heave[:-1], problem.rate[:-1], problem.heave[1:], problem.rate[1:]])
     unit = linear.peak / linear.command_gain
@@ -179,6 +180,8 @@ def refine(floor: Clairvoyant, *, max_iterations: int = 300, tolerance: float = 
         "ipopt.sb": "yes",
         "ipopt.max_iter": int(max_iterations),
         "ipopt.tol": tolerance,
+        # The barrier begins small and pushes the start hardly off its bounds: the clairvoyant's
+        # motion lies on them most of the time, and is nearly the answer.
         "ipopt.mu_init": 1e-5,
         "ipopt.warm_start_init_point": "yes",
         "ipopt.bound_push": 1e-6,

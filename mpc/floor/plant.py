@@ -220,6 +220,8 @@ def record_plant(
     B = linear.B[keep, 0] / scale * peak / gain
     E = linear.E[np.ix_(keep, hook)] / scale[:, None]
     back = regulated * gain / peak
+    # A held command lets the demand fall with the speed, which is in A; a demand that is a straight
+    # line whatever the speed does has that taken out.
     Phi, Gamma, Psi = _sampled(
         A + np.outer(B, back) if hold == "line" else A, B, E, sample_time, hold
     )

@@ -209,6 +209,7 @@ def make_stage(
     y = ca.SX.sym("y", len(law.arguments))
     n = law.function(y)
     J = ca.jacobian(n, y)
+    # Most forces depend on one argument or two: the horizon is solved by those pairs only.
     pattern = np.asarray(ca.DM(J.sparsity(), 1.0)).reshape(len(law.columns), len(law.arguments))
     out = ca.vertcat(n, ca.reshape(ca.densify(J).T, -1, 1))
     none = [ca.SX.sym("s", 0), ca.SX.sym("p", 0)]

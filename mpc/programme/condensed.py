@@ -151,6 +151,7 @@ def condense(
     H += regulator.weight * horizon.unit**2 * np.diag(lengths)
     steady = regulator.steady[nh:]
     gradient[:, constants] -= regulator.weight * horizon.unit * np.outer(lengths, steady)
+    # The rest of the cost, from the horizon's end to infinity, is the regulator's value function.
     end = S[:, moves]
     H += end.T @ regulator.P @ end
     gradient += end.T @ regulator.P @ S[:, : moves.start]

@@ -32,6 +32,7 @@ def prediction_covariance(
     SolverError
         If there is none.
     """
+    # Each state in its own size, each measurement in units of its own error.
     P = solve_discrete_riccati(
         A / scale[:, None] * scale,
         C * scale / np.sqrt(R)[:, None],

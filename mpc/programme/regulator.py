@@ -91,6 +91,7 @@ def lq_regulator(
     SolverError
         If the Riccati equation has no solution, or the regulated plant is not stable.
     """
+    # Each state in its own size, and the weight in B, so that an input of one costs one.
     scaled = output * scale
     P = solve_discrete_riccati(
         (A / scale[:, None] * scale).T,
@@ -103,6 +104,8 @@ def lq_regulator(
     closed = A - B @ K[None, :]
     if np.abs(np.linalg.eigvals(closed)).max() >= 1.0 - 1e-12:
         raise SolverError("regulator: the regulated plant is not stable")
+    # About the steady input: a constant disturbance that is held would else cost something for
+    # ever, and a horizon without end would have no finite cost.
     shifted = Gamma + np.outer(B[:, 0], steady)
     N = _cross(closed, P @ shifted, Phi)
     K_zeta = (B.T @ (P @ shifted + N @ Phi))[0] / bend

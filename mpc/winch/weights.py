@@ -280,6 +280,7 @@ def _search(
     screen = qmc.scale(qmc.Sobol(5, seed=0).random(_SCREENED), _LOW, _HIGH)
     points = np.vstack([_FIRST, screen])
     costs = [cost(point) for point in points]
+    # A simplex: the cost jumps to a constant where a loop is unstable.
     for start in points[np.argsort(costs)[:2]]:
         # towards the middle, so that no side of the simplex lies outside
         side = np.where(start > 0.5 * (_LOW + _HIGH), -0.35, 0.35)
