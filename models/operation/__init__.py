@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from .faults import fault_of as fault_of
     from .faults import with_faults as with_faults
     from .hermite import MotionBlock as MotionBlock
-    from .options import Choice as Choice
     from .options import Option as Option
+    from .options import WordOption as WordOption
     from .record_file import RecordMotion as RecordMotion
     from .scenario import Scenario as Scenario
     from .scenarios import scenario_named as scenario_named

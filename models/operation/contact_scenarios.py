@@ -24,10 +24,10 @@ from ..plant import Deck, Seabed, SplashZone, Surroundings
 from ..vessel import HeaveRao
 from .excitation import HOOK, SECOND_BODY, MotionSource, SpectrumMotion
 from .options import (
-    Choice,
     Option,
-    Recipe,
+    ScenarioRecipe,
     Values,
+    WordOption,
     acceleration_option,
     begin,
     duration_after,
@@ -138,8 +138,8 @@ def _splash(case: Case, values: Values) -> dict[str, Any]:
 
 _WAIT = time_option(60.0, "time at rest before it, with the controller engaged")
 
-_DECK: Mapping[str, Option | Choice] = {
-    "deck": Choice(words=("boat", "platform"), text="what the deck is part of", motion=True),
+_DECK: Mapping[str, Option | WordOption] = {
+    "deck": WordOption(words=("boat", "platform"), text="what the deck is part of", motion=True),
     "stiffness": Option(
         quantity=Quantity("stiffness", 1e3, 1e9), default=5e6, text="stiffness of the deck"
     ),
@@ -148,8 +148,8 @@ _DECK: Mapping[str, Option | Choice] = {
     "acceleration": acceleration_option(0.5),
 }
 
-CONTACT_SCENARIOS: Mapping[str, Recipe] = {
-    "landing": Recipe(
+CONTACT_SCENARIOS: Mapping[str, ScenarioRecipe] = {
+    "landing": ScenarioRecipe(
         description="lower the payload to above the seabed, wait, and land it",
         build=_landing,
         options={
@@ -177,7 +177,7 @@ CONTACT_SCENARIOS: Mapping[str, Recipe] = {
         },
         ramp=2.0,
     ),
-    "lift-off": Recipe(
+    "lift-off": ScenarioRecipe(
         description="lift the payload, in air, off a supply boat or a platform",
         build=_lift_off,
         options={
@@ -190,7 +190,7 @@ CONTACT_SCENARIOS: Mapping[str, Recipe] = {
         warm_up=10.0,
         ramp=5.0,
     ),
-    "set-down": Recipe(
+    "set-down": ScenarioRecipe(
         description="set the payload, in air, down on a supply boat or a platform",
         build=_set_down,
         options={
@@ -200,7 +200,7 @@ CONTACT_SCENARIOS: Mapping[str, Recipe] = {
             "wait": _WAIT,
         },
     ),
-    "splash": Recipe(
+    "splash": ScenarioRecipe(
         description="lower the payload through the splash zone",
         build=_splash,
         options={

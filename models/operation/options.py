@@ -57,7 +57,7 @@ class Option:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Choice:
+class WordOption:
     """One of a few words that a scenario may be given.
 
     Attributes
@@ -94,7 +94,7 @@ class Choice:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Recipe:
+class ScenarioRecipe:
     """How a scenario of the library is made.
 
     Attributes
@@ -111,12 +111,12 @@ class Recipe:
 
     description: str
     build: Callable[[Case, Values], dict[str, Any]]
-    options: Mapping[str, Option | Choice]
+    options: Mapping[str, Option | WordOption]
     warm_up: float = 0.0
     ramp: float = 0.0
 
     @property
-    def all_options(self) -> dict[str, Option | Choice]:
+    def all_options(self) -> dict[str, Option | WordOption]:
         """Its own options and those that every scenario has."""
         return {
             **self.options,

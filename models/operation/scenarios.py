@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 from ..basics import InputError
 from .contact_scenarios import CONTACT_SCENARIOS
-from .options import Choice, Option, Recipe
+from .options import Option, ScenarioRecipe, WordOption
 from .scenario import Scenario
 from .station_scenarios import STATION_SCENARIOS
 
 if TYPE_CHECKING:
     from ..case import Case
 
-_RECIPES: Mapping[str, Recipe] = {**STATION_SCENARIOS, **CONTACT_SCENARIOS}
+_RECIPES: Mapping[str, ScenarioRecipe] = {**STATION_SCENARIOS, **CONTACT_SCENARIOS}
 
 
 def scenario_names() -> dict[str, str]:
@@ -36,7 +36,7 @@ def scenario_names() -> dict[str, str]:
     return {name: recipe.description for name, recipe in _RECIPES.items()}
 
 
-def scenario_options(name: str) -> Mapping[str, Option | Choice]:
+def scenario_options(name: str) -> Mapping[str, Option | WordOption]:
     """Return the options of a scenario by name.
 
     Raises
@@ -94,7 +94,7 @@ def scenario_named(name: str, case: Case, **options: object) -> Scenario:
     )
 
 
-def _recipe(name: str) -> Recipe:
+def _recipe(name: str) -> ScenarioRecipe:
     if name not in _RECIPES:
         near = difflib.get_close_matches(name, _RECIPES, n=1, cutoff=0.6)
         hint = f"did you mean {near[0]!r}? " if near else ""

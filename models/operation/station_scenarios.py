@@ -13,10 +13,10 @@ from typing import Any
 from ..case import Case
 from ..casefile import Quantity
 from .options import (
-    Choice,
     Option,
-    Recipe,
+    ScenarioRecipe,
     Values,
+    WordOption,
     acceleration_option,
     begin,
     duration_after,
@@ -109,20 +109,20 @@ _SET_POINT: Mapping[str, Option] = {
 }
 _WAIT = time_option(120.0, "time before it")
 
-STATION_SCENARIOS: Mapping[str, Recipe] = {
-    "hold": Recipe(
+STATION_SCENARIOS: Mapping[str, ScenarioRecipe] = {
+    "hold": ScenarioRecipe(
         description="hold station, the controller engaged from the start",
         build=_hold,
         options={},
     ),
-    "engage": Recipe(
+    "engage": ScenarioRecipe(
         description="warm up with the brake on, engage, hold, disengage",
         build=_engage,
         options={"hold": time_option(300.0, "time from engaged to disengaging")},
         warm_up=60.0,
         ramp=20.0,
     ),
-    "lower": Recipe(
+    "lower": ScenarioRecipe(
         description="lower the payload at constant speed",
         build=_lower,
         options={
@@ -130,7 +130,7 @@ STATION_SCENARIOS: Mapping[str, Recipe] = {
             **_SET_POINT,
         },
     ),
-    "steps": Recipe(
+    "steps": ScenarioRecipe(
         description="raise and lower the payload in steps",
         build=_steps,
         options={
@@ -140,22 +140,22 @@ STATION_SCENARIOS: Mapping[str, Recipe] = {
             **_SET_POINT,
         },
     ),
-    "brake-trip": Recipe(
+    "brake-trip": ScenarioRecipe(
         description="the brake trips, and opens again",
         build=_brake_trip,
         options={"lasting": _lasting(30.0, "how long the brake is on"), "wait": _WAIT},
         ramp=10.0,
     ),
-    "sensor-loss": Recipe(
+    "sensor-loss": ScenarioRecipe(
         description="the link from the payload, its sensor or the motion reference unit is lost",
         build=_sensor_loss,
         options={
-            "lost": Choice(words=("telemetry", "sensor", "mru"), text="what is lost"),
+            "lost": WordOption(words=("telemetry", "sensor", "mru"), text="what is lost"),
             "lasting": _lasting(10.0, "how long"),
             "wait": _WAIT,
         },
     ),
-    "power-limit": Recipe(
+    "power-limit": ScenarioRecipe(
         description="the vessel has little power for the winch for a while",
         build=_power_limit,
         options={

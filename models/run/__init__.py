@@ -19,6 +19,6 @@ if TYPE_CHECKING:
     from .run import Timings as Timings
     from .statistics import Accumulator as Accumulator
     from .summary import ERROR as ERROR
-    from .summary import Quantity as Quantity
+    from .summary import NamedQuantity as NamedQuantity
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -24,7 +24,7 @@ ERROR = "payload.error"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Quantity:
+class NamedQuantity:
     """A number with a unit; NaN says that what it measures did not happen."""
 
     value: float
@@ -180,7 +180,7 @@ class Statistics:
     samples: int
     end: float
     signals: Mapping[str, SignalStatistics]
-    quantities: Mapping[str, Quantity]
+    quantities: Mapping[str, NamedQuantity]
     block: float
     blocks: Mapping[str, Blocks]
 
@@ -258,12 +258,12 @@ def quantities_of(
     lost: FirstTime | None,
     touch: Touchdown | None,
     hottest: float | None,
-) -> dict[str, Quantity]:
+) -> dict[str, NamedQuantity]:
     """Return the named quantities that the signals at hand allow; `time` dates a sample."""
-    found: dict[str, Quantity] = {}
+    found: dict[str, NamedQuantity] = {}
 
     def put(name: str, value: float, unit: str) -> None:
-        found[name] = Quantity(value=float(value), unit=unit)
+        found[name] = NamedQuantity(value=float(value), unit=unit)
 
     hook, payload = signals.get("hook.heave"), signals.get("payload.displacement")
     if hook:

@@ -53,7 +53,7 @@ _UNITS = {
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ClosedLoop:
+class LoopRecursion:
     """The recursion of a closed loop and the names of all that goes through it.
 
     Parameters
@@ -104,7 +104,7 @@ def build_closed_loop(
     start: FloatArray,
     hold: float,
     recursion: Recursion | None = None,
-) -> ClosedLoop:
+) -> LoopRecursion:
     """Return the recursion of one control sample.
 
     Parameters
@@ -176,7 +176,7 @@ def build_closed_loop(
     numbers = np.array(list(values.values()))
     at_rest = look(start, hold, np.zeros(width), numbers)[0]
     units = {**plant.units, **_UNITS, "drive.command": plant.units["drive.command"]}
-    return ClosedLoop(
+    return LoopRecursion(
         fused=fused,
         measure=_function("measure", [s, r, p], [ca.vertcat(x, seen, s[nx + ns :]), m]),
         advance=_function(

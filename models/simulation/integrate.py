@@ -32,7 +32,7 @@ from ..plant import Plant
 Value: TypeAlias = Any
 # What moves the plant over a step, as the right-hand side takes it.
 Driven = TypeVar("Driven")
-Motion: TypeAlias = tuple[Value, Value]
+
 Ends = Sequence[tuple[ca.SX, ca.SX, ca.SX]]
 """Displacement, velocity and acceleration of every motion at one moment, the hook's first."""
 
@@ -43,7 +43,7 @@ _ROUNDING = 1e-9  # [-] of a frequency, or of a ratio of times
 
 def hermite_midpoint(
     z0: Value, v0: Value, a0: Value, z1: Value, v1: Value, a1: Value, h: float
-) -> Motion:
+) -> tuple[Value, Value]:
     """Return displacement and velocity in the middle of a step of length `h`.
 
     Cubic Hermite interpolation, of the displacement from the velocities and of the velocity

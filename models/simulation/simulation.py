@@ -37,7 +37,7 @@ from ..sensing import (
     holds_brake,
     recursion_of,
 )
-from .closed_loop import HOOK, ClosedLoop, build_closed_loop
+from .closed_loop import HOOK, LoopRecursion, build_closed_loop
 from .integrate import StepChoice, choose_step
 from .kernel import Kernel
 from .rows import RowMaker
@@ -125,7 +125,7 @@ class Simulation:
     scenario: Scenario
     options: SimulationOptions
     hook: MotionSource
-    loop: ClosedLoop
+    loop: LoopRecursion
     kernels: tuple[Kernel, ...]
     sensors: SensorModel
     schedule: Schedule

@@ -15,7 +15,7 @@ import numpy as np
 
 from models.case import Case
 from models.operation import Scenario, SpectrumMotion
-from models.run import Quantity, Run
+from models.run import NamedQuantity, Run
 from models.sensing import Controller, holds_brake
 from models.simulation import (
     Progress,
@@ -101,7 +101,7 @@ def _with_error_before_touchdown(run: Run) -> Run:
         rms, largest = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
     quantities = {
         **run.statistics.quantities,
-        "error before touch-down rms": Quantity(value=rms, unit="m"),
-        "error before touch-down largest": Quantity(value=largest, unit="m"),
+        "error before touch-down rms": NamedQuantity(value=rms, unit="m"),
+        "error before touch-down largest": NamedQuantity(value=largest, unit="m"),
     }
     return replace(run, statistics=replace(run.statistics, quantities=quantities))

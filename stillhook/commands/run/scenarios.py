@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from models.basics import KINDS
-from models.operation import Choice, Option, scenario_names, scenario_options
+from models.operation import Option, WordOption, scenario_names, scenario_options
 
 from ...controllers import PREDICTIVE
 from ...text import commands, console, pairs, quantity, show
@@ -57,8 +57,8 @@ def _options(name: str) -> None:
     commands([("with an option", command)], out)
 
 
-def _text(option: Option | Choice) -> str:
-    if isinstance(option, Choice):
+def _text(option: Option | WordOption) -> str:
+    if isinstance(option, WordOption):
         return f"{option.text}: {', '.join(option.words)}"
     return f"{option.text} ({_default(option)})"
 
@@ -70,8 +70,8 @@ def _default(option: Option) -> str:
     return quantity(option.default, unit) if unit else f"{option.default:g}"
 
 
-def _example(option: Option | Choice) -> str:
-    if isinstance(option, Choice):
+def _example(option: Option | WordOption) -> str:
+    if isinstance(option, WordOption):
         return option.words[-1]
     unit = KINDS[option.quantity.kind].unit
     value = 2.0 if callable(option.default) else 2.0 * option.default or 10.0

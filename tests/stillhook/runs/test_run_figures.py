@@ -16,7 +16,7 @@ from hypothesis.extra import numpy as arrays
 from PIL import Image
 
 import stillhook as sh
-from models.run import Event, Quantity
+from models.run import Event, NamedQuantity
 from stillhook.runs import animation as animation_module
 from stillhook.runs.animation import animation
 from stillhook.runs.figures import comparison, exceedance, figures_of
@@ -250,7 +250,7 @@ def test_the_window_is_about_touchdown_or_trouble():
 
 def test_the_window_shows_what_came_first_trouble_or_loss_of_lock():
     run = calm()[0]
-    lost = {**run.statistics.quantities, "lost lock at": Quantity(value=90.0, unit="s")}
+    lost = {**run.statistics.quantities, "lost lock at": NamedQuantity(value=90.0, unit="s")}
     fallen = replace(run, statistics=replace(run.statistics, quantities=lost))
     assert window_of(fallen).why == "loss of lock"
     for time, why in ((80.0, "about 80 s"), (100.0, "loss of lock")):
