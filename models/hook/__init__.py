@@ -1,4 +1,8 @@
-"""The hook's motion: spectra, numbers and time series from vessel and sea."""
+"""The hook's motion: spectra, numbers and time series from vessel and sea.
+
+A sea's spectrum and a vessel's operators come in; the motion of the hook (`HookMotion`) goes out,
+as spectra, moments, most probable maxima and random records, with what it asks of a winch.
+"""
 
 from typing import TYPE_CHECKING
 

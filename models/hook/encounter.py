@@ -1,4 +1,4 @@
-r"""Under way, or in a current: the same waves, met at another frequency.
+r"""Frequencies of encounter, under way or in a current, and spectra of waves met at them.
 
 A wave of frequency omega and wave number k that travels at the angle beta to a vessel which moves
 through the water at U passes the vessel at the frequency of encounter

@@ -1,4 +1,4 @@
-r"""What a hook's motion asks of a winch, before any controller is thought of.
+r"""Demands of a hook's motion on a winch, before any controller is thought of.
 
 A winch that keeps the load still pays out and hauls in what the hook moves: the rope's speed and
 acceleration are those of the hook, and power is the tension times the speed.  So the spectra alone

@@ -1,4 +1,9 @@
-"""Operations in time: scenarios, what excites them, contact, payout, faults."""
+"""Operations in time: scenarios, what excites them, contact, payout, faults.
+
+A name and its options, or a `Scenario` of one's own, say what the operator asks and what fails; a
+`MotionSource` says what moves the hook. Out go a `Schedule` of rows and motions over time for the
+simulation.
+"""
 
 from typing import TYPE_CHECKING
 

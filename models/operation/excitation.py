@@ -1,4 +1,4 @@
-r"""What moves the hook, and whatever else moves by itself, as motions over time.
+r"""Motions over time, of the hook and of whatever else moves by itself.
 
 A `MotionSource` says where a motion comes from: a spectrum, a sine or nothing (this file), a
 measured record (`models.operation.record_file`), six degrees of freedom

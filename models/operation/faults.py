@@ -1,4 +1,4 @@
-"""Faults in mid-run by name: what may fail, how far, and the scenario in which it does.
+"""Faults in mid-run by name, with their ranges, and scenarios with faults in them.
 
     names and sizes (a row of a spread) --> with_faults --> Scenario --> simulation
 

@@ -1,4 +1,4 @@
-"""What a scenario may be given, and what follows from the case where nothing is given.
+"""Options of the scenarios of the library, with defaults that follow from the case.
 
 An option has a kind and a range, as the fields of a case file have, so that `height="5 m"` and
 `height=5.0` are the same and a wrong unit is told.  Its default is a number or a figure of the

@@ -1,4 +1,4 @@
-"""Set-points of the payload over time: moves from rest to rest, and periods of something else.
+"""Set-point profiles of the payload, moves from rest to rest, and periods of time.
 
 Moves have a limited speed and acceleration.  Each starts at its own time, from rest to rest; moves
 that overlap add up.  `models.operation.scenario` is made of these.

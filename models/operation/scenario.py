@@ -1,4 +1,4 @@
-"""What is asked of a run: the operation, as data.
+"""The scenario of a run: an operation as data, from set-points to faults.
 
 A scenario knows nothing of the controller and of the hook's motion; it says what the operator asks
 of the payload over time, when the controller is engaged, what fails, and what the payload meets on

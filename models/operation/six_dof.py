@@ -1,4 +1,4 @@
-r"""A vessel's six motions, and what they do to the hook.
+r"""The hook's motion from records of a vessel's six degrees of freedom.
 
 Surge, sway and heave of a reference point and the angles roll, pitch and yaw about it, measured or
 from another program, become the vertical motion of the crane's tip, a fixed point of the vessel.

@@ -1,4 +1,10 @@
-"""The plant: equations of winch, rope and payload, and the linear plants made of them."""
+"""The plant: equations of winch, rope and payload, and the linear plants made of them.
+
+Equations of winch, rope and payload in CasADi symbols come out of a case (`build_plant`); at rest
+they give a `LinearPlant` with its responses, poles and sampled form, the exact line
+(`line_response`) and the drag that is consistent with the motion. Synthesis, control and
+simulation know the world by these alone.
+"""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""Sampled plants: what a model predictive controller predicts with.
+"""Sampled plants, which model predictive controllers predict with, and the fields of any plant.
 
 `LinearPlant.discretise` makes them.  The same names and output matrices as the continuous
 plant, and matrices that carry the state exactly over one sample when inputs and

@@ -1,4 +1,4 @@
-"""Motor and drive in CasADi symbols: what torque a command makes, and within which limits.
+"""Motor and drive in CasADi symbols: the torque that a command makes, within their limits.
 
     command --> [ voltage ] --> [ window of torque: peak, current, power, overspeed ] --> torque
 

@@ -1,4 +1,4 @@
-"""Exact frequency responses of the winch with a rope that is not lumped at all.
+"""Exact frequency responses of winch and load on a distributed rope, none of it lumped.
 
 The rope is the wave equation EA (1 + tau d/dt) u'' = m u_tt between the drum and the payload.
 Its responses at a point s of the complex plane are closed forms; closed with the winch's own

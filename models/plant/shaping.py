@@ -1,4 +1,4 @@
-r"""A stable filter whose white-noise response has a given spectrum: seas for time-domain models.
+r"""Shaping filters: stable, with a sea's spectrum as their response to white noise.
 
 A spectral integral is finite for an unstable loop too, and takes the delay as a mere phase.  A
 Lyapunov equation does neither: it needs states, for the sea as well.  This fits them,

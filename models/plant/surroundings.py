@@ -1,4 +1,4 @@
-r"""What the payload meets: a seabed, a deck, the water's surface.
+r"""Forces of seabed, deck and water surface on the payload.
 
 Forces on the payload beside those of rope and open water, as CasADi expressions that stand inside
 the plant's right-hand side.  Coordinates are the plant's: P is the payload's displacement from

@@ -1,4 +1,8 @@
-"""One run in time: its series, statistics, extremes and files."""
+"""One run in time: its series, statistics, extremes and files.
+
+Samples come in while a simulation runs (`Accumulator`); a `Run` goes out, with statistics of every
+sample, extremes over seeds, and functions that write it to files.
+"""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-r"""Extreme values over seeds: what a signal's largest value in some hours will be, and how surely.
+r"""Extreme values over seeds: most probable maxima of a signal, with their intervals.
 
 Two routes, and a third to judge them by.  Maxima of whole runs or of long blocks of them follow
 Gumbel's law; maxima of clusters above a threshold exceed it by the generalised Pareto law (Coles,

@@ -1,4 +1,4 @@
-"""`Run`: what a simulation hands back, signals by name with their units, events and statistics.
+"""The result of a simulated run (`Run`): signals by name with units, events, statistics.
 
 The last room in the data's way of `models`: the simulation fills it, `models/run/metrics.py`
 compares several over seeds, `models/run/files.py` writes it to files.  The time traces are

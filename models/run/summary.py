@@ -1,4 +1,4 @@
-"""What the statistics of a run say: `Statistics`, by signal and as named quantities.
+"""Statistics of a run (`Statistics`), by signal and as named quantities.
 
 Made by `Accumulator` in `models/run/statistics.py`, kept by `Run`, compared over seeds in
 `models/run/metrics.py`.  A quantity has a name in words ("payload rms", "snap load"), a value in

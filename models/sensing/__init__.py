@@ -1,4 +1,9 @@
-"""Sensors and telemetry between the plant and a controller, and the controller's protocol."""
+"""Sensors and telemetry between the plant and a controller, and the controller's protocol.
+
+A case's sensors come in; what a controller is shown, once in a sample, goes out: as a recursion in
+the simulation (`SensorModel`) and as a linear plant with noises for synthesis (`sensed_plant`).
+Any object that keeps to `Controller` may then answer with a command.
+"""
 
 from typing import TYPE_CHECKING
 

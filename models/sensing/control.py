@@ -1,4 +1,4 @@
-"""What a controller is: a measurement in, a drive command out, once in a sample.
+"""The controller's protocol: a measurement in, a drive command out, once in a sample.
 
     HEARD --> Measurement --> Controller.step --> command --> drive
 

@@ -1,4 +1,4 @@
-"""The motion reference unit: the hook's heave as it is reported, not as it is.
+"""The motion reference unit: the hook's heave through a high-pass, with an error and a delay.
 
 Nothing that the winch does comes back to the hook, so what the unit shows is computed before the
 run, a chunk after the other, from the true motion of the hook:

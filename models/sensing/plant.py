@@ -1,4 +1,4 @@
-"""The linear plant of a case with every sensor that its winch has, and what disturbs them.
+"""The linear plant of a case with every sensor of its winch, and the spectra of their noise.
 
     case -> plant -> + reference unit, encoder, load cell -> LinearPlant
     case -> sea, error of the reference unit, sensors' noise -> spectra by name

@@ -1,4 +1,4 @@
-"""What a controller sees of the plant: sensors and telemetry as a recursion, in CasADi symbols.
+"""Sensors and telemetry as a recursion in CasADi symbols: the plant as a controller sees it.
 
     plant --> payload sensors --> telemetry: a register of messages --> held values --+
           --> encoder, load cell, the drive's own torque -----------------------------+--> m

@@ -1,4 +1,4 @@
-"""The link from the payload to the winch over time: which message is known when.
+"""The telemetry link over time: delays, dropouts and outages of the payload's messages.
 
 The payload sends a message at every control sample.  Each is late by the delay and the jitter,
 some are lost, and now and then the link or the sensor is gone for a while.  None of it depends on

@@ -1,4 +1,8 @@
-"""Simulation in time: the closed loop as one recursion, compiled and run."""
+"""Simulation in time: the closed loop as one recursion, compiled and run.
+
+Case, controller, scenario and `SimulationOptions` come in; `prepare` writes plant, sensors, drive
+and brake as one compiled recursion, and `run_simulation` makes a `Run` of it for every seed.
+"""
 
 from typing import TYPE_CHECKING
 

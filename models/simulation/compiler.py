@@ -1,4 +1,4 @@
-"""From C source to a loaded library, compiled once and kept.
+"""The C compiler: from source to a loaded library, compiled once and kept.
 
 A simulation spends its time in one recursion (`models.simulation.kernel`); CasADi writes it as C,
 and this file turns that into a shared library with whatever C compiler the machine has. Libraries

@@ -1,4 +1,4 @@
-"""What ends the work of a controller in mid-run: overspeed, or the end of the drum's travel.
+"""Trips of the brake in mid-run: overspeed, and the end of the drum's travel.
 
 A supervisor beside the controller watches a few signals, each in its range.  The first that
 leaves it closes the brake and takes the command back to the static one; the run goes on with the
