@@ -26,7 +26,7 @@ from ..loop import Disturbance, LinearController, disturbances
 from ..structures import reduced
 from .dual import Dual, DualPoint, shaped, with_input_outputs
 from .spectral_factor import SpectralFactor, spectral_factor
-from .truth import ClosedLoop, refitted, truth_of
+from .truth import TrueCost, refitted, truth_of
 
 _ENOUGH = 1e-3  # of the bound's variance: less need not be won by fitting again
 _BROKEN = 1.01  # a limit that is exceeded by more, at the highest multipliers, cannot be kept
@@ -214,7 +214,7 @@ def lqg_bound(
         start = np.array([begin[name] for name in limits])
     squares = np.array(list(limits.values()), dtype=np.float64) ** 2
     asked = np.ones(len(limits))
-    best: tuple[float, Dual, DualPoint, ClosedLoop, dict[str, ShapingFilter | float]] | None = None
+    best: tuple[float, Dual, DualPoint, TrueCost, dict[str, ShapingFilter | float]] | None = None
     # Whatever the fit, each round's figure is a lower bound (see `truth`), so the highest is kept;
     # a further round only has to make the model better where the loop feels it.
     for attempt in range(max(0, refits) + 1):
@@ -246,7 +246,7 @@ def _bound(
     minimise: Mapping[str, float],
     limits: Mapping[str, float],
     pade: int,
-    best: tuple[float, Dual, DualPoint, ClosedLoop, dict[str, ShapingFilter | float]],
+    best: tuple[float, Dual, DualPoint, TrueCost, dict[str, ShapingFilter | float]],
     assumptions: tuple[str, ...],
 ) -> Bound:
     found, dual, point, loop, filters = best

@@ -97,7 +97,7 @@ def optimal_response(
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ClosedLoop:
+class TrueCost:
     """Variances of the outputs by name, and, with weights, the cost and what a model missed."""
 
     variances: dict[str, float]
@@ -106,7 +106,7 @@ class ClosedLoop:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Truth:
+class TrueProblem:
     """A plant with its exact delays and spectra on nodes, next to its rational model.
 
     Attributes
@@ -131,7 +131,7 @@ class Truth:
         found = np.einsum("kzw,wk,k->z", np.abs(F) ** 2, self.spectra, self.weights)
         return dict(zip(self.plant.outputs, (float(v) for v in found), strict=True))
 
-    def judge(self, X: ComplexArray, charge: FloatArray) -> ClosedLoop:
+    def judge(self, X: ComplexArray, charge: FloatArray) -> TrueCost:
         """Return what X does and what its model missed, for weights of the outputs, (nz,)."""
         variances = self.variances(X)
         use = np.flatnonzero(charge)
@@ -147,7 +147,7 @@ class Truth:
         lost = np.linalg.solve(heard, G)
         spare = np.linalg.solve(moved, np.swapaxes(G.conj(), 1, 2))
         density = np.einsum("kuy,kyu->k", spare, lost).real
-        return ClosedLoop(
+        return TrueCost(
             variances=variances,
             cost=float(charge @ np.array([variances[name] for name in self.plant.outputs])),
             missed=float(np.maximum(density, 0.0) @ self.weights),
@@ -210,7 +210,7 @@ def truth_of(
     filters: Mapping[str, ShapingFilter | float],
     dual: Dual,
     point: DualPoint,
-) -> tuple[Truth, ComplexArray]:
+) -> tuple[TrueProblem, ComplexArray]:
     """Return both problems on nodes, and the closed-loop response of the model's optimum."""
     augmented, kalman = dual.plant, dual.estimator
     marks = np.concatenate([lqg_poles(augmented, point.regulator, kalman), plant.poles()])
@@ -220,7 +220,7 @@ def truth_of(
         f.density(omega) if isinstance(f, ShapingFilter) else np.full(omega.shape, f / np.pi)
         for f in filters.values()
     ]
-    truth = Truth(
+    truth = TrueProblem(
         plant=plant.response(omega).select(disturbances=names),
         model=model.response(omega).select(disturbances=names),
         weights=weights,
@@ -233,7 +233,7 @@ def truth_of(
 def refitted(
     factors: Mapping[str, SpectralFactor | float],
     sources: tuple[Disturbance, ...],
-    truth: Truth,
+    truth: TrueProblem,
     X: ComplexArray,
     charge: FloatArray,
 ) -> dict[str, SpectralFactor | float]:

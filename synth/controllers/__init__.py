@@ -1,13 +1,17 @@
-"""Controllers in time: designs, and the laws that the industry uses."""
+"""Controllers in time: designs, sampled, and the laws that the industry uses.
+
+A case comes in, with gains or a design where there is feedback; a controller that steps with the
+simulation goes out (`controller_named`, or its class).
+"""
 
 from typing import TYPE_CHECKING
 
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .brake_on import BrakeOn as BrakeOn
     from .constant_tension import ConstantTension as ConstantTension
     from .controllers import CONTROLLERS as CONTROLLERS
+    from .controllers import BrakeOn as BrakeOn
     from .controllers import controller_named as controller_named
     from .feed_forward import VelocityFeedForward as VelocityFeedForward
     from .linear_feedback import LinearFeedback as LinearFeedback

@@ -1,4 +1,4 @@
-"""Every controller of this package by its name: what comparisons and the command line offer.
+"""Controllers in time by their names: what comparisons and the command line offer.
 
 name, case [, gains or a design] --> controller
 """
@@ -9,19 +9,46 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+import casadi as ca
+
 from models.basics import InputError, pick
 from models.case import Case
 
 from ..design import GainDesign, Tuning
 from ..structures import RecursiveController
-from .brake_on import BrakeOn
 from .constant_tension import ConstantTension
 from .feed_forward import VelocityFeedForward
 from .linear_feedback import LinearFeedback
 
 
+@dataclass(frozen=True, kw_only=True, eq=False, init=False)
+class BrakeOn(RecursiveController):
+    """No compensation at all: the brake is on and the drive is off.
+
+    What every controller is compared with.  Zero is no voltage, no speed and no torque, whichever
+    the drive is told: a standing motor then carries nothing and stays cold.
+
+    Parameters
+    ----------
+    case
+        The case; nothing of it is needed, but every controller is made from one.
+    sample_time
+        T [s].
+
+    Raises
+    ------
+    InputError
+        If the sample time is out of its range.
+    """
+
+    def __init__(self, case: Case, *, sample_time: float = 0.02) -> None:
+        del case
+        self._set(brake=True)
+        self._adopt("none", sample_time, (), lambda xc, m: (xc, ca.SX(0.0)))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Wanted:
+class ControllerRequest:
     """What a controller is made from.
 
     Attributes
@@ -46,15 +73,15 @@ class Wanted:
         return usual if self.sample_time is None else self.sample_time
 
 
-def _feedback(wanted: Wanted, *, anti_windup: bool = True) -> LinearFeedback:
-    case, sample_time = wanted.case, wanted.time(0.01)
+def _feedback(request: ControllerRequest, *, anti_windup: bool = True) -> LinearFeedback:
+    case, sample_time = request.case, request.time(0.01)
     name = "feedback" if anti_windup else "feedback-no-antiwindup"
-    if wanted.gains is None and wanted.design is not None:
+    if request.gains is None and request.design is not None:
         made = LinearFeedback.from_design(
-            wanted.design, case=case, sample_time=sample_time, anti_windup=anti_windup, name=name
+            request.design, case=case, sample_time=sample_time, anti_windup=anti_windup, name=name
         )
     else:
-        gains = _own_gains(name, case) if wanted.gains is None else wanted.gains
+        gains = _own_gains(name, case) if request.gains is None else request.gains
         made = LinearFeedback(
             case, gains, sample_time=sample_time, anti_windup=anti_windup, name=name
         )
@@ -75,20 +102,20 @@ def _own_gains(name: str, case: Case) -> Mapping[str, float]:
 
 
 #: What makes a controller, by its name.
-CONTROLLERS: Mapping[str, Callable[[Wanted], RecursiveController]] = MappingProxyType(
+CONTROLLERS: Mapping[str, Callable[[ControllerRequest], RecursiveController]] = MappingProxyType(
     {
         "feedback": _feedback,
-        "feedback-no-antiwindup": lambda wanted: _feedback(wanted, anti_windup=False),
-        "feed-forward": lambda wanted: VelocityFeedForward(
-            wanted.case, sample_time=wanted.time(0.02)
+        "feedback-no-antiwindup": lambda request: _feedback(request, anti_windup=False),
+        "feed-forward": lambda request: VelocityFeedForward(
+            request.case, sample_time=request.time(0.02)
         ),
-        "feed-forward-lead": lambda wanted: VelocityFeedForward.with_lead(
-            wanted.case, sample_time=wanted.time(0.02)
+        "feed-forward-lead": lambda request: VelocityFeedForward.with_lead(
+            request.case, sample_time=request.time(0.02)
         ),
-        "constant-tension": lambda wanted: ConstantTension(
-            wanted.case, sample_time=wanted.time(0.02)
+        "constant-tension": lambda request: ConstantTension(
+            request.case, sample_time=request.time(0.02)
         ),
-        "none": lambda wanted: BrakeOn(wanted.case, sample_time=wanted.time(0.02)),
+        "none": lambda request: BrakeOn(request.case, sample_time=request.time(0.02)),
     }
 )
 
@@ -122,5 +149,5 @@ def controller_named(
         If the controller is not stable on the linear plant of the case.
     """
     pick("controllers", "controller", tuple(CONTROLLERS), (name,))
-    wanted = Wanted(case=case, design=design, gains=gains, sample_time=sample_time)
-    return CONTROLLERS[name](wanted)
+    request = ControllerRequest(case=case, design=design, gains=gains, sample_time=sample_time)
+    return CONTROLLERS[name](request)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .family import Choice as Choice
+    from .family import DiscreteValues as DiscreteValues
     from .family import Family as Family
     from .family import SeaState as SeaState
     from .family import sea_states as sea_states

@@ -3,8 +3,8 @@
     case + what varies + sea states -> Family -> corners, grid, random draws -> cases
 
 Parameters of the case are named by their dotted paths; a list of numbers stands for the whole
-range between its ends, a `Choice` for its values alone.  The sea states are few and each has
-an occurrence, as in a scatter diagram.
+range between its ends, `DiscreteValues` for its values alone.  The sea states are few and each
+has an occurrence, as in a scatter diagram.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def sea_states(scatter: Scatter) -> list[SeaState]:
 
 
 @dataclass(frozen=True)
-class Choice:
+class DiscreteValues:
     """Values of a parameter with nothing in between: layers of a drum, types of a load."""
 
     values: tuple[Any, ...]
@@ -124,7 +124,7 @@ class Family:
     def of(
         cls,
         case: Case,
-        vary: Mapping[str, Sequence[Any] | Choice],
+        vary: Mapping[str, Sequence[Any] | DiscreteValues],
         seas: Sequence[SeaState | Sequence[float]] | None = None,
     ) -> Family:
         """Return the family of a case.
@@ -135,7 +135,7 @@ class Family:
             The case.
         vary
             By dotted path (or `depth`, `payload`, `added_mass`, `stiffness`, `radius`,
-            `delay`): values, of which numbers span a range, or a `Choice`.  Added mass and
+            `delay`): values, of which numbers span a range, or a `DiscreteValues`.  Added mass and
             submerged weight grow with `payload.mass` unless they are varied themselves.
         seas
             `SeaState`, (H_s, T_p) or (H_s, T_p, occurrence); the case's own if left out.
@@ -252,12 +252,12 @@ class Family:
                 yield Member(point=point, sea=k)
 
 
-def _axis(case: Case, path: str, values: Sequence[Any] | Choice) -> Axis:
+def _axis(case: Case, path: str, values: Sequence[Any] | DiscreteValues) -> Axis:
     """Return an axis, its values read like those of a case file."""
     if path.startswith(("sea.", "vessel.")):
         raise InputError(f"family: {path} cannot be varied; sea states are given as seas")
-    choice = isinstance(values, Choice)
-    raw = values.values if isinstance(values, Choice) else tuple(values)
+    choice = isinstance(values, DiscreteValues)
+    raw = values.values if isinstance(values, DiscreteValues) else tuple(values)
     if not raw:
         raise InputError(f"family: {path} must have at least one value, got none")
     read = []

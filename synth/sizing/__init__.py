@@ -1,4 +1,9 @@
-"""Winch sizing, co-design, what a limit is worth, Pareto fronts."""
+"""Sizing of a winch: motors, gears and drums together with the gains, and what they are worth.
+
+A case and a target come in; the smallest motor (`size_winch`), the best gear and drum
+(`co_design`), the worth of each limit and sensor (`worth`) or a front of the payload's motion
+against another quantity (`pareto_front`) go out, every design verified.
+"""
 
 from typing import TYPE_CHECKING
 

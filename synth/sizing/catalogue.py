@@ -1,6 +1,6 @@
-"""Choosing out of a catalogue of motors: the smallest that meets the target behind some gear.
+"""Catalogue of motors: the smallest that meets the target behind some gear.
 
-    CSV -> CatalogueMotor, by rated power -> least factor on its limits over the gear -> Choice
+    CSV -> CatalogueMotor, by rated power -> least factor on its limits over the gear -> ChosenMotor
 
 A catalogue is a table with a heading: `name`, and fields of a case's motor and drive as a case file
 names them, each cell a number in SI or a text with a unit:
@@ -45,7 +45,7 @@ class CatalogueMotor:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Choice:
+class ChosenMotor:
     """The motor chosen out of a catalogue.
 
     Attributes
@@ -133,7 +133,7 @@ def choose(
     masses: int,
     near: Answer,
     tell: Progress,
-) -> Choice | str:
+) -> ChosenMotor | str:
     """Return the smallest motor of a catalogue that meets a target, or why there is none.
 
     Parameters
@@ -167,7 +167,7 @@ def choose(
         if best is None or best[0] > 0.0:
             smaller.append(motor.name)
             continue
-        return Choice(
+        return ChosenMotor(
             name=motor.name,
             motor=MotorData.of(best[3]),
             gear=best[1],

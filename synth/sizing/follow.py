@@ -1,4 +1,4 @@
-r"""Following an optimum from case to case: solved again from its neighbour's answer.
+r"""Optima followed from case to case: each solved again from its neighbour's answer.
 
     Posed (case, structure) + neighbour's Answer -> programme on inherited nodes -> Answer
 

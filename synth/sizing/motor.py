@@ -1,4 +1,4 @@
-r"""A family of motors: the case's own, larger or smaller, behind any gear.
+r"""Family of motors: the case's own, larger or smaller, behind any gear.
 
     case, scale s, gear ratio n -> case
 

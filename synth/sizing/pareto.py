@@ -24,7 +24,7 @@ from ..limits import DelayMargin, Limit, MaxSensitivity, Rms
 from ..question import Problem, pose
 from ..search import KEPT, Found, Solution, polish, search
 from .pareto_point import ParetoPoint, point_of
-from .pareto_walk import Walk, exchanged, with_bound
+from .pareto_walk import FrontWalk, exchanged, with_bound
 
 Progress = Callable[[str, int, int], None]
 
@@ -186,7 +186,7 @@ def _bound_points(
     # What a programme covers by the bound that it is made with, it must cover for all: the disc of
     # the loosest M_s, the arc of the longest delay.
     problem = question.problem_with((*others, _limit(against, float(bounds[-1]))))
-    walk = Walk(problem, name, bounds)
+    walk = FrontWalk(problem, name, bounds)
     for n, k in enumerate((0, count // 2, count - 1)):
         tell("ends of the front", n + 1, 4)
         if k not in known:

@@ -1,4 +1,4 @@
-"""One point of a Pareto front: a design at a bound, with what it takes to check it again."""
+"""Point of a Pareto front: a design at a bound, with what it takes to check it again."""
 
 from __future__ import annotations
 

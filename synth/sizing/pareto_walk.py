@@ -1,4 +1,4 @@
-"""Walking along a Pareto front: one programme, a bound that moves, each solve from its neighbour's.
+"""Continuation along a Pareto front: one programme, a bound that moves, warm starts.
 
     answers of searches -> predictor, warm solve, next bound ... -> best answer at each bound
 
@@ -59,7 +59,7 @@ _FIRST_HAIR, _HAIR = 1e-4, 1e-3  # excess that tightening mends, at first and la
 _SHARE = 1.1  # of what a limit is broken by, by which it is tightened
 
 
-class Walk:
+class FrontWalk:
     """Walks along the bounds of one programme, and the best answer found at each."""
 
     def __init__(self, problem: Problem, name: str, bounds: FloatArray) -> None:
@@ -279,7 +279,7 @@ def _assessed(problem: Problem, values: FloatArray, coefficient: float | None) -
     )
 
 
-def exchanged(walk: Walk, tell: Progress) -> list[tuple[float, ParetoPoint | None]]:
+def exchanged(walk: FrontWalk, tell: Progress) -> list[tuple[float, ParetoPoint | None]]:
     """Return the front with nodes where any of its points leaked through a limit."""
     there = [i for i, solved in enumerate(walk.best) if solved is not None]
     stretches = [there[k : k + _STRETCH] for k in range(0, len(there), _STRETCH)]
@@ -297,7 +297,7 @@ def exchanged(walk: Walk, tell: Progress) -> list[tuple[float, ParetoPoint | Non
 class _Stretch:
     """Neighbouring points of a front, solved again until none leaks."""
 
-    def __init__(self, walk: Walk, indices: Sequence[int]) -> None:
+    def __init__(self, walk: FrontWalk, indices: Sequence[int]) -> None:
         self._walk, self._indices = walk, indices
         self._own: dict[int, Problem] = {
             i: with_bound(walk.problem, walk.name, float(walk.bounds[i])) for i in indices
@@ -379,7 +379,7 @@ class _Stretch:
         return largest
 
 
-def _alone(walk: Walk, index: int) -> ParetoPoint | None:
+def _alone(walk: FrontWalk, index: int) -> ParetoPoint | None:
     """Return a point polished as any single answer is; None if that does not keep its limits."""
     own = with_bound(walk.problem, walk.name, float(walk.bounds[index]))
     solved = walk.best[index]

@@ -1,4 +1,4 @@
-r"""The smallest motor behind one gear that meets a target, and what limits it.
+r"""Smallest motor behind one gear that meets a target, and what limits it.
 
     Posed -> least factor on the motor's ratings -> larger rotor -> again -> SizePoint
 
@@ -83,7 +83,7 @@ class SizePoint:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Least:
+class SmallestMotor:
     """A point with the answer that its neighbours begin from."""
 
     point: SizePoint
@@ -104,7 +104,7 @@ def least_motor(
     masses: int,
     near: Answer,
     scale: float = 1.0,
-) -> Least:
+) -> SmallestMotor:
     """Return the smallest motor behind a gear.
 
     Parameters
@@ -127,17 +127,19 @@ def least_motor(
         problem = _problem(case, structure, gear, target, math.exp(size), masses)
         found = _rated(problem, answer, extra)
         if found is None:
-            return Least(point=_stopped(problem, answer, gear), answer=None)
+            return SmallestMotor(point=_stopped(problem, answer, gear), answer=None)
         answer, extra = found, found.solved.extra
         known.append((size, extra))
         if abs(extra) < _SETTLED or (extra < 0.0 and size <= rest):
             at_rest = extra <= -_SETTLED
-            return Least(point=_point(case, gear, size, found, at_rest=at_rest), answer=found)
+            return SmallestMotor(
+                point=_point(case, gear, size, found, at_rest=at_rest), answer=found
+            )
         step = _next(known, rest)
         if step is None or step > math.log(_LARGEST):
             break
         size = step
-    return Least(point=_none(gear, ("motor.inertia",)), answer=answer)
+    return SmallestMotor(point=_none(gear, ("motor.inertia",)), answer=answer)
 
 
 def sea_factor(

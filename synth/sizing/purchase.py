@@ -1,4 +1,4 @@
-r"""What is worth buying: how the optimum depends on each limit, sensor, delay and on the gear.
+r"""Worth of each limit, sensor, delay and gear of a case: what to buy first.
 
     case or design -> optimum (`synth.sizing.follow`) -> items
         -> price, optimised again with the item a little better, and twice as good -> Worth

@@ -1,4 +1,4 @@
-"""Sizing: the smallest motor and gear that hold a payload still enough in a given sea.
+"""Winch sizing: the smallest motor and gear that hold a payload still enough in a given sea.
 
     case, target, H_s -> best without a motor's limits (is it possible at all?)
         -> smallest motor behind each gear, from neighbour to neighbour -> Brent's method
@@ -28,10 +28,10 @@ from ..design import SOURCE_NAMES, StructureDesign
 from ..loop import Assessment
 from ..question import HOOK, PAYLOAD
 from ..search import KEPT, Progress, search
-from .catalogue import Choice, choose, read_catalogue
+from .catalogue import ChosenMotor, choose, read_catalogue
 from .follow import EXCESS, Answer, Posed, designed, follow, least_between
 from .motor import MotorData, changed, with_motor
-from .point import Least, SizePoint, highest_sea, least_motor, target_of
+from .point import SizePoint, SmallestMotor, highest_sea, least_motor, target_of
 
 _SPAN = 2.5  # gears that are tried: the case's over and times this
 _FINE = 0.03  # of the logarithm of the gear, to which the best is found
@@ -79,7 +79,7 @@ class Sizing:
     design: StructureDesign | None
     given_rms: float
     highest_height: float
-    choice: Choice | None = None
+    choice: ChosenMotor | None = None
 
     def to_csv(self) -> str:
         """Return the smallest motor over the gear as CSV, SI units."""
@@ -106,9 +106,9 @@ class _Search:
     masses: int
     free: Answer
     tell: Progress
-    found: dict[float, Least]
+    found: dict[float, SmallestMotor]
 
-    def at(self, gear: float) -> Least:
+    def at(self, gear: float) -> SmallestMotor:
         """Return the smallest motor behind a gear, from the nearest that is known."""
         if gear not in self.found:
             known = [g for g, least in self.found.items() if least.point.feasible]
@@ -330,7 +330,7 @@ def _gear_of(walk: _Search, answer: Answer) -> float:
     return next(g for g, least in walk.found.items() if least.answer is answer)
 
 
-def _chosen(sizing: Sizing, walk: _Search, best: Least) -> Sizing:
+def _chosen(sizing: Sizing, walk: _Search, best: SmallestMotor) -> Sizing:
     """Return the sizing with the chosen motor, and with its gains, verified."""
     point, answer = best.point, best.answer
     assert answer is not None
@@ -362,7 +362,7 @@ def _chosen(sizing: Sizing, walk: _Search, best: Least) -> Sizing:
 
 
 def _with_choice(
-    sizing: Sizing, structure: str, choice: Choice, masses: int, tell: Progress
+    sizing: Sizing, structure: str, choice: ChosenMotor, masses: int, tell: Progress
 ) -> Sizing:
     """Return the sizing with a motor out of the catalogue instead of one of any size."""
     design = designed(choice.case, structure, choice.answer, masses, tell)

@@ -20,7 +20,7 @@ from models.casefile import read_yaml
 from models.spread import Samples, Spread
 
 from ..design import GainDesign, StructureDesign
-from .metrics import Metric
+from .metrics import FrequencyMetric
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,7 +34,7 @@ def dataset_of(
     spread: Spread,
     rows: FloatArray,
     columns: Mapping[str, npt.NDArray[Any]],
-    metrics: Sequence[Metric],
+    metrics: Sequence[FrequencyMetric],
     *,
     first: int,
     notes: Mapping[str, Any],

@@ -25,7 +25,7 @@ from ..design import GainDesign
 from .chain import ChainLoops
 from .drag_rows import Velocity, agreeing_drag
 from .kernel import SpringLoops, spring_peaks
-from .metrics import Metric, finished
+from .metrics import FrequencyMetric, finished
 from .numbers import PlantNumbers, numbers_of
 from .sea_rows import SeaRows
 from .sweep_nodes import SweepNodes, sweep_nodes
@@ -80,7 +80,7 @@ class GainRows:
         self,
         design: GainDesign,
         spread: Spread,
-        metrics: Sequence[Metric],
+        metrics: Sequence[FrequencyMetric],
         *,
         accuracy: float,
         nodes: Quadrature | None = None,

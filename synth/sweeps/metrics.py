@@ -14,7 +14,7 @@ DEFAULT = ("payload_rms", "torque_rms", "speed_rms", "max_sensitivity")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Metric:
+class FrequencyMetric:
     """One number of a case.
 
     Attributes
@@ -35,126 +35,46 @@ class Metric:
     kind: str = "rms"
 
 
-def _listed(*metrics: Metric) -> Mapping[str, Metric]:
-    return {m.name: m for m in metrics}
+# name, unit, output, kind, words
+_ROWS = (
+    ("payload_rms", "m", "payload.displacement", "rms",
+     "standard deviation of the payload's motion"),
+    ("velocity_rms", "m/s", "payload.velocity", "rms",
+     "standard deviation of the payload's velocity"),
+    ("torque_rms", "N m", "motor.torque", "rms", "standard deviation of the motor's torque"),
+    ("speed_rms", "rad/s", "motor.speed", "rms", "standard deviation of the motor's speed"),
+    ("haul_rms", "m", "drum.haul", "rms", "standard deviation of the drum's haul"),
+    ("tension_rms", "N", "rope.tension", "rms",
+     "standard deviation of the rope's tension at the drum"),
+    ("current_rms", "", "motor.current", "rms",
+     "standard deviation of the motor's current (of an AC motor: its torque)"),
+    ("command_rms", "", "drive.command", "rms", "standard deviation of the drive's command"),
+    ("voltage_rms", "V", "motor.voltage", "rms", "standard deviation of the armature's voltage"),
+    ("torque_peak", "N m", "motor.torque", "peak",
+     "most probable largest torque in the exposure time, static torque included"),
+    ("speed_peak", "rad/s", "motor.speed", "peak",
+     "most probable largest speed of the motor in the exposure time"),
+    ("tension_peak", "N", "rope.tension", "peak",
+     "most probable largest tension at the drum in the exposure time"),
+    ("tension_least", "N", "rope.tension", "least",
+     "most probable smallest tension at the drum in the exposure time"),
+    ("payload_period", "s", "payload.displacement", "period",
+     "mean zero-crossing period of the payload's motion"),
+    ("max_sensitivity", "1", "", "loop", "largest sensitivity M_s of the loop"),
+    ("drag", "N s/m", "", "static", "linear drag coefficient that agrees with the response"),
+    ("static_torque", "N m", "", "static",
+     "motor torque that hauls the load at rest, gear losses included"),
+    ("static_tension", "N", "", "static", "rope tension at the drum at rest"),
+)  # fmt: skip
 
-
-METRICS: Mapping[str, Metric] = _listed(
-    Metric(
-        name="payload_rms",
-        unit="m",
-        long_name="standard deviation of the payload's motion",
-        output="payload.displacement",
-    ),
-    Metric(
-        name="velocity_rms",
-        unit="m/s",
-        long_name="standard deviation of the payload's velocity",
-        output="payload.velocity",
-    ),
-    Metric(
-        name="torque_rms",
-        unit="N m",
-        long_name="standard deviation of the motor's torque",
-        output="motor.torque",
-    ),
-    Metric(
-        name="speed_rms",
-        unit="rad/s",
-        long_name="standard deviation of the motor's speed",
-        output="motor.speed",
-    ),
-    Metric(
-        name="haul_rms",
-        unit="m",
-        long_name="standard deviation of the drum's haul",
-        output="drum.haul",
-    ),
-    Metric(
-        name="tension_rms",
-        unit="N",
-        long_name="standard deviation of the rope's tension at the drum",
-        output="rope.tension",
-    ),
-    Metric(
-        name="current_rms",
-        unit="",
-        long_name="standard deviation of the motor's current (of an AC motor: its torque)",
-        output="motor.current",
-    ),
-    Metric(
-        name="command_rms",
-        unit="",
-        long_name="standard deviation of the drive's command",
-        output="drive.command",
-    ),
-    Metric(
-        name="voltage_rms",
-        unit="V",
-        long_name="standard deviation of the armature's voltage",
-        output="motor.voltage",
-    ),
-    Metric(
-        name="torque_peak",
-        unit="N m",
-        long_name="most probable largest torque in the exposure time, static torque included",
-        output="motor.torque",
-        kind="peak",
-    ),
-    Metric(
-        name="speed_peak",
-        unit="rad/s",
-        long_name="most probable largest speed of the motor in the exposure time",
-        output="motor.speed",
-        kind="peak",
-    ),
-    Metric(
-        name="tension_peak",
-        unit="N",
-        long_name="most probable largest tension at the drum in the exposure time",
-        output="rope.tension",
-        kind="peak",
-    ),
-    Metric(
-        name="tension_least",
-        unit="N",
-        long_name="most probable smallest tension at the drum in the exposure time",
-        output="rope.tension",
-        kind="least",
-    ),
-    Metric(
-        name="payload_period",
-        unit="s",
-        long_name="mean zero-crossing period of the payload's motion",
-        output="payload.displacement",
-        kind="period",
-    ),
-    Metric(
-        name="max_sensitivity",
-        unit="1",
-        long_name="largest sensitivity M_s of the loop",
-        kind="loop",
-    ),
-    Metric(
-        name="drag",
-        unit="N s/m",
-        long_name="linear drag coefficient that agrees with the response",
-        kind="static",
-    ),
-    Metric(
-        name="static_torque",
-        unit="N m",
-        long_name="motor torque that hauls the load at rest, gear losses included",
-        kind="static",
-    ),
-    Metric(
-        name="static_tension", unit="N", long_name="rope tension at the drum at rest", kind="static"
-    ),
-)
+METRICS: Mapping[str, FrequencyMetric] = {
+    name: FrequencyMetric(name=name, unit=unit, output=output, kind=kind, long_name=words)
+    for name, unit, output, kind, words in _ROWS
+}
 """Every metric by its name; `stable` is always there."""
 
 
-def chosen_metrics(names: Sequence[str] | None, *, dc: bool) -> tuple[Metric, ...]:
+def chosen_metrics(names: Sequence[str] | None, *, dc: bool) -> tuple[FrequencyMetric, ...]:
     """Return the metrics of a sweep.
 
     Raises
@@ -172,7 +92,7 @@ def chosen_metrics(names: Sequence[str] | None, *, dc: bool) -> tuple[Metric, ..
 
 
 def finished(
-    metrics: Sequence[Metric],
+    metrics: Sequence[FrequencyMetric],
     *,
     moments: Mapping[tuple[str, int], FloatArray],
     drag: FloatArray,

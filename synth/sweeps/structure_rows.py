@@ -28,7 +28,7 @@ from models.spread import Spread
 from ..design import StructureDesign
 from ..loop import Assessment
 from ..question import pose_structure
-from .metrics import Metric
+from .metrics import FrequencyMetric
 
 
 class StructureRows:
@@ -45,7 +45,9 @@ class StructureRows:
     columns = False
     spring = False
 
-    def __init__(self, design: StructureDesign, spread: Spread, metrics: Sequence[Metric]) -> None:
+    def __init__(
+        self, design: StructureDesign, spread: Spread, metrics: Sequence[FrequencyMetric]
+    ) -> None:
         if not design.parameters:
             raise InputError(f"sweep: the design has no controller: {design.status}")
         if "rope.masses" in spread.paths:
@@ -103,7 +105,7 @@ class StructureRows:
             coefficient=self.spread.drag(row) if problem.drag is not None else None,
         )
 
-    def _measure(self, metric: Metric, assessment: Assessment, row: FloatArray) -> float:
+    def _measure(self, metric: FrequencyMetric, assessment: Assessment, row: FloatArray) -> float:
         static = assessment.plant.static
         if metric.name == "max_sensitivity":
             return assessment.max_sensitivity

@@ -14,10 +14,10 @@ from typing import Any
 from models.basics import InputError
 from models.casefile import read_yaml
 from models.sea import read_scatter
-from synth.robust import Choice, SeaState, sea_states
+from synth.robust import DiscreteValues, SeaState, sea_states
 
 
-def parse_vary(texts: Sequence[str]) -> dict[str, list[Any] | Choice]:
+def parse_vary(texts: Sequence[str]) -> dict[str, list[Any] | DiscreteValues]:
     """Return values by path from texts PATH=LOW..HIGH, PATH=A,B,.. or PATH=A|B|..
 
     Raises
@@ -30,7 +30,7 @@ def parse_vary(texts: Sequence[str]) -> dict[str, list[Any] | Choice]:
     >>> parse_vary(["depth=500..1500", "payload=40 t, 60 t"])
     {'depth': [500, 1500], 'payload': ['40 t', '60 t']}
     """
-    found: dict[str, list[Any] | Choice] = {}
+    found: dict[str, list[Any] | DiscreteValues] = {}
     for text in texts:
         path, sign, value = (part.strip() for part in text.partition("="))
         if not sign or not path or not value:
@@ -41,7 +41,7 @@ def parse_vary(texts: Sequence[str]) -> dict[str, list[Any] | Choice]:
         if path in found:
             raise InputError(f"--vary: {path} is given twice")
         if "|" in value:
-            found[path] = Choice(*(_read(part, path) for part in value.split("|")))
+            found[path] = DiscreteValues(*(_read(part, path) for part in value.split("|")))
         elif ".." in value:
             found[path] = [_read(part, path) for part in value.split("..")]
             if len(value.split("..")) != 2:

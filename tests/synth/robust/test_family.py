@@ -14,7 +14,7 @@ from models.basics import InputError
 from models.plant import PlantData
 from models.sea import Scatter, read_scatter
 from synth.loop import Assessment
-from synth.robust import Choice, Family, sea_states
+from synth.robust import DiscreteValues, Family, sea_states
 from synth.robust.family import Member
 from synth.robust.family_plants import FamilyPlants
 from synth.robust.plant_stack import numbers_of
@@ -41,7 +41,9 @@ def crane():
 
 
 def test_corners_and_grid_are_all_combinations_in_every_sea(case):
-    family = Family.of(case, {"depth": [1000, 1500, 2000], "winch.drum.radius": Choice(0.4, 0.41)})
+    family = Family.of(
+        case, {"depth": [1000, 1500, 2000], "winch.drum.radius": DiscreteValues(0.4, 0.41)}
+    )
     assert len(family.corners()) == 4
     assert len(family.grid()) == 6
     family = Family.of(case, {"depth": [1000, 1500, 2000]}, seas=[(1.5, 8.0), (2.0, 9.0)])
