@@ -1,4 +1,9 @@
-"""A design: found, evaluated, and told with its limits and its check."""
+"""The designs: what a case or a plant is answered with.
+
+`tune` answers for any linear plant, `optimise_gains`, `evaluate_gains` and `optimise_structure`
+for a case.  Out comes a design with its figures, the use and price of each limit, and the
+verdict of `synth.verify`.
+"""
 
 from typing import TYPE_CHECKING
 

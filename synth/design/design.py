@@ -1,4 +1,4 @@
-"""`GainDesign`: the answer to "which gains for this winch", with the question it answers.
+"""`GainDesign`: gains of the payload feedback for a case, with their figures and their check.
 
 A design is plain numbers: the case, the gains, what they achieve and what they cost.  From
 case and gains alone everything else can be derived again: the plant, the closed loop, the

@@ -1,4 +1,4 @@
-"""When the drive is too small: the largest sea it can do, and what it would have to be.
+"""The shortfall of a drive that is too small: its largest sea, and the limits that would do.
 
 Two further programmes on the same loop.  The first makes the sea a variable and maximises it
 within the limits: the limits that bind there are the ones that break first.  The second keeps
@@ -88,7 +88,7 @@ def _largest_sea(problem: Problem, free: Tuning) -> Solution | None:
         for guess in (0.0, -1.5, -4.0):  # from the sea asked for down to a fiftieth of it
             coefficient = free.coefficient
             if coefficient is not None:
-                coefficient *= float(np.exp(guess))
+                coefficient *= float(np.exp(guess))  # drag goes with the motion, so with the sea
             solved = programme.solve(programme.pack(begin, coefficient, guess))
             if solved.converged and problem.stable(solved.values, solved.coefficient):
                 found.append(solved)
@@ -109,7 +109,7 @@ def _required(
     programme = coarse_programme(problem, begins, reference, Goal.RELAX, relaxed=binding)
     found: list[Solution] = []
     for begin in begins:
-        for guess in (0.0, 1.0, 3.0):
+        for guess in (0.0, 1.0, 3.0):  # from the limits as they are to twenty times those
             solved = programme.solve(programme.pack(begin, free.coefficient, guess))
             if solved.converged and problem.stable(solved.values, solved.coefficient):
                 found.append(solved)

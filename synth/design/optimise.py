@@ -1,4 +1,4 @@
-"""Optimise the gains of a case, or say what given gains do: the top of `synth`.
+"""Optimisation and evaluation of the gains of a case.
 
     Case -> DesignQuestion -> tune -> (too hard? largest sea, what it would take) -> GainDesign
 

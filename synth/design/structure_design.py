@@ -1,4 +1,4 @@
-"""The answer to "how good is this structure on this case", with the question it answers.
+"""`StructureDesign`: the best controller of a structure for a case, with figures and check.
 
 `synth.design.structure_search` makes it; it can be checked again, saved
 (`stillhook.designs.structure_file`) and simulated: its controller is what

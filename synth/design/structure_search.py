@@ -1,4 +1,4 @@
-"""Optimise a named structure on a case.
+"""Optimisation of a named structure on a case.
 
     StructureQuestion -> simpler structures within -> search -> (drive too small? say so)
                       -> StructureDesign -> verified, on twice the rope masses too

@@ -1,4 +1,4 @@
-"""Where the search of a structure begins: the best of the simpler structures within it.
+"""Nested starts of a structure's search: the best of the simpler structures within it.
 
     StructureQuestion -> simpler structures, searched -> the same controllers as its own parameters
 

@@ -1,4 +1,4 @@
-"""Tune a controller structure on a plant: the entry point of gain synthesis.
+"""Tuning of a controller structure on any linear plant: `tune`, the entry point of synthesis.
 
     plant + structure + spectra + weights + limits -> Problem -> search -> Tuning
 

@@ -1,4 +1,8 @@
-"""Limits of a design: margins, signals, and what a case asks for."""
+"""The limits of a design, on its loop and on its signals.
+
+A limit says the same thing twice: as rows of a nonlinear programme and as a figure of an assessed
+loop.  `loop_limits` and `drive_limits` read those that a case states.
+"""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""The limits of a case: which there are, what they bound, and what the load at rest leaves."""
+"""The limits that a case states: on the loop, and on motor, drive and rope."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A limit on a design: what may not be exceeded, as rows of a nonlinear programme.
+"""`Limit`: a bound on a design, as rows of a nonlinear programme and as a figure in reports.
 
 Each limit says the same thing twice: `rows` for the optimiser (CasADi, at most zero when it
 is kept, with the bound as a symbol so that its price comes out of the same solve), and

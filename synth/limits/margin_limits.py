@@ -1,4 +1,4 @@
-"""Limits on the loop itself: margins, roll-off, and what it does to slow motion."""
+"""Limits on the loop: stability margins, roll-off and low-frequency error."""
 
 from __future__ import annotations
 

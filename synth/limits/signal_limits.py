@@ -1,4 +1,4 @@
-"""Limits on signals: what motor, drive and rope stand, for hours and at the peak.
+"""Limits on signals of motor, drive and rope: rms, continuous rating, peak, minimum, power.
 
 Peaks and continuous ratings follow one rule: |static| + k sigma <= bound, with
 k = sqrt(2 ln(T / T_z)), the most probable maximum of a Gaussian signal of mean period T_z in

@@ -1,4 +1,9 @@
-"""The loop: responses, margins and what is measured on them."""
+"""The closed loop of a plant and a linear controller.
+
+In come a linear plant, a controller in state space and the spectra of the disturbances; out come
+responses (for numbers and for CasADi symbols alike), poles, variances, stability margins and the
+drag that agrees with the motion.
+"""
 
 from typing import TYPE_CHECKING
 

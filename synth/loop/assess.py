@@ -1,4 +1,4 @@
-"""A closed loop in numbers: poles, variances, margins, extremes, for any controller.
+"""`Assessment`: the closed loop of any linear controller in numbers.
 
 This is what the optimiser, the exchange of nodes and every report look through: one plant,
 one controller, what shakes them, and (if there is quadratic drag) the drag coefficient that

@@ -1,4 +1,4 @@
-"""What shakes the plant: one-sided spectra of the disturbances, in one common form.
+"""One-sided spectra of the disturbances, in one common form.
 
 `synth.design.tuning` takes a callable, a table, a spectrum object of `models` (sea, hook motion) or
 `White`; here each becomes a `Disturbance` with a density, the band that holds its variance

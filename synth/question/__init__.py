@@ -1,4 +1,8 @@
-"""The question of synthesis: plant, hook, noise and limits of a case, prepared."""
+"""The question that a synthesis answers: a case prepared for the search.
+
+In come a case and a structure; out comes a `Problem`: plant responses, spectra of the hook and
+the noises, weights and limits, in numbers and as the symbols of a programme.
+"""
 
 from typing import TYPE_CHECKING
 

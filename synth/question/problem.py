@@ -1,4 +1,4 @@
-"""The problem of synthesis: a plant, a law, what shakes them, what counts and what limits."""
+"""The problem of synthesis: plant, structure, disturbances, weights and limits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a case to the question that `synth.design.tuning` answers.
+"""`DesignQuestion`: a case as plant, spectra and limits of a synthesis problem.
 
     Case -> hook motion, plant at N rope masses, drag, limits -> DesignQuestion -> Problem
 

@@ -1,4 +1,4 @@
-"""The question that a structure's design answers: plant with its sensors, spectra, limits.
+"""`StructureQuestion`: a case and a structure, with sensors and noise, as a synthesis problem.
 
     Case, name -> StructureQuestion -> Problem
 

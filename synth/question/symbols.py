@@ -116,6 +116,7 @@ class LoopSymbols:
         """Return the most probable maximum of `output` in `duration` [s]."""
         m0, m2 = self.moment(output, 0), self.moment(output, 2)
         cycles = duration / (2.0 * np.pi) * ca.sqrt(m2 / m0)
+        # No fewer than e^(1/2) cycles, a factor of one: for less the logarithm turns negative.
         factor = ca.sqrt(2.0 * ca.log(ca.fmax(cycles, float(np.exp(0.5)))))
         return factor * ca.sqrt(m0)
 

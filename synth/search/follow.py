@@ -1,4 +1,4 @@
-r"""Following an answer: from one answer of a programme to that of a programme close to it.
+r"""Sequential quadratic programming from one answer of a programme to one close to it.
 
 .. math::
 
@@ -87,6 +87,7 @@ class Follower:
             f, g, slope = float(cost.item()), g.ravel(), slope.ravel()
             if not (np.isfinite(f) and np.all(np.isfinite(rows))):
                 return None
+            # The model holds near x only; a variable near zero gets a share of the largest's room.
             room = _REACH * np.maximum(np.abs(x), _LEAST * np.abs(x).max())
             answer = self._qp(
                 h=_convex(curvature),
@@ -105,6 +106,8 @@ class Follower:
             small = np.abs(step).max() <= _ARRIVED * np.abs(x).max()
             if small and broken < _KEPT:
                 return x, lam, f, k + 1
+            # An exact penalty: with a weight above the largest multiplier the merit has its
+            # minimum where the programme has.
             weight = _STIFF * float(np.abs(lam).max(initial=0.0))
             ahead = self._shorter(x, step, bounds, lowest, f + weight * broken, weight, stable)
             if ahead is None:

@@ -1,4 +1,4 @@
-"""The search: many starts on moderate nodes, the best answers polished on refined ones.
+"""Multi-start search: many starts on moderate nodes, the best answers polished on refined ones.
 
     Problem -> starts -> IPOPT from each -> distinct answers -> exchange of nodes -> Found
 
@@ -73,6 +73,7 @@ def search(
     progress: Progress | None = None,
 ) -> Found:
     """Return the best answer of a multi-start search; see `synth.design.tuning.tune`."""
+    # The reserve is picked together with the starts, so that it lies apart from them.
     begins = begin_points(problem, starts + _RESERVE, seed, guesses)
     if not begins:
         return Found(solved=None, assessment=None, excess=np.inf)
@@ -91,7 +92,7 @@ def resume(
     ends += [s.end for s in sorted(earlier.starts, key=lambda s: s.cost) if s.converged]
     coefficient = earlier.solved.coefficient if earlier.solved is not None else None
     stable = [end for end in ends if problem.stable(end, coefficient)]
-    if not stable:
+    if not stable:  # the problem is not that close after all
         return search(problem, max(1, len(earlier.starts)), 0, [], progress)
     scales = np.array([p.scale for p in problem.law.parameters])
     order = np.arange(len(stable), dtype=np.float64)
@@ -127,7 +128,7 @@ def _from(
     count = len(begins) if wanted is None else min(wanted, len(begins))
     for k, begin in enumerate(begins):
         if k >= count and any(np.isfinite(record.cost) for record in records):
-            break
+            break  # the reserve is for a search of which no start has arrived yet
         tell("starts", min(k, count - 1), count)
         solved = programme.solve(programme.pack(begin, coefficient))
         stable = problem.stable(solved.values, solved.coefficient)
@@ -173,6 +174,7 @@ def _once_more(programme: Programme, records: list[Start], solves: list[Solution
     for k, (record, solved) in enumerate(zip(records, solves, strict=True)):
         if record.stable and not record.converged:
             cost, broken = programme.violations(programme.pack(solved.values, solved.coefficient))
+            # Rows are logarithms as the cost is, so that they add up to one merit.
             merit = cost + sum(max(0.0, row) for row in broken.values())
             if merit < best:
                 ends.append((merit, k))
@@ -243,7 +245,7 @@ def _second_pass(
         reference=reference,
         tolerance=1e-7,
     )
-    sound: dict[Solution, Solution] = {}
+    sound: dict[Solution, Solution] = {}  # from an answer to the one it began at
     for old in first:
         start = programme.pack(old.values, old.coefficient)
         for reach, pace in ((_BASIN, Pace.NEAR), (None, Pace.FAR)):
@@ -262,6 +264,7 @@ def least_violation(
     found = []
     for begin in begins[:3]:
         x = programme.pack(begin, start_coefficient(problem))
+        # Begin within the rows: the slack takes up the largest violation.
         x[-1] = max([0.0, *programme.violations(x)[1].values()])
         solved = programme.solve(x)
         if problem.stable(solved.values, solved.coefficient):

@@ -1,4 +1,4 @@
-"""Where the programme looks: quadrature nodes for its variances, frequencies for its margins."""
+"""Frequency nodes of a programme: quadrature for its variances, a grid for its margins."""
 
 from __future__ import annotations
 
@@ -37,6 +37,7 @@ def cost_nodes(
     low, high, half_line = integration_band(problem.disturbances, poles)
 
     def integrands(omega: FloatArray) -> FloatArray:
+        # Drag makes every assessment's plant its own; without it they share the responses.
         shared = numeric_blocks(problem.plant.response(omega)) if problem.drag is None else None
         densities = {d.name: d.density(omega) for d in problem.disturbances}
         rows = []
@@ -80,6 +81,8 @@ def margin_nodes(problem: Problem, poles: Sequence[ComplexArray], per_decade: in
     every = np.concatenate([problem.plant.poles(), *poles])
     grid = frequency_grid(every)
     swinging = np.abs(every[np.abs(every.imag) > 0.3 * np.abs(every)])
+    # The quantile: a few very fast poles (delay models, high rope modes) would else stretch the
+    # dense part over decades in which nothing crosses over.
     low = 0.2 * float(swinging.min(initial=float(grid[-1])))
     high = 3.0 * float(np.quantile(swinging, 0.8)) if swinging.size else float(grid[-1])
     low, high = max(low, float(grid[0])), min(max(high, 10.0 * low), float(grid[-1]))

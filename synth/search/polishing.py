@@ -1,4 +1,4 @@
-"""Polishing: a solution on ever better nodes, until no limit is broken between them.
+"""Polishing of a solution by the exchange of nodes, until no limit is broken between them.
 
 The exchange method of semi-infinite programming: solve, look where a limit is pressed
 hardest, make those places nodes, solve again.  What leaves here has been looked at on
@@ -72,6 +72,7 @@ def polish(
         moved = abs(again.objective - solved.objective)
         solved = again
         assessment, excess = assess(problem, solved, goal, relaxed)
+        # The exchange need not descend: a round may leak anew, so the best so far is kept.
         if (excess > KEPT, solved.objective) < best[:2] or best[0]:
             best = (excess > KEPT, solved.objective, solved, assessment, excess)
         if excess <= (KEPT if late else 0.5 * KEPT) and moved < (5.0 if late else 1.0) * _SETTLED:
@@ -94,6 +95,8 @@ def _any_pace(
     follow: bool,
 ) -> Solution | None:
     """Return an answer near the start, by whichever pace of the solver gets there."""
+    # From the answer itself a few quadratic programmes do; an interior point must first leave
+    # the limits that bind, and so comes after.
     if follow and excess < _CLOSE:
         near = programme.follow(start, None, tighten)
         if near is not None and programme.problem.stable(near.values, near.coefficient):

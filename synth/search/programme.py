@@ -174,6 +174,7 @@ class Programme:
         rows, self._slices, at = [], [], 0
         for k, limit in enumerate(problem.limits):
             bound = bounds[k]
+            # Relaxed limits share one factor, and rows one slack: the most that any needs.
             if goal is Goal.RELAX and limit.name in relaxed:
                 bound = bound * ca.exp(symbols.extra)
             row = limit.rows(symbols, bound)
@@ -183,6 +184,7 @@ class Programme:
             self._slices.append(slice(at, at + row.shape[0]))
             at += row.shape[0]
         self._inequalities = at
+        # No limit of the case: it stops a real pole from creeping to zero, below every node.
         rows.append(symbols.no_slow_pole(reference))
         self._inequalities += 1
         if problem.drag is not None:
@@ -197,6 +199,7 @@ class Programme:
         self._statement: dict[str, Any] = {
             "x": symbols.x,
             "p": bounds,
+            # Zero or not a number, and flat: it turns points down and changes no derivative.
             "f": objective + self._guard(symbols.x),
             "g": constraints,
         }
@@ -220,6 +223,7 @@ class Programme:
 
     @cached_property
     def _follower(self) -> Follower:
+        # Without the guard: the follower asks for stability itself, before it evaluates.
         return Follower({**self._statement, "f": self._cost})
 
     def pack(
@@ -227,6 +231,7 @@ class Programme:
     ) -> FloatArray:
         """Return the programme's vector for given parameters."""
         x = [v / p.scale for v, p in zip(values, self.problem.law.parameters, strict=True)]
+        # Drag, sea and factors as logarithms: they stay positive, and a step is a share.
         if self.problem.drag is not None:
             x.append(float(np.log(coefficient or self.problem.drag.reference)))
         if self._goal is not Goal.COST:
@@ -334,6 +339,7 @@ class Programme:
         high[:count] = [p.high / p.scale for p in parameters]
         if reach is not None:
             near = start[:count]
+            # A parameter that is nearly zero still gets a thousandth of the largest one's room.
             room = reach * np.maximum(np.abs(near), 1e-3 * np.abs(near).max(initial=1e-3))
             low[:count] = np.maximum(low[:count], near - room)
             high[:count] = np.minimum(high[:count], near + room)

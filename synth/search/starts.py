@@ -138,6 +138,7 @@ def begin_points(
     stable = np.flatnonzero(abscissas < -1e-9)
     scales = np.array([p.scale for p in problem.law.parameters])
     if stable.size < starts:
+        # Phase I moves the least unstable ones; those that are stable need no moving.
         found = stabilise(problem, points, np.where(abscissas < 0, np.inf, abscissas), starts)
         points = np.vstack([points[stable], *[f[None] for f in found]])
     else:

@@ -1,4 +1,9 @@
-"""Controller structures: parameters to C(s)."""
+"""The controller structures: from a few named parameters to C(s).
+
+A structure bound to a plant is a `ParametrisedController`: its parameters with sizes and bounds,
+its response, its state space, and candidates for a search.  Here too is what samples a
+controller and makes a recursion of it, which `synth.controllers` builds on.
+"""
 
 from typing import TYPE_CHECKING
 

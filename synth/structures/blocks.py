@@ -1,4 +1,4 @@
-r"""Filter sections with parameters: what controller structures are put together from.
+r"""Filter sections with parameters, of which controller structures are put together.
 
 Each section is one transfer function with named, bounded parameters.  It says the same thing
 three times, for the optimiser (`response`, numbers or symbols), for the guard of its search

@@ -1,4 +1,4 @@
-"""The linear quadratic Gaussian controller: where a search of free controllers begins.
+"""The linear quadratic Gaussian controller, and its reduction to a few states.
 
 For white noise and a full-order controller it is the optimum that `synth.design.tuning` must find,
 and so its test oracle; for everything else (a spectrum with a peak, delays, limits, a controller of

@@ -1,4 +1,4 @@
-"""Controllers that are a recursion: one formula for the compiled loop and for a step in Python.
+"""Recursive controllers: one formula for the compiled loop and for a step in Python.
 
     law (CasADi symbols) --> Recursion --> compiled into the loop, or RecursiveController.step
 

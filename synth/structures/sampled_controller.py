@@ -1,4 +1,4 @@
-"""A linear controller in continuous time, sampled, and what keeps its states from winding up.
+"""Sampling of a linear controller, and its anti-windup.
 
 `synth.controllers.linear_feedback` is made of these matrices; they know nothing of a case.
 """

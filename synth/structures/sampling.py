@@ -1,4 +1,4 @@
-r"""A sampled controller on the linear plant: whether it is stable, and what a swell does.
+r"""The sampled loop of a recursive controller on the linear plant: its poles and its response.
 
 ::
 

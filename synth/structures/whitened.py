@@ -1,4 +1,4 @@
-"""A plant whose disturbances are white: what LQG designs need, about what the question asks.
+"""A plant with white disturbances in place of its spectra, for LQG designs.
 
 A spectrum with a peak becomes white noise through an oscillator; good enough to begin a search
 from, and nothing that is reported rests on it.

@@ -1,4 +1,4 @@
-"""The controller structures of a winch by name: what can be asked for, and what it consists of.
+"""The controller structures of a winch, by name.
 
 `structure_named` gives each of them for a case; `synth.design.structure_design` optimises it.  How
 they are put together is said in `synth.structures.winch_diagram`.

@@ -1,4 +1,4 @@
-"""Protocols of what is checked: a problem and its answer, a design and its figures.
+"""Protocols of the claims that are checked: a problem's answer, a design and its figures.
 
 `synth.design` keeps them.  The check thus knows none of the code that it checks, not even its
 types.

@@ -1,4 +1,4 @@
-"""The second look at an answer of `synth.design.tune`, on any linear plant.
+"""Verification of an answer of `synth.design.tune`, on any linear plant.
 
 Poles with other Pade models, the winding number with exact delays, margins by root finding,
 the cost by other quadrature and, where all disturbances are white, by a Lyapunov equation,

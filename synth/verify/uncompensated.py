@@ -1,4 +1,4 @@
-"""The payload on a rope whose upper end only follows the hook, for the verification.
+"""The payload's motion with the drum held, for the verification.
 
 What a design compares itself with: the drum held, on the distributed rope or on the thesis's
 one spring, from the rope's closed form written out here once more.
