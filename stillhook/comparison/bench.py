@@ -1,6 +1,6 @@
 """Tasks of a comparison, designs and runs, and the bench that does them in any process.
 
-Setup --(to any process)--> Bench.do(Task) --> StoredDesign, Cell, Trace or Refused
+CellSetup --(to any process)--> CellBench.do(CellTask) --> StoredDesign, Cell, Trace or Refused
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from typing import Any
 from models.basics import PhysicsWarning, StillhookError
 
 from ..controllers import Contender, StoredDesign, design_law
-from .cell import Question
+from .cell import ComparisonQuestion
 from .floor import prepare
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class CellTask:
     """Something to do.
 
     Attributes
@@ -59,26 +59,26 @@ class Refused:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Setup:
+class CellSetup:
     """What all are asked, and who is asked, by name."""
 
-    question: Question
+    question: ComparisonQuestion
     contenders: Mapping[str, Contender]
 
-    def bench(self) -> Bench:
+    def bench(self) -> CellBench:
         """Return what does the tasks."""
-        return Bench(self)
+        return CellBench(self)
 
 
-class Bench:
+class CellBench:
     """Does tasks, one after the other, and keeps what it prepared for the one before."""
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: CellSetup) -> None:
         self._question, self._contenders = setup.question, setup.contenders
         self._at: tuple[str, float] | None = None
         self._prepared: Any = None
 
-    def do(self, task: Task, progress: Any = None) -> Any:
+    def do(self, task: CellTask, progress: Any = None) -> Any:
         """Return the answer to a task: a `StoredDesign`, a `Cell`, a `Trace`, or `Refused`."""
         with warnings.catch_warnings():  # told once, where the case was read
             warnings.simplefilter("ignore", PhysicsWarning)

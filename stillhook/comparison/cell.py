@@ -1,6 +1,6 @@
 """One run of a comparison: a contender in a sea with a seed, and what there is to keep of it.
 
-    Question, Contender, H_s, StoredDesign --> Prepared --> run(seed) --> Cell (plain data)
+    question, Contender, H_s, StoredDesign --> Prepared --> run(seed) --> Cell (plain data)
 
 Common random numbers: every contender meets the same motion of the hook, to the last bit at the
 nodes that it is drawn at, growing out of rest in the same way, and is judged over the same time.
@@ -46,7 +46,7 @@ _ROUNDING = 1e-6  # of a limit that counts as broken
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Question:
+class ComparisonQuestion:
     """What all contenders are asked.
 
     Attributes
@@ -196,7 +196,11 @@ class Prepared:
     """
 
     def __init__(
-        self, question: Question, contender: Contender, height: float, law: StoredDesign | None
+        self,
+        question: ComparisonQuestion,
+        contender: Contender,
+        height: float,
+        law: StoredDesign | None,
     ) -> None:
         if contender.recipe is None:
             raise InputError("the floor is no controller")

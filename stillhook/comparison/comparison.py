@@ -23,7 +23,7 @@ from models.basics import Interval, mean_interval
 from models.case import Case
 
 from ..controllers import Contender, StoredDesign
-from .cell import Cell, Question, Trace
+from .cell import Cell, ComparisonQuestion, Trace
 
 COLUMNS: Mapping[str, str] = {
     "payload rms": "m",
@@ -106,7 +106,7 @@ class Comparison:
     contenders: tuple[Contender, ...]
     heights: tuple[float, ...]
     seeds: tuple[int, ...]
-    question: Question
+    question: ComparisonQuestion
     cells: tuple[Cell, ...]
     refused: Mapping[tuple[str, float], str] = field(default_factory=dict)
     laws: Mapping[tuple[str, float], StoredDesign] = field(default_factory=dict)

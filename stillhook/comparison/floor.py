@@ -1,6 +1,6 @@
 """The floor of a comparison: what the clairvoyant leaves, in the same form as a controller's run.
 
-    Question, Contender, H_s --> prepare --> Prepared (a controller) or Floor --> run(seed) --> Cell
+    question, Contender, H_s --> prepare --> Prepared (a controller) or Floor --> run(seed) --> Cell
 
 It sees the same motion of the hook as all contenders and is judged over the same time; its plant
 is linear, and every command within the drive's limits is open to it.
@@ -17,7 +17,7 @@ from models.operation import SpectrumMotion
 from models.simulation import EASE, Progress
 
 from ..controllers import Contender, StoredDesign
-from .cell import WINDOW, Cell, CommonSea, Prepared, Question, Trace
+from .cell import WINDOW, Cell, CommonSea, ComparisonQuestion, Prepared, Trace
 
 _SAMPLE = 0.05  # of the demand, which may bend in any way from one to the next [s]
 
@@ -25,7 +25,7 @@ _SAMPLE = 0.05  # of the demand, which may bend in any way from one to the next 
 class Floor:
     """The clairvoyant floor in one sea: no controller, and no nonlinear plant."""
 
-    def __init__(self, question: Question, contender: Contender, height: float) -> None:
+    def __init__(self, question: ComparisonQuestion, contender: Contender, height: float) -> None:
         self._name, self._height, self._question = contender.name, height, question
         self._case = question.true(height)
         self._hook = SpectrumMotion.from_case(self._case).hook
@@ -78,7 +78,7 @@ class Floor:
 
 
 def prepare(
-    question: Question, contender: Contender, height: float, law: StoredDesign | None
+    question: ComparisonQuestion, contender: Contender, height: float, law: StoredDesign | None
 ) -> Prepared | Floor:
     """Return a contender in one sea, ready to run.
 

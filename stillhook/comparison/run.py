@@ -17,18 +17,19 @@ from pathlib import Path
 
 from models.basics import InputError, check_range
 from models.case import Case
-from models.casefile import Quantity
 from models.simulation import EASE
 
 from ..controllers import contenders_of
 from ..keeper import Processes, usable_cores
-from ..runs.simulation import seeds_of
-from .bench import Setup
-from .cell import Question
+from ..runs import seconds_of, seeds_of
+from .bench import CellSetup
+from .campaign import Campaign, Progress
+from .cell import ComparisonQuestion
 from .comparison import Comparison
 from .mismatch import Mismatch
 from .store import STORE, Store
-from .work import Progress, Work
+
+_LONGEST = 1e6  # run [s]
 
 
 def compare(
@@ -111,17 +112,18 @@ def compare(
     ([2, 2], True)
     """
     contenders = contenders_of(controllers)
-    numbers = seeds_of(seeds)
-    lasting = _seconds("duration", duration)
+    numbers = seeds_of("compare", seeds)
+    lasting = seconds_of("compare: duration", duration, high=_LONGEST)
     if design_at not in ("each", "case"):
         raise InputError(f"compare: design_at must be one of each, case; got {design_at!r}")
     check_range("compare", "starts", starts, low=1, high=4096)
     waves = EASE + 10.0 * case.sea.spectral_peak_period
+    asked = seconds_of("compare: settle", settle, high=_LONGEST, positive=False)
     usual = max(min(waves, 0.1 * lasting), min(EASE, 0.5 * lasting))
-    question = Question(
+    question = ComparisonQuestion(
         case=case,
         duration=lasting,
-        settle=usual if settle is None else _seconds("settle", settle),
+        settle=usual if asked is None else asked,
         mismatch=Mismatch.read(mismatch),
         masses=masses,
         compiled=compiled,
@@ -141,7 +143,7 @@ def compare(
 
             store = Store(OutputFolder.prepare(out).path / STORE, question)
             stack.enter_context(store.journal)
-        work = Work(
+        campaign = Campaign(
             question=question,
             contenders=contenders,
             heights=levels,
@@ -153,14 +155,14 @@ def compare(
         try:
             if workers > 1 and sys.executable:
                 names = {each.name: each for each in contenders if each.portable}
-                setup = Setup(question=question, contenders=names)
-                work.share(stack.enter_context(Processes(workers).begin(setup, workers)))
-            work.alone()
+                setup = CellSetup(question=question, contenders=names)
+                campaign.share(stack.enter_context(Processes(workers).begin(setup, workers)))
+            campaign.alone()
             if traces:
-                work.look_closely()
+                campaign.look_closely()
         except KeyboardInterrupt:
             complete = False
-        return work.comparison(complete=complete, seconds=clock.perf_counter() - began)
+        return campaign.comparison(complete=complete, seconds=clock.perf_counter() - began)
 
 
 def _heights(case: Case, heights: Sequence[float] | None) -> tuple[float, ...]:
@@ -179,13 +181,6 @@ def _jobs(jobs: int | None) -> int:
     if jobs is not None:
         return int(check_range("compare", "jobs", jobs, low=1, high=512))
     return usable_cores()
-
-
-def _seconds(name: str, value: float | str) -> float:
-    try:
-        return float(Quantity("time", 0.0, 1e6, open_low=name == "duration").read(value))
-    except InputError as error:
-        raise InputError(f"compare: {name} {error}") from None
 
 
 def _silent(what: str, done: int, total: int) -> None:

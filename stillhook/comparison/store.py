@@ -10,14 +10,14 @@ from typing import Any
 
 from ..controllers import Contender, StoredDesign
 from ..keeper import Journal, versions
-from .bench import Bench
-from .cell import Cell, Question
+from .bench import CellBench
+from .cell import Cell, ComparisonQuestion
 
 STORE = "cells.jsonl"
 """Name of the file in the folder of a comparison."""
 
 
-def question_of(question: Question) -> dict[str, Any]:
+def question_of(question: ComparisonQuestion) -> dict[str, Any]:
     """Return what a store has to answer, as plain data."""
     return {
         "case": question.case.to_dict(),
@@ -28,7 +28,7 @@ def question_of(question: Question) -> dict[str, Any]:
         "compiled": question.compiled,
         "design at": question.design_at,
         "starts": question.starts,
-        "versions": versions(Bench),
+        "versions": versions(CellBench),
     }
 
 
@@ -48,7 +48,7 @@ class Store:
         As for `Journal`.
     """
 
-    def __init__(self, path: Path, question: Question) -> None:
+    def __init__(self, path: Path, question: ComparisonQuestion) -> None:
         self._cells: dict[tuple[str, str, float, int], Cell] = {}
         self._laws: dict[tuple[str, float], StoredDesign] = {}
         self.journal = Journal(path, "comparison", question_of(question), self._take)

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from .runs import Runs as Runs
     from .runs import keep_worst as keep_worst
     from .series import Series as Series
+    from .simulation import seconds_of as seconds_of
+    from .simulation import seeds_of as seeds_of
     from .simulation import simulate as simulate
     from .terminal import Ticker as Ticker
     from .terminal import run_progress as run_progress

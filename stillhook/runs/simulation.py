@@ -9,7 +9,7 @@ folder.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, overload
 
 from models.basics import InputError, check_range, check_seed, one_thread
 from models.case import Case
@@ -110,7 +110,7 @@ def simulate(
     >>> len(runs), runs.completed, runs.summary["payload rms"].count
     (3, True, 3)
     """
-    numbers = seeds_of(seeds)
+    numbers = seeds_of("simulate", seeds)
     if traces not in ("all", "worst"):
         raise InputError(f"simulate: traces must be one of all, worst; got {traces!r}")
     if isinstance(scenario, str):
@@ -130,7 +130,7 @@ def simulate(
         scenario,
         SimulationOptions(
             hook=hook,
-            duration=None if duration is None else _seconds(duration),
+            duration=seconds_of("simulate: duration", duration, high=1e8),
             step=step,
             masses=masses,
             limits=limits,
@@ -155,7 +155,7 @@ def simulate(
     return series.runs(found)
 
 
-def seeds_of(seeds: int | Sequence[int]) -> tuple[int, ...]:
+def seeds_of(owner: str, seeds: int | Sequence[int]) -> tuple[int, ...]:
     """Return the seeds: 0 to n - 1, or those given.
 
     Raises
@@ -164,19 +164,34 @@ def seeds_of(seeds: int | Sequence[int]) -> tuple[int, ...]:
         If there is none, one is negative, or one comes twice.
     """
     if isinstance(seeds, int):
-        check_range("simulate", "seeds", seeds, low=1)
+        check_range(owner, "seeds", seeds, low=1)
         return tuple(range(seeds))
-    found = tuple(check_seed("simulate", seed) for seed in seeds)
+    found = tuple(check_seed(owner, seed) for seed in seeds)
     if not found or len(set(found)) != len(found):
-        raise InputError(f"simulate: seeds must be distinct whole numbers, got {list(found)}")
+        raise InputError(f"{owner}: seeds must be distinct whole numbers, got {list(found)}")
     return found
 
 
-def _seconds(duration: float | str) -> float:
+@overload
+def seconds_of(owner: str, value: None, *, high: float, positive: bool = ...) -> None: ...
+@overload
+def seconds_of(owner: str, value: float | str, *, high: float, positive: bool = ...) -> float: ...
+def seconds_of(
+    owner: str, value: float | str | None, *, high: float, positive: bool = True
+) -> float | None:
+    """Return a time that was given as a number [s] or as a text with a unit; None as it is.
+
+    Raises
+    ------
+    InputError
+        If it is none, or not above 0 (at least 0 unless `positive`) and up to the highest.
+    """
+    if value is None:
+        return None
     try:
-        return float(Quantity("time", 0.0, 1e8, open_low=True).read(duration))
+        return float(Quantity("time", 0.0, high, open_low=positive).read(value))
     except InputError as error:
-        raise InputError(f"simulate: duration {error}") from None
+        raise InputError(f"{owner} {error}") from None
 
 
 def _part(progress: Progress, done: int, total: int) -> Progress:

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 from models.basics import InputError, check_range, check_seed, pick
 from models.case import Case
-from models.casefile import Quantity
 from models.spread import METHODS, Spread
 from synth.design import GainDesign, StructureDesign
 
@@ -27,6 +26,8 @@ if TYPE_CHECKING:
 
 SAMPLES = {"frequency": 10_000, "time": 256}
 """Cases of a sweep unless told otherwise, by its mode."""
+
+_LONGEST = 1e6  # run in time [s]
 
 
 def sweep(
@@ -141,6 +142,7 @@ def sweep(
             design, given, nominal, int(wanted), sampling, seed, metrics, chunk, store, progress
         )
     from ..controllers import recipe_of
+    from ..runs import seconds_of
     from .store import Draw
     from .time_cases import TimeQuestion
     from .time_metrics import names_of
@@ -148,13 +150,13 @@ def sweep(
 
     del accessor
     recipe = recipe_of(design, "sweep")
-    lasting = _seconds("duration", duration)
+    lasting = seconds_of("sweep: duration", duration, high=_LONGEST)
     question = TimeQuestion(
         case=nominal,
         recipe=recipe,
         metrics=names_of(metrics),
         duration=lasting,
-        settle=None if settle is None else _seconds("settle", settle),
+        settle=seconds_of("sweep: settle", settle, high=_LONGEST, positive=False),
         scenario=scenario,
         options=dict(options or {}),
         masses=masses,
@@ -287,10 +289,3 @@ def _in_frequency(
     if store is not None:
         write_result(found, store)
     return found
-
-
-def _seconds(name: str, value: float | str) -> float:
-    try:
-        return float(Quantity("time", 0.0, 1e6, open_low=name == "duration").read(value))
-    except InputError as error:
-        raise InputError(f"sweep: {name} {error}") from None

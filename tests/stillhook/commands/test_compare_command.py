@@ -16,7 +16,7 @@ from designs import thesis_design
 
 import stillhook as sh
 from stillhook import cli
-from stillhook.comparison.bench import Bench
+from stillhook.comparison.bench import CellBench
 from stillhook.comparison.store import STORE
 from stillhook.controllers import CONTENDERS
 from stillhook.designs import save_design
@@ -74,7 +74,7 @@ def test_the_same_command_again_computes_nothing(run, monkeypatch):
     words = (*CALM, *WHO, *SHORT, "--no-figures", "--out", "here")
     first = run(*words)
     tables = Path("here/table.csv").read_bytes(), Path("here/runs.csv").read_bytes()
-    monkeypatch.setattr(Bench, "do", lambda *given: pytest.fail("computed again"))
+    monkeypatch.setattr(CellBench, "do", lambda *given: pytest.fail("computed again"))
     again = run(*words)
     assert (again.status, again.out) == (0, first.out)
     assert (Path("here/table.csv").read_bytes(), Path("here/runs.csv").read_bytes()) == tables

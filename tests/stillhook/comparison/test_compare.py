@@ -14,11 +14,10 @@ from designs import thesis_design
 
 import stillhook as sh
 from models.sensing import Measurement
-from stillhook.comparison import Comparison, comparison_report, sentences_of
+from stillhook.comparison import Comparison, campaign, comparison_report, sentences_of
 from stillhook.comparison import store as compare_store
-from stillhook.comparison import work as compare_work
-from stillhook.comparison.bench import Bench, Task
-from stillhook.comparison.cell import Cell, Prepared, Question
+from stillhook.comparison.bench import CellBench, CellTask
+from stillhook.comparison.cell import Cell, ComparisonQuestion, Prepared
 from stillhook.comparison.figures import heights, worst_moment
 from stillhook.comparison.mismatch import Mismatch
 from stillhook.comparison.store import STORE
@@ -72,9 +71,9 @@ def unmade(case: sh.Case) -> Listener:
     raise KeyError("torque")
 
 
-def asked(case: sh.Case = CASE, **changes: object) -> Question:
+def asked(case: sh.Case = CASE, **changes: object) -> ComparisonQuestion:
     given = {"duration": 30.0, "settle": 15.0, "mismatch": Mismatch.read(None), **changes}
-    return Question(case=case, **given)
+    return ComparisonQuestion(case=case, **given)
 
 
 def numbers(found: Comparison) -> list[dict]:
@@ -84,6 +83,19 @@ def numbers(found: Comparison) -> list[dict]:
         content = {**cell.to_dict(), "wall": 0.0, "step": {}}
         clean.append(json.dumps(content, sort_keys=True))
     return clean
+
+
+def tasks_done(monkeypatch) -> list[CellTask]:
+    """Return a list to which every task is added that is done from now on."""
+    done: list[CellTask] = []
+    do = CellBench.do
+
+    def noted(self, task, progress=None):
+        done.append(task)
+        return do(self, task)
+
+    monkeypatch.setattr(CellBench, "do", noted)
+    return done
 
 
 # common random numbers
@@ -156,9 +168,11 @@ def test_a_comparison_that_was_stopped_goes_on_and_ends_the_same(tmp_path, monke
     first = sh.compare(CASE, ["none", "feed-forward"], jobs=1, out=tmp_path, progress=stop, **FAST)
     assert not first.complete
     assert len(first.cells) == 2
-    done: list[Task] = []
-    do = Bench.do
-    monkeypatch.setattr(Bench, "do", lambda self, task, p=None: done.append(task) or do(self, task))
+    done: list[CellTask] = []
+    do = CellBench.do
+    monkeypatch.setattr(
+        CellBench, "do", lambda self, task, p=None: done.append(task) or do(self, task)
+    )
     then = sh.compare(CASE, ["none", "feed-forward"], jobs=1, out=tmp_path, **FAST)
     assert [(task.name, task.seed) for task in done] == [("feed-forward", 0), ("feed-forward", 1)]
     assert then.complete
@@ -217,7 +231,7 @@ def test_a_store_that_answers_another_question_is_refused_and_told_apart(tmp_pat
 
 def test_a_store_of_other_code_is_refused(tmp_path, monkeypatch):
     sh.compare(CASE, ["none"], jobs=1, out=tmp_path, **FAST)
-    own = compare_store.versions(compare_store.Bench)
+    own = compare_store.versions(compare_store.CellBench)
     monkeypatch.setattr(compare_store, "versions", lambda entry: {**own, "code": "0123456789"})
     with pytest.raises(sh.InputError, match="another version of Stillhook's own code"):
         sh.compare(CASE, ["none"], jobs=1, out=tmp_path, **FAST)
@@ -241,8 +255,10 @@ def test_another_contender_of_the_same_name_is_run_anew(tmp_path, monkeypatch):
     first = Listener(CASE, "own", 0.05, 0.0)
     sh.compare(CASE, [first], jobs=1, out=tmp_path, **FAST)
     done = []
-    do = Bench.do
-    monkeypatch.setattr(Bench, "do", lambda self, task, p=None: done.append(task) or do(self, task))
+    do = CellBench.do
+    monkeypatch.setattr(
+        CellBench, "do", lambda self, task, p=None: done.append(task) or do(self, task)
+    )
     sh.compare(CASE, [Listener(CASE, "own", 0.05, 5.0)], jobs=1, out=tmp_path, **FAST)
     assert len(done) == 2
 
@@ -253,9 +269,9 @@ def test_another_contender_of_the_same_name_is_run_anew(tmp_path, monkeypatch):
 @pytest.mark.ci
 def test_a_process_that_dies_costs_its_own_runs_only_and_is_tried_twice(monkeypatch):
     made = []
-    begin = compare_work.Processes.submit
+    begin = campaign.Processes.submit
     monkeypatch.setattr(
-        compare_work.Processes,
+        campaign.Processes,
         "submit",
         lambda self, task: made.append(task.name) or begin(self, task),
     )

@@ -121,9 +121,9 @@ def test_the_code_of_a_study_is_read_in_less_than_a_second():
 
 
 def test_what_a_run_needs_is_reached_through_faces_and_functions():
-    from stillhook.comparison.bench import Bench
+    from stillhook.comparison.bench import CellBench
 
-    reached = digest._Reached(Bench.__module__).contents
+    reached = digest._Reached(CellBench.__module__).contents
     for module in (
         "models.plant.linear",
         "models.simulation.kernel",
@@ -134,4 +134,6 @@ def test_what_a_run_needs_is_reached_through_faces_and_functions():
     ):
         assert module in reached, module
     assert not [module for module in reached if module.startswith(("synth.sizing", "tests"))]
-    assert versions(Bench)["code"] == code_digest(Bench.__module__) == code_digest(Bench)
+    assert (
+        versions(CellBench)["code"] == code_digest(CellBench.__module__) == code_digest(CellBench)
+    )

@@ -1,6 +1,6 @@
-"""What a comparison has to do and has done: which task comes next, and what becomes of an answer.
+"""The campaign of a comparison: which task comes next, and what becomes of its answer.
 
-    Question, contenders --> Work.share (in processes), Work.alone (in this one) --> Comparison
+    question, contenders --> Campaign.share (in processes), Campaign.alone (here) --> Comparison
 
 Designs come first, since runs wait for them.  A process is given what it has prepared already, as
 long as there is any.
@@ -14,8 +14,8 @@ from typing import Any
 
 from ..controllers import Contender, StoredDesign
 from ..keeper import POLL, Died, Processes
-from .bench import Bench, Refused, Setup, Task
-from .cell import Cell, Question, Trace
+from .bench import CellBench, CellSetup, CellTask, Refused
+from .cell import Cell, ComparisonQuestion, Trace
 from .comparison import Comparison
 from .store import Store
 
@@ -23,8 +23,8 @@ Progress = Callable[[str, int, int], None]
 
 
 @dataclass(kw_only=True)
-class Work:
-    """What is to be done, and what has been.
+class Campaign:
+    """Designs and runs of a comparison that are to be done, and what came of those that are.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Work:
         Called as progress(what, done, total), in runs.
     """
 
-    question: Question
+    question: ComparisonQuestion
     contenders: tuple[Contender, ...]
     heights: tuple[float, ...]
     seeds: tuple[int, ...]
@@ -47,8 +47,8 @@ class Work:
     cells: dict[tuple[str, float, int], Cell] = field(default_factory=dict)
     traces: tuple[Trace, ...] = ()
     no_design: dict[tuple[str, float], str] = field(default_factory=dict)
-    under_way: set[Task] = field(default_factory=set)
-    _bench: Bench | None = None
+    under_way: set[CellTask] = field(default_factory=set)
+    _bench: CellBench | None = None
     _names: dict[str, Contender] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -108,7 +108,7 @@ class Work:
                 continue
             self._tell(f"traces of {contender.name}")
             name = contender.name
-            task = Task(kind="trace", name=name, height=height, seed=seed, moment=moment)
+            task = CellTask(kind="trace", name=name, height=height, seed=seed, moment=moment)
             trace = self._do(task)
             if isinstance(trace, Trace):
                 traces.append(trace)
@@ -136,9 +136,11 @@ class Work:
             seconds=seconds,
         )
 
-    def _designs(self) -> list[Task]:
+    def _designs(self) -> list[CellTask]:
         wanted = {
-            Task(kind="design", name=each.needs, height=self.question.design_height(height)): None
+            CellTask(
+                kind="design", name=each.needs, height=self.question.design_height(height)
+            ): None
             for height in self.heights
             for each in self.contenders
             if each.needs
@@ -146,15 +148,15 @@ class Work:
         # The longest first, so that nobody waits for it at the end.
         return sorted(wanted, key=lambda task: not task.name.startswith("combined"))
 
-    def _runs(self) -> list[Task]:
+    def _runs(self) -> list[CellTask]:
         return [
-            Task(kind="run", name=each.name, height=height, seed=seed)
+            CellTask(kind="run", name=each.name, height=height, seed=seed)
             for each in self.contenders
             for height in self.heights
             for seed in self.seeds
         ]
 
-    def _todo(self) -> list[Task]:
+    def _todo(self) -> list[CellTask]:
         """Return what can be done now: designs first, then runs whose design is there."""
         known = {**self.laws, **self.no_design}
         designs = [task for task in self._designs() if task.group not in known]
@@ -167,7 +169,7 @@ class Work:
         ]
         return designs + runs
 
-    def _next(self, pool: Processes, todo: list[Task]) -> Task:
+    def _next(self, pool: Processes, todo: list[CellTask]) -> CellTask:
         """Return what fits best: what an idle process has prepared, then what nobody has."""
         if todo[0].kind == "design":
             return todo[0]
@@ -178,7 +180,7 @@ class Work:
         taken = {task.group for task in self.under_way}
         return next((task for task in todo if task.group not in taken), todo[0])
 
-    def _waits(self, task: Task) -> bool:
+    def _waits(self, task: CellTask) -> bool:
         """Return whether a run's design is still to come; note a run that will have none."""
         needs = self._names[task.name].needs
         if not needs:
@@ -188,31 +190,31 @@ class Work:
             self.refused[task.group] = self.no_design[at]
         return at not in self.laws
 
-    def _law(self, task: Task) -> StoredDesign | None:
+    def _law(self, task: CellTask) -> StoredDesign | None:
         return self._law_of(self._names[task.name], task.height)
 
     def _law_of(self, contender: Contender, height: float) -> StoredDesign | None:
         return self.laws.get((contender.needs, self.question.design_height(height)))
 
-    def _portable(self, task: Task) -> bool:
+    def _portable(self, task: CellTask) -> bool:
         return task.kind == "design" or self._names[task.name].portable
 
-    def _do(self, task: Task) -> Any:
+    def _do(self, task: CellTask) -> Any:
         """Do a task in this process."""
         if self._bench is None:
-            self._bench = Setup(question=self.question, contenders=self._names).bench()
+            self._bench = CellSetup(question=self.question, contenders=self._names).bench()
         full = self._full(task)
         self._tell(_words(task))
         if task.kind == "design":
             return self._bench.do(full, lambda stage, done, total: self._tell(_words(task)))
         return self._bench.do(full, lambda share: self._tell(_words(task)))
 
-    def _full(self, task: Task) -> Task:
+    def _full(self, task: CellTask) -> CellTask:
         """Return a task with the law that it takes."""
         law = None if task.kind == "design" else self._law(task)
         return task if law is None else replace(task, law=law)
 
-    def _take(self, task: Task, answer: Any) -> None:
+    def _take(self, task: CellTask, answer: Any) -> None:
         """Keep an answer."""
         key = (task.name, task.height, task.seed)
         if isinstance(answer, Died):
@@ -243,13 +245,13 @@ class Work:
         self.progress(what, len(self.cells), max(total, len(self.cells)))
 
 
-def _words(task: Task) -> str:
+def _words(task: CellTask) -> str:
     if task.kind == "design":
         return f"designing {task.name}, H_s {task.height:.4g} m"
     return f"{task.name}, H_s {task.height:.4g} m, seed {task.seed}"
 
 
-def _without(task: Task, status: str, message: str) -> Cell:
+def _without(task: CellTask, status: str, message: str) -> Cell:
     return Cell(
         contender=task.name, height=task.height, seed=task.seed, status=status, message=message
     )
