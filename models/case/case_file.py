@@ -2,7 +2,8 @@
 
     file or bundled name -> text -> plain data with line numbers -> `Case.from_dict`
 
-YAML is read as version 1.2; JSON is a part of it.  TOML goes through the same models.
+YAML is read as version 1.2; JSON is a part of it.  TOML goes through the same models; its errors
+name the field alone, as the standard library does not say in which line a value stood.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import Any
 
 from ..basics import InputError
 from ..casefile import Path as FieldPath
-from ..casefile import message_line, read_yaml, toml_lines
+from ..casefile import message_line, read_yaml
 from .case import Case
 
 _TEMPLATE = "template"
@@ -159,4 +160,4 @@ def _parsed(text: str, kind: str, source: str) -> tuple[Any, dict[FieldPath, int
         digits = place.removeprefix("line ").partition(",")[0]
         line = int(digits) if digits.isdigit() else 0
         raise InputError(message_line(source, line, (), f"is not TOML: {problem}")) from None
-    return data or None, toml_lines(text)
+    return data or None, {}

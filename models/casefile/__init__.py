@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from .section import Section as Section
     from .section import describe as describe
     from .section import problems as problems
-    from .toml import toml_lines as toml_lines
     from .yaml_lines import read_yaml as read_yaml
     from .yaml_lines import yaml_text as yaml_text
 else:

@@ -1,11 +1,10 @@
-"""Case files that cannot be read, YAML and TOML with their lines, and writing files."""
+"""Case files that cannot be read, YAML with its lines, TOML, and writing files."""
 
 from __future__ import annotations
 
 import os
 import re
 import textwrap
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from models import InputError, load_case, template_text, write_text_atomically
-from models.casefile import read_yaml, toml_lines
+from models.casefile import read_yaml
 
 
 class TestFiles:
@@ -138,7 +137,7 @@ class TestFiles:
 
 TOML = textwrap.dedent(
     '''\
-    stillhook = 1                      # line 1
+    stillhook = 1
     name = "a [section] = in a text"
     description = """
     several lines
@@ -147,107 +146,51 @@ TOML = textwrap.dedent(
     "quoted.key" = 'literal \\'
 
     [sea]
-    spectrum = "jonswap"               # line 10
+    spectrum = "jonswap"
     significant_height = "2 m"
     peak_period = 9
 
     [vessel.heave_rao]
     omega = [
-      0.3, 0.6,                        # line 16, with a ] in the comment
+      0.3, 0.6,
       "0.1 Hz",
     ]
     amplitude = [1, 1, 0.8]
 
-    [rope]                             # line 21
+    [rope]
     diameter = "50 mm"
     axial_stiffness = 2.428e8
     payload.mass = 1
     table = { a = 1, b = { c = [2, 3] }, d = "}" }
 
-    [[winch.drum.layers]]              # line 27
+    [[winch.drum.layers]]
     pitch_diameter = 1
     rope_on_drum = 100
     [[winch.drum.layers]]
-    pitch_diameter = 1.1               # line 31
+    pitch_diameter = 1.1
     rope_on_drum = 200
     [winch.drum.layers.extra]
     x = """a ""quoted"" text"""
-    y = 2024-01-01T12:00:00Z           # line 35
+    y = 2024-01-01T12:00:00Z
     '''
 )
 
 
 class TestToml:
-    def test_lines(self):
-        tomllib.loads(TOML)
-        lines = toml_lines(TOML)
-        assert {path: line for path, line in lines.items() if len(path) <= 1} == {
-            (): 1,
-            ("stillhook",): 1,
-            ("name",): 2,
-            ("description",): 3,
-            ("quoted.key",): 7,
-            ("sea",): 9,
-            ("vessel",): 14,
-            ("rope",): 21,
-            ("winch",): 27,
-        }
-        assert lines["sea", "peak_period"] == 12
-        assert lines["vessel", "heave_rao"] == 14
-        assert [lines["vessel", "heave_rao", "omega", i] for i in range(3)] == [16, 16, 17]
-        assert lines["vessel", "heave_rao", "amplitude"] == 19
-        assert lines["rope", "payload", "mass"] == 24
-        assert lines["rope", "table", "b", "c", 1] == 25
-        assert lines["rope", "table", "d"] == 25
-        layers = ("winch", "drum", "layers")
-        assert [lines[*layers, i, "rope_on_drum"] for i in range(2)] == [29, 32]
-        assert lines[*layers, 1, "extra", "y"] == 35
-
-    def test_scanner_finds_every_path_that_the_parser_finds(self):
-        def paths(value, path=()):
-            items = value.items() if isinstance(value, dict) else ()
-            items = enumerate(value) if isinstance(value, list) else items
-            return {path}.union(*(paths(item, (*path, key)) for key, item in items))
-
-        assert set(toml_lines(TOML)) == paths(tomllib.loads(TOML))
-        assert toml_lines(TOML.replace("\n", "\r\n")) == toml_lines(TOML)
-
-    @given(
-        st.dictionaries(
-            st.text("ab.\"' ", max_size=3),
-            st.one_of(
-                st.integers(),
-                st.text("a\"'\\]}#=\n ", max_size=6),
-                st.lists(st.lists(st.text("],[", max_size=3), max_size=3), max_size=3),
-            ),
-            max_size=4,
-        )
-    )
-    def test_scanner_on_awkward_keys_and_texts(self, tree):
-        def basic(text):
-            escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-            return f'"{escaped}"'
-
-        def written(value):
-            if isinstance(value, list):
-                return f"[{', '.join(map(written, value))}]"
-            return basic(value) if isinstance(value, str) else str(value)
-
-        text = "\n".join(f"{basic(key)} = {written(value)}" for key, value in tree.items())
-        assert tomllib.loads(text) == tree
-        lines = toml_lines(text)
-        assert [lines[(key,)] for key in tree] == list(range(1, len(tree) + 1))
-
-    def test_errors_have_their_line(self, tmp_path):
+    def test_errors_have_their_path(self, tmp_path):
         path = tmp_path / "my.toml"
         path.write_text(TOML)
         with pytest.raises(InputError) as caught:
             load_case(path)
         lines = str(caught.value).splitlines()
-        assert f"{path}:7: quoted.key: unknown key" in lines[0] + lines[1]
-        assert f"{path}:24: rope.payload: unknown key" in "".join(lines)
-        assert f"{path}:33: winch.drum.layers[1].extra: unknown key" in "".join(lines)
-        assert f"{path}:21: rope.length: is missing; it must be a length" in "".join(lines)
+        starts = (
+            "quoted.key: unknown key",
+            "rope.payload: unknown key",
+            "winch.drum.layers[1].extra: unknown key",
+            "rope.length: is missing; it must be a length",
+        )
+        for start in starts:
+            assert any(line.startswith(f"{path}: {start}") for line in lines), start
 
     @pytest.mark.parametrize(
         ("text", "message"),
