@@ -1,4 +1,8 @@
-"""The case: all sections of a case file together, read, checked and written again."""
+"""Case: all sections of a case file together.
+
+A file, a bundled name or plain data comes in; a checked and frozen `Case` goes out, which can be
+changed by dotted paths and written again.
+"""
 
 from typing import TYPE_CHECKING
 

@@ -1,8 +1,9 @@
-"""`Case`: one vessel, one sea, one rope, one payload, one winch, and what a design must respect.
+"""`Case`: one vessel, one sea, one rope, one payload, one winch, and the limits of a design.
 
 A case is the frozen image of a case file.  It is made through one door, `Case.from_dict`, which
-checks everything, words every error for the user, and warns about implausible physics;
-`replace` changes fields by their dotted paths and goes through the same door again.
+checks everything and words every error for the user; `replace` changes fields by their dotted paths
+and goes through the same door again.  Of implausible figures its user is told once: by `load_case`,
+and by the `replace` that brings them in.
 """
 
 from __future__ import annotations
@@ -20,7 +21,6 @@ from ..casefile import (
     FOLDER,
     Path,
     describe,
-    line_of,
     message_line,
     plain,
     problems,
@@ -35,6 +35,7 @@ class Case(Contents):
     """A case: all that a design needs to know, checked and frozen."""
 
     _source: str = PrivateAttr(default="")
+    _quiet: bool = PrivateAttr(default=False)
 
     @model_validator(mode="after")
     def _check(self) -> Case:
@@ -70,11 +71,6 @@ class Case(Contents):
         ------
         InputError
             One line for each error, all at once.
-
-        Warns
-        -----
-        PhysicsWarning
-            For each implausible figure.
         """
         try:
             context = {FOLDER: None if folder is None else FilePath(folder)}
@@ -82,14 +78,12 @@ class Case(Contents):
         except ValidationError as error:
             raise InputError(describe(error, cls, source=source, lines=lines)) from error
         case._source = source
-        for path, text in remarks(case):
-            where = tuple(path.split("."))
-            message = message_line(source, line_of(where, lines), where, text)
-            warnings.warn(message, PhysicsWarning, stacklevel=2)
         return case
 
     def replace(self, changes: Mapping[str, Any]) -> Case:
         """Return a case with some fields changed, checked like a file.
+
+        Of implausible figures that this case did not have, its user is warned.
 
         Parameters
         ----------
@@ -112,8 +106,34 @@ class Case(Contents):
         >>> round(case.rope.stiffness)
         160000
         """
+        case = self._changed(changes)
+        if not self._quiet:
+            known = {path for path, _ in remarks(self)}
+            for path, text in remarks(case):
+                if path not in known:
+                    message = message_line(self.label, 0, tuple(path.split(".")), text)
+                    warnings.warn(message, PhysicsWarning, stacklevel=2)
+        return case
+
+    def variant(self, changes: Mapping[str, Any]) -> Case:
+        """Return :meth:`replace`, for the cases of a study that nobody has asked for one by one.
+
+        Of these nobody is warned, nor of what is made of them: they are quiet.
+        """
+        case = self._changed(changes) if changes else self.model_copy()
+        case._quiet = True
+        return case
+
+    def _changed(self, changes: Mapping[str, Any]) -> Case:
         tree = replaced(self.to_dict(), Case, changes, self.label)
-        return Case.from_dict(tree, source=self.label)
+        case = Case.from_dict(tree, source=self.label)
+        case._quiet = self._quiet
+        return case
+
+    @property
+    def quiet(self) -> bool:
+        """Whether this is a :meth:`variant`, or was made of one."""
+        return self._quiet
 
     @property
     def source(self) -> str:

@@ -10,15 +10,17 @@ from __future__ import annotations
 
 import difflib
 import tomllib
+import warnings
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ..basics import InputError
+from ..basics import InputError, PhysicsWarning
 from ..casefile import Path as FieldPath
-from ..casefile import message_line, read_yaml
+from ..casefile import line_of, message_line, read_yaml
 from .case import Case
+from .plausibility import remarks
 
 _TEMPLATE = "template"
 
@@ -68,7 +70,12 @@ def load_case(name_or_path: str | Path) -> Case:
         raise InputError(
             f"{source}: must hold sections (sea:, vessel:, rope:, ...) at the top, got {what}"
         )
-    return Case.from_dict(data, source=source, lines=lines, folder=folder)
+    case = Case.from_dict(data, source=source, lines=lines, folder=folder)
+    for field, text in remarks(case):
+        where = tuple(field.split("."))
+        message = message_line(source, line_of(where, lines), where, text)
+        warnings.warn(message, PhysicsWarning, stacklevel=2)
+    return case
 
 
 def bundled_cases() -> tuple[tuple[str, str], ...]:

@@ -1,4 +1,4 @@
-"""Checks across sections: what cannot be (errors), and what can hardly be (warnings).
+"""Checks across sections: contradictions (errors) and implausible figures (warnings).
 
 The static load comes first: a drive whose rating lies below it can hold nothing, and no gains
 will change that.

@@ -1,4 +1,8 @@
-"""What a case file is made of: quantities with units, sections, messages, paths, YAML and TOML."""
+"""Building blocks of a case file: quantities with units, sections, dotted paths, YAML.
+
+Text with units comes in; sections in SI go out, or one sentence for each error, with the field that
+it is about and its line.
+"""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""A field of the case file that names another file: `file: buoy.spec`, `raos: supply.re1`.
+"""Fields of a case file that name another file: `file: buoy.spec`, `raos: supply.re1`.
 
 A path in a case file is meant relative to that file, and a case has to mean the same wherever it
 is used from: when a case is read, such a path becomes absolute (`Case.from_dict(..., folder=)`,

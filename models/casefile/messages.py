@@ -1,4 +1,4 @@
-"""The sentences that a user of case files reads: where, and what is wrong there.
+"""Error sentences of a case file: place, field, and what is wrong there.
 
 Each error is one line, `file:line: field.path: must be ..., got ...`; unknown keys get a
 suggestion.

@@ -1,4 +1,4 @@
-"""The field types of the case file: a quantity with its range, as pydantic annotations.
+"""Field types of a case file: quantities with their ranges, as pydantic annotations.
 
 `Annotated[float, Quantity("length", 0.005, 0.3)]` is a field that takes a number in metres or a
 text such as `44 mm`, holds a float in SI, refuses what lies outside the range, and knows how to

@@ -124,7 +124,7 @@ class HookMotion:
             The case.
         warn
             Whether to warn if much of the motion lies outside the RAO's table; not where the
-            case's user has been told before.
+            case's user has been told before, and never of a quiet case (`Case.variant`).
         """
         sea = case.sea.to_spectrum()
         motion = cls(
@@ -132,7 +132,7 @@ class HookMotion:
             rao=hook_rao(case.vessel, sea.spreading, case.label),
             encounter=Encounter.from_case(case),
         )
-        if warn:
+        if warn and not case.quiet:
             remark = speed_remark(case.vessel, case.label)
             if remark is not None:
                 warnings.warn(f"{case.label}: {remark}", PhysicsWarning, stacklevel=2)

@@ -10,7 +10,6 @@ encounter as weight, which needs no mapped spectrum.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,7 +21,6 @@ from ..basics import (
     BoolArray,
     FloatArray,
     InputError,
-    PhysicsWarning,
     check_finite,
     check_range,
     read_only,
@@ -252,13 +250,11 @@ def _seas(
     periods = np.atleast_1d(check_finite("hook", "peak periods", wanted or PEAK_PERIODS))
     ratio = getattr(case.sea, field) / case.sea.spectral_peak_period
     seas, steep = [], []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PhysicsWarning)
-        for period in map(float, periods):
-            check_range("hook", "peak period", period, low=0.0, high=60.0, unit="s", open_low=True)
-            there = case.replace({f"sea.{field}": ratio * period})
-            seas.append(there.sea.to_spectrum())
-            steep.append(there.sea.steepness > there.sea.breaking_steepness)
+    for period in map(float, periods):
+        check_range("hook", "peak period", period, low=0.0, high=60.0, unit="s", open_low=True)
+        there = case.variant({f"sea.{field}": ratio * period})
+        seas.append(there.sea.to_spectrum())
+        steep.append(there.sea.steepness > there.sea.breaking_steepness)
     return periods, seas, np.array(steep)
 
 

@@ -1,4 +1,8 @@
-"""The rig's sections of a case file: rope, payload, drum, winch, sensors and limits."""
+"""Rig: rope, payload, drum, winch, sensors and limits, as sections of the case file.
+
+Data of a case file come in; what follows from one section by itself (stiffness, virtual mass, the
+drum's radius, inertia at the shaft) goes out.
+"""
 
 from typing import TYPE_CHECKING
 

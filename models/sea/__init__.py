@@ -1,6 +1,7 @@
-"""Seas: spectra and their parts, spreading over headings, records of buoys, scatter diagrams.
+"""Seas: spectra of the surface elevation, spreading, records of buoys, scatter diagrams.
 
-`models.sea.sea.SeaSpectrum` is the sea of a case; the rooms here hold what it is made of.
+The sea of a case file, a file of measured spectra or a scatter diagram comes in; spectra, their
+statistics and the shares of the sea states go out.
 """
 
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""Which format a file of spectra is in, and which reader takes it.
+"""Formats of files of spectra, told by their contents, and the reader of each.
 
 A format is told by what is in the file; its name and extension only count for the few formats
 without a mark of their own.

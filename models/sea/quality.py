@@ -1,4 +1,4 @@
-"""Quality control of measured seas: which records are no sea states, and why.
+"""Quality control of measured seas: records that are no sea states, and the reasons.
 
 A buoy's file holds rows that are no spectra: missing codes, empty rows, broken dates, the same hour
 twice.  Each is rejected for one stated reason and counted, so that nothing disappears in silence.

@@ -1,4 +1,4 @@
-"""Scatter diagrams: how often each sea state occurs.
+"""Scatter diagrams: the occurrence of sea states.
 
 A diagram is a list of sea states with their share of the time, whether it came as a list, as a
 matrix of H_s against period, or from the records of a buoy.  `models.sea.scatter_files` reads

@@ -8,7 +8,6 @@ become numbers, every path is checked, and the ends of every range are tried on 
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, InputError, PhysicsWarning, check_range
+from ..basics import FloatArray, InputError, check_range
 from ..case import Case
 from ..operation import PREFIX as FAULTS
 from .distributions import Samples, at_ends, distribution_of
@@ -293,12 +292,7 @@ class Spread:
         """
         if self.case is None:
             raise InputError("spread: it has met no case; call Spread.on(case) first")
-        changes = self.changes(row)
-        if not changes:
-            return self.case
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PhysicsWarning)
-            return self.case.replace(changes)
+        return self.case.variant(self.changes(row))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the spread as in a file."""

@@ -16,7 +16,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from ..basics import InputError, check_ascending
+from ..basics import ascending_fault
 from ..casefile import DataFile, Quantity, Section, problems
 from .crane import Point, crane_tip
 
@@ -44,10 +44,9 @@ class HeaveTable(Section):
     @model_validator(mode="after")
     def _check(self) -> HeaveTable:
         found = []
-        try:
-            check_ascending("rao", "omega", self.omega)
-        except InputError as error:
-            found.append(("omega", str(error).removeprefix("rao: omega ")))
+        fault = ascending_fault(self.omega)
+        if fault:
+            found.append(("omega", fault))
         for name in ("amplitude", "phase"):
             values = getattr(self, name)
             if values is not None and len(values) != len(self.omega):

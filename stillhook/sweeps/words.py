@@ -9,7 +9,6 @@ averaged in: every quantile is of those that hold.
 from __future__ import annotations
 
 import json
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -17,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics import InputError, PhysicsWarning, Share, check_range, pick, share
+from models.basics import InputError, Share, check_range, pick, share
 from models.case import Case
 from models.spread import Samples, Spread
 
@@ -199,6 +198,4 @@ def case_at(result: xr.Dataset, number: int, nominal: Case) -> Case:
     if gains:
         changes["gains"] = gains
     changes["name"] = f"{nominal.name} ({number})"[:100]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PhysicsWarning)  # told of the nominal case
-        return nominal.replace(changes)
+    return nominal.variant(changes)

@@ -5,7 +5,6 @@ case, T_p, headings -> SeaColumn -> densities of all disturbances on nodes, at g
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,7 +16,6 @@ from models.basics import (
     ComplexArray,
     FloatArray,
     InputError,
-    PhysicsWarning,
     Quadrature,
     adaptive_nodes,
 )
@@ -64,7 +62,7 @@ class SeaColumn:
         """Return the hook's motion in one heading at a significant height [m]."""
         if self.scalable:
             return self.hooks[index].scaled(height)
-        return _quiet_hook(self.cases[index].replace({"sea.significant_height": height}))
+        return HookMotion.from_case(self.cases[index].replace({"sea.significant_height": height}))
 
     @cached_property
     def floor(self) -> float:
@@ -163,11 +161,6 @@ class SeaColumn:
         return sorted({min(max(c, 1.05 * low), 0.95 * high) for c in wanted})
 
 
-def own_period(case: Case) -> float:
-    """Return the peak period of a case's own sea [s]."""
-    return float(2.0 * np.pi / _quiet_hook(case).sea.peak_frequency)
-
-
 def sea_column(
     case: Case, period: float | None, headings: Sequence[float] | None = None
 ) -> SeaColumn:
@@ -187,28 +180,24 @@ def sea_column(
     InputError
         If the sea of the case has no period that could be changed, or the vessel no headings.
     """
-    changed = case
-    with warnings.catch_warnings():
-        # Of seas that nobody has asked for: a contour goes up to where waves break and beyond.
-        warnings.simplefilter("ignore", PhysicsWarning)
-        if period is not None:
-            changed = case.replace(_period_changes(case, period))
-        cases = [changed]
-        if headings is not None:
-            if not has_headings(case):
-                raise InputError(
-                    f"{case.label}: vessel: has no headings, as it is given by the "
-                    "heave of its hook alone; give raos for a contour over heading"
-                )
-            cases = [changed.replace({"vessel.heading": float(b)}) for b in headings]
-        hooks = [_quiet_hook(c) for c in cases]
-        return SeaColumn(
-            period=period if period is not None else own_period(case),
-            headings=None if headings is None else tuple(float(b) for b in headings),
-            cases=tuple(cases),
-            hooks=tuple(hooks),
-            scalable=_scales(cases[0], hooks[0]),
-        )
+    # Of seas that nobody has asked for: a contour goes up to where waves break and beyond.
+    changed = case.variant({} if period is None else _period_changes(case, period))
+    cases = [changed]
+    if headings is not None:
+        if not has_headings(case):
+            raise InputError(
+                f"{case.label}: vessel: has no headings, as it is given by the "
+                "heave of its hook alone; give raos for a contour over heading"
+            )
+        cases = [changed.replace({"vessel.heading": float(b)}) for b in headings]
+    hooks = [HookMotion.from_case(c) for c in cases]
+    return SeaColumn(
+        period=period if period is not None else case.sea.spectral_peak_period,
+        headings=None if headings is None else tuple(float(b) for b in headings),
+        cases=tuple(cases),
+        hooks=tuple(hooks),
+        scalable=_scales(cases[0], hooks[0]),
+    )
 
 
 def has_headings(case: Case) -> bool:
@@ -239,11 +228,6 @@ def _period_changes(case: Case, period: float) -> dict[str, float | None]:
     return {"sea.peak_period": period}
 
 
-def _quiet_hook(case: Case) -> HookMotion:
-    # Without the remarks on the case, which its user has been told.
-    return HookMotion.from_case(case, warn=False)
-
-
 def _scales(case: Case, hook: HookMotion) -> bool:
     """Return whether the hook's density grows as H_s^2, as far as some sea states tell."""
     omega = np.linspace(0.5, 3.0, 11) * hook.sea.peak_frequency
@@ -251,7 +235,9 @@ def _scales(case: Case, hook: HookMotion) -> bool:
         # Far apart, as a shape may follow the height in steep seas only (`gamma: auto`).
         for height in _HEIGHTS:
             scaled = hook.scaled(height).density(omega)
-            rebuilt = _quiet_hook(case.replace({"sea.significant_height": height})).density(omega)
+            rebuilt = HookMotion.from_case(
+                case.replace({"sea.significant_height": height})
+            ).density(omega)
             if not np.allclose(scaled, rebuilt, rtol=_SAME, atol=0.0):
                 return False
     except InputError:

@@ -201,7 +201,7 @@ def case_criteria(case: Case, plant: LinearPlant) -> tuple[Criterion, ...]:
         Its plant, for the static values.
     """
     # A load at rest that breaks a limit is no error here: the limiting H_s is then zero.
-    limits = list(drive_limits(case.replace({"limits.drive": "report"}), plant))
+    limits = list(drive_limits(case.variant({"limits.drive": "report"}), plant))
     if not any(isinstance(limit, Minimum) for limit in limits):
         limits.append(
             Minimum(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from models.basics import InputError, PhysicsWarning
+from models.basics import InputError
 from models.case import Case
 from models.plant import LinearPlant, PlantData
 
@@ -80,29 +79,27 @@ def pose_operability(
     changes: dict[str, object] = {"limits.drive": "report"}
     if length is not None:
         changes["rope.length"] = length
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PhysicsWarning)
-        reported = case.replace(changes)
-        same = reported.rope.length == case.rope.length
-        question = pose(reported, source.masses if same and not isinstance(source, Case) else None)
-        loop_plant: LinearPlant = question.plant
-        noises: tuple[Disturbance, ...] = ()
-        loop_parts: tuple[LinearPlant, LinearController, DragElement | None] | None = None
-        if isinstance(source, GainDesign):
-            if source.margins is None:
-                raise InputError("operability: the design has no stabilising gains")
-            assessment = question.assess(source.gains, 0.0)
-            loop_parts = (question.plant, assessment.controller, question.drag)
-        elif isinstance(source, StructureDesign):
-            if not source.parameters:
-                raise InputError("operability: the design has no controller")
-            posed = pose_structure(reported, source.structure, source.masses if same else None)
-            law = posed.law
-            controller = law.controller([source.parameters[p.name] for p in law.parameters])
-            problem = posed.problem(())
-            noises = tuple(d for d in problem.disturbances if d.name != HOOK)
-            loop_parts = (problem.plant, controller, problem.drag)
-            loop_plant = problem.plant
+    reported = case.variant(changes)
+    same = reported.rope.length == case.rope.length
+    question = pose(reported, source.masses if same and not isinstance(source, Case) else None)
+    loop_plant: LinearPlant = question.plant
+    noises: tuple[Disturbance, ...] = ()
+    loop_parts: tuple[LinearPlant, LinearController, DragElement | None] | None = None
+    if isinstance(source, GainDesign):
+        if source.margins is None:
+            raise InputError("operability: the design has no stabilising gains")
+        assessment = question.assess(source.gains, 0.0)
+        loop_parts = (question.plant, assessment.controller, question.drag)
+    elif isinstance(source, StructureDesign):
+        if not source.parameters:
+            raise InputError("operability: the design has no controller")
+        posed = pose_structure(reported, source.structure, source.masses if same else None)
+        law = posed.law
+        controller = law.controller([source.parameters[p.name] for p in law.parameters])
+        problem = posed.problem(())
+        noises = tuple(d for d in problem.disturbances if d.name != HOOK)
+        loop_parts = (problem.plant, controller, problem.drag)
+        loop_plant = problem.plant
     of_case = case_criteria(reported, question.plant)
     every = (STABILITY, *wanted, *of_case)
     held = tuple(c for c in every if set(c.outputs) <= _HELD)

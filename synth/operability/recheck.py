@@ -9,14 +9,12 @@ drag coefficient is taken over, and shown to agree with the motion that it leads
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics import PhysicsWarning
 from models.case import Case
 from models.plant import PlantData
 
@@ -82,23 +80,21 @@ def evaluate_in(design: Design, case: Case, drag: float | None = None) -> Assess
     drag
         Drag coefficient [N s/m] where it is known; else it is solved with the motion.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PhysicsWarning)
-        case = case.replace({"limits.drive": "report"})
-        masses = design.masses if case.rope.length == design.case.rope.length else None
-        if isinstance(design, GainDesign):
-            question = pose(case, masses)
-            return question.assess(design.gains, None if question.drag is None else drag)
-        posed = pose_structure(case, design.structure, masses)
-        law = posed.law
-        problem = posed.problem(())
-        return Assessment(
-            problem.plant,
-            law.controller([design.parameters[p.name] for p in law.parameters]),
-            problem.disturbances,
-            drag=problem.drag,
-            coefficient=None if problem.drag is None else drag,
-        )
+    case = case.variant({"limits.drive": "report"})
+    masses = design.masses if case.rope.length == design.case.rope.length else None
+    if isinstance(design, GainDesign):
+        question = pose(case, masses)
+        return question.assess(design.gains, None if question.drag is None else drag)
+    posed = pose_structure(case, design.structure, masses)
+    law = posed.law
+    problem = posed.problem(())
+    return Assessment(
+        problem.plant,
+        law.controller([design.parameters[p.name] for p in law.parameters]),
+        problem.disturbances,
+        drag=problem.drag,
+        coefficient=None if problem.drag is None else drag,
+    )
 
 
 def recheck(
@@ -126,9 +122,7 @@ def recheck(
         criterion = contour.criteria[k]
         assert criterion.limit is not None
         height = float(limit[h, p])
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PhysicsWarning)
-            case = columns[p].cases[h].replace({"sea.significant_height": height})
+        case = columns[p].cases[h].replace({"sea.significant_height": height})
         drag = float(contour.drag[h, p])
         assessment = evaluate_in(design, case, drag)
         # The velocity's drag; a coefficient that the case fixes agrees with itself.

@@ -8,18 +8,17 @@ limits; the gains that it ends with are then looked at like those of any design.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from models.basics import PhysicsWarning, SolverError, one_thread
+from models.basics import SolverError, one_thread
 from models.case import Case
 
 from ..design import GainDesign, shortfall, tuning_of
 from ..limits import Limit
-from ..question import DesignQuestion, pose
+from ..question import pose
 from ..search import search
 from .columns import SeaColumn
 from .contour import Contour
@@ -70,7 +69,7 @@ def reoptimised_contour(
             one = replace(column, headings=None, cases=(case,), hooks=(column.hooks[h],))
             loop = replace(
                 question.loop,
-                controller=_question(case, design.masses).assess(gains, 0.0).controller,
+                controller=pose(case, design.masses).assess(gains, 0.0).controller,
             )
             found = limiting_heights(SeaStates.of(loop, one), criteria, highest=highest)
             heights[:, h, p], drag[h, p] = found.heights[:, 0], found.drag[0]
@@ -88,7 +87,7 @@ def _best(
     case: Case, design: GainDesign, drive: tuple[Limit, ...], seed: int
 ) -> dict[str, float] | None:
     """Return the gains of the largest sea that any gains can do, or None."""
-    question = _question(case, design.masses)
+    question = pose(case, design.masses)
     loop_limits = tuple(limit for limit in question.limits if not limit.drive)
     problem = question.problem_with(loop_limits)
     scale = design.gains["A"] / question.amplifier
@@ -102,9 +101,3 @@ def _best(
     except SolverError:
         found = None
     return None if found is None else {"A": question.amplifier, **found.values}
-
-
-def _question(case: Case, masses: int) -> DesignQuestion:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PhysicsWarning)
-        return pose(case, masses)

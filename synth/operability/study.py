@@ -8,8 +8,7 @@ design or case, periods, headings -> columns of seas
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +18,6 @@ from scipy.special import ndtr
 from models.basics import (
     FloatArray,
     InputError,
-    PhysicsWarning,
     check_ascending,
     check_range,
     one_thread,
@@ -121,41 +119,6 @@ def operability(
     InputError
         If the design has no stable loop, or an argument is out of its range.
     """
-    with warnings.catch_warnings():
-        # Of seas that nobody has asked for: a contour goes up to where waves break and beyond.
-        warnings.simplefilter("ignore", PhysicsWarning)
-        return _operability(
-            design,
-            periods=periods,
-            headings=headings,
-            wanted={
-                "rms": payload_rms,
-                "significant": payload_significant,
-                "maximum": payload_max,
-                "speed": payload_speed,
-            },
-            depths=depths,
-            scatter=scatter,
-            reoptimise=reoptimise,
-            highest=highest,
-            seed=seed,
-            progress=progress,
-        )
-
-
-def _operability(
-    design: Design | Case,
-    *,
-    periods: Sequence[float] | None,
-    headings: Sequence[float] | None,
-    wanted: Mapping[str, float | str | None],
-    depths: Sequence[float] | None,
-    scatter: Scatter | str | Path | None,
-    reoptimise: bool,
-    highest: float,
-    seed: int,
-    progress: Progress | None,
-) -> Operability:
     case = design if isinstance(design, Case) else design.case
     check_range("operability", "highest", highest, low=0.1, high=HIGHEST, unit="m")
     diagram = _diagram(scatter)
@@ -169,7 +132,13 @@ def _operability(
             f"{case.label}: sea: the {case.sea.spectrum} spectrum has no peak_period "
             "of its own, so that it cannot be set against a scatter diagram; use jonswap"
         )
-    criteria = payload_criteria(case, **wanted)
+    criteria = payload_criteria(
+        case,
+        rms=payload_rms,
+        significant=payload_significant,
+        maximum=payload_max,
+        speed=payload_speed,
+    )
     angles = _headings(case, headings)
     times = _periods(case, periods, diagram)
     columns = [sea_column(case, period, angles) for period in times]

@@ -18,7 +18,6 @@ numbers, in which the true delays are a curve.
 from __future__ import annotations
 
 import itertools
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -28,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from models.basics import ComplexArray, FloatArray, InputError, PhysicsWarning, check_range
+from models.basics import ComplexArray, FloatArray, InputError, check_range
 from models.case import Case
 from models.plant import LinearPlant, PlantData
 from models.sensing import sensed_plant
@@ -134,15 +133,13 @@ def plant_of(
     values = {d.path: d.at(float(x)) for d, x in zip(doubts, delta, strict=True)}
     drag = values.pop(DRAG, drag)
     axes = tuple(Axis(path=p, values=(v,), continuous=True) for p, v in values.items())
-    family = Family(case=case, axes=axes, seas=Family.of(case, {}).seas)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PhysicsWarning)  # the nominal case has told its own
-        changed = family.case_at(Member(point=tuple(values.values())))
-        data, nominal = PlantData.from_case(changed), PlantData.from_case(case)
-        if data.damping_time > 0.0:
-            ratio = data.damping_ratio * nominal.damping_time / data.damping_time
-            data = replace(data, damping_ratio=min(ratio, 1.0))
-        return sensed_plant(data, masses=masses, drag=drag, sensors=changed.sensors)
+    family = Family(case=case.variant({}), axes=axes, seas=Family.of(case, {}).seas)
+    changed = family.case_at(Member(point=tuple(values.values())))
+    data, nominal = PlantData.from_case(changed), PlantData.from_case(case)
+    if data.damping_time > 0.0:
+        ratio = data.damping_ratio * nominal.damping_time / data.damping_time
+        data = replace(data, damping_ratio=min(ratio, 1.0))
+    return sensed_plant(data, masses=masses, drag=drag, sensors=changed.sensors)
 
 
 def _number(case: Case, path: str) -> float:

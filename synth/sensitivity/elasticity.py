@@ -19,12 +19,11 @@ moves with every number too.  With theta the number and all slopes logarithmic,
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from models.basics import FloatArray, InputError, PhysicsWarning
+from models.basics import FloatArray, InputError
 from models.plant import PlantData
 
 from ..design import GainDesign, StructureDesign
@@ -208,9 +207,7 @@ def _density_slopes(fixed: FixedDesign, number: Number, omega: FloatArray) -> di
         sources = fixed.disturbances_of(changed(fixed.case, number, value))
         return np.array([_density(sources, d.name, omega) for d in fixed.disturbances])
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PhysicsWarning)
-        slopes = np.asarray(derivative(densities, number.value, common=True), dtype=np.float64)
+    slopes = np.asarray(derivative(densities, number.value, common=True), dtype=np.float64)
     pairs = zip(fixed.disturbances, slopes, strict=True)
     return {d.name: slope for d, slope in pairs if slope.any()}
 

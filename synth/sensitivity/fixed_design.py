@@ -8,14 +8,13 @@ differs from the one designed for.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from models.basics import ComplexArray, InputError, PhysicsWarning, SolverError, White
+from models.basics import ComplexArray, InputError, SolverError, White
 from models.case import Case
 from models.hook import HookMotion
 from models.plant import PlantData, build_plant
@@ -80,9 +79,7 @@ class FixedDesign:
 
     def disturbances_of(self, case: Case) -> tuple[Disturbance, ...]:
         """Return what shakes the plant of a changed case."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PhysicsWarning)
-            hook = HookMotion.from_case(case)
+        hook = HookMotion.from_case(case, warn=False)
         if self.measurements is None:
             return disturbances({HOOK: hook}, (HOOK,))
         heard = set(self.measurements)
@@ -143,12 +140,10 @@ class FixedDesign:
             ]
             return replace(self, values=tuple(values), drag=None)
         number = next(n for n in numbers_of(self.case) if n.path == path)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PhysicsWarning)
-            try:
-                case = self.case.replace(number.change(number.value * factor))
-            except InputError:
-                return None  # at the end of its range
+        try:
+            case = self.case.variant(number.change(number.value * factor))
+        except InputError:
+            return None  # at the end of its range
         return replace(self, case=case, drag=None)
 
     def law_slopes(self, s: ComplexArray) -> Iterator[tuple[str, float, ComplexArray]]:

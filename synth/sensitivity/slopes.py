@@ -13,14 +13,13 @@ returned beside the others.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 
-from models.basics import FloatArray, PhysicsWarning
+from models.basics import FloatArray
 from models.case import Case
 from models.plant import MEAN_LOSSES, LinearPlant, Plant, PlantData, build_plant, parameter_values
 from models.sensing import with_sensors
@@ -130,9 +129,7 @@ class PlantSlopes:
 
 def changed(case: Case, number: Number, value: float) -> Case:
     """Return the case with another value of a number; implausible values are not remarked on."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PhysicsWarning)
-        return case.replace(number.change(value))
+    return case.variant(number.change(value))
 
 
 def _parameters(case: Case, model: Plant) -> FloatArray:

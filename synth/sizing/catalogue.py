@@ -29,7 +29,7 @@ from models.rig import ACMotor, DCMotor, Drive
 from ..question import Goal
 from ..search import Progress
 from .follow import Answer, Posed, follow
-from .motor import MotorData, changed, motor_changes
+from .motor import MotorData, motor_changes
 from .point import with_target
 
 _GEARS = 7  # that a motor is tried behind
@@ -115,7 +115,7 @@ def read_catalogue(
         own = {places[n]: _value(v) for n, v in given.items() if n != "type"}
         try:
             changes = _completed(case, own)
-            put = changed(case, changes)
+            put = case.variant(changes)
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
         motor = CatalogueMotor(name=name, changes=changes)
@@ -157,7 +157,7 @@ def choose(
         step = (gears[1] / gears[0]) ** (1.0 / (_GEARS - 1))
         for i in range(_GEARS):
             gear = float(f"{gears[0] * step**i:.3g}")
-            put = changed(case, {**motor.changes, "winch.gearbox.ratio": gear})
+            put = case.variant({**motor.changes, "winch.gearbox.ratio": gear})
             found = _factor(put, structure, target, masses, answer, near)
             if found is None:
                 continue
@@ -171,7 +171,7 @@ def choose(
             name=motor.name,
             motor=MotorData.of(best[3]),
             gear=best[1],
-            case=changed(best[3], {"limits.drive": "enforce"}),
+            case=best[3].variant({"limits.drive": "enforce"}),
             spare=1.0 - math.exp(best[0]),
             answer=best[2],
             smaller=tuple(smaller),
@@ -202,7 +202,7 @@ def _factor(
 
 def _completed(case: Case, own: Mapping[str, Any]) -> dict[str, Any]:
     """Return the changes of a row with what it leaves out, from the family of the case's motor."""
-    given = changed(case, own).winch
+    given = case.variant(own).winch
     scale = given.drive.torque_continuous / case.winch.drive.torque_continuous
     changes: dict[str, Any] = {**motor_changes(case, scale), **own}
     motor, before, box = given.motor, case.winch.motor, case.winch.gearbox.inertia

@@ -30,7 +30,6 @@ from models.case import Case
 from ..design import StructureDesign, optimise_structure
 from ..search import Progress
 from .follow import Answer, Posed, designed, follow, least_between, slope
-from .motor import changed
 
 _GRID = 7  # gears that are tried before the Brent's method
 _FINE = 2e-3  # of the logarithm of the gear
@@ -109,8 +108,8 @@ class _Gears:
 
     def problem(self, gear: float, radius: float) -> Any:
         """Return the problem behind a gear."""
-        case = changed(
-            self.case, {"limits.drive": "report", **gear_changes(self.case, gear, radius)}
+        case = self.case.variant(
+            {"limits.drive": "report", **gear_changes(self.case, gear, radius)}
         )
         posed = Posed.of(case, self.structure, self.masses)
         enforced = self.case.limits.drive == "enforce"
@@ -276,7 +275,7 @@ def _finished(
     )
     if answer is None:
         return result
-    best_case = changed(case, gear_changes(case, gear, radius))
+    best_case = case.variant(gear_changes(case, gear, radius))
     design = designed(best_case, search.structure, answer, search.masses, search.tell)
     tilt = slope(answer, search.problem(gear * math.exp(_STEP), radius), _STEP)
     binding = _binding(answer)

@@ -15,14 +15,13 @@ is counted right.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from models.basics import FloatArray, PhysicsWarning, Quadrature
+from models.basics import FloatArray, Quadrature
 from models.case import Case
 
 from ..design import StructureDesign, design_of, tuning_of, verified
@@ -70,12 +69,10 @@ class Posed:
     @classmethod
     def of(cls, case: Case, structure: str, masses: int | None = None) -> Posed:
         """Return a case posed for a structure on a number of rope masses."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PhysicsWarning)
-            # Posed as one that reports: a motor may be too small for the load at rest.
-            reporting = case.replace({"limits.drive": "report"})
-            question = pose_structure(reporting, structure, masses)
-            drive = drive_limits(reporting, question.plant)
+        # Posed as one that reports: a motor may be too small for the load at rest.
+        reporting = case.variant({"limits.drive": "report"})
+        question = pose_structure(reporting, structure, masses)
+        drive = drive_limits(reporting, question.plant)
         return cls(question=question, loop=question.limits, drive=drive)
 
     @property

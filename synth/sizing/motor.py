@@ -15,12 +15,9 @@ speed regulator keeps its bandwidth on both.
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
-from models.basics import PhysicsWarning, check_range
+from models.basics import check_range
 from models.case import Case
 from models.rig import DCMotor
 
@@ -125,14 +122,4 @@ def with_motor(
     changes: dict[str, float] = motor_changes(case, scale, exponent=exponent)
     if gear is not None:
         changes["winch.gearbox.ratio"] = gear
-    return changed(case, changes)
-
-
-def changed(case: Case, changes: Mapping[str, Any]) -> Case:
-    """Return a case with changes, without its remarks on the physics.
-
-    A search looks at motors and seas that nobody has asked for.
-    """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PhysicsWarning)
-        return case.replace(changes)
+    return case.variant(changes)

@@ -23,7 +23,7 @@ from ..limits import Limit, Rms
 from ..question import Goal, Problem
 from ..search import Progress
 from .follow import Answer, Posed, follow
-from .motor import MotorData, changed, with_motor
+from .motor import MotorData, with_motor
 
 TARGET = "payload.displacement.rms"
 """Name of the target among the limits."""
@@ -149,7 +149,7 @@ def sea_factor(
 
     At a factor of one or less (its `extra` at most 0) the winch meets the target there.
     """
-    posed = Posed.of(changed(case, {"sea.significant_height": height}), structure, masses)
+    posed = Posed.of(case.variant({"sea.significant_height": height}), structure, masses)
     problem = posed.problem(with_target(posed, target))
     relaxed = [m.name for m in problem.limits if m.drive and not m.at_least]
     return follow(
@@ -356,7 +356,7 @@ def highest_sea(
     for k in range(_SEA_STEPS):
         tell("the highest sea for the winch as it is", k, _SEA_STEPS)
         height = asked * math.exp(size)
-        sea = changed(case, {"sea.significant_height": height})
+        sea = case.variant({"sea.significant_height": height})
         aim = target_of(target, float(HookMotion.from_case(sea).displacement.rms))
         found = sea_factor(case, structure, height, aim, masses=masses, near=answer)
         if found is None:

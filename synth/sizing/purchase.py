@@ -25,7 +25,7 @@ from ..limits import Limit
 from ..question import Problem
 from ..search import Progress
 from .follow import Answer, Posed, begin_from, follow, slope
-from .motor import changed, motor_changes
+from .motor import motor_changes
 
 _RPM = 0.10471975511965977
 _NOISE = ("acceleration", "velocity", "displacement")
@@ -77,7 +77,7 @@ class Item:
         if self.changes is None:
             return None
         try:
-            return changed(case, {"limits.drive": "report", **self.changes(factor)})
+            return case.variant({"limits.drive": "report", **self.changes(factor)})
         except InputError:
             return None
 

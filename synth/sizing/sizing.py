@@ -30,7 +30,7 @@ from ..question import HOOK, PAYLOAD
 from ..search import KEPT, Progress, search
 from .catalogue import ChosenMotor, choose, read_catalogue
 from .follow import EXCESS, Answer, Posed, designed, follow, least_between
-from .motor import MotorData, changed, with_motor
+from .motor import MotorData, with_motor
 from .point import SizePoint, SmallestMotor, highest_sea, least_motor, target_of
 
 _SPAN = 2.5  # gears that are tried: the case's over and times this
@@ -184,7 +184,7 @@ def size_winch(
     changes: dict[str, Any] = {"limits.drive": "report"}
     if height is not None:
         changes["sea.significant_height"] = height
-    base = changed(case, changes)
+    base = case.variant(changes)
     catalogue = None if motors is None else read_catalogue(motors, base)
     tell: Progress = progress or (lambda stage, done, total: None)
     masses: int | None = None
@@ -336,7 +336,7 @@ def _chosen(sizing: Sizing, walk: _Search, best: SmallestMotor) -> Sizing:
     assert answer is not None
     scale = point.scale * _ROOM
     walk.tell("the gains of the chosen motor", 0, 1)
-    chosen_case = changed(with_motor(walk.case, scale, point.gear), {"limits.drive": "enforce"})
+    chosen_case = with_motor(walk.case, scale, point.gear).variant({"limits.drive": "enforce"})
     design = designed(chosen_case, walk.structure, answer, walk.masses, walk.tell)
     point = replace(point, scale=scale, motor=MotorData.of(chosen_case))
     met = design is not None and design.payload_rms <= sizing.target * (1.0 + KEPT)

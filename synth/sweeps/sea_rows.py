@@ -8,13 +8,12 @@ through its own case.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from models.basics import FloatArray, PhysicsWarning
+from models.basics import FloatArray
 from models.case import Case
 from models.hook import HookMotion
 from models.spread import Spread
@@ -46,7 +45,7 @@ class SeaRows:
 
     def __init__(self, case: Case, spread: Spread) -> None:
         self.spread = spread
-        self.hook = _hook(case)
+        self.hook = HookMotion.from_case(case, warn=False)
         self._columns = [j for j, p in enumerate(spread.paths) if p.startswith(_SEA)]
         self._known: dict[bytes, HookMotion] = {}
         names = {spread.paths[j] for j in self._columns}
@@ -137,19 +136,11 @@ class SeaRows:
             if len(self._known) > 20_000:
                 self._known.clear()
             named = dict(zip(self.spread.paths, row, strict=True))
-            self._known[key] = _hook(_with(self.spread, named, self._columns))
+            self._known[key] = HookMotion.from_case(_with(self.spread, named, self._columns))
         return self._known[key]
 
 
 def _with(spread: Spread, named: Mapping[str, float], columns: list[int]) -> Case:
     assert spread.case is not None
     changes = {spread.paths[j]: float(named[spread.paths[j]]) for j in columns}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PhysicsWarning)
-        return spread.case.replace(changes)
-
-
-def _hook(case: Case) -> HookMotion:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PhysicsWarning)  # the case has told its own
-        return HookMotion.from_case(case)
+    return spread.case.variant(changes)

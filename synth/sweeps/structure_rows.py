@@ -7,7 +7,6 @@ assessed as `synth.design.structure_design` does, with the design's own paramete
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,7 +17,6 @@ from models.basics import (
     BoolArray,
     FloatArray,
     InputError,
-    PhysicsWarning,
     Quadrature,
     SolverError,
     peak_factor,
@@ -92,9 +90,7 @@ class StructureRows:
 
     def _assessment(self, row: FloatArray) -> Assessment:
         case = self.spread.case_at(row)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PhysicsWarning)  # the design's case has told its own
-            posed = pose_structure(case, self.design.structure, self.design.masses)
+        posed = pose_structure(case, self.design.structure, self.design.masses)
         own = {**self.design.parameters, **self.spread.gains(row)}
         problem = posed.problem(())
         return Assessment(

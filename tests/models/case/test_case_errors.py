@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 import textwrap
 
 import pytest
@@ -374,6 +375,25 @@ class TestPhysics:
         # 800 A of 5.8 N m each.
         message = self.warned({"winch.drive.current_continuous": 800})
         assert "current_continuous: 800 A is below the static motor current, 870.3 A" in message
+
+    def test_its_user_is_told_once(self):
+        with pytest.warns(PhysicsWarning, match=r"sea\.significant_height: 2 m"):
+            steep = load_case("subsea-crane").replace({"sea.peak_period": 4})
+        # Warnings are errors here: neither a change of something else, nor more of the same.
+        assert steep.replace({"rope.length": "900 m"}).sea == steep.sea
+        steeper = steep.replace({"sea.significant_height": 2.5})
+        assert Case.from_dict(steeper.to_dict()) == steeper
+        with pytest.warns(PhysicsWarning, match=r"sensors\.telemetry\.delay: 1\.5 s is more"):
+            steep.replace({"sensors.telemetry.delay": 1.5})
+
+    def test_of_the_cases_of_a_study_nobody_is_told(self):
+        crane = load_case("subsea-crane")
+        steep = crane.variant({"sea.peak_period": 4})
+        assert steep.quiet
+        assert not crane.quiet
+        again = pickle.loads(pickle.dumps(steep.variant({})))
+        assert again == steep
+        assert again.replace({"sensors.telemetry.delay": 1.5}).quiet
 
     def test_warnings_have_their_line(self, tmp_path):
         path = tmp_path / "my.yaml"
