@@ -454,7 +454,7 @@ def _no_sum(part: Any) -> Any:
     return part
 
 
-SeaPart = Annotated[
+_SeaOfOneKind = (
     Bretschneider1975Sea
     | BretschneiderSea
     | JonswapSea
@@ -463,7 +463,11 @@ SeaPart = Annotated[
     | PiersonMoskowitzSea
     | TmaSea
     | GaussianSwell
-    | MeasuredSea,
+    | MeasuredSea
+)
+
+SeaPart = Annotated[
+    _SeaOfOneKind,
     Field(discriminator="spectrum"),
     BeforeValidator(_no_sum),
 ]
@@ -501,19 +505,7 @@ class SumSea(_SeaOfData):
         return tuple(file for part in self.parts for file in part._files())
 
 
-Sea = Annotated[
-    Bretschneider1975Sea
-    | BretschneiderSea
-    | JonswapSea
-    | TorsethaugenSea
-    | OchiHubbleSea
-    | PiersonMoskowitzSea
-    | TmaSea
-    | GaussianSwell
-    | MeasuredSea
-    | SumSea,
-    Field(discriminator="spectrum"),
-]
+Sea = Annotated[_SeaOfOneKind | SumSea, Field(discriminator="spectrum")]
 """The sea state: a section of the kind that its `spectrum` names."""
 
 KINDS_OF_SEA: tuple[type[SeaSection], ...] = get_args(get_args(Sea)[0])
