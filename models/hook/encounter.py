@@ -196,7 +196,7 @@ class Encounter:
             a, b = ends, centre
             if own is not None:
                 a, b = own.gain(wave) ** 2 * ends, own.gain(middle) ** 2 * centre
-            # Simpson's rule over ln omega.
+            # Simpson's rule over ln omega, in which the waves are evenly spaced.
             log_step = np.log(wave[1:] / wave[:-1])
             cells = log_step / 6.0 * (a[:-1] * wave[:-1] + 4.0 * b * middle + a[1:] * wave[1:])
             energies.append(share * np.concatenate([[0.0], np.cumsum(cells)]))
@@ -267,9 +267,11 @@ class MetSpectrum:
 
 def _mapped(met: FloatArray, energy: FloatArray, high: float) -> MetSpectrum:
     """Return the spectrum over |omega_e| of waves met at (n, k) with energies up to each (n, k)."""
+    # Up to the fold waves are met ever faster, beyond it ever slower, then overtaken (met < 0).
     turns = np.argmax(met, axis=1)
 
     def total(w: FloatArray) -> FloatArray:
+        # The energy met at |omega_e| <= w, of each branch by itself, as each is monotone.
         found = np.zeros_like(w)
         for row, sums, turn in zip(met, energy, turns, strict=True):
             up, down = slice(None, turn + 1), slice(turn, None)
@@ -295,6 +297,7 @@ def _mapped(met: FloatArray, energy: FloatArray, high: float) -> MetSpectrum:
         _spaced(top, high, _WIDE_KNOT),
     ]
     folds = met[np.arange(turns.size), turns]
+    # Many headings smear their poles out; that of a single one wants knots of its own.
     if turns.size == 1 and low < folds[0] < top and turns[0] + 1 < met.shape[1]:
         parts.append(folds[0] * np.array([0.985, 0.995, 1.0, 1.005]))
     knots = np.unique(np.concatenate(parts))
@@ -302,6 +305,7 @@ def _mapped(met: FloatArray, energy: FloatArray, high: float) -> MetSpectrum:
     energy_up_to = total(knots)
     energy_up_to[0] = 0.0  # what little lies below goes into the first cell
     means = np.diff(energy_up_to) / np.diff(knots)
+    # A slope over a short stretch, not at a point: the sums are interpolated linearly.
     near = 0.003 * knots
     slope = (total(knots + near) - total(knots - near)) / (2.0 * near)
     # No more than three times the mean of either side: then the curve rises everywhere.

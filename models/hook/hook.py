@@ -281,12 +281,16 @@ class HookMotion:
         spacing = 2.0 * math.pi / (steps * step)
         lines = math.floor(self.band[1] / spacing)
         omega = spacing * np.arange(1.0, lines + 1.0)
+        # As many lines whatever the step, which the transform below may make finer: so every step
+        # samples the same motion.
         parts = np.random.default_rng(seed).standard_normal((lines, 2))
         noise = parts[:, 0] - 1j * parts[:, 1]
         if self.encounter is None:
             wave = np.sqrt(self.sea.density(omega) * spacing) * noise
             heave = self.rao.response(omega) * wave
         else:
+            # Several waves are met at one frequency: amplitudes come from the spectrum, the phase
+            # is that of the longest, so that the motion stays related to the waves at the ship.
             phase = np.angle(self.rao.response(self.encounter.wave_frequency(omega)))
             heave = np.sqrt(self.density(omega) * spacing) * np.exp(1j * phase) * noise
         count = math.floor(duration / step + 1e-9) + 1

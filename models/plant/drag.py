@@ -156,6 +156,7 @@ def consistent_drag(
         sigma = velocity_rms(C)
         return math.inf if math.isinf(sigma) else stochastic_equivalent(quadratic, sigma, current)
 
+    # A loop may be unstable at low drag (infinite motion) and calm at high: go up until it is.
     low, high = 0.0, quadratic  # the drag of about 0.6 m/s rms
     for _ in range(60):
         if target(high) <= high:

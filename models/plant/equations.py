@@ -125,7 +125,8 @@ def build_equations(
         # A rope that has grown has the stretch of the static rope at its new stiffness.
         at_rest = hanging[j] if travel is None else hanging[j] * p["rope.length"] / length
         whole = at_rest + k * (stretch + p["rope.damping_time"] * rate)
-        tension.append(ca.fmax(0, whole))
+        tension.append(ca.fmax(0, whole))  # a rope does not push
+    # What no mass carries (two thirds of the rope on one spring) hangs on the drum all the same.
     top = tension[0] + p["rope.submerged_weight_per_length"] * length * lumps.at_drum
     acceleration = ca.SX(0)
     outside: Mapping[str, ca.SX] = {}
@@ -146,6 +147,7 @@ def build_equations(
                 v, quadratic = around.relative_velocity, quadratic * around.drag_factor
                 mass += around.virtual_mass_change
                 force, outside = force + around.force, around.outputs
+            # Quadratic drag has no slope at rest: a linear plant gets its drag as a parameter.
             other = force - quadratic * ca.fabs(v) * v - p["payload.linear_drag"] * v
         acceleration = (tension[j] - below - weight + other) / mass
         xdot[shift] = velocity[j + 1]
@@ -153,6 +155,8 @@ def build_equations(
 
     motor = motor_equations(data, p, x_of, command)
     xdot |= motor.derivative
+    # Losses always work against the motion: the motor feels 1/eta of the load that it hauls, and
+    # eta of one that drives it.  A simulation switches by the speed, a linear plant takes the mean.
     direction = p["winch.gear_direction"] + ca.tanh(p["winch.gear_switching"] * speed)
     eta = p["winch.gear_efficiency"]
     gear = 0.5 * ((1 + direction) / eta + (1 - direction) * eta)
@@ -161,6 +165,7 @@ def build_equations(
         friction += p["winch.coulomb_friction"] * ca.tanh(speed / data.friction_speed)
     xdot["motor.speed"] = (motor.torque - friction - gear * r_over_n * top) / p["winch.inertia"]
 
+    # Sensor, then telemetry: the same low-pass each, its delay is left to whoever samples it.
     measured = (acceleration, velocity[-1], position[-1])
     for stage in ("sensor", "telemetry"):
         if f"{stage}.bandwidth" in p:
@@ -193,6 +198,7 @@ def build_equations(
     y_out, z_out = ca.vertcat(*measured), ca.vertcat(*z.values())
     rhs = ca.vertcat(*(xdot[name] for name in states))
     arguments = [x, u, w, symbols]
+    # All nine blocks in one function share their subexpressions.
     derivatives = [ca.jacobian(f, v) for f in (rhs, y_out, z_out) for v in (x, u, w)]
     signatures = ["x", "u", "w", "p"], ["xdot", "y", "z"]
     units = _units(data, states, disturbances, tuple(z))

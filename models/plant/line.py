@@ -95,6 +95,7 @@ def line_response_at(source: Case | PlantData, s: npt.ArrayLike, *, drag: float)
         back = lag * data.speed_gain
     h = data.drum_radius / data.gear_ratio
     load = data.mean_gear_factor * h
+    # Torque balance of the shaft, solved for its angle: the rope is a spring T_Y on the drum.
     shaft = data.inertia * s**2 + (data.viscous_friction + back) * s + load * h * T_Y
     # columns: command, heave, force on the payload, set-point
     zero = np.zeros_like(s)
@@ -119,6 +120,7 @@ def line_response_at(source: Case | PlantData, s: npt.ArrayLike, *, drag: float)
     }
     if data.motor == "dc":
         z["motor.voltage"] = command
+    # Exact delay and low-passes: no Pade model, no states.
     sensor = np.exp(-s * data.delay)
     for bandwidth in (data.sensor_bandwidth, data.telemetry_bandwidth):
         if not math.isinf(bandwidth):
@@ -165,6 +167,7 @@ def rope_transfers(
     cosh = 0.5 * (1.0 + decay**2)  # times exp(-gamma), as the next one
     safe = np.where(gamma == 0.0, 1.0, gamma)
     sinh_over_gamma = np.where(gamma == 0.0, 1.0, -0.5 * np.expm1(-2.0 * safe) / safe)
+    # The wave equation's solution between Y above and the payload's D P = F - tension below.
     D = data.payload_mass * s**2 + drag * s
     below = cosh + D * compliance * sinh_over_gamma
     P_Y = decay / below

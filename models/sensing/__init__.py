@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from .control import Recursion as Recursion
     from .control import holds_brake as holds_brake
     from .control import recursion_of as recursion_of
-    from .lowpass import noise_root as noise_root
     from .mru import Bias as Bias
     from .mru import MruModel as MruModel
     from .mru import MruState as MruState

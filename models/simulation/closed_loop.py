@@ -169,8 +169,11 @@ def build_closed_loop(
             after = one_step(after, u, ends, flags[FLAGS.index("brake")], p)
         return [ca.vertcat(after, seen, u, warmer, controller), log]
 
+    # With the controller inside nothing leaves the recursion in a sample; otherwise it is cut where
+    # the measurement goes out and the command comes in.
     fused = None
     if recursion is not None:
+        # The sensors see the plant before the command: a command acts on the sample it is made in.
         following, command = recursion.function(of_controller, m)
         fused = _function("sample", [s, r, p], sample(command, seen, following))
     numbers = np.array(list(values.values()))

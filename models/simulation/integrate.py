@@ -125,6 +125,8 @@ def braked_step(plant: Plant, parameters: Sequence[str], motions: int, step: flo
     def free(at: ca.SX, moved: Ends) -> ca.SX:
         return plant.function(at, u, disturbances(moved), of_plant)[0]
 
+    # What the brake would have to hold, and whether it can, is asked once, at the start of the
+    # step: within it the friction keeps its sign, and Runge-Kutta sees no kink.
     net = inertia * free(x, first)[speed]
     resting = x[speed] == 0
     held = ca.logic_and(resting, ca.logic_and(capacity > 0, ca.fabs(net) <= capacity))
@@ -139,6 +141,7 @@ def braked_step(plant: Plant, parameters: Sequence[str], motions: int, step: flo
 
     after = ca.SX(rk4_step(rhs, x, first, middle, last, step))
     braking = ca.logic_and(capacity > 0, ca.logic_not(resting))
+    # Friction stops a drum and does not turn it round: at a change of sign it rests.
     stops = ca.logic_and(braking, after[speed] * x[speed] <= 0)
     after[speed] = ca.if_else(stops, 0, after[speed])
     (dense,) = ca.cse([ca.densify(after)])
@@ -262,6 +265,7 @@ def choose_step(
         check_range("integration", "extra_rates", rate, low=0.0, unit="rad/s")
         eigenvalues.append(complex(-rate))
     longest, fastest = float(sample_time), 0.0
+    # Stability is needed of what decays in truth; accuracy of everything.
     for value in eigenvalues:
         allowed = rk4_stability_limit(value)
         if abs(value) > 0.0:

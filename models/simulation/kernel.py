@@ -196,6 +196,7 @@ class _Compiled:
         held, given = state.ctypes.data, p.ctypes.data
         for first in range(0, len(rows), BLOCK):
             some, its = rows[first : first + BLOCK], out[first : first + BLOCK]
+            # Block by block, so that Python gets a chance to see Ctrl-C in between.
             failed = self._drive(len(some), held, some.ctypes.data, given, its.ctypes.data)
             if failed != -1:
                 raise _failed(first + max(0, failed))
@@ -222,6 +223,8 @@ class _Interpreted:
         self._accumulators = {1: function}
 
     def run(self, state: FloatArray, rows: FloatArray, p: FloatArray, out: FloatArray) -> None:
+        # A call from Python costs more than a sample: long stretches go in one call, the rest in
+        # shorter ones.
         first = 0
         for size in VM_BLOCKS:
             if len(rows) - first < size:

@@ -96,17 +96,19 @@ def run_simulation(
     try:
         while store.seen < samples:
             first = store.seen
+            # A chunk ends where a parameter changes: the recursion has one set of them in a call.
             until = min([samples, first + CHUNK, *(row for row in breaks if row > first)])
             p = _parameters(simulation, first)
             chunk, mru = rows.block(first, until - first, mru)
             if not math.isnan(trip_time):
                 rows.trip(chunk, first, trip_time)
+            # A trip ends the stepper's work early; the rest of the chunk goes on with the brake.
             while len(chunk):
                 at = store.seen
                 watching = simulation.trips if math.isnan(trip_time) else ()
                 state, log, trip = stepper.run(state, chunk, p, at, watching)
                 chunk = chunk[len(log) :]
-                good = _finite(log)
+                good = _finite(log)  # up to the divergence everything is kept
                 accumulator.update(log[:good], at * dt)
                 store.add(log[:good])
                 if good < len(log):

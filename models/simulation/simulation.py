@@ -287,7 +287,7 @@ def prepare(
     travels = max(farthest, abs(scenario.initial_haul)) > _TRAVELS
     travel = DrumTravel.from_case(case) if travels else None
     plant = build_plant(case, masses, limits=limits, travel=travel, surroundings=surroundings)
-    rest = _rest(case, masses, surroundings)
+    rest = _rest(case, masses, surroundings)  # without limits, which rest must not depend on
     values = _parameters(case, plant, options.parameters or {})
     choice = _choose_step(plant, rest, values, sample_time, options.step, surroundings)
     sensors = SensorModel.from_case(case, sample_time, scenario.telemetry_delays)

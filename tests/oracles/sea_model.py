@@ -18,7 +18,8 @@ import scipy.linalg
 from models.basics import FloatArray, read_only
 from models.hook import HookMotion
 from models.plant import ShapingFilter
-from models.sensing import MruModel, noise_root
+from models.sensing import MruModel
+from models.sensing.lowpass import noise_root
 
 _PANEL = 0.25  # [rad/s], of the quadrature over the true spectrum
 _BUTTERWORTH = math.sqrt(2.0)
