@@ -5,12 +5,11 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .design_argument import add_design_arguments as add_design_arguments
-    from .design_argument import given_design as given_design
     from .given import case_words as case_words
     from .given import gains_text as gains_text
     from .given import given_case as given_case
     from .given import parse_gains as parse_gains
+    from .given_design import given_design as given_design
     from .working import Stop as Stop
     from .working import conclude as conclude
     from .working import counting as counting

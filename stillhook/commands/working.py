@@ -8,13 +8,25 @@ from __future__ import annotations
 import argparse
 import contextlib
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from models.basics import StillhookError
 
-from ..text import Progress, Report, commands, console, number, progress, show
+from ..text import (
+    OutputFolder,
+    Progress,
+    Report,
+    commands,
+    console,
+    json_data,
+    json_text,
+    number,
+    progress,
+    show,
+)
 
 _NAMED = 3  # pictures that are named
 _AGAIN = 0.25  # s between two attempts to interrupt
@@ -139,6 +151,18 @@ def kept_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
 
 
+def prepared(arguments: argparse.Namespace, default: str | Path) -> OutputFolder:
+    """Return the folder for the results, with the figures that the arguments ask for."""
+    return OutputFolder.prepare(arguments.out or default, figure_kinds(arguments))
+
+
+def figure_kinds(arguments: argparse.Namespace) -> tuple[str, ...]:
+    """Return the endings of the files of a figure; none where none is to be drawn."""
+    if not arguments.figures:
+        return ()
+    return ("svg", "png") if arguments.format is None else (arguments.format,)
+
+
 def conclude(
     report: Report,
     arguments: argparse.Namespace,
@@ -153,12 +177,17 @@ def conclude(
     report
         What came of the command.
     arguments
-        If they ask to be quiet the verdict alone is printed.
+        If they ask to be quiet the verdict alone is printed; if they ask for JSON the report as
+        `stillhook.text.json_data` has it, with ``written``, the files, and nothing else.
     written
         The files.
     following
         Returns commands to go on with, each with what it does.
     """
+    if arguments.json:
+        data = json_data(report) | {"written": [str(path) for path in written]}
+        sys.stdout.write(json_text(data))
+        return 1 if report.ok is False else 0
     out = console()
     if arguments.quiet:
         out.print(f"{report.name}: {report.status}", soft_wrap=True)

@@ -73,7 +73,7 @@ def design_report(design: GainDesign, *, bound: bool = True) -> Report:
 
 
 def write_report(
-    folder: str | Path,
+    folder: str | Path | OutputFolder,
     *,
     design: GainDesign,
     bound: bool = True,

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
+    from .json import summary_of as summary_of
     from .report import RunFolder as RunFolder
     from .report import write_runs as write_runs
     from .runs import TRIPS as TRIPS

@@ -26,19 +26,26 @@ class OutputFolder:
     ----------
     path
         The folder; it is made with its parents by `prepare`.
+    kinds
+        Endings of the files of a figure; none for no figures.
     """
 
     path: Path
+    kinds: tuple[str, ...] = ("svg", "png")
 
     @classmethod
-    def prepare(cls, path: str | Path) -> OutputFolder:
-        """Return the folder, made if need be and known to be writable.
+    def prepare(
+        cls, path: str | Path | OutputFolder, kinds: tuple[str, ...] = ("svg", "png")
+    ) -> OutputFolder:
+        """Return the folder, made if need be and known to be writable; one that is, as it is.
 
         Raises
         ------
         InputError
             If it cannot be made, or no file can be written into it.
         """
+        if isinstance(path, OutputFolder):
+            return path
         folder = Path(path)
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -53,7 +60,7 @@ class OutputFolder:
         except OSError as error:
             reason = error.strerror or error
             raise InputError(f"{folder}: the output folder cannot be made: {reason}") from error
-        ready = cls(folder)
+        ready = cls(folder, kinds)
         ready.write(f".{os.getpid()}.probe", b"")
         (folder / f".{os.getpid()}.probe").unlink(missing_ok=True)
         return ready
@@ -84,7 +91,7 @@ class OutputFolder:
         self,
         drawings: Sequence[Drawing],
         *,
-        kinds: Sequence[str] = ("svg", "png"),
+        kinds: Sequence[str] | None = None,
         progress: Callable[[str, int, int], None] | None = None,
     ) -> list[Path]:
         """Draw figures and write them; return their files.
@@ -96,7 +103,7 @@ class OutputFolder:
         drawings
             The figures.
         kinds
-            Endings of their files.
+            Endings of their files (default: those of the folder).
         progress
             Called as progress("figures", done, total).
 
@@ -108,6 +115,9 @@ class OutputFolder:
         from . import style
 
         written: list[Path] = []
+        kinds = self.kinds if kinds is None else kinds
+        if not kinds:
+            return []
         for done, drawing in enumerate(drawings):
             if progress is not None:
                 progress("figures", done, len(drawings))

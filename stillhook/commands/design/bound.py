@@ -6,8 +6,21 @@ import argparse
 
 from models.basics import InputError, check_range
 
-from ...text import commands, console, progress
+from ...text import Report, Section, progress
+from ..declare import CASE, real, text, whole
 from ..given import case_words, given_case
+from ..working import conclude
+
+ARGUMENTS = (
+    CASE,
+    text(
+        "--sensors",
+        "A,B,..",
+        "what a controller may hear, as in payload.displacement,mru.heave (default: all)",
+    ),
+    whole("--masses", "masses along the rope"),
+    real("--faint", "R", "noise of a sensor that the case calls exact, over the hook's rms", 1e-3),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -25,10 +38,16 @@ def run(arguments: argparse.Namespace) -> int:
         tell("bound", 0, 1)
         found = bound_for(case, masses=arguments.masses, measurements=heard, faint=arguments.faint)
         tell("bound", 1, 1)
-    out, words = console(), case_words(arguments, None)
-    text = str(found).partition("\n")[0] if arguments.quiet else str(found)
-    out.print(text, soft_wrap=True)
-    if not arguments.quiet:
-        gains = ("gains of payload feedback", f"stillhook optimise {words}")
-        commands([gains, ("other structures", f"stillhook structures {words}")], out)
-    return 0 if found.feasible else 1
+    words = case_words(arguments, None)
+    following = [
+        ("gains of payload feedback", f"stillhook optimise {words}"),
+        ("other structures", f"stillhook structures {words}"),
+    ]
+    verdict, _, rest = str(found).partition("\n")
+    report = Report(
+        name=case.name,
+        status=verdict,
+        ok=None if found.feasible else False,
+        sections=[Section("", [rest])] if rest else [],
+    )
+    return conclude(report, arguments, following=lambda: following)

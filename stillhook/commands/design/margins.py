@@ -7,11 +7,24 @@ import argparse
 from models.basics import InputError, check_range
 
 from ...text import Report, Section
-from ..design_argument import given_design
+from ..declare import CASE, DESIGN, repeated, whole
 from ..given import case_words, given_case
+from ..given_design import given_design
 from ..working import conclude, working
 
 _USUAL = {"payload.mass": 0.3, "stiffness": 0.2, "drag": 0.5}
+
+ARGUMENTS = (
+    CASE,
+    DESIGN,
+    repeated(
+        "--off",
+        "PATH=SHARE",
+        "what may be off and how far either way, as in payload.mass=0.3, drag=0.5 or "
+        "'delay=20 ms' (default: payload.mass=0.3, stiffness=0.2, drag=0.5)",
+    ),
+    whole("--draws", "random plants to check with", 1000),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

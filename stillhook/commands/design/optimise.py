@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 
 from ...designs import AT_LEAST
 from ...text import OutputFolder, folder_name, number, progress
+from ..declare import CASE, NO_BOUND, results_folder, text, whole
 from ..given import case_words, gains_text, given_case
-from ..working import conclude, interruptible, kept_in
+from ..working import conclude, interruptible, kept_in, prepared
+from .structures import optimise_one
 
 if TYPE_CHECKING:
     from synth.design import GainDesign
@@ -36,6 +38,20 @@ _FIELDS = {
     "rope.tension.least": "limits.minimum_tension",
 }
 
+ARGUMENTS = (
+    CASE,
+    results_folder("out/<name of the case>"),
+    whole("--starts", "starts of the search", 16),
+    whole("--seed", "seed of the starts", 0),
+    text(
+        "--structure",
+        "NAME",
+        "another structure than the three gains of payload feedback, such as combined; "
+        "`stillhook structures CASE` compares them",
+    ),
+    NO_BOUND,
+)
+
 
 def run(arguments: argparse.Namespace) -> int:
     """Optimise, show and save; return 0 if the design is ok, 1 if not."""
@@ -43,8 +59,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     check_range("optimise", "--starts", arguments.starts, low=1, high=4096)
     check_range("optimise", "--seed", arguments.seed, low=0)
+    if arguments.structure is not None:
+        return optimise_one(arguments)
     case = given_case(arguments)
-    folder = OutputFolder.prepare(arguments.out or Path("out") / folder_name(case.name))
+    folder = prepared(arguments, Path("out") / folder_name(case.name))
     folder.write("case.yaml", case.to_yaml())
     from synth import optimise_gains
 
@@ -62,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
                 starts, seed = arguments.starts, arguments.seed
                 design = optimise_gains(case, starts=starts, seed=seed, progress=step)
             # Outside, as a report that is interrupted leaves whole files.
-            written = write_report(folder.path, design=design, bound=arguments.bound, progress=tell)
+            written = write_report(folder, design=design, bound=arguments.bound, progress=tell)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(_kept(folder, design)) from None
     report = design_report(design, bound=arguments.bound and not arguments.quiet)

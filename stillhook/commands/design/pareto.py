@@ -5,10 +5,25 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ...text import OutputFolder, folder_name
+from ...text import folder_name
+from ..declare import CASE, choice, results_folder, text, whole
 from ..given import case_words, gains_text, given_case
-from ..working import conclude, working
-from .vary import parse_range
+from ..vary import parse_range
+from ..working import conclude, prepared, working
+
+ARGUMENTS = (
+    CASE,
+    choice(
+        "--against",
+        ("torque", "speed", "max_sensitivity", "delay_margin", "delay"),
+        "the other quantity (default: torque); delay is that of the telemetry",
+        "torque",
+    ),
+    whole("--points", "points of the front", 30),
+    text("--between", "LOW..HIGH", "ends of the front in SI units (default: found)"),
+    whole("--seed", "seed of the searches", 0),
+    results_folder("out/<case>-pareto"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -19,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     case = given_case(arguments)
     between = parse_range("--between", arguments.between) if arguments.between else None
-    folder = OutputFolder.prepare(arguments.out or Path("out") / f"{folder_name(case.name)}-pareto")
+    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}-pareto")
     folder.write("case.yaml", case.to_yaml())
     with working(arguments) as step:
         front = pareto_front(

@@ -10,13 +10,42 @@ from typing import TYPE_CHECKING
 from models.basics import InputError
 
 from ...text import OutputFolder, csv_text, folder_name
+from ..declare import CASE, STRUCTURE, choice, repeated, results_folder, text, whole
 from ..given import case_words, gains_text, given_case
-from ..working import conclude, working
-from .vary import parse_range, parse_seas, parse_vary
+from ..vary import parse_range, parse_seas, parse_vary
+from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
     from models import Case
     from synth.robust import RobustDesign
+
+ARGUMENTS = (
+    CASE,
+    repeated(
+        "--vary",
+        "PATH=LOW..HIGH",
+        "what varies, as in rope.length=500..1500, payload.mass=40t,50t or "
+        "'PATH=a|b' for values with nothing between",
+    ),
+    text("--seas", "H_S/T_P[:SHARE],..", "the sea states"),
+    text(
+        "--scatter",
+        "FILE",
+        "a table of sea states: significant_height, peak_period, occurrence (.csv)",
+    ),
+    choice(
+        "--objective",
+        ("worst", "mean", "regret"),
+        "what is made small (default: the worst payload motion)",
+        "worst",
+    ),
+    STRUCTURE,
+    text("--schedule", "LOW..HIGH", "gains over the rope's length [m] instead of one set"),
+    whole("--starts", "starts of the search", 8),
+    whole("--seed", "seed of the starts", 0),
+    whole("--draws", "random plants to check with", 10_000),
+    results_folder("out/<case>-robust"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -30,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
             "robust: nothing varies; give --vary (as in --vary rope.length=500..1500), --seas, "
             "--scatter or --schedule"
         )
-    folder = OutputFolder.prepare(arguments.out or Path("out") / f"{folder_name(case.name)}-robust")
+    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}-robust")
     folder.write("case.yaml", case.to_yaml())
     if arguments.schedule is not None:
         return _scheduled(case, arguments, folder)
@@ -43,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
             case,
             Family.of(case, vary, seas),
             arguments.objective,
-            structure=arguments.family_structure,
+            structure=arguments.structure,
             starts=arguments.starts,
             seed=arguments.seed,
             draws=arguments.draws,

@@ -11,14 +11,34 @@ from typing import TYPE_CHECKING
 from models.basics import InputError, check_range
 
 from ...text import OutputFolder, folder_name
+from ..declare import CASE, STRUCTURE, results_folder, switch, text, whole
 from ..given import case_words, given_case
-from ..working import conclude, working
-from .vary import parse_range
+from ..vary import parse_range
+from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
     from models import Case
     from synth.design import StructureDesign
     from synth.sizing import Sizing
+
+ARGUMENTS = (
+    CASE,
+    text(
+        "--target",
+        "LENGTH",
+        "rms that the payload may move: '20 mm', '5 %%' of the hook's rms, '26 dB' below it",
+    ),
+    text("--hs", "LENGTH", "significant wave height, as in '2.5 m' (default: the case's)"),
+    text("--gear", "LOW..HIGH", "gear ratios to look at (default: the case's over and times 2.5)"),
+    whole("--points", "gears on the curve", 9),
+    text("--motors", "FILE", "a catalogue of motors to choose from (.csv)"),
+    switch("--co-design", "keep the motor and find the gear with which the payload is stillest"),
+    text("--radius", "LOW..HIGH", "with --co-design: drum radii to look at [m]"),
+    STRUCTURE,
+    whole("--starts", "starts of the search", 4),
+    whole("--seed", "seed of the starts", 0),
+    results_folder("out/<case>-size"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -39,8 +59,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("size: --radius goes with --co-design")
     radius = parse_range("--radius", arguments.radius) if arguments.radius else None
     case = given_case(arguments)
-    structure_named(arguments.family_structure, case)
-    folder = OutputFolder.prepare(arguments.out or Path("out") / f"{folder_name(case.name)}-size")
+    structure_named(arguments.structure, case)
+    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}-size")
     if arguments.co_design:
         return _co_designed(case, arguments, gear, radius, folder)
     from synth.sizing import size_winch
@@ -50,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
             case,
             target=arguments.target,
             height=arguments.hs,
-            structure=arguments.family_structure,
+            structure=arguments.structure,
             gear=gear,
             points=arguments.points,
             motors=arguments.motors,
@@ -117,7 +137,7 @@ def _co_designed(
             case,
             gear=gear,
             radius=radius,
-            structure=arguments.family_structure,
+            structure=arguments.structure,
             starts=arguments.starts,
             seed=arguments.seed,
             progress=step,

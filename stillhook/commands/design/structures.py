@@ -19,29 +19,42 @@ from ...text import (
     number,
     pairs,
 )
+from ..declare import CASE, NO_BOUND, results_folder, text, whole
 from ..given import case_words, given_case
-from ..working import conclude, working
+from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
     from models import Case
     from synth.design import StructureDesign
 
+ARGUMENTS = (
+    CASE,
+    text(
+        "--structures",
+        "A,B,..",
+        "which (default: all): payload-feedback, payload-feedback-rolloff, -lead, -notch, "
+        "-integral, drum-feedback, feed-forward, combined, constant-tension, low-order-N",
+    ),
+    results_folder("out/<name of the case>"),
+    whole("--starts", "starts of each search", 8),
+    whole("--seed", "seed of the starts", 0),
+    NO_BOUND,
+)
+
 
 def run(arguments: argparse.Namespace) -> int:
-    """Compare structures on a case, or optimise one; return 0 if one of them is ok, else 1."""
+    """Compare structures on a case; return 0 if one of them is ok, else 1."""
     from models.basics import check_range
     from synth.structures import structure_named, structure_names
 
-    check_range(arguments.command, "--starts", arguments.starts, low=1, high=4096)
-    check_range(arguments.command, "--seed", arguments.seed, low=0)
-    if arguments.command == "optimise":
-        return _optimise_one(arguments)
+    check_range("structures", "--starts", arguments.starts, low=1, high=4096)
+    check_range("structures", "--seed", arguments.seed, low=0)
     known = structure_names()
     names = known if arguments.structures is None else _names(arguments.structures)
     case = given_case(arguments)
     for name in names:
         structure_named(name, case)  # an unknown name ends here, not after minutes
-    folder = OutputFolder.prepare(arguments.out or Path("out") / f"{folder_name(case.name)}")
+    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}")
     folder.write("case.yaml", case.to_yaml())
     designs: list[StructureDesign] = []
     with working(arguments) as tell:
@@ -63,13 +76,13 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if ok else 1
 
 
-def _optimise_one(arguments: argparse.Namespace) -> int:
+def optimise_one(arguments: argparse.Namespace) -> int:
     """Optimise one structure, show and save it; return 0 if it is ok, 1 if not."""
     from synth.structures import structure_named
 
     case = given_case(arguments)
     structure_named(arguments.structure, case)
-    folder = OutputFolder.prepare(arguments.out or Path("out") / folder_name(case.name))
+    folder = prepared(arguments, Path("out") / folder_name(case.name))
     folder.write("case.yaml", case.to_yaml())
     with working(arguments) as tell:
         design = _design(case, arguments.structure, arguments, tell, arguments.structure)

@@ -11,11 +11,20 @@ from typing import TYPE_CHECKING
 from models.basics import check_range
 
 from ...text import OutputFolder, folder_name
+from ..declare import CASE, STRUCTURE, results_folder, whole
 from ..given import case_words, given_case
-from ..working import conclude, working
+from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
     from synth.sizing import Worth
+
+ARGUMENTS = (
+    CASE,
+    STRUCTURE,
+    whole("--starts", "starts of the search", 4),
+    whole("--seed", "seed of the starts", 0),
+    results_folder("out/<case>-worth"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -26,13 +35,13 @@ def run(arguments: argparse.Namespace) -> int:
     check_range("worth", "--starts", arguments.starts, low=1, high=4096)
     check_range("worth", "--seed", arguments.seed, low=0)
     case = given_case(arguments)
-    structure_named(arguments.family_structure, case)
-    folder = OutputFolder.prepare(arguments.out or Path("out") / f"{folder_name(case.name)}-worth")
+    structure_named(arguments.structure, case)
+    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}-worth")
     folder.write("case.yaml", case.to_yaml())
     with working(arguments) as step:
         result = worth(
             case,
-            structure=arguments.family_structure,
+            structure=arguments.structure,
             starts=arguments.starts,
             seed=arguments.seed,
             progress=step,

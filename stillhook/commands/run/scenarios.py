@@ -8,7 +8,9 @@ from models.basics import KINDS
 from models.operation import Option, WordOption, scenario_names, scenario_options
 
 from ...controllers import PREDICTIVE
-from ...text import commands, console, pairs, quantity, show
+from ...text import Report, Section, pairs, quantity
+from ..declare import positional
+from ..working import conclude
 
 CONTROLLER_TEXTS = {
     "feedback": "the gains of a design, on what comes up from the payload",
@@ -20,41 +22,32 @@ CONTROLLER_TEXTS = {
 }
 """One line on each controller of `synth.controllers.controllers.CONTROLLERS`."""
 
+ARGUMENTS = (positional("name", "an operation, to see its options", optional=True),)
+
 
 def run(arguments: argparse.Namespace) -> int:
     """List scenarios and controllers, or the options of one scenario; return 0."""
-    out = console()
-    if arguments.name is not None:
-        _options(arguments.name)
-        return 0
+    name = arguments.name
+    if name is not None:
+        options = scenario_options(name)  # an unknown name ends here
+        told = pairs([(key, _text(option)) for key, option in options.items()])
+        report = Report(name=name, about=scenario_names()[name], sections=[Section("", [told])])
+        key, option = next(iter(options.items()))
+        command = f"stillhook simulate CASE --scenario {name} --option '{key}={_example(option)}'"
+        return conclude(report, arguments, following=lambda: [("with an option", command)])
     from synth.controllers import CONTROLLERS
 
-    out.print("Scenarios (--scenario)", style="bold")
-    show(pairs(list(scenario_names().items())), out)
-    out.print()
-    out.print("Controllers (--controller)", style="bold")
     texts = {name: CONTROLLER_TEXTS.get(name, "") for name in CONTROLLERS}
-    show(pairs(list({**texts, **PREDICTIVE}.items())), out)
-    out.print()
-    commands(
-        [
-            ("the options of one scenario", "stillhook scenarios landing"),
-            ("its simulation", "stillhook simulate landing --scenario landing"),
-        ],
-        out,
-    )
-    return 0
-
-
-def _options(name: str) -> None:
-    options = scenario_options(name)  # an unknown name ends here
-    out = console()
-    out.print(f"{name}: {scenario_names()[name]}", style="bold", soft_wrap=True)
-    show(pairs([(key, _text(option)) for key, option in options.items()]), out)
-    out.print()
-    key, option = next(iter(options.items()))
-    command = f"stillhook simulate CASE --scenario {name} --option '{key}={_example(option)}'"
-    commands([("with an option", command)], out)
+    sections = [
+        Section("Scenarios (--scenario)", [pairs(list(scenario_names().items()))]),
+        Section("Controllers (--controller)", [pairs(list({**texts, **PREDICTIVE}.items()))]),
+    ]
+    following = [
+        ("the options of one scenario", "stillhook scenarios landing"),
+        ("its simulation", "stillhook simulate landing --scenario landing"),
+    ]
+    report = Report(name="operations and controllers", sections=sections)
+    return conclude(report, arguments, following=lambda: following)
 
 
 def _text(option: Option | WordOption) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -27,9 +28,22 @@ from ...runs import (
     show_comparison,
     show_events,
     show_runs,
+    summary_of,
     tree,
 )
-from ...text import OutputFolder, commands, console, count, folder_name, progress
+from ...text import OutputFolder, commands, console, count, folder_name, json_text, progress
+from ..declare import (
+    CASE,
+    choice,
+    group,
+    one_of,
+    real,
+    repeated,
+    results_folder,
+    switch,
+    text,
+    whole,
+)
 from ..given import case_words
 from ..working import Stop, stoppable
 from .simulate_given import Asked, again, asked_of
@@ -50,6 +64,90 @@ class _Simulated:
     left_out: dict[str, StillhookError] = field(default_factory=dict)
 
 
+ARGUMENTS = (
+    CASE,
+    group(
+        "what is simulated",
+        text(
+            "--controller",
+            "NAME",
+            "a controller, several with commas between, or all, which leaves out the predictive "
+            "ones (default: feedback; see `stillhook scenarios`)",
+            "feedback",
+        ),
+        text("--scenario", "NAME", "an operation (default: hold)", "hold"),
+        repeated(
+            "--option", "KEY=VALUE", "an option of the operation, as in 'height=6 m'", "options"
+        ),
+        whole("--seeds", "how many seas", 1),
+        whole("--first-seed", "seed of the first", 0),
+        one_of(
+            real("--hours", "H", "length of a run in hours"),
+            text(
+                "--duration",
+                "TIME",
+                "length of a run, as in '20 min' (default: the operation's own)",
+            ),
+        ),
+        one_of(
+            text(
+                "--hook",
+                "FILE",
+                "the hook's motion from a CSV file with the columns time and displacement",
+            ),
+            text("--sine", "AMPLITUDE,PERIOD", "a sine instead, as in '0.5 m, 8 s'"),
+        ),
+        text(
+            "--tip",
+            "X,Y,Z",
+            "--hook holds heave, roll and pitch of the vessel; the crane's tip is so far "
+            "forward, to port and up [m]",
+        ),
+    ),
+    group(
+        "the feedback's gains (default: those of the case)",
+        one_of(
+            text("--design", "FILE", "the gains of a design, as in out/CASE/design.yaml"),
+            text("--gains", "A=..,a=..,a1=..,a2=..", "the gains"),
+        ),
+    ),
+    group(
+        "how",
+        text("--sample-time", "TIME", "of the controller, as in '20 ms'"),
+        text("--step", "TIME", "integration step (default: the longest)"),
+        whole("--masses", "masses along the rope (default: the case's)"),
+        text("--settle", "TIME", "when statistics begin (default: after some waves)"),
+        text(
+            "--lock-limit",
+            "LENGTH",
+            "error of the payload that counts as lost lock (default: the hook's significant "
+            "height)",
+        ),
+        switch(
+            "--no-compile",
+            "do not compile the loop to C: slower, and needs no compiler",
+            "compiled",
+        ),
+    ),
+    group(
+        "results",
+        results_folder("out/<case>-<scenario>"),
+        choice(
+            "--traces",
+            ("csv", "parquet", "netcdf", "none"),
+            "format of the time traces (default: csv)",
+            "csv",
+        ),
+        text(
+            "--store-step",
+            "TIME",
+            "time between two rows of them (default: so that there are at most 40 000)",
+        ),
+        switch("--animate", "make a moving picture (GIF) of the worst run"),
+    ),
+)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Simulate, show and save; return the exit status."""
     asked = asked_of(arguments)
@@ -57,7 +155,7 @@ def run(arguments: argparse.Namespace) -> int:
     place = Path(arguments.out or Path("out") / name)
     made = [path for path in (place, *place.parents) if not path.exists()]
     folder = OutputFolder.prepare(place)
-    target = RunFolder(folder=folder, format=arguments.format, several=len(asked.controllers) > 1)
+    target = RunFolder(folder=folder, format=arguments.traces, several=len(asked.controllers) > 1)
     out = console()
     with stoppable() as stop:
         try:
@@ -79,7 +177,9 @@ def run(arguments: argparse.Namespace) -> int:
         if not stopped:
             raise next(iter(found.left_out.values()))
         raise KeyboardInterrupt(f"nothing was simulated; {_kept(folder)}")
-    if arguments.quiet:
+    if arguments.json:
+        sys.stdout.write(json_text(summary_of(found.compared)))
+    elif arguments.quiet:
         for runs in found.compared:
             out.print(f"{headline_of(runs)}; {tree(runs)[0]}", soft_wrap=True)
     else:

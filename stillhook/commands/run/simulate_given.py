@@ -129,7 +129,7 @@ def asked_of(arguments: argparse.Namespace) -> Asked:
             hook=hook,
             duration=lasting,
             masses=arguments.masses,
-            compiled=arguments.compiled,
+            compiled=None if arguments.compiled else False,  # as the machine can
             **given,
         ),
     )
@@ -194,7 +194,7 @@ def again(arguments: argparse.Namespace, case: str, **changes: object) -> str:
             text = f"{value:g}" if isinstance(value, float) else str(value)
             words.append(f"--{name} {shlex.quote(text)}")
     words += [f"--option {shlex.quote(text)}" for text in arguments.options]
-    words += ["--no-compile"] * (arguments.compiled is False)
+    words += ["--no-compile"] * (not arguments.compiled)
     words += [f"--{key}" for key, value in changes.items() if value is True]
     return " ".join(words)
 

@@ -15,10 +15,47 @@ from models.basics import InputError, check_range
 
 from ...comparison import Comparison, comparison_report, write_comparison
 from ...text import console, count, folder_name, pairs, show
+from ..declare import CASE, choice, switch, text, whole
 from ..given import case_words, given_case
 from ..working import conclude, counting, tidy
 
 _MANY = 10_000  # seeds: more than anybody wants on purpose
+
+ARGUMENTS = (
+    CASE,
+    text(
+        "--controllers",
+        "A,B,..",
+        "who takes part (default: all that do anything here); see --list; a design file is "
+        "one too, as in out/CASE/design.yaml",
+    ),
+    switch("--list", "say who they are, and end"),
+    whole("--seeds", "seas of each height", 10),
+    text("--hs", "H,H,..", "significant heights [m] (default: that of the case)"),
+    text("--duration", "TIME", "of a run (default: 20 min)", "20 min"),
+    text(
+        "--mismatch",
+        "NAME=VALUE,..",
+        "what of the plant is not as the controllers think, as in payload=+30%%,E=-30%%,"
+        "delay=+50ms,spectrum=jonswap, or a path of the case",
+    ),
+    choice(
+        "--design-at",
+        ("each", "case"),
+        "design the linear laws for each height (default), or once for the case's sea",
+        "each",
+    ),
+    whole("--starts", "starts of each search for a design", 8),
+    whole("--masses", "masses along the plant's rope (default: the case's)"),
+    text("--settle", "TIME", "when statistics begin"),
+    whole("--jobs", "processes (default: one for each core)"),
+    text(
+        "--out",
+        "DIR",
+        "folder for the results (default: out/<case>-compare); the same command again goes "
+        "on with what is there",
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -16,9 +16,10 @@ import numpy as np
 from models.basics import InputError, parse_quantity
 
 from ...text import OutputFolder, Progress, folder_name
-from ..design_argument import given_design
+from ..declare import CASE, DESIGN, group, results_folder, switch, text
 from ..given import case_words, gains_text, given_case
-from ..working import conclude, working
+from ..given_design import given_design
+from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
     from models import Case
@@ -26,6 +27,57 @@ if TYPE_CHECKING:
     from synth.operability import Operability
 
 _FINEST = 400  # points of an axis
+
+ARGUMENTS = (
+    CASE,
+    DESIGN,
+    switch(
+        "--held",
+        "no design: the drum held and a perfect winch only (default: the case's gains, or "
+        "the best ones where it has none)",
+    ),
+    text(
+        "--tp",
+        "LOW..HIGH[/STEP]|A,B,..",
+        "peak periods [s], as in 5..15, 5..15/0.5 or 6,8,10 (default: 4..18, or those of "
+        "the scatter diagram)",
+    ),
+    text(
+        "--headings",
+        "LOW..HIGH[/STEP]|A,B,..",
+        "headings [deg], where the waves travel to, 180 head sea, as in 0..345/15 or "
+        "90,135,180 (default: 0..330/30 of a vessel with raos)",
+    ),
+    group(
+        "how still the payload must be",
+        text("--payload-rms", "LENGTH", "standard deviation of its motion, as in '50 mm'"),
+        text("--payload-significant", "LENGTH", "significant double amplitude, 4 sigma"),
+        text(
+            "--payload-max",
+            "LENGTH",
+            "most probable maximum amplitude in the case's exposure time",
+        ),
+        text(
+            "--payload-speed",
+            "SPEED",
+            "most probable maximum of its speed, as in '0.5 m/s'",
+        ),
+    ),
+    text(
+        "--depths",
+        "A,B,..",
+        "lengths of rope paid out [m], as in 100,500,1000 (default: the case's)",
+    ),
+    text(
+        "--scatter",
+        "FILE",
+        "scatter diagram (.csv): the share of the year that is workable; `example` is a "
+        "made-up one",
+    ),
+    switch("--reoptimise", "also find the gains anew for each sea (seconds for each)"),
+    text("--highest", "LENGTH", "highest H_s looked at (default: 30 m)", "30 m"),
+    results_folder("out/<case>-operability"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -38,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
     highest = _length("--highest", arguments.highest)
     case = given_case(arguments)
     name = f"{folder_name(case.name)}-operability"
-    folder = OutputFolder.prepare(arguments.out or Path("out") / name)
+    folder = prepared(arguments, Path("out") / name)
     from synth.operability import operability
 
     from ...seas import operability_report, write_operability

@@ -9,16 +9,52 @@ from typing import TYPE_CHECKING
 
 from models.basics import InputError, check_range, read_quantity
 
-from ...text import OutputFolder, csv_text, folder_name
-from ..design_argument import given_design
+from ...text import csv_text, folder_name
+from ..declare import CASE, DESIGN, group, repeated, results_folder, switch, text, whole
 from ..given import case_words, given_case
-from ..working import conclude, working
+from ..given_design import given_design
+from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
     from synth.design import GainDesign, StructureDesign
 
     from ...designs import Wide
     from ...text import Progress
+
+ARGUMENTS = (
+    CASE,
+    DESIGN,
+    whole("--second", "second derivatives of the N numbers with the largest effect", 6),
+    text(
+        "--plus",
+        "SHARE",
+        "move each gain by this share and compute all anew, as Figure 32 of the 1975 thesis "
+        "does (default: '10 %%')",
+        "10 %",
+    ),
+    group(
+        "over whole ranges: Sobol's indices and Morris's screening",
+        switch(
+            "--ranges",
+            "study ranges too; without --spread or --vary: payload mass 30 %% either way, "
+            "stiffness 20 %%, drag 50 %%, the telemetry up to 20 ms later",
+        ),
+        text("--spread", "FILE", "a spread file (.yaml); implies --ranges"),
+        repeated(
+            "--vary",
+            "PATH=RANGE",
+            "vary a number evenly, as in payload.mass=30%% or 'sensors.telemetry.delay="
+            "20 ms..80 ms'; implies --ranges",
+        ),
+        whole(
+            "--samples",
+            "base points of the indices, a power of two; numbers + 2 cases each",
+            1024,
+        ),
+        whole("--seed", "seed of the draws", 0),
+    ),
+    results_folder("out/<case>-sensitivity"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -27,8 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     share = _share(arguments.plus)
     case = given_case(arguments)
     design = given_design(case, arguments)
-    out_name = arguments.out or Path("out") / f"{folder_name(case.name)}-sensitivity"
-    folder = OutputFolder.prepare(out_name)
+    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}-sensitivity")
     from synth.sensitivity import sensitivity
 
     with working(arguments) as step:

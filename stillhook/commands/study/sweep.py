@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 from models.basics import InputError, check_range
 
 from ...text import OutputFolder, count, folder_name
-from ..design_argument import given_design
+from ..declare import case_argument, choice, group, one_of, repeated, switch, text, whole
 from ..given import case_words, given_case
+from ..given_design import given_design
 from ..working import counting, tidy
 from .sweep_output import Swept, conclude_sweep
 
@@ -24,6 +25,91 @@ if TYPE_CHECKING:
     from models.spread import Spread
 
 _MOST = 100  # of the worst cases that are told
+
+ARGUMENTS = (
+    case_argument(optional=True),  # none with --resume
+    group(
+        "who is tried",
+        one_of(
+            text("--design", "FILE", "a design that was written (design.yaml, combined.yaml)"),
+            text(
+                "--gains",
+                "A=..,a=..,a1=..,a2=..",
+                "gains (default: those that the case has in use)",
+            ),
+            text(
+                "--controller",
+                "NAME",
+                "another controller, with --mode time, as in mpc (see `stillhook scenarios`)",
+            ),
+        ),
+        switch(
+            "--follow",
+            "make the controller for each case, and design a design anew (default: it is made for "
+            "the nominal case, and the plant is another)",
+        ),
+    ),
+    group(
+        "what varies (default: mass, stiffness, drag and delay)",
+        text("--spread", "FILE", "a spread file (.yaml)"),
+        repeated(
+            "--vary",
+            "PATH=RANGE",
+            "vary a number evenly, as in payload.mass=30%% (either way) or "
+            "'delay=20 ms..80 ms'; adds to --spread",
+        ),
+        text(
+            "--faults",
+            "A,B,..",
+            "vary what fails, with --mode time: dropouts, outages, delay-jumps, sensor-bias, "
+            "mru-bias, limit-cuts",
+        ),
+        whole("--samples", "number of cases (default: 10000; with --mode time 256)"),
+        text(
+            "--sampling",
+            "METHOD",
+            "sobol (default), lhs, random, grid, corners or given",
+            "sobol",
+        ),
+        whole("--seed", "seed of the draws", 0),
+        choice(
+            "--mode",
+            ("frequency", "time"),
+            "the linear loop (default), or nonlinear runs in time",
+            "frequency",
+        ),
+    ),
+    group(
+        "in the time domain (--mode time)",
+        text("--duration", "TIME", "length of a run (default: 10 min)", "10 min"),
+        text("--settle", "TIME", "when its statistics begin"),
+        text("--scenario", "NAME", "the operation (default: hold)", "hold"),
+        repeated("--option", "KEY=VALUE", "an option of the operation", "options"),
+        whole("--masses", "masses along the rope (default: the case's)"),
+        whole("--first", "number of the first case, for a part of a longer sweep", 0),
+        switch("--common-seed", "let all cases meet the same sea and noise"),
+    ),
+    group(
+        "where it runs, with --mode time",
+        whole("--jobs", "processes (default: one for each core)"),
+        text(
+            "--cluster",
+            "ADDRESS",
+            "a dask scheduler, as in tcp://10.0.0.1:8786, or local:4 for four processes here",
+        ),
+        text("--resume", "DIR", "go on with a sweep that was stopped, from its folder alone"),
+    ),
+    group(
+        "results",
+        text(
+            "--out",
+            "DIR",
+            "folder for the results (default: out/<case>-sweep); with --mode time the same "
+            "command again goes on with what is there",
+        ),
+        whole("--worst", "how many of the worst", 5),
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -158,8 +244,9 @@ def given_spread(case: Case, arguments: argparse.Namespace) -> Spread | None:
         parts.append(Spread.from_yaml(arguments.spread))
     if arguments.vary:
         parts.append(Spread(parse_ranges(arguments.vary)))
-    if arguments.faults is not None:
-        names = [name.strip() for name in arguments.faults.split(",")]
+    faults = getattr(arguments, "faults", None)  # of the time domain
+    if faults is not None:
+        names = [name.strip() for name in faults.split(",")]
         parts.append(fault_spread(*names))
     if not parts:
         return None
@@ -190,13 +277,13 @@ def parse_ranges(texts: list[str]) -> dict[str, Any]:
     from models.spread import Uniform
 
     found: dict[str, Any] = {}
-    for text in texts:
-        path, sign, value = (part.strip() for part in text.partition("="))
+    for given in texts:
+        path, sign, value = (part.strip() for part in given.partition("="))
         ends = [_number(part) for part in value.split("..")]
         if not (path and sign and value) or len(ends) > 2 or "" in ends:
             raise InputError(
                 "--vary: must be PATH=WIDTH or PATH=LOW..HIGH, as in payload.mass=30% or "
-                f"'delay=20 ms..80 ms', got {text!r}"
+                f"'delay=20 ms..80 ms', got {given!r}"
             )
         if path in found:
             raise InputError(f"--vary: {path} is given twice")
@@ -216,10 +303,10 @@ def _options(texts: list[str]) -> dict[str, object]:
     from models.casefile import read_yaml
 
     found: dict[str, object] = {}
-    for text in texts:
-        key, sign, value = (part.strip() for part in text.partition("="))
+    for given in texts:
+        key, sign, value = (part.strip() for part in given.partition("="))
         if not (key and sign):
-            raise InputError(f"--option: must be KEY=VALUE, as in 'height=6 m', got {text!r}")
+            raise InputError(f"--option: must be KEY=VALUE, as in 'height=6 m', got {given!r}")
         found[key], _ = read_yaml(value, f"--option {key}")
     return found
 

@@ -14,23 +14,24 @@ from typing import TYPE_CHECKING
 from ...text import (
     Report,
     Section,
-    commands,
-    console,
     duration,
     heading_words,
     number,
     percent,
     quantity,
     remarks,
-    show,
 )
+from ..declare import CASE
 from ..given import case_words, given_case
+from ..working import conclude
 
 if TYPE_CHECKING:
     from models import Case
     from models.hook import HookMotion
 
 Rows = list[tuple[str, str, str]]
+
+ARGUMENTS = (CASE,)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -46,12 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
         following.append(("the gains in use", f"stillhook evaluate {words}"))
     sea = f"stillhook check {shlex.quote(arguments.case)} --set sea.significant_height=1.5"
     following.append(("another sea", sea))
-    out = console()
-    show(report, out)
-    out.print()
-    out.print(f"{arguments.case}: no errors", soft_wrap=True)
-    commands(following, out)
-    return 0
+    return conclude(report, arguments, following=lambda: following)
 
 
 def check_report(case: Case, hook: HookMotion) -> Report:
@@ -63,7 +59,7 @@ def check_report(case: Case, hook: HookMotion) -> Report:
         remarks("sensors and limits", _limits(case)),
     ]
     about = " ".join(case.description.split())
-    return Report(name=case.name, about=about, sections=[Section("", tables)])
+    return Report(name=case.name, about=about, status="no errors", sections=[Section("", tables)])
 
 
 def _sea(case: Case, hook: HookMotion) -> Rows:

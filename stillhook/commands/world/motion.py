@@ -17,12 +17,36 @@ from models.basics import InputError
 
 from ...seas import motion_report, own_place
 from ...text import OutputFolder, console, folder_name, show
+from ..declare import CASE, real, results_folder, text
 from ..given import case_words, given_case
-from ..working import conclude
+from ..working import conclude, prepared
 
 if TYPE_CHECKING:
     from models import Case
     from models.hook import HookSurvey
+
+ARGUMENTS = (
+    CASE,
+    text(
+        "--headings",
+        "A,B,.. or LOW..HIGH",
+        "where the waves travel to, relative to the bow [deg]: 180 is a head sea, 90 comes "
+        "from starboard (default: every 15 degrees)",
+    ),
+    text(
+        "--tp",
+        "A,B,.. or LOW..HIGH",
+        "peak periods [s]; a range goes in steps of one second (default: 5..16)",
+    ),
+    real(
+        "--fractile",
+        "P",
+        "probability that the largest value of the exposure time stays below the second "
+        "extreme that is told",
+        0.9,
+    ),
+    results_folder("out/<case>-motion"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -38,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
             "heading; give vessel.raos, hook and heading to look at others"
         )
     survey = hook_motion(case, headings=headings, peak_periods=periods, fractile=arguments.fractile)
-    folder = OutputFolder.prepare(arguments.out or Path("out") / f"{folder_name(case.name)}-motion")
+    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}-motion")
     report = motion_report(survey)
     written = [
         folder.write("case.yaml", survey.case.to_yaml()),

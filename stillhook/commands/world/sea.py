@@ -18,10 +18,33 @@ from models.basics import InputError, check_range
 from models.sea import read_seas, write_scatter
 
 from ...seas import records_report, records_table, sea_report
-from ...text import OutputFolder, csv_text, folder_name, told_once
-from ..working import conclude
+from ...text import csv_text, folder_name, told_once
+from ..declare import choice, positional, real, results_folder, text, whole
+from ..working import conclude, prepared
 
 _CASES = {".yaml", ".yml", ".toml"}
+
+ARGUMENTS = (
+    positional(
+        "file",
+        "a file of wave spectra (NDBC, Spotter, SWAN, WAVEWATCH III, ERA5 and more), or a "
+        "case (bundled, .yaml or .toml) to see its sea",
+    ),
+    text("--read-as", "NAME", "format of the file (default: found out)"),
+    whole(
+        "--record",
+        "record to show, counted from 0 in the order of time (default: the highest)",
+    ),
+    choice(
+        "--beyond",
+        ("decay", "zero"),
+        "what a spectrum is above its last frequency (default: decay, as 1/omega^5)",
+        "decay",
+    ),
+    real("--height-step", "M", "width of the scatter diagram's classes of H_s [m]", 0.5),
+    real("--period-step", "S", "width of its classes of T_p [s]", 1.0),
+    results_folder("out/<file>-sea"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -32,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     named = {name for name, _ in bundled_cases()}
     if arguments.file in named or Path(arguments.file).suffix.lower() in _CASES:
         return _of_case(arguments)
-    records = read_seas(arguments.file, file_format=arguments.format)
+    records = read_seas(arguments.file, file_format=arguments.read_as)
     chosen = arguments.record
     if chosen is None:
         chosen = int(np.argmax(records.significant_height))
@@ -40,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     steps = {"height_step": arguments.height_step, "period_step": arguments.period_step}
     report = records_report(records, chosen, sea, name=arguments.file, steps=steps)
     named_after = f"{folder_name(Path(arguments.file).name)}-sea"
-    folder = OutputFolder.prepare(arguments.out or Path("out") / named_after)
+    folder = prepared(arguments, Path("out") / named_after)
     written = [folder.write("records.csv", csv_text(records_table(records)))]
     write_scatter(folder.path / "scatter.csv", records.scatter(**steps))
     written += [folder.path / "scatter.csv", *folder.draw(report.drawings)]
@@ -56,12 +79,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _of_case(arguments: argparse.Namespace) -> int:
-    if arguments.record is not None or arguments.format is not None:
-        raise InputError("sea: --record and --format are for a file of spectra, not for a case")
+    if arguments.record is not None or arguments.read_as is not None:
+        raise InputError("sea: --record and --read-as are for a file of spectra, not for a case")
     with told_once():
         case = load_case(arguments.file)
         sea = case.sea.to_spectrum()
-    folder = OutputFolder.prepare(arguments.out or Path("out") / f"{folder_name(case.name)}-sea")
+    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}-sea")
     steepness = ("steepness", f"{case.sea.steepness:.3g}")
     report = sea_report(sea, name=case.name, extra=[steepness])
     written = folder.draw(report.drawings)

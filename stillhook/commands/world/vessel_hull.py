@@ -16,13 +16,79 @@ from models.vessel.readers import check_long_waves, write_raos
 
 from ...seas import hull_report
 from ...text import OutputFolder, folder_name, progress
-from ..design import parse_range
-from ..working import conclude
+from ..declare import choice, declared, group, real, switch, text, whole
+from ..vary import parse_range
+from ..working import conclude, figure_kinds
 
 if TYPE_CHECKING:
     from models.vessel.hull import Hull
 
 _STAGE = "computing waves on the hull"
+
+ARGUMENTS = (
+    group(
+        "the hull: main dimensions, or a mesh",
+        choice("--shape", ("ship", "box"), "what the main dimensions make (default: ship)", "ship"),
+        real("--length", "L", "of the waterline [m]"),
+        real("--beam", "B", "of the waterline [m]"),
+        real(
+            "--draught",
+            "T",
+            "[m]; with --mesh: where the waterline is above the lowest point "
+            "(default: z = 0 of the file)",
+        ),
+        real("--block", "C", "block coefficient", 0.7),
+        real("--midship", "C", "midship section coefficient", 0.96),
+        text(
+            "--transom",
+            "WIDTH,DEPTH",
+            "of the transom over beam and draught (default: 0.9,0.3)",
+            "0.9,0.3",
+        ),
+        text("--mesh", "FILE", "a mesh: .stl, .gdf, .pnl, .hst, .mar; z up, x forward"),
+        real("--scale", "F", "metres per unit of length of the mesh", 1.0),
+    ),
+    group(
+        "how it is loaded",
+        real("--kg", "Z", "centre of gravity above the keel [m]; or"),
+        real("--gm", "GM", "metacentric height [m]"),
+        text(
+            "--radii",
+            "ROLL,PITCH,YAW",
+            "radii of gyration [m] (default: 0.37 beam, 0.25 length, 0.25 length)",
+        ),
+        real(
+            "--roll-damping",
+            "SHARE",
+            "damping of roll beyond that of its waves, over the critical",
+            0.05,
+        ),
+    ),
+    group(
+        "water and waves",
+        real("--depth", "D", "[m] (default: deep)"),
+        real("--density", "RHO", "[kg/m3]", 1025.0),
+        text(
+            "--frequencies",
+            "LOW..HIGH",
+            "of the coefficients [rad/s] (default: 0.15..2.0)",
+            "0.15..2.0",
+        ),
+        whole("--count", "how many of them (default: 0.05 rad/s apart, closer for long ships)"),
+        real("--heading-step", "DEG", "between headings, all round [deg]", 15.0),
+    ),
+    group(
+        "the computation",
+        whole("--panels", "of our own hulls", 600),
+        switch("--no-lid", "no lid against irregular frequencies"),
+        whole("--threads", "how many to use (default: one for each core)"),
+        switch("--no-cache", "compute it anew, and keep nothing"),
+        text("--name", "NAME", "what the vessel is called"),
+        text(
+            "--out", "PATH", "a .nc or .csv file, or a folder (default: out/<name of the vessel>)"
+        ),
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -121,19 +187,17 @@ def _place(arguments: argparse.Namespace, hull: Hull) -> tuple[OutputFolder, Pat
     """Return the folder, made and tried before anything long begins, and the table in it."""
     target = Path(arguments.out or Path("out") / folder_name(hull.name))
     alone = target.suffix.lower() in {".csv", ".nc"}
-    folder = OutputFolder.prepare(target.parent if alone else target)
+    folder = OutputFolder.prepare(target.parent if alone else target, figure_kinds(arguments))
     return folder, target if alone else folder.path / "raos.nc"
 
 
 def _command(arguments: argparse.Namespace) -> str:
     """Return the command that makes the same vessel again: what differs from the defaults."""
-    from .vessel_hull_arguments import add_hull_arguments
-
     parser = argparse.ArgumentParser()
-    add_hull_arguments(parser)
+    declared(parser, ARGUMENTS)
     words = ["stillhook", "vessel", "hull"]
     for action in parser._actions:
-        if action.dest in {"help", "out", "quiet", "threads", "cache"}:
+        if action.dest in {"help", "out", "threads", "cache"}:
             continue
         value = getattr(arguments, action.dest)
         if value == action.default or not action.option_strings:

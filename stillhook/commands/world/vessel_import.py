@@ -11,7 +11,41 @@ from models.vessel.readers import check_long_waves, read_raos, write_raos
 
 from ...seas import rao_report
 from ...text import OutputFolder, folder_name, told_once
-from ..working import conclude
+from ..declare import choice, positional, real, switch, text
+from ..working import conclude, figure_kinds
+
+ARGUMENTS = (
+    positional(
+        "file",
+        "a RAO file: CSV, WAMIT .4, OrcaFlex .yml, Capytaine .nc, MSS .mat, ShipX .re1; or a "
+        "bundled vessel",
+    ),
+    choice(
+        "--read-as",
+        ("csv", "netcdf", "wamit", "orcaflex", "capytaine", "mss", "shipx"),
+        "what it is (default: its contents tell)",
+    ),
+    text("--out", "PATH", "a .csv or .nc file, or a folder (default: out/<name of the vessel>)"),
+    real("--speed", "V", "which forward speed [m/s]"),
+    text("--body", "BODY", "which body of several"),
+    real("--length", "L", "WAMIT's ULEN [m] (default: 1)"),
+    choice(
+        "--waves",
+        ("period", "frequency"),
+        "first column of a WAMIT file (default: the heave of long waves tells)",
+    ),
+    choice(
+        "--symmetry",
+        ("none", "xz plane", "yz plane", "xz and yz planes", "circular"),
+        "of the vessel, to fill in headings, if the file is silent",
+    ),
+    real("--depth", "D", "water depth [m]"),
+    text("--origin", "X,Y,Z", "the point whose motions they are, if the file is silent"),
+    text("--vessel-type", "NAME", "which of an OrcaFlex file"),
+    text("--draught", "NAME", "which of an OrcaFlex vessel type"),
+    real("--roll-damping", "SHARE", "to add, over the critical (Capytaine)"),
+    switch("--no-check", "take the file even if it contradicts the limits of long waves", "check"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -19,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     with told_once():
         raos = read_raos(
             arguments.file,
-            file_format=arguments.format,
+            file_format=arguments.read_as,
             speed=arguments.speed,
             body=_body(arguments.body),
             length=arguments.length,
@@ -34,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     target = Path(arguments.out or Path("out") / folder_name(raos.name))
     alone = target.suffix.lower() in {".csv", ".nc"}
-    folder = OutputFolder.prepare(target.parent if alone else target)
+    folder = OutputFolder.prepare(target.parent if alone else target, figure_kinds(arguments))
     table = target if alone else folder.path / "raos.csv"
     if table.exists() and Path(arguments.file).exists() and table.samefile(arguments.file):
         raise InputError(f"{table}: is the file itself; --out must name another")

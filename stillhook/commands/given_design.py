@@ -11,18 +11,6 @@ if TYPE_CHECKING:
     from synth.design import GainDesign, StructureDesign
 
 
-def add_design_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options ``--design`` and ``--gains``."""
-    parser.add_argument(
-        "--design", metavar="FILE", help="a design that was written (design.yaml, combined.yaml)"
-    )
-    parser.add_argument(
-        "--gains",
-        metavar="A=..,a=..,a1=..,a2=..",
-        help="or gains (default: those that the case has in use)",
-    )
-
-
 def given_design(case: Case, arguments: argparse.Namespace) -> GainDesign | StructureDesign:
     """Return the design of a file on the case given, or that of gains.
 

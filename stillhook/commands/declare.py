@@ -1,0 +1,138 @@
+"""Declarations of what a command takes, beside the function that does it.
+
+    ARGUMENTS = (CASE, OUT, whole("--starts", "starts of the search", 16))  --> `declared`
+
+Each command's module has such a tuple and a function ``run(arguments)``; `stillhook.cli` reads the
+tuple of the command that was asked for, and no other.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import Any
+
+Declaration = Callable[[argparse._ActionsContainer], None]
+"""Adds one argument, or a group of them, to a parser."""
+
+
+def _argument(*names: str, **settings: Any) -> Declaration:
+    def add(parser: argparse._ActionsContainer) -> None:
+        parser.add_argument(*names, **settings)
+
+    return add
+
+
+def positional(name: str, help: str, *, optional: bool = False) -> Declaration:
+    """Declare an argument without a dash."""
+    return _argument(name, metavar=name.upper(), help=help, nargs="?" if optional else None)
+
+
+def text(flag: str, metavar: str, help: str, default: str | None = None) -> Declaration:
+    """Declare an option with a text, as a name, a file or a quantity with its unit."""
+    return _argument(flag, metavar=metavar, help=help, default=default)
+
+
+def whole(flag: str, help: str, default: int | None = None) -> Declaration:
+    """Declare an option with a whole number; a default is told."""
+    told = help if default is None else f"{help} (default: {default})"
+    return _argument(flag, metavar="N", help=told, type=int, default=default)
+
+
+def real(flag: str, metavar: str, help: str, default: float | None = None) -> Declaration:
+    """Declare an option with a number; a default is told."""
+    told = help if default is None else f"{help} (default: {default:g})"
+    return _argument(flag, metavar=metavar, help=told, type=float, default=default)
+
+
+def choice(flag: str, of: tuple[str, ...], help: str, default: str | None = None) -> Declaration:
+    """Declare an option with one of some words."""
+    return _argument(flag, choices=of, help=help, default=default)
+
+
+def switch(flag: str, help: str, dest: str | None = None) -> Declaration:
+    """Declare an option without a value: ``--no-x`` makes `x` false, any other its name true."""
+    off = flag.startswith("--no-")
+    name = dest or flag.removeprefix("--no-" if off else "--").replace("-", "_")
+    return _argument(flag, action="store_false" if off else "store_true", help=help, dest=name)
+
+
+def repeated(flag: str, metavar: str, help: str, dest: str | None = None) -> Declaration:
+    """Declare an option that may come several times."""
+    name = dest or flag.removeprefix("--")
+    told = f"{help}; may be repeated"
+    return _argument(flag, metavar=metavar, help=told, action="append", default=[], dest=name)
+
+
+def group(title: str, *inside: Declaration) -> Declaration:
+    """Declare options under a title."""
+
+    def add(parser: argparse._ActionsContainer) -> None:
+        declared(parser.add_argument_group(title), inside)
+
+    return add
+
+
+def one_of(*inside: Declaration) -> Declaration:
+    """Declare options of which one may be given."""
+
+    def add(parser: argparse._ActionsContainer) -> None:
+        declared(parser.add_mutually_exclusive_group(), inside)
+
+    return add
+
+
+def declared(parser: argparse._ActionsContainer, arguments: tuple[Declaration, ...]) -> None:
+    """Add what is declared to a parser."""
+    for add in arguments:
+        add(parser)
+
+
+def case_argument(*, optional: bool = False) -> Declaration:
+    """Declare the case and changes of it."""
+    told = "a bundled case (see `stillhook cases`) or a case file (.yaml, .json, .toml)"
+
+    def add(parser: argparse._ActionsContainer) -> None:
+        positional("case", told, optional=optional)(parser)
+        repeated(
+            "--set",
+            "PATH=VALUE",
+            "change a field of the case, as in --set limits.max_sensitivity=2.5 "
+            "or --set 'sensors.telemetry.delay=50 ms'",
+            "changes",
+        )(parser)
+
+    return add
+
+
+CASE = case_argument()
+DESIGN = one_of(
+    text("--design", "FILE", "a design that was written (design.yaml, combined.yaml)"),
+    text("--gains", "A=..,a=..,a1=..,a2=..", "or gains (default: those that the case has in use)"),
+)
+NO_BOUND = switch(
+    "--no-bound",
+    "do not compare with the best that any linear controller could do (2 s a design)",
+)
+SEED = whole("--seed", "seed of the random numbers", 0)
+STRUCTURE = text(
+    "--structure",
+    "NAME",
+    "controller structure (default: payload-feedback)",
+    "payload-feedback",
+)
+
+
+def results_folder(default: str) -> Declaration:
+    """Declare the folder for the results."""
+    return text("--out", "DIR", f"folder for the results (default: {default})")
+
+
+#: What every command takes, wherever it stands.
+EVERYWHERE = group(
+    "output",
+    switch("--quiet", "print the verdict only"),
+    switch("--json", "print what came of it as JSON, and nothing else"),
+    switch("--no-figures", "draw no figures", "figures"),
+    choice("--format", ("svg", "png"), "format of the figures (default: both)"),
+)

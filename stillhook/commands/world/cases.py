@@ -1,0 +1,19 @@
+"""`stillhook cases`: the bundled cases."""
+
+from __future__ import annotations
+
+import argparse
+
+from ...text import Report, Section, pairs
+from ..declare import Declaration
+from ..working import conclude
+
+ARGUMENTS: tuple[Declaration, ...] = ()
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """List the cases; return 0."""
+    from models import bundled_cases
+
+    report = Report(name="bundled cases", sections=[Section("", [pairs(bundled_cases())])])
+    return conclude(report, arguments)

@@ -1,0 +1,45 @@
+"""`stillhook new`: a commented case file that runs as it is."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from pathlib import Path
+
+from ...text import Report
+from ..declare import positional, switch
+from ..working import conclude
+
+FORCE = switch("--force", "overwrite the file if it exists")
+ARGUMENTS = (positional("file", "the file to write"), FORCE)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the template; return 0."""
+    from models import template_text
+
+    path = written(arguments, template_text())
+    file = shlex.quote(str(path))
+    following = [
+        ("every error at once, with its line", f"stillhook check {file}"),
+        ("the gains", f"stillhook optimise {file}"),
+    ]
+    status = "a case that runs as it is; change what is different on your vessel"
+    return conclude(Report(name=str(path), status=status), arguments, following=lambda: following)
+
+
+def written(arguments: argparse.Namespace, text: str) -> Path:
+    """Write a text into the file that was named, and return its path.
+
+    Raises
+    ------
+    InputError
+        If it exists and is not to be overwritten.
+    """
+    from models import write_text_atomically
+    from models.basics import InputError
+
+    path = Path(arguments.file)
+    if path.exists() and not arguments.force:
+        raise InputError(f"{path}: exists already; --force overwrites it")
+    return write_text_atomically(path, text)

@@ -1,0 +1,30 @@
+"""`stillhook schema`: the JSON Schema of a case file, for editors."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+
+from ...text import Report
+from ..declare import positional
+from ..working import conclude
+from .new import FORCE, written
+
+ARGUMENTS = (
+    positional("file", "the file to write (default: standard output)", optional=True),
+    FORCE,
+)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the schema; return 0."""
+    from models import case_schema
+
+    text = json.dumps(case_schema(), indent=2, ensure_ascii=False) + "\n"
+    if arguments.file is None:
+        sys.stdout.write(text)  # not through rich, which would break its long lines
+        return 0
+    path = written(arguments, text)
+    status = f"begin a case file with `# yaml-language-server: $schema={path}`"
+    return conclude(Report(name=str(path), status=status), arguments)

@@ -1,0 +1,22 @@
+"""`stillhook vessel list`: the vessels that come with the toolkit."""
+
+from __future__ import annotations
+
+import argparse
+
+from ...text import Report, Section, pairs
+from ..declare import Declaration
+from ..working import conclude
+
+ARGUMENTS: tuple[Declaration, ...] = ()
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """List them; return 0."""
+    from models.vessel.readers import bundled_vessels
+
+    found = bundled_vessels()
+    rows = [("look at one", f"stillhook vessel import {name}") for name, _ in found[:1]]
+    rows.append(("a vessel from its main dimensions", "stillhook vessel hull --help"))
+    report = Report(name="bundled vessels", sections=[Section("", [pairs(found)])])
+    return conclude(report, arguments, following=lambda: rows)
