@@ -41,7 +41,7 @@ FORMATS: dict[str, str] = {
     "funwave": "FUNWAVE text",
     "xwaves": "XWaves MAT",
 }
-"""Formats by the names that `read_seas` and `stillhook sea --format` take."""
+"""Formats by the names that `read_seas` and `stillhook sea --read-as` take."""
 
 _READERS: dict[str, tuple[str, dict[str, Any]]] = {
     "spotter": ("spotter", {"dd": None}),  # its own directions are moments, not a second axis

@@ -92,7 +92,7 @@ WRITERS = (
     "simulate CASES/thesis-1975.yaml --set sea.significant_height=0.5 --duration '30 s' --quiet "
     "--out OUT",
     "simulate CASES/thesis-1975.yaml --controller none,feed-forward --duration '30 s' --quiet "
-    "--no-figures --format netcdf --out OUT",
+    "--no-figures --traces netcdf --out OUT",
     "compare CASES/thesis-1975.yaml --controllers none,feed-forward --seeds 1 --duration '30 s' "
     "--jobs 1 --quiet --out OUT",
     "sea CASES/subsea-crane.yaml --quiet --out OUT",

@@ -128,7 +128,7 @@ def test_the_summary_for_programs_keeps_question_and_answer(run):
 
 def test_the_same_question_gives_the_same_numbers_and_another_seed_others(run):
     for folder, seed in (("a", "3"), ("b", "3"), ("c", "4")):
-        run("simulate", *CALM, *SHORT, "--first-seed", seed, "--out", folder, "--format", "none")
+        run("simulate", *CALM, *SHORT, "--first-seed", seed, "--out", folder, "--traces", "none")
     a, b, c = (summary(f)["controllers"]["feedback"]["runs"][0]["quantities"] for f in "abc")
     assert a == b
     assert a["payload rms"] != c["payload rms"]
@@ -155,7 +155,7 @@ def test_quiet_prints_one_line(run):
 
 @pytest.mark.parametrize(("name", "suffix"), [("parquet", "parquet"), ("netcdf", "nc")])
 def test_traces_come_in_other_formats(name, suffix, run):
-    run("simulate", *CALM, *SHORT, "--format", name, "--store-step", "1 s", "--out", "here")
+    run("simulate", *CALM, *SHORT, "--traces", name, "--store-step", "1 s", "--out", "here")
     path = Path(f"here/runs/seed-000.{suffix}")
     data = xr.load_dataset(path, engine="scipy") if name == "netcdf" else pd.read_parquet(path)
     assert data["payload.displacement"].shape == (41,)
@@ -180,7 +180,7 @@ def test_gains_come_from_the_command_or_a_design(run):
         ("--design", "design.yaml"),
         ("--gains", "a=0,a1=0,a2=1"),
     ):
-        run("simulate", *CALM, *SHORT, "--format", "none", "--out", "here", *words)
+        run("simulate", *CALM, *SHORT, "--traces", "none", "--out", "here", *words)
         quantities = summary()["controllers"]["feedback"]["runs"][0]["quantities"]
         found.append(quantities["payload rms"])
     assert found[0] == found[1] == found[2]  # the case's own are those of 1975
@@ -421,7 +421,7 @@ def test_bad_input_ends_with_2_one_sentence_and_no_folder(name, run):
 
 @pytest.mark.parametrize(
     "words",
-    ["--hours 1 --duration '1 h'", "--gains a=1 --design x", "--sine 1,8 --hook x", "--format xls"],
+    ["--hours 1 --duration '1 h'", "--gains a=1 --design x", "--sine 1,8 --hook x", "--traces xls"],
 )
 def test_words_that_the_parser_refuses_end_with_2(words, run):
     ending = run("simulate", "thesis-1975", *shlex.split(words))
@@ -443,7 +443,7 @@ def small_disk(largest: int):
 @pytest.mark.parametrize("format", ["csv", "parquet", "netcdf"])
 def test_a_full_disk_is_one_sentence_and_leaves_no_half_of_a_file(format, run):
     with small_disk(200_000):
-        ending = run("simulate", *CALM, *SHORT, "--out", "here", "--format", format)
+        ending = run("simulate", *CALM, *SHORT, "--out", "here", "--traces", format)
     suffix = {"netcdf": "nc"}.get(format, format)
     assert (ending.status, ending.out) == (2, "")
     assert ending.err == f"here/runs/seed-000.{suffix}: cannot be written: File too large\n"
@@ -557,7 +557,7 @@ def test_commands_to_go_on_with_work(run):
     assert (parsed[1].seeds, parsed[2].animate) == (10, True)
     assert parsed[1].options == ["distance=1 m"]
     assert parsed[1].hours == 0.02
-    again = run(*found[1], "--quiet", "--no-figures", "--format", "none")
+    again = run(*found[1], "--quiet", "--no-figures", "--traces", "none")
     assert again.status == 0
     assert "10 runs of 72 s" in again.out
 
