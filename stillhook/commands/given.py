@@ -7,13 +7,14 @@ import math
 import shlex
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from models import Case, load_case
 from models.basics import InputError, PhysicsWarning
-from models.casefile import read_yaml
 
 from ..text import told_once
+
+if TYPE_CHECKING:
+    from models import Case
 
 _NAMES = ("A", "a", "a1", "a2")
 
@@ -29,6 +30,7 @@ def given_case(arguments: argparse.Namespace) -> Case:
     InputError
         If the case is wrong, or a change is.
     """
+    from models import load_case
     from models.hook import HookMotion
 
     with told_once():
@@ -54,6 +56,8 @@ def parse_changes(texts: Sequence[str]) -> dict[str, Any]:
     >>> parse_changes(["rope.length=800 m", "limits.roll_off=null", "vessel.below=zero"])
     {'rope.length': '800 m', 'limits.roll_off': None, 'vessel.below': 'zero'}
     """
+    from models.casefile import read_yaml
+
     changes: dict[str, Any] = {}
     for text in texts:
         path, sign, value = text.partition("=")
