@@ -105,11 +105,15 @@ def case_argument(*, optional: bool = False) -> Declaration:
     return add
 
 
+def design_argument(parser: argparse._ActionsContainer) -> None:
+    """Add the design, a file or gains; `commands.given_design` reads it."""
+    text("--design", "FILE", "a design that was written (design.yaml, combined.yaml)")(parser)
+    told = "or gains (default: those that the case has in use)"
+    text("--gains", "A=..,a=..,a1=..,a2=..", told)(parser)
+
+
 CASE = case_argument()
-DESIGN = one_of(
-    text("--design", "FILE", "a design that was written (design.yaml, combined.yaml)"),
-    text("--gains", "A=..,a=..,a1=..,a2=..", "or gains (default: those that the case has in use)"),
-)
+DESIGN: Declaration = design_argument
 NO_BOUND = switch(
     "--no-bound",
     "do not compare with the best that any linear controller could do (2 s a design)",

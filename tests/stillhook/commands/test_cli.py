@@ -265,7 +265,7 @@ def test_check_shows_what_follows_from_a_case(run):
         "594 mm",
         "2.38 m",
         "5.99 m",
-        "thesis-1975: no errors",
+        "no errors",
     ):
         assert text in ending.out
     assert max(map(len, ending.out.splitlines())) <= 80
