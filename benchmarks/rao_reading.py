@@ -37,7 +37,7 @@ LIMIT = 1.0  # s
 _FIRST = """
 import sys, time
 start = time.process_time()
-from models.vessel import read_raos
+from models.vessel.readers import read_raos
 read_raos(sys.argv[1])
 print(time.process_time() - start)
 """
