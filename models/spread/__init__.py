@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from .fields import ALIASES as ALIASES
     from .fields import DRAG as DRAG
     from .fields import GAINS as GAINS
+    from .fields import Field as Field
+    from .fields import field_of as field_of
     from .sampling import METHODS as METHODS
     from .spread import Spread as Spread
 else:

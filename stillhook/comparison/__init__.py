@@ -1,4 +1,8 @@
-"""The fair comparison of controllers in the same seas."""
+"""The fair comparison of controllers in the same seas.
+
+In come a case and contenders (names, designs, controllers of one's own); out goes a `Comparison`,
+kept run by run, with a report of who holds the load better and how sure that is.
+"""
 
 from typing import TYPE_CHECKING
 

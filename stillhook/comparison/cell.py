@@ -1,4 +1,4 @@
-"""One run of a comparison: a contender in a sea with a seed, and what there is to keep of it.
+"""One run of a comparison (`Cell`): a contender in a sea with a seed, as plain data.
 
     question, Contender, H_s, StoredDesign --> Prepared --> run(seed) --> Cell (plain data)
 

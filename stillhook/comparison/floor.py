@@ -1,4 +1,4 @@
-"""The floor of a comparison: what the clairvoyant leaves, in the same form as a controller's run.
+"""The clairvoyant floor of a comparison, in the form of a controller's run (`prepare`).
 
     question, Contender, H_s --> prepare --> Prepared (a controller) or Floor --> run(seed) --> Cell
 

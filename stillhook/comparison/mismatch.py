@@ -1,4 +1,4 @@
-"""A plant that is not what its controller thinks: changes of the case that only the plant sees.
+"""Mismatch of a plant (`Mismatch`): changes of the case that its controllers do not know of.
 
     "payload=+30%,E=-30%,delay=+50ms" --> Mismatch --> apply(case) --> the case that is simulated
 
@@ -17,6 +17,7 @@ from typing import Any
 from models.basics import GRAVITY, InputError, parse_quantity
 from models.case import Case
 from models.casefile import read_yaml
+from models.spread import Field, field_of
 
 SHORT: Mapping[str, str] = {
     "payload": "mass of the payload, by a share the water that moves with it too; not its weight",
@@ -148,56 +149,28 @@ def _value(name: str, path: str, value: object, case: Case) -> object:
     text = value.strip() if isinstance(value, str) else ""
     if not _SIGNED.match(text):
         return read_yaml(text, f"{_OWNER} {name}")[0] if text else value
-    now = _present(path, case)
+    field = _field(path, case)
     sign = -1.0 if text[0] == "-" else 1.0
     size = text[1:].strip()
     if size.endswith("%"):
-        return now * (1.0 + sign * 0.01 * _number(name, size[:-1], value))
+        return field.nominal * (1.0 + sign * 0.01 * _number(name, size[:-1], value))
     try:
-        return now + sign * float(parse_quantity(size, _kind_of(path, case)))
+        return field.nominal + sign * float(parse_quantity(size, field.kind))
     except InputError as error:
         raise InputError(f"{_OWNER} {name}: {error}") from None
 
 
-def _present(path: str, case: Case) -> float:
-    """Return the number that a path leads to."""
-    if path == "payload.added_mass":
-        return float(case.payload.hydrodynamic_mass)
-    found: Any = case
-    for part in path.split("."):
-        found = getattr(found, part, None)
-    if isinstance(found, bool) or not isinstance(found, int | float) or not math.isfinite(found):
+def _field(path: str, case: Case) -> Field:
+    """Return the number that a path leads to, with its kind."""
+    try:
+        found = field_of(case, path, {}, None)
+    except InputError:
+        found = None
+    if found is None or not math.isfinite(found.nominal):
         raise InputError(
             f"{_OWNER}: {path} is not a number in the case {case.name}, so it cannot be changed by "
             "a share or an amount"
         )
-    return float(found)
-
-
-def _kind_of(path: str, case: Case) -> str:
-    """Return the kind of quantity that a path holds, as `models.basics.units` names it."""
-    from models.casefile import Quantity
-
-    section: Any = case
-    *parents, last = path.split(".")
-    for part in parents:
-        section = getattr(section, part)
-    for item in _flat(type(section).model_fields[last]):
-        if isinstance(item, Quantity):
-            return item.kind
-    return "number"
-
-
-def _flat(field: Any) -> list[Any]:
-    """Return everything that is said about a field, however deep."""
-    from typing import get_args
-
-    found: list[Any] = list(field.metadata)
-    todo = [field.annotation]
-    while todo:
-        each = todo.pop()
-        found += list(getattr(each, "__metadata__", ()))
-        todo += list(get_args(each)) if not hasattr(each, "kind") else []
     return found
 
 

@@ -1,4 +1,4 @@
-"""The results of a comparison on disk, so that it can go on where it stopped.
+"""The journal of a comparison (`Store`), from which it goes on where it stopped.
 
 Cell, StoredDesign --> Store --> cells.jsonl --> Store --> what is there already
 """

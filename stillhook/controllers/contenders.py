@@ -1,4 +1,4 @@
-"""Contenders of a comparison: every controller by its name, what it is and what it knows.
+"""Contenders of a comparison by name: recipe, description and knowledge of each.
 
 names, designs, controllers, (name, function) --> contenders_of --> Contender ... --> compare
 """

@@ -1,4 +1,4 @@
-"""Controllers by name, linear and predictive, and of designs: what `simulate` takes.
+"""Controllers in time by name or of a design (`controller_of`), linear and predictive.
 
     name, case [, design, gains] --> synth.controllers or mpc --> controller
 

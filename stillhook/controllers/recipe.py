@@ -1,4 +1,4 @@
-"""Recipes for controllers in time: from a name, a design, an object or a function, in any process.
+"""Recipes for controllers in time (`Recipe`), for any process and any store.
 
     name, design, controller, (name, function) --> recipe_of --> Recipe --> controller(case)
 

@@ -1,4 +1,4 @@
-"""The designs of a comparison: one for each sea, fair to the linear laws, as plain data.
+"""Designs as plain data (`StoredDesign`), and those that are fair to linear laws.
 
     case at one H_s --> optimise_gains, optimise_structure --> StoredDesign --> store, processes
 

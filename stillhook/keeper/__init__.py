@@ -1,4 +1,8 @@
-"""What keeps results: the journal, the pool of processes, the digest of the code."""
+"""Keeping of results: journals, pools of workers, digests of code.
+
+In come a question and tasks; out go answers, whichever process gave them, files from which work
+goes on after it was stopped, and a digest of the code behind the numbers.
+"""
 
 from typing import TYPE_CHECKING
 

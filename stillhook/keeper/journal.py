@@ -1,4 +1,4 @@
-"""Journals: results in a file that only grows, a checked line each, so that work can go on.
+"""Journals: append-only files of results, a checked line each (`Journal`).
 
     question; key, values --> Journal.add --> lines on disk --> Journal --> take(key, values)
 

@@ -1,4 +1,4 @@
-"""Pools: places where tasks are done, and what to do when a worker dies of one.
+"""Pools of workers that do tasks, and what follows when one dies (`Pool`, `Alone`).
 
     tasks --> Pool.submit --> a worker's bench --> Pool.wait --> answers
 

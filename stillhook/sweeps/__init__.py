@@ -1,8 +1,7 @@
-"""Sweeps at the face: figures, engines, stores and `stillhook sweep`.
+"""Sweeps: a design or a controller on thousands of cases, kept on disk, and what came of them.
 
-What is varied stands in `models.spread`, the vectorised frequency-domain engine in
-`synth.sweeps`; here are what runs thousands of time-domain cases, keeps them on disk, and shows
-what came of it.
+What is varied stands in `models.spread`, the vectorised engine of the frequency domain in
+`synth.sweeps`; here are runs in time on any number of cores, and the report of both.
 """
 
 from typing import TYPE_CHECKING

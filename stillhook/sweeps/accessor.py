@@ -1,4 +1,4 @@
-"""`result.sweep`: what one asks of the result of a sweep, on the Dataset itself.
+"""The accessor `result.sweep`: summary, worst cases and tables of the Dataset of a sweep.
 
     result = sh.sweep(...);  result.sweep.summary(), .worst(5), .case(7), .to_csv("cases.csv")
 

@@ -1,4 +1,4 @@
-"""The result of a sweep as a file that other tools open: CSV, Parquet, NetCDF, Zarr.
+"""Files of the result of a sweep for other tools (`write_result`): CSV, Parquet, NetCDF, Zarr.
 
 xarray.Dataset --> write_result --> by the ending of the file's name
 """

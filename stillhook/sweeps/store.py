@@ -1,4 +1,4 @@
-"""The results of a sweep in memory and in its journal, so that a driver that was killed goes on.
+"""Results of a sweep in memory and in a journal (`Results`), and the question they answer.
 
     TimeQuestion, Spread, Draw --> header_of --> journal and attributes --> stored_question
     CaseResult --> Results.put --> journal.jsonl --> Results --> what is there already --> result.nc

@@ -1,4 +1,4 @@
-"""One case of a time-domain sweep: a changed plant, a controller, a seed, and the run's numbers.
+"""One case of a sweep in time: changed plant, controller, seed, and the numbers of its run.
 
     TimeQuestion --(to any process)--> bench() --> do(CaseTask) --> CaseResult (plain data)
 

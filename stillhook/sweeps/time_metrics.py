@@ -1,4 +1,4 @@
-"""What is kept of one run of a sweep: a status and some numbers, each with unit and long name.
+"""Status and metrics of one run of a sweep, with units and long names.
 
 Run --> status_of, numbers_of --> one row of the result
 """

@@ -1,4 +1,4 @@
-"""A time-domain sweep from its question to its result: what is drawn, run, kept and told.
+"""A sweep in time from its question to its result (`run_sweep`): draws, tasks, pool, journal.
 
     TimeQuestion, Spread, Draw --> tasks --> engine --> store (or memory) --> xarray.Dataset
 

@@ -1,4 +1,4 @@
-"""A controller whose load is weighed: its static part is that of the plant, all else as it knows.
+"""Controllers with a weighed load: the static part of the true plant, all else as designed.
 
     measurement - shift --> controller made for the nominal case --> command + shift
 

@@ -1,4 +1,4 @@
-"""Spreads that one would ask for first: what is never known exactly, and what fails.
+"""The usual spreads: plant data that are never known exactly, and faults.
 
     case, mode --> usual_spread --> Spread;  name --> fault_spread --> Spread
 
