@@ -32,5 +32,6 @@ if TYPE_CHECKING:
     from .structures import structures_report as structures_report
     from .structures import structures_table as structures_table
     from .summary import AT_LEAST as AT_LEAST
+    from .summary import LIMITS as LIMITS
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -6,6 +6,7 @@ GainDesign -> Tables -> `stillhook.designs.report`
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from models.rig import DCMotor
 from synth.design import GainDesign, LimitUse
@@ -26,21 +27,23 @@ from ..text import (
 from .bound_text import bound_sentence
 from .motion import MotionView
 
-_LABELS = {
-    "max_sensitivity": "sensitivity peak M_s",
-    "gain_margin_up": "gain margin, up",
-    "gain_margin_down": "gain margin, down",
-    "delay_margin": "delay margin",
-    "roll_off": "|L| beyond the rope modes",
-    "motor.torque.peak": "motor torque, peak",
-    "motor.torque.continuous": "motor torque, continuous",
-    "motor.speed.peak": "motor speed, peak",
-    "motor.voltage.peak": "motor voltage, peak",
-    "motor.current.peak": "motor current, peak",
-    "motor.current.continuous": "motor current, continuous",
-    "motor.power.peak": "motor power, peak",
-    "rope.tension.peak": "rope tension, largest",
-    "rope.tension.least": "rope tension, least",
+#: What people call each limit, and where it stands in the case file.
+LIMITS: Mapping[str, tuple[str, str]] = {
+    "max_sensitivity": ("sensitivity peak M_s", "limits.max_sensitivity"),
+    "gain_margin_up": ("gain margin, up", "limits.gain_margin_up"),
+    "gain_margin_down": ("gain margin, down", "limits.gain_margin_down"),
+    "delay_margin": ("delay margin", "limits.delay_margin"),
+    "low_frequency": ("low frequency", "limits.low_frequency.ratio"),
+    "roll_off": ("|L| beyond the rope modes", "limits.roll_off"),
+    "motor.torque.peak": ("motor torque, peak", "winch.drive.torque_peak"),
+    "motor.torque.continuous": ("motor torque, continuous", "winch.drive.torque_continuous"),
+    "motor.speed.peak": ("motor speed, peak", "winch.drive.speed"),
+    "motor.voltage.peak": ("motor voltage, peak", "winch.drive.voltage"),
+    "motor.current.peak": ("motor current, peak", "winch.drive.current_peak"),
+    "motor.current.continuous": ("motor current, continuous", "winch.drive.current_continuous"),
+    "motor.power.peak": ("motor power, peak", "winch.drive.power"),
+    "rope.tension.peak": ("rope tension, largest", "limits.rope_tension_peak"),
+    "rope.tension.least": ("rope tension, least", "limits.minimum_tension"),
 }
 AT_LEAST = ("gain_margin_up", "delay_margin", "rope.tension.least")
 """Limits whose bound is the least value."""
@@ -187,7 +190,7 @@ def label_of(design: GainDesign, name: str) -> str:
     slow = design.case.limits.low_frequency
     if name == "low_frequency" and slow is not None:
         return f"|P/Z| up to {slow.below:g} rad/s"
-    return _LABELS.get(name, name.replace(".", " ").replace("_", " "))
+    return LIMITS[name][0] if name in LIMITS else name.replace(".", " ").replace("_", " ")
 
 
 def facts(design: GainDesign, *, bound: bool = True) -> list[tuple[str, str]]:

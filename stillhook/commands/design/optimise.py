@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...designs import AT_LEAST
+from ...designs import AT_LEAST, LIMITS
 from ...text import OutputFolder, folder_name, number, progress
 from ..declare import CASE, NO_BOUND, results_folder, text, whole
 from ..given import case_words, gains_text, given_case
@@ -18,25 +18,6 @@ from .structures import optimise_one
 
 if TYPE_CHECKING:
     from synth.design import GainDesign
-
-# Where a limit stands in the case file, to suggest a change of it.
-_FIELDS = {
-    "max_sensitivity": "limits.max_sensitivity",
-    "gain_margin_up": "limits.gain_margin_up",
-    "gain_margin_down": "limits.gain_margin_down",
-    "delay_margin": "limits.delay_margin",
-    "low_frequency": "limits.low_frequency.ratio",
-    "roll_off": "limits.roll_off",
-    "motor.torque.peak": "winch.drive.torque_peak",
-    "motor.torque.continuous": "winch.drive.torque_continuous",
-    "motor.speed.peak": "winch.drive.speed",
-    "motor.voltage.peak": "winch.drive.voltage",
-    "motor.current.peak": "winch.drive.current_peak",
-    "motor.current.continuous": "winch.drive.current_continuous",
-    "motor.power.peak": "winch.drive.power",
-    "rope.tension.peak": "limits.rope_tension_peak",
-    "rope.tension.least": "limits.minimum_tension",
-}
 
 ARGUMENTS = (
     CASE,
@@ -115,7 +96,7 @@ def _next(
         )
     if design.required:
         sets = [
-            f"--set {_FIELDS[name]}={_rounded(value, math.ceil)}"
+            f"--set {LIMITS[name][1]}={_rounded(value, math.ceil)}"
             for name, value in design.required.items()
         ]
         rows.append(("a drive that can do it", f"stillhook optimise {case} {' '.join(sets)}"))
@@ -125,7 +106,7 @@ def _next(
         rows.append(
             (
                 "the dearest limit, a tenth looser",
-                f"stillhook optimise {case} --set {_FIELDS[dearest.name]}={number(bound)} "
+                f"stillhook optimise {case} --set {LIMITS[dearest.name][1]}={number(bound)} "
                 f"--out {shlex.quote(str(folder.path) + '-looser')}",
             )
         )
