@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from .arrays import BoolArray as BoolArray
     from .arrays import ComplexArray as ComplexArray
     from .arrays import FloatArray as FloatArray
+    from .arrays import IndexArray as IndexArray
     from .checks import InputError as InputError
     from .checks import PhysicsWarning as PhysicsWarning
     from .checks import SolverError as SolverError

@@ -1,4 +1,4 @@
-"""Arrays of numbers by their names: `FloatArray`, `ComplexArray`, `BoolArray`."""
+"""Arrays of numbers by their names: `FloatArray`, `ComplexArray`, `BoolArray`, `IndexArray`."""
 
 from __future__ import annotations
 
@@ -8,3 +8,4 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 BoolArray = npt.NDArray[np.bool_]
+IndexArray = npt.NDArray[np.intp]

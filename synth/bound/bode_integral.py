@@ -21,9 +21,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics import FloatArray, adaptive_nodes, check_range
+from models.basics import ComplexArray, FloatArray, adaptive_nodes, check_range
 
 from ..loop import Assessment
 
@@ -82,7 +81,7 @@ def least_sensitivity(max_sensitivity: float, available: float, band: float) -> 
 
 def bode_integral(
     log_sensitivity: Callable[[FloatArray], FloatArray],
-    poles: npt.NDArray[np.complex128],
+    poles: ComplexArray,
 ) -> float:
     """Return the integral of ln|S| over the half line [rad/s].
 

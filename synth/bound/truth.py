@@ -28,9 +28,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics import ComplexArray, FloatArray
+from models.basics import ComplexArray, FloatArray, IndexArray
 from models.plant import LinearPlant, PlantResponse, ShapingFilter
 
 from ..loop import Disturbance
@@ -178,7 +177,7 @@ class TrueProblem:
         blocks: PlantResponse,
         X: ComplexArray,
         spectra: FloatArray,
-        use: npt.NDArray[np.intp],
+        use: IndexArray,
         charge: FloatArray,
     ) -> ComplexArray:
         """Return G, (k, ny, nu)."""

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
 from models.basics import (
     ComplexArray,
     FloatArray,
+    IndexArray,
     InputError,
     Quadrature,
     adaptive_nodes,
@@ -86,9 +86,7 @@ class SeaColumn:
             return False
         return True
 
-    def heave(
-        self, omega: FloatArray, heights: FloatArray, index: npt.NDArray[np.intp]
-    ) -> FloatArray:
+    def heave(self, omega: FloatArray, heights: FloatArray, index: IndexArray) -> FloatArray:
         """Return the hook's density (r, n) at heights (r,) [m] in headings `index` (r,)."""
         if self.scalable:
             unit = self._unit(omega)

@@ -11,9 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics import FloatArray, InputError, check_range, parse_quantity
+from models.basics import BoolArray, FloatArray, InputError, check_range, parse_quantity
 from models.case import Case
 from models.plant import LinearPlant
 
@@ -106,7 +105,7 @@ class Criterion:
             raise InputError("operability: stability has no value")
         return self.shown * _measure(self.limit, moments)
 
-    def excess(self, moments: SeaMoments, stationary: npt.NDArray[np.bool_]) -> FloatArray:
+    def excess(self, moments: SeaMoments, stationary: BoolArray) -> FloatArray:
         """Return by how much the limit is broken, relative; at most 0 where it is kept (r,).
 
         Parameters

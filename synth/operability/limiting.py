@@ -13,17 +13,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import elementwise
 
-from models.basics import FloatArray, SolverError, read_only
+from models.basics import FloatArray, IndexArray, SolverError, read_only
 
 from .columns import SeaColumn
 from .criteria import Criterion, SeaMoments
 from .responses import DragResponses
 from .systems import System
-
-IntArray = npt.NDArray[np.intp]
 
 LOWEST, HIGHEST = 0.01, 30.0  # H_s that are looked at [m]
 _INSIDE = 1e-12  # how far inside the edge of stability, in the logarithm
@@ -56,7 +53,7 @@ class SeaStates:
         responses = system.responses(column.nodes(system))
         return cls(system=system, column=column, responses=responses)
 
-    def densities(self, heights: FloatArray, index: IntArray) -> list[FloatArray]:
+    def densities(self, heights: FloatArray, index: IndexArray) -> list[FloatArray]:
         """Return the disturbances' densities at heights (r,) [m] in headings `index` (r,)."""
         omega = self.responses.nodes.omega
         heave = self.column.heave(omega, heights, index)
@@ -116,7 +113,7 @@ class SeaStates:
         still = np.all(weighted == 0.0, axis=1)  # no motion, no drag
         return np.where(still, max(low, 0.0), np.where(good, C, np.nan))
 
-    def look(self, heights: FloatArray, index: IntArray) -> tuple[SeaMoments, FloatArray]:
+    def look(self, heights: FloatArray, index: IndexArray) -> tuple[SeaMoments, FloatArray]:
         """Return moments and drag coefficients at heights (r,) [m] in headings `index` (r,)."""
         densities = self.densities(heights, index)
         C = self.coefficients(densities)
@@ -201,8 +198,8 @@ def limiting_heights(
 def _refined(
     states: SeaStates,
     criteria: Sequence[Criterion],
-    which: IntArray,
-    heading: IntArray,
+    which: IndexArray,
+    heading: IndexArray,
     low: FloatArray,
     high: FloatArray,
 ) -> FloatArray:

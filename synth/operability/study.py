@@ -8,7 +8,7 @@ design or case, periods, headings -> columns of seas
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,6 +27,7 @@ from models.sea import Scatter, read_scatter
 
 from ..design import GainDesign
 from ..loop import Assessment
+from ..search import Progress
 from .capability import capability
 from .columns import SeaColumn, has_headings, has_period, sea_column
 from .contour import Contour, contour_of
@@ -37,8 +38,6 @@ from .pose import Design, OperabilityQuestion, pose_operability
 from .reoptimise import reoptimised_contour
 from .result import Operability
 from .workable import workable
-
-Progress = Callable[[str, int, int], None]
 
 EXAMPLE = "example"
 """The name by which the command line knows the diagram."""

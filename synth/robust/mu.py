@@ -11,7 +11,7 @@ what was known before: the margins of the loop and the radius of errors of the g
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -23,13 +23,12 @@ from models.basics import InputError, check_range, one_thread
 from ..design import GainDesign, StructureDesign
 from ..loop import LinearController, Margins, closed_loop_poles
 from ..question import pose
+from ..search import Progress
 from ..structures import ParametrisedController
 from ..verify import LawMatrices, winding_of_plant
 from .mu_plant import UncertainLoop, UncertainNumber, uncertain_loop, uncertain_numbers
 from .mu_search import critical_point, furthest, grid_of, proved_bound
 from .perturbation import GainRadius, gain_radius
-
-Progress = Callable[[str, int, int], None]
 
 _PAST = 1e-3  # relative step beyond the boundary, at which the true plant has to be unstable
 _INSIDE = 0.999  # of the proved factor, within which draws are made

@@ -27,7 +27,7 @@ import numpy.typing as npt
 import scipy.linalg
 from scipy.optimize import minimize
 
-from models.basics import ComplexArray, FloatArray, InputError, check_range
+from models.basics import ComplexArray, FloatArray, IndexArray, InputError, check_range
 
 _SHARPER = (10.0, 40.0, 160.0, 640.0)  # of the smoothed largest eigenvalue, in turn
 _STEPS = 150  # of each
@@ -173,7 +173,7 @@ class _Shape:
     """Scalings as a vector: the lower triangle of each L, its diagonal as logarithms, and G."""
 
     def __init__(self, blocks: Sequence[UncertaintyBlock]) -> None:
-        self._parts: list[tuple[slice, bool, tuple[npt.NDArray[np.intp], ...]]] = []
+        self._parts: list[tuple[slice, bool, tuple[IndexArray, ...]]] = []
         at = 0
         for block in blocks:
             inside = slice(at, at + block.size)
@@ -252,7 +252,7 @@ class _Shape:
 
 
 def _triangle(
-    x: FloatArray, at: int, n: int, off: int, low: tuple[npt.NDArray[np.intp], ...]
+    x: FloatArray, at: int, n: int, off: int, low: tuple[IndexArray, ...]
 ) -> tuple[ComplexArray, int]:
     """Return a lower triangle with a real diagonal from a vector, and where it ends."""
     found = np.zeros((n, n), dtype=np.complex128)

@@ -22,9 +22,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics import ComplexArray, FloatArray, Quadrature, peak_factor
+from models.basics import BoolArray, ComplexArray, FloatArray, IndexArray, Quadrature, peak_factor
 from models.case import Case
 from models.plant import LinearPlant, PlantData, build_plant, pade_bank, parameter_values
 
@@ -96,7 +95,7 @@ class PlantStack:
     def __len__(self) -> int:
         return len(self.A)
 
-    def part(self, index: slice | npt.NDArray[np.intp]) -> PlantStack:
+    def part(self, index: slice | IndexArray) -> PlantStack:
         """Return some of the plants."""
         return PlantStack(
             like=self.like,
@@ -287,7 +286,7 @@ class LoopStack:
         return np.asarray(self.poles.real.max(axis=1), dtype=np.float64)
 
     @property
-    def stable(self) -> npt.NDArray[np.bool_]:
+    def stable(self) -> BoolArray:
         """Whether each loop is stable, (m,)."""
         return np.asarray(self.growth < -1e-10 * np.abs(self.poles).max(axis=1))
 

@@ -10,7 +10,7 @@ design", IEEE TAC 60, 2015); it is returned with the gains, as it says what deci
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from models.case import Case
 from models.plant import masses_for_bandwidth
 
 from ..question import FamilyLoop, FamilyProblem, Objective
-from ..search import KEPT, FamilyFound, search, search_family
+from ..search import KEPT, FamilyFound, Progress, search, search_family
 from ..structures import Structure
 from .family import Family, Member
 from .family_plants import PAYLOAD_FEEDBACK, FamilyPlants
@@ -28,8 +28,6 @@ from .robust_result import RobustDesign as RobustDesign
 from .robust_result import ScenarioResult as ScenarioResult
 from .robust_result import answer_of
 from .worst_case import worst_members
-
-Progress = Callable[[str, int, int], None]
 
 _MOST_FIRST = 64  # members that a design begins with at most
 _ROUNDS = 8  # of looking for the worst member

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,13 +13,12 @@ from models.case import Case
 from ..design import LimitUse, limit_uses, tuning_of
 from ..loop import LinearController
 from ..question import FamilyProblem, Objective
-from ..search import KEPT, FamilyFound, Found
+from ..search import KEPT, FamilyFound, Found, Progress
 from .family import Family, Member
 from .family_plants import PAYLOAD_FEEDBACK, FamilyPlants
 from .perturbation import GainRadius, gain_radius
 from .worst_case import DrawCheck, draw_check
 
-Progress = Callable[[str, int, int], None]
 _BINDS = 1e-3  # multiplier of log(bound) from which a limit is said to bind
 _VERIFIED = 8  # scenarios, the hardest first, that are verified one by one
 

@@ -13,7 +13,7 @@ The length changes slowly against the loop: each length is a loop of its own.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -26,14 +26,13 @@ from models.case import Case
 
 from ..design import tuning_of
 from ..question import FamilyLoop, FamilyProblem, Objective
-from ..search import KEPT, FamilyFound, Found, assessment_of, search, search_family
+from ..search import KEPT, FamilyFound, Found, Progress, assessment_of, search, search_family
 from .family import Family, Member
 from .family_plants import FamilyPlants
 from .worst_case import exact_figures
 
 LENGTH = "rope.length"
 KEPT_BETWEEN = 1e-3  # relative excess over a limit that counts as kept between the nodes
-Progress = Callable[[str, int, int], None]
 _STARTS = 6
 _STANDS_OUT = 0.02  # of a log cost above both neighbours', from which it is searched again
 _ALONE = 4  # starts of a length's own best, besides its neighbour's

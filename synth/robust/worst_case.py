@@ -10,7 +10,7 @@ by one, for the members that are worst already.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,11 +21,10 @@ from models.basics import FloatArray, InputError, read_only, share
 from ..limits import Limit, MaxSensitivity
 from ..loop import Assessment
 from ..question import PAYLOAD, Objective
+from ..search import Progress
 from .family import Member
 from .family_plants import FamilyPlants
 from .plant_stack import PlantStack, StackView, consistent_stack
-
-Progress = Callable[[str, int, int], None]
 
 _SAMPLES = 256  # Sobol points of a search for the worst
 _TOP = 6  # of them that are zoomed in on

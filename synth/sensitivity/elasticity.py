@@ -19,7 +19,7 @@ moves with every number too.  With theta the number and all slopes logarithmic,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -29,14 +29,13 @@ from models.plant import PlantData
 from ..design import GainDesign, StructureDesign
 from ..loop import Assessment, Disturbance
 from ..question import PAYLOAD
+from ..search import Progress
 from .differences import StepError, derivative
 from .fields import Number, numbers_of
 from .fixed_design import FixedDesign, fixed_design
 from .gradient import Gradient, sensitivity_gradient, variance_gradient
 from .results import FIGURES, Elasticity, Sensitivity
 from .slopes import PlantSlopes, changed
-
-Progress = Callable[[str, int, int], None]
 
 _OUTPUTS = {"payload_rms": PAYLOAD, "torque_rms": "motor.torque", "speed_rms": "motor.speed"}
 _PEAK = "peak of |S| "

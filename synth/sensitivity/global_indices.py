@@ -22,8 +22,8 @@ from models.basics import FloatArray, InputError, check_range, read_only
 from models.spread import Spread
 
 from ..design import GainDesign, StructureDesign
+from ..search import Progress
 
-Progress = Callable[[str, int, int], None]
 Evaluate = Callable[[FloatArray], FloatArray]
 
 _FEWEST = 32  # base points without which an index means nothing

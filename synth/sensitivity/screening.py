@@ -20,9 +20,9 @@ from models.basics import FloatArray, check_range, read_only
 from models.spread import Spread
 
 from ..design import GainDesign, StructureDesign
+from ..search import Progress
 from .global_indices import evaluate_rows, on_ranges
 
-Progress = Callable[[str, int, int], None]
 Evaluate = Callable[[FloatArray], FloatArray]
 
 _LEVELS = 4

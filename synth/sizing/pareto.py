@@ -12,7 +12,7 @@ search at its ends found, and the best answer at each bound counts.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,11 +22,9 @@ from models.case import Case
 
 from ..limits import DelayMargin, Limit, MaxSensitivity, Rms
 from ..question import Problem, pose
-from ..search import KEPT, Found, Solution, polish, search
+from ..search import KEPT, Found, Progress, Solution, polish, search
 from .pareto_point import ParetoPoint, point_of
 from .pareto_walk import FrontWalk, exchanged, with_bound
-
-Progress = Callable[[str, int, int], None]
 
 #: What a front can be drawn against: name -> (limit's name, unit).
 AGAINST: Mapping[str, tuple[str, str]] = {

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,6 +26,7 @@ from ..search import (
     KEPT,
     Pace,
     Programme,
+    Progress,
     Solution,
     assessment_of,
     cost_nodes,
@@ -35,7 +36,6 @@ from ..search import (
 )
 from .pareto_point import ParetoPoint, point_of
 
-Progress = Callable[[str, int, int], None]
 Place = tuple[float, FloatArray]  # a step, and the programme's vector there
 
 _SAME = 1e-6  # log costs that differ by less are the same answer
@@ -79,6 +79,7 @@ class FrontWalk:
     def go(self, tell: Progress) -> None:
         """Walk both ways from every beginning, then look at what is out of order."""
         problem = self.problem
+        # The reference normalises the row that keeps slow poles off: a briskly stable point does.
         stable = [b for b in self.begins if problem.stable(b[1], b[2])]
         self.reference = min((b[1] for b in stable), key=problem.abscissa)
         self._assessments = [
@@ -130,6 +131,8 @@ class FrontWalk:
             solved = self._reached(before, here or (self.steps[i], x), self.steps[i], last)
             if solved is None:
                 return
+            # Where another walk has done as well this one would only follow it: it ends there, but
+            # for its own beginning, which it may share.
             known = self.best[i]
             if known is not None and solved.objective > known.objective - _SAME:
                 if n > 0 or known.objective < solved.objective - _SAME:
@@ -143,6 +146,7 @@ class FrontWalk:
         self, before: Place | None, here: Place, step: float, last: Solution | None
     ) -> Solution | None:
         """Return an answer at a step from where a walk stands, in smaller steps if it must be."""
+        # A basin may turn too sharply for one step: then three, then ten, each from the last.
         for parts in _PARTS:
             at, behind, solved = here, before, last
             for k in range(1, parts + 1):
@@ -190,6 +194,8 @@ class FrontWalk:
     ) -> Solution | None:
         """Return a stable answer on the nodes, by the quickest way that leads to one."""
         programme, stable = self.programme, self.problem.stable
+        # A few quadratic programmes, begun with the neighbour's multipliers, mostly do; IPOPT, from
+        # near and from far, is for where other limits come to bind.
         if last is not None:
             for start in (ahead, x):
                 near = programme.follow(start, last, tighten)

@@ -20,14 +20,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics import ComplexArray, FloatArray
+from models.basics import ComplexArray, FloatArray, IndexArray
 from models.plant import RopeLumps
 
 from .numbers import PlantNumbers
-
-Index = npt.NDArray[np.intp]
 
 BLOCK = 12_000  # numbers of an array at once: the half dozen in use stay in the cache
 
@@ -116,7 +113,7 @@ class ChainLoops:
         other._drag = drag
         return other
 
-    def responses(self, rows: Index, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    def responses(self, rows: IndexArray, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Return closed and open characteristic functions of some loops, (m, k) each.
 
         Parameters
@@ -154,7 +151,7 @@ class ChainLoops:
         return found
 
     def velocity_of_drag(
-        self, rows: Index, omega: FloatArray
+        self, rows: IndexArray, omega: FloatArray
     ) -> tuple[ComplexArray, ComplexArray, FloatArray]:
         """Return c0, c1 and |s W|^2: the payload's velocity is s W / (c0 + C c1), (m, k) each."""
         s = np.asarray(1j * omega, dtype=np.complex128)
@@ -165,7 +162,9 @@ class ChainLoops:
         driven = np.broadcast_to(_size(none.W) * omega**2, (rows.size, omega.size))
         return none.closed, slope, driven
 
-    def _numerator(self, name: str, rows: Index, s: ComplexArray, parts: _Parts) -> ComplexArray:
+    def _numerator(
+        self, name: str, rows: IndexArray, s: ComplexArray, parts: _Parts
+    ) -> ComplexArray:
         if name == "payload.displacement":
             return parts.W
         if name == "payload.velocity":
@@ -185,7 +184,7 @@ class ChainLoops:
         assert name == "motor.current", name
         return np.asarray(torque / _at(self._torque_constant, rows))
 
-    def _parts(self, rows: Index, s: ComplexArray) -> _Parts:
+    def _parts(self, rows: IndexArray, s: ComplexArray) -> _Parts:
         stretch = 1.0 + s * _at(self._tau, rows)
         square = s * s
         springs, masses = self._lumps.springs, self._lumps.masses
@@ -226,7 +225,7 @@ class ChainLoops:
         return _Parts(closed=closed, open=open_loop, W=W + 0.0 * x, f=f, G=G + 0.0 * x, e=e)
 
 
-def _at(column: FloatArray, rows: Index) -> FloatArray:
+def _at(column: FloatArray, rows: IndexArray) -> FloatArray:
     return column[rows][:, None] if column.size > 1 else column[:, None]
 
 

@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics import FloatArray
+from models.basics import FloatArray, IndexArray
 
-Index = npt.NDArray[np.intp]
-Velocity = Callable[[Index, FloatArray], FloatArray]
+Velocity = Callable[[IndexArray, FloatArray], FloatArray]
 
 _ROUNDS = 60
 _AGREE = 3e-13  # of the logarithm of C

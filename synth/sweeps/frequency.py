@@ -8,18 +8,26 @@ FrequencyEngine(design, spread).chunks(samples=..) -> dataset after dataset, for
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics import BoolArray, FloatArray, InputError, Quadrature, check_range, one_thread
+from models.basics import (
+    BoolArray,
+    ComplexArray,
+    FloatArray,
+    InputError,
+    Quadrature,
+    check_range,
+    one_thread,
+)
 from models.case import Case
 from models.operation import PREFIX as FAULTS
 from models.spread import Spread
 
 from ..design import GainDesign, StructureDesign
+from ..search import Progress
 from .dataset import dataset_of
 from .gain_rows import GainRows
 from .metrics import chosen_metrics
@@ -28,7 +36,6 @@ from .structure_rows import StructureRows
 if TYPE_CHECKING:
     import xarray as xr
 
-Progress = Callable[[str, int, int], None]
 Design = GainDesign | StructureDesign
 
 ACCURACY = 1e-5  # difference of two rules from which a variance gets finer nodes
@@ -128,7 +135,7 @@ class FrequencyEngine:
                 progress("cases", part.stop, len(table))
         return found
 
-    def loop_gain(self, rows: FloatArray, omega: FloatArray) -> npt.NDArray[np.complex128]:
+    def loop_gain(self, rows: FloatArray, omega: FloatArray) -> ComplexArray:
         """Return the loop gain L(i omega) of rows, (n, k), at frequencies above zero [rad/s]."""
         return self.rows.loop_gain(np.atleast_2d(rows), np.asarray(omega, dtype=np.float64))
 

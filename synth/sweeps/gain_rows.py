@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics import BoolArray, FloatArray, InputError, Quadrature
+from models.basics import BoolArray, ComplexArray, FloatArray, IndexArray, InputError, Quadrature
 from models.plant import lump_rope
 from models.spread import GAINS, Spread
 
@@ -31,7 +30,6 @@ from .sea_rows import SeaRows
 from .sweep_nodes import SweepNodes, sweep_nodes
 from .winding_count import calming_drag, count_unstable, light_poles, peak_sensitivity
 
-Index = npt.NDArray[np.intp]
 Loops = SpringLoops | ChainLoops
 
 _REFERENCE = 3.0  # frequency by which polynomials are scaled [rad/s]
@@ -54,7 +52,7 @@ class _Batch:
     def __len__(self) -> int:
         return len(self.rows)
 
-    def part(self, index: Index) -> _Batch:
+    def part(self, index: IndexArray) -> _Batch:
         gains = self.gains[index] if len(self.gains) > 1 else self.gains
         return _Batch(rows=self.rows[index], numbers=self.numbers.part(index), gains=gains)
 
@@ -128,7 +126,9 @@ class GainRows:
             key: np.full(len(rows), np.nan)
             for key in [*((o, 0) for o in self._outputs), *((o, 2) for o in self._second)]
         }
-        at: Index = np.arange(len(rows))
+        # All rows on common nodes first; those whose two rules disagree begin again on panels half
+        # as long, and so on: narrow resonances are few, and pay for themselves.
+        at: IndexArray = np.arange(len(rows))
         for level in range(_LEVELS):
             doubtful = []
             step = _AT_ONCE if level or self.sea.varies else max(len(rows), 1)
@@ -170,7 +170,7 @@ class GainRows:
             result[name] = np.where(stable, column, np.nan)
         return result
 
-    def loop_gain(self, rows: FloatArray, omega: FloatArray) -> npt.NDArray[np.complex128]:
+    def loop_gain(self, rows: FloatArray, omega: FloatArray) -> ComplexArray:
         """Return L(i omega) of rows, (n, k), at frequencies above zero [rad/s]."""
         numbers, _ = numbers_of(self.case, self.spread, rows)
         batch = _Batch(rows=rows, numbers=numbers, gains=self._gains(rows))
@@ -228,7 +228,7 @@ class GainRows:
 
     def _solved(
         self, batch: _Batch, level: int, nodes: SweepNodes | None = None
-    ) -> tuple[FloatArray, BoolArray, dict[tuple[str, int], FloatArray], Index]:
+    ) -> tuple[FloatArray, BoolArray, dict[tuple[str, int], FloatArray], IndexArray]:
         """Return drag, stability, moments by (output, order), and the rows to be refined."""
         nodes = nodes or self.level_nodes(level)
         drag = self._drag(batch, nodes)
@@ -280,7 +280,7 @@ class GainRows:
         factors = self.sea.factors(rows)[:, None]
         return {name: columns * factors for name, columns in found.items()}
 
-    def _peaks(self, batch: _Batch, drag: FloatArray, chosen: Index) -> FloatArray:
+    def _peaks(self, batch: _Batch, drag: FloatArray, chosen: IndexArray) -> FloatArray:
         loops = self._loops(batch, np.where(np.isfinite(drag), drag, 0.0))
         if isinstance(loops, SpringLoops):
             return spring_peaks(loops, chosen)
@@ -298,7 +298,7 @@ class GainRows:
         if self.spring:
             own = batch.part(at)
 
-            def spring(some: Index, C: FloatArray) -> FloatArray:
+            def spring(some: IndexArray, C: FloatArray) -> FloatArray:
                 loops = self._loops(own.part(some), C)
                 seen = self._variances(loops, [_VELOCITY], nodes, own.rows[some])
                 return np.where(_stable(loops), np.sqrt(seen[_VELOCITY][:, 0]), np.inf)
@@ -336,7 +336,7 @@ class GainRows:
         factors = self.sea.factors(batch.rows)[:, None]
         driven = driven * (density * factors * nodes.weights[0])
 
-        def velocity(some: Index, C: FloatArray) -> FloatArray:
+        def velocity(some: IndexArray, C: FloatArray) -> FloatArray:
             closed = c0[some] + C[:, None] * c1[some]
             size = closed.real**2 + closed.imag**2
             sigma = np.sqrt((driven[some] / size).sum(axis=1))

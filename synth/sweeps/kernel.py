@@ -24,16 +24,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics import BoolArray, ComplexArray, FloatArray
+from models.basics import BoolArray, ComplexArray, FloatArray, IndexArray
 
 from .numbers import PlantNumbers
 
 Columns = list[FloatArray]  # coefficients of s^0, s^1, .., each (n,), or (1,) if all have the same
 
 CHUNK = 500  # loops at once: two arrays of 500 x 200 numbers stay in the second-level cache
-Index = npt.NDArray[np.intp]
 _COMMON = 64
 _STEP = 1024  # loops at once
 _NEAR = np.array([-3.0, -1.5, -0.7, -0.3, 0.0, 0.3, 0.7, 1.5, 3.0])
@@ -156,6 +154,8 @@ class SpringLoops:
         second
             The second moments instead, of the outputs' rates.
         """
+        # Every variance is sum_m c_m int omega^2m S / |Den|^2, c_m of the output's |numerator|^2:
+        # so 1/|Den|^2 is made once, and multiplied once with all powers, weights and rules.
         x = (omega / self.reference) ** 2
         squares = {name: squared(self._scaled(self._numerators[name])) for name in outputs}
         highest = max(len(c) for c in squares.values()) + second
@@ -178,13 +178,11 @@ class SpringLoops:
             found[name] = columns * self.reference**2 if second else columns
         return found
 
-    def distance(self, rows: npt.NDArray[np.intp], omega: FloatArray) -> FloatArray:
+    def distance(self, rows: IndexArray, omega: FloatArray) -> FloatArray:
         """Return |1 + L|^2 of some loops, each at its own frequencies [rad/s], (m, k)."""
         return np.asarray(self._size(self.closed, rows, omega) / self._size(self.open, rows, omega))
 
-    def poles(
-        self, rows: npt.NDArray[np.intp], *, closed: bool = True
-    ) -> npt.NDArray[np.complex128]:
+    def poles(self, rows: IndexArray, *, closed: bool = True) -> ComplexArray:
         """Return poles of some loops, (m, order) [1/s], from their companion matrices."""
         coefficients = self.closed if closed else self.open
         c = self._table(coefficients)[rows]
@@ -228,7 +226,7 @@ class SpringLoops:
         np.add(real, imaginary, out=real)
         return np.reciprocal(real, out=real)
 
-    def _size(self, columns: Columns, rows: npt.NDArray[np.intp], omega: FloatArray) -> FloatArray:
+    def _size(self, columns: Columns, rows: IndexArray, omega: FloatArray) -> FloatArray:
         """Return |polynomial|^2, (m, k), by Horner's rule in -omega^2."""
         y = omega / self.reference
         x = -(y**2)
@@ -315,7 +313,7 @@ def _there(column: FloatArray) -> bool:
     return column.size > 1 or bool(column[0] != 0.0)
 
 
-def _at(column: FloatArray, rows: npt.NDArray[np.intp]) -> FloatArray:
+def _at(column: FloatArray, rows: IndexArray) -> FloatArray:
     return column[rows][:, None] if column.size > 1 else column[:, None]
 
 
@@ -323,7 +321,7 @@ def _chunks(count: int) -> list[slice]:
     return [slice(at, min(at + CHUNK, count)) for at in range(0, count, CHUNK)]
 
 
-def spring_peaks(loops: SpringLoops, rows: Index) -> FloatArray:
+def spring_peaks(loops: SpringLoops, rows: IndexArray) -> FloatArray:
     """Return M_s = max 1/|1 + L| of some loops, (m,)."""
     found = np.empty(rows.size)
     for at in range(0, rows.size, _STEP):
@@ -332,7 +330,7 @@ def spring_peaks(loops: SpringLoops, rows: Index) -> FloatArray:
     return found
 
 
-def _peaks(loops: SpringLoops, rows: Index) -> FloatArray:
+def _peaks(loops: SpringLoops, rows: IndexArray) -> FloatArray:
     poles = [loops.poles(rows, closed=closed) for closed in (True, False)]
     sizes = np.abs(np.concatenate(poles, axis=1))
     sizes = np.where(sizes > 1e-9 * sizes.max(axis=1, keepdims=True), sizes, np.nan)

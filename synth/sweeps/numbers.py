@@ -13,9 +13,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics import FloatArray, InputError
+from models.basics import FloatArray, IndexArray, InputError
 from models.case import Case
 from models.plant import PlantData
 from models.spread import DRAG, GAINS, Spread
@@ -90,7 +89,7 @@ class PlantNumbers:
     def __getitem__(self, name: str) -> FloatArray:
         return self.values[name]
 
-    def part(self, index: slice | npt.NDArray[np.intp]) -> PlantNumbers:
+    def part(self, index: slice | IndexArray) -> PlantNumbers:
         """Return some of the plants."""
 
         def some(column: FloatArray) -> FloatArray:

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from models.basics import (
     BoolArray,
+    ComplexArray,
     FloatArray,
     InputError,
     Quadrature,
@@ -84,7 +84,7 @@ class StructureRows:
                     found[metric.name][k] = self._measure(metric, assessment, row)
         return found
 
-    def loop_gain(self, rows: FloatArray, omega: FloatArray) -> npt.NDArray[np.complex128]:
+    def loop_gain(self, rows: FloatArray, omega: FloatArray) -> ComplexArray:
         """Return L(i omega) of rows, (n, k), at frequencies above zero [rad/s]."""
         return np.stack([self._assessment(row).loop_gain(omega) for row in rows])
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics import InputError, Share, check_range, share
+from models.basics import BoolArray, InputError, Share, check_range, share
 from models.spread import DRAG, GAINS, Samples, Spread, Uniform
 
 from ..design import GainDesign, StructureDesign
@@ -22,7 +22,7 @@ from ..robust import GainRadius, gain_radius
 from .frequency import FrequencyEngine
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
+    pass
 
 _OUTSIDE = 1.001  # times the radius, where the nearest unstable gains have to be unstable
 _FACES = 0.5  # share of the draws that are put on the faces of the box
@@ -163,7 +163,7 @@ def _stable_at(design: GainDesign | StructureDesign, radius: GainRadius, times: 
     spread = _held(design, {f"{GAINS}{name}": Uniform(v, v) for name, v in there.items()})
     engine = FrequencyEngine(design, spread, metrics=["payload_rms"])
     row = [float(d.ends[0]) for d in engine.spread.distributions.values()]
-    found: npt.NDArray[np.bool_] = engine.evaluate(np.array([row]))["stable"].astype(bool)
+    found: BoolArray = engine.evaluate(np.array([row]))["stable"].astype(bool)
     return bool(found[0])
 
 

@@ -25,14 +25,12 @@ from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics import ComplexArray, FloatArray
+from models.basics import BoolArray, ComplexArray, FloatArray, IndexArray
 
 from .chain import ChainLoops
 
-Index = npt.NDArray[np.intp]
-Follow = Callable[[Index, ComplexArray], ComplexArray]
+Follow = Callable[[IndexArray, ComplexArray], ComplexArray]
 
 _TURN, _GROWTH = 0.5, 1.0  # largest steps of phase [rad] and of the logarithm of the size
 _PER_DECADE, _PER_MODE = 24, 8
@@ -62,12 +60,12 @@ class Loops(Protocol):
         """Distance of the rope's modes [rad/s], (n,) or (1,)."""
         ...
 
-    def responses(self, rows: Index, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    def responses(self, rows: IndexArray, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Return closed and open characteristic functions, (m, k) each."""
         ...
 
 
-def count_unstable(loops: Loops, rows: Index | None = None) -> npt.NDArray[np.intp]:
+def count_unstable(loops: Loops, rows: IndexArray | None = None) -> IndexArray:
     """Return how many poles each loop has in the right half plane; -1 where one is on the axis.
 
     Parameters
@@ -85,7 +83,7 @@ def count_unstable(loops: Loops, rows: Index | None = None) -> npt.NDArray[np.in
     return found
 
 
-def peak_sensitivity(loops: Loops, rows: Index | None = None) -> FloatArray:
+def peak_sensitivity(loops: Loops, rows: IndexArray | None = None) -> FloatArray:
     """Return M_s = max 1/|1 + L| of each loop, stable or not, (m,)."""
     chosen = np.arange(len(loops)) if rows is None else rows
     found = np.empty(chosen.size)
@@ -119,15 +117,15 @@ def light_poles(loops: Loops, row: int) -> ComplexArray:
     return np.asarray(found, dtype=np.complex128)
 
 
-def frequencies(loops: Loops, rows: Index) -> FloatArray:
+def frequencies(loops: Loops, rows: IndexArray) -> FloatArray:
     """Return frequencies of each loop between which little happens, (m, k) [rad/s], ascending."""
     return _grid(loops, rows, _radius(loops, rows))[:, 1:]
 
 
-def _count(loops: Loops, rows: Index) -> npt.NDArray[np.intp]:
+def _count(loops: Loops, rows: IndexArray) -> IndexArray:
     radius = _radius(loops, rows)
 
-    def closed(at: Index, s: ComplexArray) -> ComplexArray:
+    def closed(at: IndexArray, s: ComplexArray) -> ComplexArray:
         return loops.responses(at, s)[0]
 
     # The first quadrant's contour: up the imaginary axis, and along the arc from the real one, on
@@ -142,7 +140,7 @@ def _count(loops: Loops, rows: Index) -> npt.NDArray[np.intp]:
     return count.astype(np.intp)
 
 
-def _radius(loops: Loops, rows: Index) -> FloatArray:
+def _radius(loops: Loops, rows: IndexArray) -> FloatArray:
     """Return a radius of each loop on which, and beyond, the loop gain is small, (m,) [1/s]."""
     angle = np.exp(1j * np.linspace(0.0, 0.5 * np.pi, 13))
     beyond = 1j * np.geomspace(1.0, 30.0, 25)[1:]
@@ -162,7 +160,7 @@ def _radius(loops: Loops, rows: Index) -> FloatArray:
     return radius
 
 
-def _grid(loops: Loops, rows: Index, radius: FloatArray) -> FloatArray:
+def _grid(loops: Loops, rows: IndexArray, radius: FloatArray) -> FloatArray:
     """Return frequencies from 0 to the radius, (m, k) [rad/s]: by decades, and by modes."""
     decades = np.log10(radius / _LOW)
     count = int(_PER_DECADE * decades.max()) + 2
@@ -179,7 +177,7 @@ def _imaginary(omega: FloatArray) -> ComplexArray:
 
 
 def _follow(
-    function: Follow, rows: Index, points: ComplexArray, *, around: bool = False
+    function: Follow, rows: IndexArray, points: ComplexArray, *, around: bool = False
 ) -> FloatArray:
     """Return by how much the phase of each loop's function changes along its points, (m,) [rad].
 
@@ -213,7 +211,7 @@ def _middle(a: ComplexArray, b: ComplexArray, around: bool) -> ComplexArray:
     return np.asarray(middle * (np.abs(a) / np.abs(middle)) if around else middle)
 
 
-def _steps(one: ComplexArray, other: ComplexArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+def _steps(one: ComplexArray, other: ComplexArray) -> tuple[FloatArray, BoolArray]:
     """Return the phase step between neighbours, and whether phase and size are followed."""
     with np.errstate(all="ignore"):
         ratio = other / one
@@ -224,7 +222,7 @@ def _steps(one: ComplexArray, other: ComplexArray) -> tuple[FloatArray, npt.NDAr
     return np.where(same, 0.0, turn), smooth | same
 
 
-def _peaks(loops: Loops, rows: Index) -> FloatArray:
+def _peaks(loops: Loops, rows: IndexArray) -> FloatArray:
     omega = _grid(loops, rows, _radius(loops, rows))[:, 1:]
     closed, free = loops.responses(rows, _imaginary(omega))
     m, k = omega.shape
@@ -256,7 +254,7 @@ def _peaks(loops: Loops, rows: Index) -> FloatArray:
 
 
 def _least(
-    loops: Loops, rows: Index, loop: Index, omega: FloatArray, size: FloatArray
+    loops: Loops, rows: IndexArray, loop: IndexArray, omega: FloatArray, size: FloatArray
 ) -> FloatArray:
     """Return 1/min|1 + L| from points (loop, omega, |1 + L|^2), the lowest minima refined."""
     size = np.where(np.isfinite(size), size, np.inf)
@@ -306,7 +304,7 @@ def calming_drag(loops: ChainLoops) -> FloatArray:
     bare, unit = loops.with_drag(np.zeros(1)), loops.scale
     more = loops.with_drag(np.array([unit]))
 
-    def parts(rows: Index, omega: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def parts(rows: IndexArray, omega: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return Im(c0 conj c1), zero where C is real, and that C."""
         s = np.asarray(1j * omega, dtype=np.complex128)
         c0 = bare.responses(rows, s)[0]
