@@ -12,6 +12,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from models.basics import StillhookError
 
@@ -169,6 +170,7 @@ def conclude(
     *,
     written: Sequence[Path] = (),
     following: Callable[[], Sequence[tuple[str, str]]] = tuple,
+    result: Callable[[], Any] | None = None,
 ) -> int:
     """Print a report, the files that were written, and what to do next; return the exit status.
 
@@ -183,9 +185,13 @@ def conclude(
         The files.
     following
         Returns commands to go on with, each with what it does.
+    result
+        Returns the result itself as plain data, for JSON alone.
     """
     if arguments.json:
         data = json_data(report) | {"written": [str(path) for path in written]}
+        if result is not None:
+            data["result"] = result()
         sys.stdout.write(json_text(data))
         return 1 if report.ok is False else 0
     out = console()

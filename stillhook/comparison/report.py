@@ -64,7 +64,9 @@ def comparison_report(found: Comparison) -> Report:
     )
 
 
-def write_comparison(folder: str | Path, found: Comparison, *, figures: bool = True) -> list[Path]:
+def write_comparison(
+    folder: str | Path | OutputFolder, found: Comparison, *, figures: bool = True
+) -> list[Path]:
     """Write a comparison into a folder, and return the files written.
 
     Parameters

@@ -10,6 +10,7 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .bound_text import bound_sentence as bound_sentence
+    from .design_file import design_data as design_data
     from .design_file import design_text as design_text
     from .design_file import load_design as load_design
     from .design_file import load_structure as load_structure

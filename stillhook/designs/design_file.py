@@ -65,6 +65,12 @@ def design_text(design: GainDesign) -> str:
     return heading + _content(_KEY, design)
 
 
+def design_data(design: GainDesign | StructureDesign) -> dict[str, Any]:
+    """Return a design as plain data, SI units: its fields by their names, but for the case."""
+    data: dict[str, Any] = _encoded(design)
+    return {name: value for name, value in data.items() if name != "case"}
+
+
 def load_design(path: str | Path) -> GainDesign:
     """Read a design from a file that `save_design` wrote.
 

@@ -160,7 +160,7 @@ class RunFolder:
                 figure = make()
             except InputError:
                 continue  # runs that were cut short have nothing to show
-            for kind in _KINDS:
+            for kind in self.folder.kinds:
                 self._put(place, f"{name}.{kind}", picture(figure, kind))
             drawn.append((place.path / name).relative_to(self.folder.path).as_posix())
         return drawn

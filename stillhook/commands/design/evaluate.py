@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     folder = None if arguments.out is None else prepared(arguments, arguments.out)
     from synth import evaluate_gains
 
-    from ...designs import design_report, write_report
+    from ...designs import design_data, design_report, write_report
 
     written = []
     with progress(shown=not arguments.quiet) as tell:
@@ -44,4 +44,10 @@ def run(arguments: argparse.Namespace) -> int:
     words = case_words(arguments, None if folder is None else str(folder.path / "case.yaml"))
     again = [("the best gains for this case", f"stillhook optimise {words}")]
     report = design_report(design, bound=arguments.bound and not arguments.quiet)
-    return conclude(report, arguments, written=written, following=lambda: again)
+    return conclude(
+        report,
+        arguments,
+        written=written,
+        following=lambda: again,
+        result=lambda: design_data(design),
+    )

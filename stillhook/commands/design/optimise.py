@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     folder.write("case.yaml", case.to_yaml())
     from synth import optimise_gains
 
-    from ...designs import design_report, write_report
+    from ...designs import design_data, design_report, write_report
 
     design: GainDesign | None = None
     try:
@@ -66,7 +66,11 @@ def run(arguments: argparse.Namespace) -> int:
         raise KeyboardInterrupt(_kept(folder, design)) from None
     report = design_report(design, bound=arguments.bound and not arguments.quiet)
     return conclude(
-        report, arguments, written=written, following=lambda: _next(design, arguments, folder)
+        report,
+        arguments,
+        written=written,
+        following=lambda: _next(design, arguments, folder),
+        result=lambda: design_data(design),
     )
 
 

@@ -8,7 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...designs import bound_sentence, structure_text, structures_report, structures_table
+from ...designs import (
+    bound_sentence,
+    design_data,
+    structure_text,
+    structures_report,
+    structures_table,
+)
 from ...text import (
     OutputFolder,
     Progress,
@@ -72,7 +78,13 @@ def run(arguments: argparse.Namespace) -> int:
     best = min(designs, key=lambda design: (not design.ok, design.payload_rms))
     again = f"stillhook optimise {case_words(arguments)} --structure {best.structure}"
     report = structures_report(designs, bound=arguments.bound)
-    conclude(report, arguments, written=written, following=lambda: [("the best one alone", again)])
+    conclude(
+        report,
+        arguments,
+        written=written,
+        following=lambda: [("the best one alone", again)],
+        result=lambda: [design_data(design) for design in designs],
+    )
     return 0 if ok else 1
 
 
@@ -97,7 +109,7 @@ def optimise_one(arguments: argparse.Namespace) -> int:
         sections.append(Section("Parameters", [pairs(rows)]))
     verdict = f"{design.structure}: {design.status}"
     report = replace(report, about=report.status, status=verdict, ok=design.ok, sections=sections)
-    return conclude(report, arguments, written=[written])
+    return conclude(report, arguments, written=[written], result=lambda: design_data(design))
 
 
 def _names(text: str) -> tuple[str, ...]:

@@ -45,7 +45,7 @@ from ..declare import (
     whole,
 )
 from ..given import case_words
-from ..working import Stop, stoppable
+from ..working import Stop, figure_kinds, stoppable
 from .simulate_given import Asked, again, asked_of
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ def run(arguments: argparse.Namespace) -> int:
     name = f"{folder_name(asked.case.name)}-{asked.scenario.name}"
     place = Path(arguments.out or Path("out") / name)
     made = [path for path in (place, *place.parents) if not path.exists()]
-    folder = OutputFolder.prepare(place)
+    folder = OutputFolder.prepare(place, figure_kinds(arguments))
     target = RunFolder(folder=folder, format=arguments.traces, several=len(asked.controllers) > 1)
     out = console()
     with stoppable() as stop:

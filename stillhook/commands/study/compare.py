@@ -14,10 +14,10 @@ from pathlib import Path
 from models.basics import InputError, check_range
 
 from ...comparison import Comparison, comparison_report, write_comparison
-from ...text import console, count, folder_name, pairs, show
+from ...text import OutputFolder, console, count, folder_name, pairs, show
 from ..declare import CASE, choice, switch, text, whole
 from ..given import case_words, given_case
-from ..working import conclude, counting, tidy
+from ..working import conclude, counting, figure_kinds, tidy
 
 _MANY = 10_000  # seeds: more than anybody wants on purpose
 
@@ -92,7 +92,9 @@ def run(arguments: argparse.Namespace) -> int:
         for line in found.refused.values():
             console().print(line, soft_wrap=True)
         return 1
-    written = write_comparison(place, found, figures=arguments.figures)
+    written = write_comparison(
+        OutputFolder.prepare(place, figure_kinds(arguments)), found, figures=arguments.figures
+    )
     report = comparison_report(found)
     if arguments.quiet:  # what the numbers say is the verdict
         brief = [part for part in report.sections if part.items and isinstance(part.items[0], str)]

@@ -47,7 +47,8 @@ def conclude_sweep(swept: Swept, arguments: argparse.Namespace) -> int:
     result, most = swept.result, arguments.worst
     written = write_sweep(swept.folder, result, swept.case, swept.spread, worst=most)
     if arguments.figures:
-        written += _figures(swept)
+        # Clouds of ten thousand points: as pixels, unless asked otherwise.
+        written += _figures(swept, arguments.format or "png")
     report = sweep_report(result, swept.case.name, worst=most)
     if arguments.quiet:
         show(replace(report, sections=report.sections[:1]), console())
@@ -58,7 +59,7 @@ def conclude_sweep(swept: Swept, arguments: argparse.Namespace) -> int:
     )
 
 
-def _figures(swept: Swept) -> list[Path]:
+def _figures(swept: Swept, kind: str) -> list[Path]:
     """Draw and write the figures; return their files."""
     from synth.design import GainDesign, StructureDesign
 
@@ -70,7 +71,7 @@ def _figures(swept: Swept) -> list[Path]:
         result = result.isel(case=result["status"].to_numpy() != STATUS["not run"])
     figures = sweep_figures(result, design)
     folder = OutputFolder(swept.folder)
-    return [folder.write(f"{n}.png", picture(f, "png")) for n, f in figures.items()]
+    return [folder.write(f"{n}.{kind}", picture(f, kind)) for n, f in figures.items()]
 
 
 def _next(swept: Swept, worst: list[int], arguments: argparse.Namespace) -> list[tuple[str, str]]:

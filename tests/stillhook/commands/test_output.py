@@ -107,3 +107,10 @@ def test_only_the_command_that_is_asked_for_is_imported():
     assert "stillhook.commands.world.cases" in run.stdout
     assert "optimise" not in run.stdout
     assert "sweep" not in run.stdout
+
+
+def test_json_of_a_design_holds_its_fields(capsys):
+    result = told(capsys, "evaluate", *CALM, "--gains", GAINS, "--no-bound")["result"]
+    assert result["gains"] == {"A": 1.0, "a": 16.0, "a1": 44.0, "a2": 6.4}
+    assert result["payload_rms"] > 0.0
+    assert "case" not in result
