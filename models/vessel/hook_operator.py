@@ -17,7 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..basics import ComplexArray, FloatArray, InputError
+from ..basics import ComplexArray, FloatArray, InputError, read_only
 from ..sea import Spreading
 from .crane import Point
 from .raos import VesselRaos
@@ -89,9 +89,9 @@ def sea_directions(heading: float, spreading: Spreading | None) -> tuple[FloatAr
         (n,) [rad], (n,).
     """
     if spreading is None:
-        return _frozen(np.array([heading % (2.0 * np.pi)])), _frozen(np.array([1.0]))
+        return read_only([heading % (2.0 * np.pi)]), read_only([1.0])
     headings, weights = spreading.nodes(heading)
-    return _frozen(headings), _frozen(weights)
+    return read_only(headings), read_only(weights)
 
 
 def heave_operators(raos: VesselRaos, point: Point, headings: FloatArray) -> ComplexArray:
@@ -252,8 +252,3 @@ def _kept(
     operators = heave_operators(raos, point, headings)
     operators.setflags(write=False)
     return operators, headings, weights
-
-
-def _frozen(array: FloatArray) -> FloatArray:
-    array.setflags(write=False)
-    return array

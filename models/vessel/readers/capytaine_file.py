@@ -208,11 +208,10 @@ def _six(
     M, C = np.eye(6), np.zeros((6, 6))
     A, B = np.zeros((omega.size, 6, 6)), np.zeros((omega.size, 6, 6))
     F = np.zeros((omega.size, heading.size, 6), dtype=np.complex128)
-    M[np.ix_(there, there)] = mass[np.ix_(picked, picked)]
-    C[np.ix_(there, there)] = spring[np.ix_(picked, picked)]
-    for k in range(omega.size):
-        A[k][np.ix_(there, there)] = added[k][np.ix_(picked, picked)]
-        B[k][np.ix_(there, there)] = damping[k][np.ix_(picked, picked)]
+    at, own = np.ix_(there, there), np.ix_(picked, picked)
+    M[at], C[at] = mass[own], spring[own]
+    A[:, at[0], at[1]] = added[:, own[0], own[1]]
+    B[:, at[0], at[1]] = damping[:, own[0], own[1]]
     if force is not None:
         F[:, :, there] = force[:, :, picked]
     order = np.argsort(heading)
@@ -225,10 +224,7 @@ def _six(
         point=point,
     )
     centre = centre_of_mass(M, point)
-    found = FloatingBody(
-        hydrodynamics=water, mass=M, stiffness=C, centre=centre, roll_damping=share
-    )
-    return found
+    return FloatingBody(hydrodynamics=water, mass=M, stiffness=C, centre=centre, roll_damping=share)
 
 
 def _missed(body: FloatingBody) -> list[str]:

@@ -35,6 +35,9 @@ from ..symmetry import SYMMETRIES
 
 FORMAT = "Stillhook RAOs, version 1"
 
+Columns = dict[str, tuple[int, str]]  # number and unit of the column of each "mode part"
+Header = tuple[str, str, Columns]  # kind of the first column, unit of the headings, the rest
+
 _ABOUT = ("name", "origin", "phase_origin", "depth", "speed", "symmetry", "source", "note")
 _KEY = re.compile(r"^#\s*([A-Za-z_ ]+?)\s*:\s*(.*?)\s*$")
 _COLUMN = re.compile(r"^([a-z_ ]+?)\s*(?:[\[(]\s*(.*?)\s*[\])])?$")
@@ -70,11 +73,8 @@ def parse_csv(owner: str, text: str) -> VesselRaos:
         word is no number, or rows are missing.
     """
     told, notes, body, start = _head(owner, text)
-    columns, rows = _rows(owner, body, start)
-    known = {*CHOICES, "heading_zero"}
-    choices = {key: value for key, value in told.items() if key in known}
-    first = columns.pop("first")
-    convention = _convention(owner, choices, str(first), columns)
+    (first, turn, columns), rows = _rows(owner, body, start)
+    convention = _convention(owner, told, first, columns)
     depth = _figure(owner, "depth", told, math.inf)
     low, high = float(rows[:, 0].min()), float(rows[:, 0].max())
     if not (low > 1e-6 and high < 1e6):
@@ -82,8 +82,7 @@ def parse_csv(owner: str, text: str) -> VesselRaos:
             f"{owner}: {first} must be in (1e-6, 1e6), got {low:g} to {high:g} in the first column"
         )
     omega = convention.omega(rows[:, 0])
-    in_radians = columns.pop("heading") == "radians"
-    heading = np.degrees(rows[:, 1]) if in_radians else rows[:, 1]
+    heading = np.degrees(rows[:, 1]) if turn == "radians" else rows[:, 1]
     if np.any(np.abs(heading) > 720.0):
         raise InputError(f"{owner}: heading must be in [-720, 720] deg, got {heading.max():g} deg")
     slope = wave_number(omega, depth)
@@ -167,7 +166,7 @@ def _head(owner: str, text: str) -> tuple[dict[str, str], list[str], list[str], 
     return told, notes, body, start
 
 
-def _rows(owner: str, lines: list[str], start: int) -> tuple[dict[str, object], FloatArray]:
+def _rows(owner: str, lines: list[str], start: int) -> tuple[Header, FloatArray]:
     """Return what the columns are, and the numbers below them."""
     if not lines:
         raise InputError(f"{owner}: there is no line of column names in this file")
@@ -176,7 +175,7 @@ def _rows(owner: str, lines: list[str], start: int) -> tuple[dict[str, object], 
         table = list(csv.reader(lines, delimiter=mark))
     except csv.Error as error:
         raise InputError(f"{owner}: cannot be read as CSV: {error}") from error
-    columns = _columns(owner, [cell.strip() for cell in table[0]])
+    header = _header(owner, [cell.strip() for cell in table[0]])
     width = len(table[0])
     found = []
     for number, row in enumerate(table[1:], start=start + 1):
@@ -190,12 +189,13 @@ def _rows(owner: str, lines: list[str], start: int) -> tuple[dict[str, object], 
         found.append(numbers(owner, number, [cell.strip() for cell in row]))
     if not found:
         raise InputError(f"{owner}: there is no row of RAOs below the column names")
-    return columns, np.array(found, dtype=np.float64)
+    return header, np.array(found, dtype=np.float64)
 
 
-def _columns(owner: str, names: list[str]) -> dict[str, object]:
-    """Return what the first two columns are, and (column, unit) of each `mode part`."""
-    columns: dict[str, object] = {}
+def _header(owner: str, names: list[str]) -> Header:
+    """Return what the first column is, the unit of the second, and where each `mode part` is."""
+    first = turn = ""
+    columns: Columns = {}
     for index, name in enumerate(names):
         match = _COLUMN.match(name.lower())
         word, unit = (match[1], (match[2] or "").lower()) if match else ("", "")
@@ -205,13 +205,13 @@ def _columns(owner: str, names: list[str]) -> dict[str, object]:
                     f"{owner}: the first column must be omega [rad/s], frequency [Hz] or period "
                     f"[s], got {name!r}"
                 )
-            columns["first"] = _FIRST_UNITS[unit] if unit else _FIRST[word]
+            first = _FIRST_UNITS[unit] if unit else _FIRST[word]
         elif index == 1:
             if word != "heading" or (unit and unit not in _TURN_UNITS):
                 raise InputError(
                     f"{owner}: the second column must be heading [deg] or [rad], got {name!r}"
                 )
-            columns["heading"] = _TURN_UNITS[unit] if unit else "degrees"
+            turn = _TURN_UNITS[unit] if unit else "degrees"
         else:
             mode, _, part = word.rpartition("_")
             key = f"{mode} {_NAMES[_PARTS[part]]}" if mode in MODES and part in _PARTS else ""
@@ -221,22 +221,19 @@ def _columns(owner: str, names: list[str]) -> dict[str, object]:
                     f"_phase, _real or _imag, each once; got {name!r}"
                 )
             columns[key] = (index, unit)
-    if "heading" not in columns:
+    if not turn:
         raise InputError(f"{owner}: there must be a second column, heading [deg]")
-    return columns
+    return first, turn, columns
 
 
-def _convention(
-    owner: str, told: Mapping[str, str], first: str, columns: Mapping[str, object]
-) -> Convention:
+def _convention(owner: str, told: Mapping[str, str], first: str, columns: Columns) -> Convention:
     """Return the convention of the remarks, and of the units in the column names."""
-    choices = dict(told)
+    choices = {key: value for key, value in told.items() if key in CHOICES}
     choices["waves"] = first
-    for key, entry in columns.items():
-        if not isinstance(entry, tuple) or not entry[1]:
+    for key, (_, unit) in columns.items():
+        if not unit:
             continue
         mode, part = key.split()
-        unit = entry[1]
         if part == "phase" and unit in _TURN_UNITS:
             field, value = "phase_unit", _TURN_UNITS[unit]
         elif mode in MODES[3:] and part != "phase" and unit in _ANGLES:
@@ -249,15 +246,14 @@ def _convention(
             raise InputError(
                 f"{owner}: {field} is told twice: {choices[field]}, and {value} at {mode}_{part}"
             )
-    zero = choices.pop("heading_zero", "0")
-    fields = {key: value for key, value in choices.items() if key in CHOICES}
-    return Convention(**fields, heading_zero=_one(owner, "heading_zero", zero))
+    zero = _one(owner, "heading_zero", told.get("heading_zero", "0"))
+    return Convention(**choices, heading_zero=zero)
 
 
 def _values(
     owner: str,
     rows: FloatArray,
-    columns: Mapping[str, object],
+    columns: Columns,
     convention: Convention,
     slope: FloatArray,
 ) -> tuple[ComplexArray, list[str]]:
@@ -266,12 +262,9 @@ def _values(
     turn = 1.0 if convention.phase_unit == "radians" else math.pi / 180.0
     missing = []
 
-    def column(key: str) -> FloatArray | None:
-        entry = columns.get(key)
-        return rows[:, entry[0]] if isinstance(entry, tuple) else None
-
     for i, mode in enumerate(MODES):
-        amplitude, phase, real, imag = (column(f"{mode} {part}") for part in _NAMES)
+        places = [columns.get(f"{mode} {part}") for part in _NAMES]
+        amplitude, phase, real, imag = (None if at is None else rows[:, at[0]] for at in places)
         if real is not None and imag is not None and amplitude is None and phase is None:
             table[:, i] = real + 1j * imag
         elif amplitude is not None and phase is not None and real is None and imag is None:
