@@ -73,26 +73,6 @@ def gaussian_gain(sigma: float, current: float = 0.0) -> float:
     return 2.0 * (sigma * bell + current * float(erf(ratio / math.sqrt(2.0))))
 
 
-def gaussian_mean(sigma: float, current: float) -> float:
-    """Return E[|v + U|(v + U)], v Gaussian: the mean force over q [m2/s2].
-
-    (U^2 + sigma^2) erf(U / (sqrt(2) sigma)) + U sigma sqrt(2/pi) exp(-U^2 / 2 sigma^2).
-
-    Raises
-    ------
-    InputError
-        If `sigma` is negative or a number is not finite.
-    """
-    check_range(_OWNER, "sigma", sigma, low=0.0, unit="m/s")
-    check_range(_OWNER, "current", current, unit="m/s")
-    if sigma == 0.0:
-        return abs(current) * current
-    ratio = current / sigma
-    bell = math.sqrt(2.0 / math.pi) * math.exp(-0.5 * ratio * ratio)
-    both = (current**2 + sigma**2) * float(erf(ratio / math.sqrt(2.0)))
-    return both + current * sigma * bell
-
-
 def stochastic_equivalent(quadratic: float, sigma: float, current: float = 0.0) -> float:
     """Return the C of stochastic linearisation, q times `gaussian_gain` [N s/m].
 
