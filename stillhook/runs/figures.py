@@ -1,13 +1,12 @@
-"""The figures of runs: traces and strip of one run, and what the seeds say together.
+"""The figures of runs over seeds: what is left of the motion, and how often a level is reached.
 
-Each function returns a matplotlib `Figure`; nothing is shown, saved or kept.  `figures_of` names
-those that some runs have.
+Each function returns a matplotlib `Figure`; nothing is shown, saved or kept.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,10 +29,7 @@ from ..text import (
     quantity,
     scale,
 )
-from .runs import Runs
-from .strip import strip
-from .table import main_quantity
-from .trace_figure import traces
+from .runs import MAIN, Runs, main_quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,22 +39,8 @@ if TYPE_CHECKING:
 _COLOURS = {"none": BEFORE, "feedback": AFTER, "constant-tension": "#cc79a7"}
 _OTHERS = (DRUM, "#56b4e9", "#e69f00", HOOK)
 _MARKS = (60.0, 300.0, 1200.0, 3600.0, 10800.0, 36000.0, 86400.0)  # on the axis of time [s]
-_WHAT = {
-    "payload rms": "payload",
-    "tracking error rms": "payload's error",
-    "error before touch-down rms": "error before touchdown",
-}
 _DOTS, _LAST = 200, 30  # crests shown: evenly over the axis, and those of the rarest
 _SCATTER = 0.16  # of the width of a bar, over which the seeds' dots are spread
-
-
-def figures_of(runs: Runs) -> dict[str, Callable[[], Figure]]:
-    """Return the figures of one controller's runs by the names of their files."""
-    found: dict[str, Callable[[], Figure]] = {}
-    if runs.worst.time.size > 1:
-        found["traces"] = lambda: traces(runs.worst)
-        found["strip"] = lambda: strip(runs.worst, runs.scenario)
-    return found
 
 
 @drawn
@@ -124,7 +106,7 @@ def comparison(compared: Sequence[Runs]) -> Figure:
     )
     axes.set_xlim(-0.6, len(compared) - 0.4)
     axes.grid(visible=False, axis="x")
-    axes.set_ylabel(f"{_WHAT[name]}, rms [{unit}]")
+    axes.set_ylabel(f"{MAIN[name]}, rms [{unit}]")
     return headline(figure, _comparison_finding(compared, values), _about(compared))
 
 

@@ -1,4 +1,4 @@
-"""A folder with everything that runs have to say: numbers, words, figures, time traces.
+"""The report of runs, and a folder with all of it: numbers, words, figures, time traces.
 
     Runs, or several to compare --> summary.json, summary.md, events.csv, figures, runs/seed-000.csv
 
@@ -9,23 +9,40 @@ is written whole or not at all.
 
 from __future__ import annotations
 
-import csv
-import io
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from models.basics import InputError
 from models.case import Case
-from models.run import Run, write_csv, write_netcdf, write_parquet
+from models.run import ERROR, FEWEST_MAXIMA, Run, write_csv, write_netcdf, write_parquet
 
-from ..text import OutputFolder, folder_name
-from .json import summary_of, summary_text
-from .runs import Runs
-from .table import TableRow, rows_of
-from .words import headline_of
+from ..text import (
+    Drawing,
+    Item,
+    OutputFolder,
+    Report,
+    Section,
+    Table,
+    count,
+    csv_text,
+    data_table,
+    duration,
+    folder_name,
+    json_text,
+    markdown,
+    number,
+    quantity,
+)
+from .data import runs_data
+from .figures import comparison, exceedance
+from .runs import Runs, headline_of, speed_of
+from .strip import strip
+from .table import tables_of
+from .trace_figure import traces
 
 TraceFormat = Literal["csv", "parquet", "netcdf", "none"]
 FORMATS: Mapping[str, tuple[str, Callable[[Run, Path], Path]]] = {
@@ -35,15 +52,43 @@ FORMATS: Mapping[str, tuple[str, Callable[[Run, Path], Path]]] = {
 }
 """Suffix and writer of each format of time traces; "none" writes none."""
 
-_KINDS = ("svg", "png")
 _FIGURES = ("traces", "strip", "comparison", "exceedance")
-_CAPTIONS = {
-    "comparison": "What is left of the motion with each controller",
-    "exceedance": "How often the payload reaches a level",
-    "traces": "Time traces: the whole run, and a close-up",
-    "strip": "Hook, drum, rope and payload at some moments",
-}
 _MOVIE = "animation.gif"
+_READ = "`summary.json` holds all of this for programs, `case.yaml` the case."
+_EVENTS = 8  # told of a run
+_RUNS = 4  # whose events are told
+
+
+def runs_report(compared: Sequence[Runs]) -> Report:
+    """Return what came of runs of one controller, or of several on the same case and scenario."""
+    first, several = compared[0], len(compared) > 1
+    name, about = f"{first.case.name}, {first.scenario.name}", first.scenario.description
+    heads = [headline_of(runs) for runs in compared]
+    if not several:
+        name, _, about = headline_of(first).partition(": ")
+        heads = [first.scenario.description]
+    tables: list[Item] = [*tables_of(compared)]
+    closing = [] if several else [*_missing_extremes(first), *_speed(first)]
+    drawings = []
+    if several:
+        caption = "What is left of the motion with each controller"
+        drawings.append(Drawing("comparison", caption, lambda: comparison(compared)))
+    if first.stays:
+        caption = "How often the payload reaches a level"
+        drawings.append(Drawing("exceedance", caption, lambda: exceedance(compared)))
+    for runs in compared:
+        drawings += _drawings(runs, several=several)
+    return Report(
+        name=name,
+        about=about,
+        ok=all(runs.completed for runs in compared),
+        sections=[
+            Section("", heads),
+            Section("", tables),
+            Section("", [*closing, *drawings]),
+            *_events(compared),
+        ],
+    )
 
 
 @dataclass(kw_only=True)
@@ -124,46 +169,29 @@ class RunFolder:
         InputError
             If a file cannot be written.
         """
-        tell = progress or _silent
-        content = summary_of(compared, question)
+        tell = progress or (lambda what, share: None)
+        report = runs_report(compared)
         own = compared[0].case if case is None else case
-        self._put(self.folder, "case.yaml", own.to_yaml())
-        self._put(self.folder, "summary.json", summary_text(content))
-        self._put(self.folder, "events.csv", _events_text(compared))
-        drawn = self._draw(compared, tell) if figures else []
+        self._put("case.yaml", own.to_yaml())
+        self._put("summary.json", json_text(runs_data(compared, question)))
+        self._put("events.csv", csv_text(_event_table(compared)))
+        drawn: list[Path] = []
+        if figures:
+            for runs in compared:
+                OutputFolder.prepare(self.place_of(runs.controller).path)
+            drawn = self.folder.draw(
+                report.drawings, progress=lambda what, done, of: tell("drawing", done / of)
+            )
+            self.written += drawn
         if animate:
             self._animate(compared, tell)
-        self._put(self.folder, "summary.md", _markdown(compared, drawn))
+        names = [p.relative_to(self.folder.path).with_suffix("").as_posix() for p in drawn]
+        text = markdown(_with_each(report, compared), names)
+        self._put("summary.md", f"{text}\n{_READ}\n")
         self._clean(compared)
 
-    def _put(self, place: OutputFolder, name: str, content: str | bytes) -> None:
-        self.written.append(place.write(name, content))
-
-    def _draw(self, compared: Sequence[Runs], tell: Callable[[str, float], None]) -> list[str]:
-        """Write the figures; return their paths from the folder, without suffix."""
-        from ..text import picture
-        from .figures import comparison, exceedance, figures_of
-
-        wanted: list[tuple[OutputFolder, str, Callable[[], Any]]] = []
-        if len(compared) > 1:
-            wanted.append((self.folder, "comparison", lambda: comparison(compared)))
-        if compared[0].stays:
-            wanted.append((self.folder, "exceedance", lambda: exceedance(compared)))
-        for runs in compared:
-            if figures_of(runs):
-                place = OutputFolder.prepare(self.place_of(runs.controller).path)
-                wanted += [(place, name, make) for name, make in figures_of(runs).items()]
-        drawn = []
-        for done, (place, name, make) in enumerate(wanted):
-            tell("drawing", done / len(wanted))
-            try:
-                figure = make()
-            except InputError:
-                continue  # runs that were cut short have nothing to show
-            for kind in self.folder.kinds:
-                self._put(place, f"{name}.{kind}", picture(figure, kind))
-            drawn.append((place.path / name).relative_to(self.folder.path).as_posix())
-        return drawn
+    def _put(self, name: str, content: str | bytes) -> None:
+        self.written.append(self.folder.write(name, content))
 
     def _animate(self, compared: Sequence[Runs], tell: Callable[[str, float], None]) -> None:
         from .animation import animation
@@ -174,7 +202,7 @@ class RunFolder:
             place = OutputFolder.prepare(self.place_of(runs.controller).path)
             what = f"animating {runs.controller}"
             film = animation(runs.worst, runs.scenario, progress=partial(tell, what))
-            self._put(place, _MOVIE, film)
+            self.written.append(place.write(_MOVIE, film))
 
     def _clean(self, compared: Sequence[Runs]) -> None:
         """Remove what an earlier simulation has left here and this one does not have."""
@@ -182,7 +210,7 @@ class RunFolder:
         places = {self.folder.path, *(self.place_of(runs.controller).path for runs in compared)}
         suffixes = [suffix for suffix, _ in FORMATS.values()]
         for place in places:
-            old = [place / f"{name}.{kind}" for name in _FIGURES for kind in _KINDS]
+            old = [place / f"{name}.{kind}" for name in _FIGURES for kind in ("svg", "png")]
             old += [place / _MOVIE]
             old += [path for s in suffixes for path in (place / "runs").glob(f"seed-[0-9]*.{s}")]
             for path in old:
@@ -249,62 +277,98 @@ def write_runs(
     return target.written
 
 
-def _events_text(compared: Sequence[Runs]) -> str:
-    """Return the events of all runs as CSV."""
-    target = io.StringIO()
-    table = csv.writer(target, lineterminator="\n")
-    table.writerow(("controller", "seed", "time [s]", "kind", "event"))
-    for runs in compared:
-        for run in runs:
-            for event in run.events:
-                table.writerow((run.controller, run.seed, repr(event.time), event.kind, event.text))
-    return target.getvalue()
-
-
-def _markdown(compared: Sequence[Runs], drawn: Sequence[str]) -> str:
-    """Return the summary as Markdown; its figures are those of the same folder."""
-    first = compared[0]
-    parts = [f"# {first.case.name}, {first.scenario.name}", f"{_sentence(first)}"]
-    parts += [f"{headline_of(runs)}." for runs in compared]
-    if len(compared) > 1:
-        rows = rows_of(compared)
-        headings = ("", *(runs.controller for runs in compared))
-        cells = [(_label(row), *(row.cell(i) for i in range(len(compared)))) for row in rows]
-        parts.append(_table(headings, cells))
-    parts += [
-        _picture(name) for name in drawn if "/" not in name and name not in ("traces", "strip")
+def _drawings(runs: Runs, *, several: bool) -> list[Drawing]:
+    """Return the figures of one controller; of several each has a folder of its own."""
+    if runs.worst.time.size < 2:
+        return []
+    own = f"{folder_name(runs.controller)}/" if several else ""
+    whole = "Time traces: the whole run, and a close-up"
+    moments = "Hook, drum, rope and payload at some moments"
+    return [
+        Drawing(f"{own}traces", whole, lambda: traces(runs.worst)),
+        Drawing(f"{own}strip", moments, lambda: strip(runs.worst, runs.scenario)),
     ]
-    for runs in compared:
-        parts.append(f"## {runs.controller}")
-        cells = [(r.group, r.label, r.full(0), r.interval(0), r.note) for r in rows_of([runs])]
-        parts.append(_table(("", "", "mean", "95 % interval", ""), cells))
-        own = folder_name(runs.controller) + "/" if len(compared) > 1 else ""
-        own_names = [f"{own}traces", f"{own}strip"]
-        parts += [_picture(name) for name in drawn if name in own_names]
-    parts.append("`summary.json` holds all of this for programs, `case.yaml` the case.")
-    return "\n\n".join(parts) + "\n"
 
 
-def _sentence(runs: Runs) -> str:
-    """Return what the scenario is, as a sentence."""
-    text = runs.scenario.description
-    return f"{text[:1].upper()}{text[1:]}."
+def _with_each(report: Report, compared: Sequence[Runs]) -> Report:
+    """Return the report of several controllers with the tables of each of them alone."""
+    if len(compared) < 2:
+        return report
+    own = [Section(runs.controller, [*tables_of([runs])]) for runs in compared]
+    return replace(report, sections=[*report.sections, *own])
 
 
-def _label(row: TableRow) -> str:
-    return f"{row.label} [{row.shown_unit}]" if row.shown_unit else row.label
-
-
-def _picture(name: str) -> str:
-    return f"![{_CAPTIONS[name.rpartition('/')[2]]}]({name}.svg)"
-
-
-def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [headings, ["---"] * len(headings), *rows]
-    return "\n".join(
-        "| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines
+def _event_table(compared: Sequence[Runs]) -> Table:
+    """Return the events of all runs as data."""
+    names = ("controller", "seed", "time [s]", "kind", "event")
+    return data_table(
+        names,
+        [
+            (runs.controller, run.seed, event.time, event.kind, event.text)
+            for runs in compared
+            for run in runs
+            for event in run.events
+        ],
     )
 
 
-def _silent(what: str, share: float) -> None:
-    """Tell nobody."""
+def _events(compared: Sequence[Runs]) -> list[Section]:
+    """Return what happened: first what all runs have in common, then run by run."""
+    told = {(runs.controller, run.seed): _told(run) for runs in compared for run in runs}
+    common = [line for line in next(iter(told.values())) if all(line in t for t in told.values())]
+    common = common if len(told) > 1 else []
+    sections = [Section("in every run", _first(common))] if common else []
+    for runs in compared:
+        own = {
+            run.seed: [line for line in told[runs.controller, run.seed] if line not in common]
+            for run in sorted(runs, key=lambda run: run.completed)
+        }
+        eventful = [(seed, lines) for seed, lines in own.items() if lines]
+        for seed, lines in eventful[:_RUNS]:
+            sections.append(Section(f"{runs.controller}, seed {seed}", _first(lines)))
+        if len(eventful) > _RUNS:
+            rest = count(len(eventful) - _RUNS, "more run")
+            text = f"and {rest} of {runs.controller} with events, see events.csv"
+            sections.append(Section("", [text]))
+    return sections
+
+
+def _first(lines: Sequence[str]) -> list[str]:
+    rest = len(lines) - _EVENTS
+    more = [f"and {count(rest, 'more event')}, see events.csv"] if rest > 0 else []
+    return [*lines[:_EVENTS], *more]
+
+
+def _told(run: Run) -> list[str]:
+    """Return a run's events, its end and its fallbacks as lines."""
+    lines = [f"at {event}" for event in run.events]
+    for kind, times in run.timings.fallbacks.items():
+        lines.append(f"the controller's command was not used {count(times, 'time')}: {kind}")
+    if run.status not in ("completed", "diverged") and run.message:
+        lines.append(run.message)
+    return lines
+
+
+def _missing_extremes(runs: Runs) -> list[str]:
+    """Return why there is no most probable maximum, if there should be one."""
+    known = runs.extremes["payload up"].values() if runs.extremes else ()
+    if not runs.extremes or any(not math.isnan(estimate.value) for estimate in known):
+        return []
+    blocks = sum(run.statistics.blocks[ERROR].maxima.size for run in runs.judged)
+    length = duration(runs[0].statistics.block)
+    need = f"they take {FEWEST_MAXIMA} blocks of {length}, these runs have {blocks}"
+    return [f"no extremes of the payload: {need}"]
+
+
+def _speed(runs: Runs) -> list[str]:
+    """Return how fast the runs were, and how fast a controller in Python."""
+    first, timings = runs[0], runs[0].timings
+    steps = f"step {quantity(first.step, 's')}, sample {quantity(first.sample_time, 's')}"
+    lines = [f"{speed_of(runs)}; {steps}"]
+    if not math.isnan(timings.controller_median):
+        each = (timings.controller_median, timings.controller_p99, timings.controller_max)
+        median, rare, most = (
+            f"{number(1e6 * s)} us" if s < 1e-3 else quantity(s, "s") for s in each
+        )
+        lines.append(f"a step of the controller takes {median}, {rare} in 1 of 100, at most {most}")
+    return lines

@@ -3,17 +3,17 @@
     Series.run(seed) ... --> Runs --> summary, extremes, worst --> table, figures, folder
 
 The runs differ in their seed alone: case, controller and scenario are the same.
-`stillhook.runs.simulation` makes them, `stillhook.runs.table` and `stillhook.runs.words` say what
-came of them, `stillhook.runs.report` writes them into a folder.
+`stillhook.runs.simulation` makes them, `stillhook.runs.table` and `stillhook.runs.report` say what
+came of them.
 """
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Literal, overload
 
 import numpy as np
@@ -22,6 +22,8 @@ from models.basics import InputError
 from models.case import Case
 from models.operation import Scenario
 from models.run import ERROR, ExtremeEstimate, Run, Summary, extreme_over_seeds
+
+from ..text import count, duration, number, scale
 
 EXTREMES: Mapping[str, tuple[str, bool]] = {
     "payload up": (ERROR, False),
@@ -32,6 +34,13 @@ EXTREMES: Mapping[str, tuple[str, bool]] = {
 
 TRIPS = ("overspeed", "stroke", "rope-out", "rope-in")
 """Kinds of events in which the brake ends the controller's work (`models.simulation.trips`)."""
+
+MAIN: Mapping[str, str] = {
+    "payload rms": "payload",
+    "error before touch-down rms": "error before touchdown",
+    "tracking error rms": "payload's error",
+}
+"""What tells controllers apart, by name: of a payload that stays, that lands, that is moved."""
 
 _METHODS: tuple[Literal["gumbel", "pareto"], ...] = ("gumbel", "pareto")
 _EVENTS_SHOWN = 4
@@ -142,48 +151,82 @@ class Runs(Sequence[Run]):
         shown = [run for run in self.runs if run.time.size] or list(self.runs)
         return max(shown, key=_badness)
 
-    def save(
-        self,
-        folder: str | Path,
-        *,
-        format: Literal["csv", "parquet", "netcdf", "none"] = "csv",
-        figures: bool = True,
-    ) -> list[Path]:
-        """Write everything there is to say about the runs into a folder.
-
-        Parameters
-        ----------
-        folder
-            The folder; it is made if need be.
-        format
-            Of the files with the time traces.
-        figures
-            Whether to draw figures.
-
-        Returns
-        -------
-        list of Path
-            The files written, see `stillhook.runs.report.write_runs`.
-
-        Raises
-        ------
-        InputError
-            If the folder cannot be made or a file cannot be written.
-        """
-        from .report import write_runs
-
-        return write_runs(folder, [self], format=format, figures=figures)
-
     def __str__(self) -> str:
         """Return the runs as a small tree."""
-        from .words import headline_of, tree
-
         lines = [headline_of(self), *tree(self)]
         for run in self.runs:
             told = [f"seed {run.seed}: at {event}" for event in run.events[:_EVENTS_SHOWN]]
             lines += told if len(self) == 1 or run.status != "completed" else []
         marks = ["", *["├ "] * (len(lines) - 2), "└ "]
         return "\n".join(mark + line for mark, line in zip(marks, lines, strict=True))
+
+
+def headline_of(runs: Runs) -> str:
+    """Return what was simulated, and how it ended."""
+    what = f"{runs.case.name}, {runs.controller}, {runs.scenario.name}"
+    lasting = duration(runs[0].duration)
+    return f"{what}: {count(len(runs), 'run')} of {lasting}, {_outcome(runs)}"
+
+
+def main_quantity(compared: Sequence[Runs]) -> str:
+    """Return the name of the quantity that tells controllers apart, a standard deviation [m]."""
+    stays, lands, moves = MAIN
+    if compared[0].stays:
+        return stays
+    landed = any(lands in runs.summary.means and runs.summary[lands].count for runs in compared)
+    return lands if landed else moves
+
+
+def tree(runs: Runs) -> list[str]:
+    """Return the lines that stand under the headline."""
+
+    def told(name: str) -> str:
+        found = runs.summary.means.get(name)
+        if found is None or not found.count or math.isnan(found.mean):
+            return ""
+        factor, unit = scale(found.unit, found.mean)
+        text = f"{number(found.mean / factor)} {unit}".strip()
+        if math.isnan(found.low) or math.isnan(found.high):
+            return text
+        return f"{text} ({number(found.low / factor)} to {number(found.high / factor)})"
+
+    main = main_quantity([runs])
+    lines = []
+    if told(main):
+        residual = f", residual {told('residual')} of the hook's motion" if told("residual") else ""
+        lines.append(f"{MAIN[main]} {told(main)} rms{residual}")
+    for name, label in (("lost lock", "lock lost"), ("slack", "slack rope")):
+        share = runs.summary.shares.get(name)
+        if share is not None and share.count:
+            lines.append(f"{label} in {share.count} of {count(share.total, 'run')}")
+    if runs.tripped:
+        lines.append(f"ended by the brake: {runs.tripped} of {count(len(runs.judged), 'run')}")
+    for name, label in (("touch-down speed", "touchdown speed"), ("snap load", "snap load")):
+        if told(name):
+            lines.append(f"{label} {told(name)}")
+    if told("motor torque rms"):
+        largest = told("motor torque largest")
+        lines.append(f"motor torque {told('motor torque rms')} rms, {largest} at most")
+    fallbacks = sum(sum(run.timings.fallbacks.values()) for run in runs)
+    if fallbacks:
+        lines.append(f"{count(fallbacks, 'command')} of the controller could not be used")
+    return [*lines, speed_of(runs)]
+
+
+def speed_of(runs: Runs) -> str:
+    """Return how fast the runs were."""
+    wall = sum(run.timings.wall_seconds for run in runs)
+    simulated = sum(run.statistics.end for run in runs if math.isfinite(run.statistics.end))
+    how = "compiled" if runs[0].compiled else "not compiled"
+    return f"{how}, {number(simulated / max(wall, 1e-9), 2)} times real time"
+
+
+def _outcome(runs: Runs) -> str:
+    """Return how many runs completed, diverged or were interrupted."""
+    if runs.completed:
+        return "all completed" if len(runs) > 1 else "completed"
+    found = Counter(run.status for run in runs)
+    return ", ".join(f"{n} {status}" for status, n in found.items())
 
 
 def stays(scenario: Scenario) -> bool:

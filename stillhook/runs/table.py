@@ -1,9 +1,8 @@
-"""What there is to say about runs, in figures: one table for terminal and report.
+"""Tables of runs: one quantity a row, a mean and its 95 % interval for each controller.
 
-    Runs, or several to compare --> rows --> `stillhook.runs.terminal`, `stillhook.runs.report`
+    Runs, or several to compare --> rows --> Tables, one for each group of quantities
 
-A row is one quantity, with a mean and its 95 % interval for each controller; all cells of a row
-are in the same unit, so that they can be compared.  Nothing here decides how it looks.
+All cells of a row are in the same unit, so that they can be compared.
 """
 
 from __future__ import annotations
@@ -11,41 +10,42 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from models.basics import Interval, Share, share
 from models.case import Case
-from models.run import ExtremeEstimate
 
-from ..text import duration, number, quantity, scale
-from .runs import Runs
+from ..text import Column, Table, Written, duration, number, quantity, scale
+from .runs import Runs, main_quantity
 
 _KWH = 3.6e6  # [J]
 _UNITS = {"rad/s": "rpm"}  # motors are rated in rpm
+_LONG = 11  # characters of a heading that is not broken
 
 # Quantities of `models.run.summary` by group: name, label, key of the note beside it.
-_Wanted = tuple[str, str, str]
-_STAYS: tuple[_Wanted, ...] = (
+_Listed = tuple[str, str, str]
+_STAYS: tuple[_Listed, ...] = (
     ("payload rms", "payload, rms", ""),
     ("payload significant", "significant height", ""),
     ("tracking error largest", "largest displacement", "from its place"),
 )
-_MOVES: tuple[_Wanted, ...] = (
+_MOVES: tuple[_Listed, ...] = (
     ("tracking error rms", "payload's error, rms", "from what is asked"),
     ("tracking error largest", "largest error", ""),
 )
-_RESIDUAL: tuple[_Wanted, ...] = (
+_RESIDUAL: tuple[_Listed, ...] = (
     ("residual", "residual", "of the hook's motion"),
     ("attenuation", "attenuation", ""),
 )
-_LANDS: tuple[_Wanted, ...] = (
+_LANDS: tuple[_Listed, ...] = (
     ("error before touch-down rms", "error before touchdown", "rms, from what is asked"),
     ("error before touch-down largest", "largest before touchdown", ""),
     ("touch-down speed", "touchdown speed", "the first"),
     ("hardest touch-down", "hardest touchdown", ""),
     ("touch-downs", "touchdowns", ""),
 )
-_HOOK: tuple[_Wanted, ...] = (("hook rms", "hook, rms", ""),)
-_DRIVE: tuple[_Wanted, ...] = (
+_HOOK: tuple[_Listed, ...] = (("hook rms", "hook, rms", ""),)
+_DRIVE: tuple[_Listed, ...] = (
     ("motor speed largest", "motor speed, largest", "speed"),
     ("motor torque rms", "motor torque, rms", "rating"),
     ("motor torque thermal equivalent", "motor torque, thermal", "rating"),
@@ -57,7 +57,7 @@ _DRIVE: tuple[_Wanted, ...] = (
     ("energy per hour, net", "energy, net", "in an hour"),
     ("motor temperature rise largest", "motor's temperature rise", ""),
 )
-_ROPE: tuple[_Wanted, ...] = (
+_ROPE: tuple[_Listed, ...] = (
     ("rope tension largest", "rope tension, largest", "tension"),
     ("rope tension smallest", "rope tension, least", "least"),
     ("slack share", "rope slack", "of the time"),
@@ -73,22 +73,19 @@ _EXTREMES = {
 _METHODS = {"gumbel": "Gumbel", "pareto": "peaks"}  # over a threshold
 
 
-@dataclass(frozen=True, kw_only=True)
-class Figure:
+class Estimate(NamedTuple):
     """A figure with the ends of its 95 % interval, in the row's unit; NaN where there is none."""
 
     mean: float = math.nan
     low: float = math.nan
     high: float = math.nan
 
-    @property
-    def known(self) -> bool:
-        """Whether there is a figure at all."""
-        return not math.isnan(self.mean)
+
+_NONE = Estimate()
 
 
-@dataclass(frozen=True, kw_only=True)
-class TableRow:
+@dataclass(frozen=True)
+class QuantityRow:
     """One quantity, for each of the runs that are compared.
 
     Attributes
@@ -111,7 +108,7 @@ class TableRow:
     name: str
     label: str
     unit: str
-    figures: tuple[Figure, ...]
+    figures: tuple[Estimate, ...]
     note: str = ""
 
     @property
@@ -121,19 +118,15 @@ class TableRow:
 
     def cell(self, at: int) -> str:
         """Return a mean as text, without its unit; nothing if there is none."""
-        figure = self.figures[at]
-        return number(figure.mean / self._scale[0]) if figure.known else ""
+        mean = self.figures[at].mean
+        return "" if math.isnan(mean) else number(mean / self._scale[0])
 
     def interval(self, at: int) -> str:
         """Return an interval as text, nothing if there is none."""
-        figure, factor = self.figures[at], self._scale[0]
-        if math.isnan(figure.low) or math.isnan(figure.high):
+        (_, low, high), factor = self.figures[at], self._scale[0]
+        if math.isnan(low) or math.isnan(high):
             return ""
-        return f"{number(figure.low / factor)} to {number(figure.high / factor)}"
-
-    def full(self, at: int) -> str:
-        """Return a mean with its unit."""
-        return f"{self.cell(at)} {self.shown_unit}".strip() if self.figures[at].known else ""
+        return f"{number(low / factor)} to {number(high / factor)}"
 
     @property
     def _scale(self) -> tuple[float, str]:
@@ -142,7 +135,54 @@ class TableRow:
         return scale(self.unit, size) if size > 0.0 else (1.0, self.unit)
 
 
-def rows_of(compared: Sequence[Runs]) -> list[TableRow]:
+def tables_of(compared: Sequence[Runs]) -> list[Table]:
+    """Return a table for each group of quantities, of one controller or of several."""
+    groups: dict[str, list[QuantityRow]] = {}
+    for row in rows_of(compared):
+        groups.setdefault(row.group, []).append(row)
+    if len(compared) > 1:
+        return [_beside(group, rows, compared) for group, rows in groups.items()]
+    several = len(compared[0].judged) > 1
+    columns = (
+        Column("mean", "mean" if several else ""),
+        Column("interval", "95 % interval" if several else ""),
+        Column("note", "", left=True),
+    )
+    return [
+        Table(
+            title=group,
+            columns=(Column("quantity", ""), *columns),
+            rows=[
+                (
+                    row.label,
+                    Written(row.figures[0].mean, f"{row.cell(0)} {row.shown_unit}".strip()),
+                    row.interval(0),
+                    row.note,
+                )
+                for row in rows
+            ],
+        )
+        for group, rows in groups.items()
+    ]
+
+
+def _beside(group: str, rows: Sequence[QuantityRow], compared: Sequence[Runs]) -> Table:
+    """Return means side by side, and the intervals of what tells controllers apart."""
+    every, cells = range(len(compared)), []
+    for place, row in enumerate(rows):
+        unit = f" [{row.shown_unit}]" if row.shown_unit else ""
+        means = (Written(row.figures[at].mean, row.cell(at) or "-") for at in every)
+        cells.append((f"{row.label}{unit}", *means))
+        intervals = [row.interval(at).replace(" to ", " to\n") for at in every]
+        if group == "payload" and place == 0 and any(intervals):
+            cells.append(("  95 % interval", *intervals))
+    names = [runs.controller for runs in compared]
+    heads = [name if len(name) <= _LONG else name.replace("-", "-\n") for name in names]
+    columns = (Column("quantity", ""), *map(Column, names, heads))
+    return Table(title=group, columns=columns, rows=cells)
+
+
+def rows_of(compared: Sequence[Runs]) -> list[QuantityRow]:
     """Return the rows of a table of one or more controllers on the same case and scenario."""
     first = compared[0]
     if main_quantity(compared) == _LANDS[0][0]:
@@ -161,16 +201,9 @@ def rows_of(compared: Sequence[Runs]) -> list[TableRow]:
     return rows + rope + slack + _extremes(compared)
 
 
-def main_quantity(compared: Sequence[Runs]) -> str:
-    """Return the name of the quantity that tells controllers apart, a standard deviation [m]."""
-    if compared[0].stays:
-        return _STAYS[0][0]
-    name = _LANDS[0][0]
-    lands = any(name in runs.summary.means and runs.summary[name].count for runs in compared)
-    return name if lands else _MOVES[0][0]
-
-
-def _quantities(compared: Sequence[Runs], group: str, wanted: Sequence[_Wanted]) -> list[TableRow]:
+def _quantities(
+    compared: Sequence[Runs], group: str, wanted: Sequence[_Listed]
+) -> list[QuantityRow]:
     rows = []
     for name, label, note in wanted:
         intervals = [runs.summary.means.get(name) for runs in compared]
@@ -179,19 +212,19 @@ def _quantities(compared: Sequence[Runs], group: str, wanted: Sequence[_Wanted])
             continue
         factor, unit = (_KWH, "kWh") if found.unit == "J/h" else (1.0, found.unit)
         rows.append(
-            TableRow(
-                group=group,
-                name=name,
-                label=label,
-                unit=_UNITS.get(unit, unit),
-                figures=tuple(_figure(interval, factor) for interval in intervals),
-                note=_note(note, compared[0].case),
+            QuantityRow(
+                group,
+                name,
+                label,
+                _UNITS.get(unit, unit),
+                tuple(_estimate(interval, factor) for interval in intervals),
+                _note(note, compared[0].case),
             )
         )
     return rows
 
 
-def _against_none(compared: Sequence[Runs]) -> list[TableRow]:
+def _against_none(compared: Sequence[Runs]) -> list[QuantityRow]:
     """Return what is left of the payload's motion with the brake on, where that was simulated."""
     from models.run import Summary
 
@@ -203,77 +236,43 @@ def _against_none(compared: Sequence[Runs]) -> list[TableRow]:
     for runs in compared:
         pairs = [(run, before[run.seed]) for run in runs.judged if run.seed in before]
         if runs is held or not pairs:
-            figures.append(Figure())
+            figures.append(_NONE)
             continue
         both = Summary.of([run for run, _ in pairs], uncompensated=[other for _, other in pairs])
-        figures.append(_figure(both.means["residual of uncompensated"]))
-    return [
-        TableRow(
-            group="payload",
-            name="residual of uncompensated",
-            label="of the drum held",
-            unit="%",
-            figures=tuple(figures),
-            note="of the payload's motion with the brake on",
-        )
-    ]
+        figures.append(_estimate(both.means["residual of uncompensated"]))
+    name, note = "residual of uncompensated", "of the payload's motion with the brake on"
+    return [QuantityRow("payload", name, "of the drum held", "%", tuple(figures), note)]
 
 
 def _shares(
     compared: Sequence[Runs], group: str, name: str, label: str, note: str
-) -> list[TableRow]:
+) -> list[QuantityRow]:
     shares = [runs.summary.shares.get(name) for runs in compared]
     if all(found is None for found in shares):
         return []
-    figures = tuple(_share_figure(found) for found in shares)
-    return [TableRow(group=group, name=name, label=label, unit="%", figures=figures, note=note)]
+    return [QuantityRow(group, name, label, "%", tuple(map(_percentage, shares)), note)]
 
 
-def _share_figure(found: Share | None) -> Figure:
-    if found is None:
-        return Figure()
-    return Figure(mean=100.0 * found.value, low=100.0 * found.low, high=100.0 * found.high)
-
-
-def _fall_times(compared: Sequence[Runs]) -> list[TableRow]:
+def _fall_times(compared: Sequence[Runs]) -> list[QuantityRow]:
     """Return how long lock is kept on average, where any run has lost it."""
     times = [runs.summary.fall_time for runs in compared]
     if not any(time is not None and time.falls for time in times):
         return []
-    figures = []
-    for time in times:
-        mean, low, high = (math.nan,) * 3 if time is None or not time.falls else time.mean
-        figures.append(Figure(mean=mean, low=low, high=high))
-    return [
-        TableRow(
-            group="payload",
-            name="fall time",
-            label="time to loss of lock",
-            unit="s",
-            figures=tuple(figures),
-            note="mean, at a constant rate",
-        )
-    ]
+    figures = tuple(Estimate(*time.mean) if time and time.falls else _NONE for time in times)
+    label, note = "time to loss of lock", "mean, at a constant rate"
+    return [QuantityRow("payload", "fall time", label, "s", figures, note)]
 
 
-def _trips(compared: Sequence[Runs]) -> list[TableRow]:
+def _trips(compared: Sequence[Runs]) -> list[QuantityRow]:
     """Return how often the brake ended the controller's work, where it did at all."""
     if not any(runs.tripped for runs in compared):
         return []
-    shares = [share(runs.tripped, len(runs.judged)) for runs in compared]
-    return [
-        TableRow(
-            group="payload",
-            name="tripped",
-            label="runs ended by the brake",
-            unit="%",
-            figures=tuple(_share_figure(each) for each in shares),
-            note="the drum left its range",
-        )
-    ]
+    shares = tuple(_percentage(share(runs.tripped, len(runs.judged))) for runs in compared)
+    label, note = "runs ended by the brake", "the drum left its range"
+    return [QuantityRow("payload", "tripped", label, "%", shares, note)]
 
 
-def _extremes(compared: Sequence[Runs]) -> list[TableRow]:
+def _extremes(compared: Sequence[Runs]) -> list[QuantityRow]:
     rows = []
     group = f"most probable in {duration(compared[0].case.limits.exposure_time)}"
     for name, label in _EXTREMES.items():
@@ -284,31 +283,20 @@ def _extremes(compared: Sequence[Runs]) -> list[TableRow]:
                 continue
             unit = "N" if name == "rope tension" else "m"
             note = f"Rayleigh {quantity(known[0].rayleigh, unit)}" if len(compared) == 1 else ""
-            rows.append(
-                TableRow(
-                    group=group,
-                    name=f"{name}, {method}",
-                    label=f"{label}, {called}",
-                    unit=unit,
-                    figures=tuple(_extreme_figure(e) for e in found),
-                    note=note,
-                )
-            )
+            figures = tuple(Estimate(e.value, e.low, e.high) if e else _NONE for e in found)
+            names = (f"{name}, {method}", f"{label}, {called}")
+            rows.append(QuantityRow(group, *names, unit, figures, note))
     return rows
 
 
-def _extreme_figure(estimate: ExtremeEstimate | None) -> Figure:
-    if estimate is None:
-        return Figure()
-    return Figure(mean=estimate.value, low=estimate.low, high=estimate.high)
+def _percentage(found: Share | None) -> Estimate:
+    return Estimate(*(100.0 * x for x in (found.value, found.low, found.high))) if found else _NONE
 
 
-def _figure(interval: Interval | None, factor: float = 1.0) -> Figure:
+def _estimate(interval: Interval | None, factor: float = 1.0) -> Estimate:
     if interval is None or not interval.count:
-        return Figure()
-    return Figure(
-        mean=interval.mean / factor, low=interval.low / factor, high=interval.high / factor
-    )
+        return _NONE
+    return Estimate(*(x / factor for x in (interval.mean, interval.low, interval.high)))
 
 
 def _lock_note(runs: Runs) -> str:

@@ -74,7 +74,7 @@ class OutputFolder:
             If it cannot be written.
         """
         target = self.path / name
-        temporary = target.with_name(f".{name}.{os.getpid()}.tmp")
+        temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
         data = content.encode("utf-8") if isinstance(content, str) else content
         try:
             temporary.write_bytes(data)

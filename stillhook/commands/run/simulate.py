@@ -7,7 +7,6 @@ until then is written all the same.
 from __future__ import annotations
 
 import argparse
-import contextlib
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -21,17 +20,24 @@ from ...runs import (
     RunFolder,
     Runs,
     Series,
-    Ticker,
     headline_of,
     keep_worst,
-    run_progress,
-    show_comparison,
-    show_events,
-    show_runs,
-    summary_of,
+    runs_data,
+    runs_report,
     tree,
 )
-from ...text import OutputFolder, commands, console, count, folder_name, json_text, progress
+from ...text import (
+    OutputFolder,
+    Section,
+    commands,
+    console,
+    count,
+    folder_name,
+    json_text,
+    number,
+    progress,
+    show,
+)
 from ..declare import (
     CASE,
     choice,
@@ -45,7 +51,7 @@ from ..declare import (
     whole,
 )
 from ..given import case_words
-from ..working import Stop, figure_kinds, stoppable
+from ..working import Stop, figure_kinds, kept_in, stoppable, tidy
 from .simulate_given import Asked, again, asked_of
 
 if TYPE_CHECKING:
@@ -54,6 +60,7 @@ if TYPE_CHECKING:
     from models.run import Run
 
 _MEGABYTE = 1e6
+_Ticker = Callable[[str, float], None]  # takes what is being done, and how much is done [s]
 
 
 @dataclass(kw_only=True)
@@ -153,32 +160,31 @@ def run(arguments: argparse.Namespace) -> int:
     asked = asked_of(arguments)
     name = f"{folder_name(asked.case.name)}-{asked.scenario.name}"
     place = Path(arguments.out or Path("out") / name)
-    made = [path for path in (place, *place.parents) if not path.exists()]
-    folder = OutputFolder.prepare(place, figure_kinds(arguments))
-    target = RunFolder(folder=folder, format=arguments.traces, several=len(asked.controllers) > 1)
-    out = console()
-    with stoppable() as stop:
+    several = len(asked.controllers) > 1
+    with tidy(place), stoppable() as stop:
+        folder = OutputFolder.prepare(place, figure_kinds(arguments))
+        target = RunFolder(folder=folder, format=arguments.traces, several=several)
         try:
             asked = _with_gains(asked, folder, stop, shown=not arguments.quiet)
             total = len(asked.controllers) * len(asked.seeds) * asked.duration
-            with run_progress(total, shown=not arguments.quiet) as tick:
+            with progress(shown=not arguments.quiet, pace=_times_real) as tell:
+
+                def tick(what: str, done: float) -> None:
+                    tell(what, done, total)
+
                 found = _simulated(asked, target, stop, tick)
                 if found.compared:
                     _finish(target, asked, found.compared, arguments, tick, total)
         except KeyboardInterrupt:
             raise KeyboardInterrupt(_kept(folder)) from None
-        except StillhookError:
-            for path in made:  # a question that was wrong leaves no empty folders behind
-                with contextlib.suppress(OSError):
-                    path.rmdir()
-            raise
         stopped = stop()
+    out = console()
     if not found.compared:
         if not stopped:
             raise next(iter(found.left_out.values()))
         raise KeyboardInterrupt(f"nothing was simulated; {_kept(folder)}")
     if arguments.json:
-        sys.stdout.write(json_text(summary_of(found.compared)))
+        sys.stdout.write(json_text(runs_data(found.compared)))
     elif arguments.quiet:
         for runs in found.compared:
             out.print(f"{headline_of(runs)}; {tree(runs)[0]}", soft_wrap=True)
@@ -217,7 +223,7 @@ def _with_gains(asked: Asked, folder: OutputFolder, stop: Stop, *, shown: bool) 
     return replace(asked, design=design)
 
 
-def _simulated(asked: Asked, target: RunFolder, stop: Stop, tick: Ticker) -> _Simulated:
+def _simulated(asked: Asked, target: RunFolder, stop: Stop, tick: _Ticker) -> _Simulated:
     """Run every controller with every seed, until all are done or the user asks to stop."""
     found = _Simulated()
     before = 0.0
@@ -285,7 +291,7 @@ def _finish(
     asked: Asked,
     compared: Sequence[Runs],
     arguments: argparse.Namespace,
-    tick: Ticker,
+    tick: _Ticker,
     total: float,
 ) -> None:
     hook = "the case's own sea" if asked.how.hook is None else asked.how.hook.description
@@ -321,13 +327,12 @@ def _show(
         mark = "ok" if design.ok else "NOT OK"
         out.print(f"The case has no gains in use, so they were optimised: {mark}: {design.status}")
         out.print()
-    if len(found.compared) == 1:
-        show_runs(found.compared[0], out)
-    else:
-        show_comparison(found.compared, out)
-    for name, error in found.left_out.items():
-        out.print(f"left out: {error if name in str(error) else f'{name}: {error}'}")
-    show_events(found.compared, out)
+    report = runs_report(found.compared)
+    left = [
+        f"left out: {error if name in str(error) else f'{name}: {error}'}"
+        for name, error in found.left_out.items()
+    ]
+    show(replace(report, sections=[*report.sections, Section("", left)]), out)
     out.print()
     out.print(_written(target), soft_wrap=True)
     commands(_next(asked, found, target, arguments), out)
@@ -372,5 +377,8 @@ def _next(
 
 
 def _kept(folder: OutputFolder) -> str:
-    kept = sorted(path.name for path in folder.path.iterdir() if not path.name.startswith("."))
-    return f"kept in {folder.path}: {', '.join(kept) or 'nothing'}"
+    return f"kept in {folder.path}: {', '.join(kept_in(folder.path)) or 'nothing'}"
+
+
+def _times_real(speed: float) -> str:
+    return f"{number(speed, 2)} x real time"

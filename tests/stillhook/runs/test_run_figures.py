@@ -18,12 +18,17 @@ from PIL import Image
 import stillhook as sh
 from models.run import Event, NamedQuantity
 from stillhook.runs import animation as animation_module
+from stillhook.runs import runs_report
 from stillhook.runs.animation import animation
-from stillhook.runs.figures import comparison, exceedance, figures_of
+from stillhook.runs.figures import comparison, exceedance
 from stillhook.runs.strip import Scene, strip
 from stillhook.runs.trace_figure import traces
 from stillhook.runs.window import Window, envelope, runs_of_true, window_of
 from stillhook.text import picture
+
+
+def figures_of(runs: sh.Runs) -> set[str]:
+    return {drawing.name for drawing in runs_report([runs]).drawings}
 
 
 @cache
@@ -209,8 +214,8 @@ def test_a_run_without_traces_has_no_figures():
     for make in (traces, strip, animation):
         with pytest.raises(sh.InputError, match="the run with seed 0 has no time traces to draw"):
             make(bare)
-    assert figures_of(replace(calm(), runs=(bare,))) == {}
-    assert set(figures_of(calm())) == {"traces", "strip"}
+    assert figures_of(replace(calm(), runs=(bare,))) == {"exceedance"}
+    assert figures_of(calm()) == {"traces", "strip", "exceedance"}
 
 
 def test_a_run_that_diverged_can_be_drawn():

@@ -20,7 +20,7 @@ from models.sensing import Measurement
 from models.simulation import prepare
 from stillhook.runs import headline_of, keep_worst
 from stillhook.runs.runs import EXTREMES
-from stillhook.runs.table import rows_of
+from stillhook.runs.table import rows_of, tables_of
 
 THESIS = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
 
@@ -252,7 +252,8 @@ def test_the_cells_of_a_row_share_a_unit():
     factor = {"m": 1.0, "mm": 1e-3}[row.shown_unit]
     shown = [float(row.cell(at)) * factor for at in (0, 1)]
     assert shown == pytest.approx([np.mean(rms(three())), np.mean(rms(held))], rel=6e-3)
-    assert row.full(0) == f"{row.cell(0)} {row.shown_unit}"
+    (alone,) = (table for table in tables_of([three()]) if table.title == "payload")
+    assert alone.cells(0)[1] == f"{row.cell(0)} {row.shown_unit}"
 
 
 def test_printed_runs_are_a_small_tree():
@@ -377,24 +378,24 @@ def test_a_format_whose_package_is_missing_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     message = "format parquet: the package pyarrow is not installed; use csv"
     with pytest.raises(sh.InputError, match=message):
-        three().save(tmp_path, format="parquet", figures=False)
+        sh.write_runs(tmp_path, [three()], format="parquet", figures=False)
 
 
 # files
 
 
 def test_saved_runs_can_be_read_again(tmp_path):
-    written = three().save(tmp_path / "here", figures=False)
+    written = sh.write_runs(tmp_path / "here", [three()], figures=False)
     assert all(path.exists() for path in written)
     with open(tmp_path / "here" / "runs" / "seed-002.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     tension = np.array([float(row["rope.tension [N]"]) for row in rows])
     assert np.array_equal(tension, three()[2]["rope.tension"])
     with pytest.raises(sh.InputError, match="format must be one of csv, parquet, netcdf, none"):
-        three().save(tmp_path, format="xls")  # type: ignore[arg-type]
+        sh.write_runs(tmp_path, [three()], format="xls")  # type: ignore[arg-type]
 
 
 def test_a_file_in_the_way_is_one_sentence(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(sh.InputError, match="the output folder cannot be made: a file is there"):
-        three().save(tmp_path / "file", figures=False)
+        sh.write_runs(tmp_path / "file", [three()], figures=False)
