@@ -16,6 +16,7 @@ import numpy as np
 
 from models.basics import InputError, check_range, one_thread
 from models.case import Case
+from models.plant import masses_for_bandwidth
 
 from ..loop import Assessment
 from ..question import PAYLOAD, DesignQuestion, pose, with_masses
@@ -35,7 +36,7 @@ def optimise_gains(
     """Return the gains that minimise the payload's variance within the limits of a case.
 
     As in the thesis, it is the sea alone that shakes them: the noise of the payload's sensors is
-    not counted here, but by `synth.optimise_structure` and by the bound (`GainDesign.bound`).
+    not counted here, but by `optimise_structure` and by the bound (`GainDesign.bound`).
 
     Parameters
     ----------
@@ -298,8 +299,6 @@ def _masses_wanted(question: DesignQuestion, tuning: Tuning) -> int:
 
 def _masses_for(question: DesignQuestion, assessment: Assessment) -> int:
     """Return the rope masses that the loop's crossover asks for, where the case leaves it open."""
-    from models.plant import masses_for_bandwidth
-
     if question.data.masses is not None or not assessment.margins.crossovers.size:
         return question.masses
     highest = _MODES * float(assessment.margins.crossovers.max())

@@ -156,9 +156,8 @@ def design_of(posed: StructureQuestion, tuning: Tuning, *, drive_kept: bool) -> 
         others = (*posed.reported, *(() if drive_kept else posed.drive))
         limits |= limit_uses(others, assessment, {}, enforced=False)
         for disturbance in tuning.problem.disturbances:
-            alone = Assessment(
-                assessment.plant, assessment.controller, [disturbance]
-            )  # its drag is in the plant already
+            # Its drag is in the plant already.
+            alone = Assessment(assessment.plant, assessment.controller, [disturbance])
             parts[disturbance.name] = alone.sigma(PAYLOAD)
     fixed = question.case.payload.fixed_drag
     drag = question.drag_before

@@ -372,7 +372,7 @@ class LoopStack:
 
 
 @dataclass(frozen=True, kw_only=True)
-class StackView:
+class StackAssessment:
     """One loop of a stack as the limits see it (`synth.limits.limits.Limit.measure`)."""
 
     max_sensitivity: float

@@ -24,7 +24,7 @@ from ..question import PAYLOAD, Objective
 from ..search import Progress
 from .family import Member
 from .family_plants import FamilyPlants
-from .plant_stack import PlantStack, StackView, consistent_stack
+from .plant_stack import PlantStack, StackAssessment, consistent_stack
 
 _SAMPLES = 256  # Sobol points of a search for the worst
 _TOP = 6  # of them that are zoomed in on
@@ -128,18 +128,18 @@ def figures_of(
             found.append(_unstable(member, max(float(growth[k]), 1e-300)))
             continue
         sigmas = {name: (float(m[0][k]), float(m[1][k])) for name, m in moments.items()}
-        view = StackView(max_sensitivity=float(peaks[k]), sigmas=sigmas)
+        assessment = StackAssessment(max_sensitivity=float(peaks[k]), sigmas=sigmas)
         use, name = 0.0, ""
         for limit in limits:
             own = _at_rest(limit, stack, k)
-            used = own.use(own.measure(view))  # type: ignore[arg-type]  # all that it asks for
+            used = own.use(own.measure(assessment))  # type: ignore[arg-type]  # all that it asks for
             if used > use:
                 use, name = used, limit.name
         found.append(
             Figures(
                 member=member,
                 growth=float(growth[k]),
-                payload_rms=view.sigma(PAYLOAD),
+                payload_rms=assessment.sigma(PAYLOAD),
                 max_sensitivity=float(peaks[k]),
                 use=use,
                 limit=name,
@@ -151,22 +151,22 @@ def figures_of(
 def exact_figures(plants: FamilyPlants, values: Sequence[float], member: Member) -> Figures:
     """Return what gains do to one member: every limit, refined nodes, exact delays."""
     problem = plants.scenario(member).problem
-    view = Assessment(
+    assessment = Assessment(
         problem.plant,
         problem.law.controller([float(v) for v in values]),
         problem.disturbances,
         drag=problem.drag,
     )
-    growth = float(view.poles.real.max())
+    growth = float(assessment.poles.real.max())
     if growth >= 0.0:
         return _unstable(member, growth)
-    uses = {limit.name: limit.use(limit.measure(view)) for limit in problem.limits}
+    uses = {limit.name: limit.use(limit.measure(assessment)) for limit in problem.limits}
     name = max(uses, key=lambda n: uses[n], default="")
     return Figures(
         member=member,
         growth=growth,
-        payload_rms=view.sigma(PAYLOAD),
-        max_sensitivity=view.max_sensitivity,
+        payload_rms=assessment.sigma(PAYLOAD),
+        max_sensitivity=assessment.max_sensitivity,
         use=uses.get(name, 0.0),
         limit=name,
     )

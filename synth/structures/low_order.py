@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -49,7 +49,7 @@ _PADE = 4  # of the delays, in the designs that candidates are made of
 _SIDE = 12  # so many regulators times so many filters
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True)
 class LowOrder(Structure):
     """A free controller x' = A x + B y, u = C x + D y of order n.
 
@@ -71,24 +71,15 @@ class LowOrder(Structure):
     """
 
     order: int
+    _: KW_ONLY
     proper: bool = False
     stable: bool = False
     bounds: Bounds = field(default_factory=dict)
 
-    def __init__(
-        self,
-        order: int,
-        *,
-        proper: bool = False,
-        stable: bool = False,
-        bounds: Bounds | None = None,
-    ) -> None:
+    def __post_init__(self) -> None:
+        order: object = self.order
         if isinstance(order, bool) or not isinstance(order, int) or order < 1:
             raise InputError(f"LowOrder: order must be a whole number of at least 1, got {order!r}")
-        object.__setattr__(self, "order", order)
-        object.__setattr__(self, "proper", proper)
-        object.__setattr__(self, "stable", stable)
-        object.__setattr__(self, "bounds", dict(bounds or {}))
 
     def bind(self, plant: LinearPlant) -> ParametrisedController:
         """Return the law; see `Structure.bind`."""
