@@ -14,7 +14,7 @@ from os import PathLike
 from pathlib import Path as FilePath
 from typing import Any
 
-from pydantic import PrivateAttr, ValidationError, model_validator
+from pydantic import PrivateAttr, ValidationError
 
 from ..basics import InputError, PhysicsWarning
 from ..casefile import (
@@ -23,12 +23,11 @@ from ..casefile import (
     describe,
     message_line,
     plain,
-    problems,
     replaced,
     yaml_text,
 )
 from .contents import Contents
-from .plausibility import contradictions, remarks
+from .plausibility import Finding, contradictions, remarks
 
 
 class Case(Contents):
@@ -37,12 +36,8 @@ class Case(Contents):
     _source: str = PrivateAttr(default="")
     _quiet: bool = PrivateAttr(default=False)
 
-    @model_validator(mode="after")
-    def _check(self) -> Case:
-        found = contradictions(self)
-        if found:
-            raise problems(*found)
-        return self
+    def _faults(self) -> list[Finding]:
+        return contradictions(self)
 
     @classmethod
     def from_dict(

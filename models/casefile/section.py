@@ -1,7 +1,7 @@
 """Sections of a case file, and the sentences that pydantic's errors about them become.
 
 A section is a frozen pydantic model that refuses unknown keys.  Its fields carry their own
-ranges (`models.casefile.quantity`); checks between fields raise `problems`, each with the path of
+ranges (`models.casefile.quantity`); checks between fields are its `_faults`, each with the path of
 the field it is about, so that the message can name the line.
 
 `describe` words the errors.  Paths are those of the case file: the tags that pydantic puts into the
@@ -11,10 +11,10 @@ path of a discriminated union are taken out again by walking the section classes
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar, Literal, get_args, get_origin
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, ClassVar, Literal, Self, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from ..basics import InputError
@@ -45,6 +45,17 @@ class Section(BaseModel):
     # Without this mark pydantic would call __init__ for nested sections too, and the error of
     # a nested section would arrive as one text without its paths.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    def _faults(self) -> Iterable[tuple[str, str]]:
+        """Return what is wrong between the fields, once each by itself is right; see `problems`."""
+        return ()
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        found = tuple(self._faults())
+        if found:
+            raise problems(*found)
+        return self
 
 
 def problems(*found: tuple[str, str]) -> PydanticCustomError:

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
 from ..basics import InputError
-from ..casefile import Quantity, Section, custom_error, problems
+from ..casefile import Quantity, Section, custom_error
 from .tables import DRUM_LAYERS
 
 
@@ -102,23 +103,18 @@ class Drum(Section):
     inertia: Annotated[float, Quantity("inertia", 0.0, 1e9)] = 0.0
     """Moment of inertia of the drum with the rope on it, about the drum's axis."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Drum:
-        found = []
+    def _faults(self) -> Iterator[tuple[str, str]]:
         if self.layers is not None and self.geometry is not None:
-            found.append(("", "give either layers or geometry, got both"))
+            yield ("", "give either layers or geometry, got both")
         elif self.radius is None and self.layers is None and self.geometry is None:
-            found.append(("", "give one of radius, layers and geometry, got none"))
+            yield ("", "give one of radius, layers and geometry, got none")
         if self.layers is not None:
             for name in ("pitch_diameter", "rope_on_drum"):
                 values = [getattr(layer, name) for layer in self.layers]
                 for i, (inner, outer) in enumerate(itertools.pairwise(values), 1):
                     if outer <= inner:
                         text = f"must grow from layer to layer, got {inner:g} m then {outer:g} m"
-                        found.append((f"layers.{i}.{name}", text))
-        if found:
-            raise problems(*found)
-        return self
+                        yield (f"layers.{i}.{name}", text)
 
     def radius_at(self, paid_out: float, rope_diameter: float) -> float:
         """Return the pitch radius with a length of rope paid out.

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from pydantic import model_validator
-
-from ..casefile import Quantity, Section, problems
+from ..casefile import Quantity, Section
 
 _Length = Annotated[float, Quantity("length", -12000.0, 12000.0)]
 
@@ -48,13 +47,11 @@ class Limits(Section):
     """Lowest and highest haul of the drum while it holds the load; negative is paid out. It is
     for the simulation: a design does not know it."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Limits:
-        found = []
+    def _faults(self) -> Iterator[tuple[str, str]]:
         low, high = self.minimum_tension, self.rope_tension_peak
         if low is not None and high is not None and low >= high:
             text = f"must be below rope_tension_peak, {high:g} N, got {low:g} N"
-            found.append(("minimum_tension", text))
+            yield ("minimum_tension", text)
         if self.stroke is not None:
             lowest, highest = self.stroke
             if not (lowest <= 0.0 <= highest and lowest < highest):
@@ -62,10 +59,7 @@ class Limits(Section):
                     "must be [low, high] with low < high and 0 within, "
                     f"got [{lowest:g}, {highest:g}] m"
                 )
-                found.append(("stroke", text))
-        if found:
-            raise problems(*found)
-        return self
+                yield ("stroke", text)
 
 
 _Number = Annotated[float, Quantity("number")]
@@ -103,14 +97,9 @@ class GainBounds(Section):
     a2: tuple[_Number, _Number] | None = None
     """Bounds of A a2."""
 
-    @model_validator(mode="after")
-    def _check(self) -> GainBounds:
-        found = []
+    def _faults(self) -> Iterator[tuple[str, str]]:
         for name in ("a", "a1", "a2"):
             bounds = getattr(self, name)
             if bounds is not None and bounds[0] >= bounds[1]:
                 text = f"must be [low, high] with low < high, got [{bounds[0]:g}, {bounds[1]:g}]"
-                found.append((name, text))
-        if found:
-            raise problems(*found)
-        return self
+                yield (name, text)

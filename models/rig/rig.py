@@ -8,12 +8,13 @@ The formulas are those of the 1975 thesis, eq. 1, 5 and 13.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..basics import GRAVITY, SEA_WATER_DENSITY
-from ..casefile import Quantity, Section, problems
+from ..casefile import Quantity, Section
 from .tables import DRAG_COEFFICIENTS, STEEL_DENSITY, prism_added_mass
 
 
@@ -47,29 +48,22 @@ class Rope(Section):
     """How the rope's mass is lumped: `distributed` along the rope (a single mass takes a third
     of it), or `thesis`: all of it at the payload, with `masses: 1` only."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Rope:
-        found = []
+    def _faults(self) -> Iterator[tuple[str, str]]:
         if (self.modulus is None) == (self.axial_stiffness is None):
             given = "both" if self.modulus is not None else "neither"
-            found.append(("", f"give either modulus or axial_stiffness, got {given}"))
+            yield ("", f"give either modulus or axial_stiffness, got {given}")
         if self.lumping == "thesis" and self.masses != 1:
             text = (
                 f"'thesis' puts all of the rope at the payload: needs masses 1, got {self.masses!r}"
             )
-            found.append(("lumping", text))
+            yield ("lumping", text)
         weight = self.submerged_weight_per_length
         if weight is not None and weight > self.mass_per_length * GRAVITY:
-            found.append(
-                (
-                    "submerged_weight_per_length",
-                    f"must be at most the weight in air, {self.mass_per_length * GRAVITY:.4g} N/m "
-                    f"({self.mass_per_length:g} kg/m), got {weight:g} N/m",
-                )
+            yield (
+                "submerged_weight_per_length",
+                f"must be at most the weight in air, {self.mass_per_length * GRAVITY:.4g} N/m "
+                f"({self.mass_per_length:g} kg/m), got {weight:g} N/m",
             )
-        if found:
-            raise problems(*found)
-        return self
 
     @property
     def area(self) -> float:
@@ -219,28 +213,23 @@ class Payload(Section):
     drag: Drag = StochasticDrag()
     """How quadratic drag is linearised for the design."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Payload:
-        found = []
+    def _faults(self) -> Iterator[tuple[str, str]]:
         for one, other in self.alternatives:
             given = [getattr(self, name) is not None for name in (one, other)]
             if sum(given) != 1:
                 word = "both" if all(given) else "neither"
-                found.append(("", f"give either {one} or {other}, got {word}"))
+                yield ("", f"give either {one} or {other}, got {word}")
         if self.shape is not None:
             ratio = self.shape.prism_height / self.shape.prism_side
             if not 1.0 <= ratio <= 10.0:
                 text = f"prism_height / prism_side must be in [1, 10] (Table A-1), got {ratio:.3g}"
-                found.append(("shape", text))
+                yield ("shape", text)
         if self.submerged_weight > self.mass * GRAVITY:
             text = (
                 f"must be at most the weight in air, {self.mass * GRAVITY:.4g} N "
                 f"({self.mass:g} kg), got {self.submerged_weight:g} N"
             )
-            found.append(("submerged_weight", text))
-        if found:
-            raise problems(*found)
-        return self
+            yield ("submerged_weight", text)
 
     @property
     def hydrodynamic_mass(self) -> float:

@@ -9,11 +9,12 @@ section on the winch, eq. 14 to 19).
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from ..casefile import Quantity, Section, problems
+from ..casefile import Quantity, Section
 from .drum import Drum
 
 
@@ -92,15 +93,13 @@ class ACMotor(Section):
     ] = 80.0
     """Temperature rise after hours at the continuous torque."""
 
-    @model_validator(mode="after")
-    def _check(self) -> ACMotor:
+    def _faults(self) -> Iterator[tuple[str, str]]:
         if self.maximum_speed < self.base_speed:
             text = (
                 f"must be at least base_speed, {self.base_speed:g} rad/s, "
                 f"got {self.maximum_speed:g} rad/s"
             )
-            raise problems(("maximum_speed", text))
-        return self
+            yield ("maximum_speed", text)
 
 
 Motor = Annotated[DCMotor | ACMotor, Field(discriminator="type")]
@@ -125,22 +124,17 @@ class Drive(Section):
     """Highest shaft power; by default peak torque times base speed of an AC motor, and none
     for a DC motor."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Drive:
-        found = []
+    def _faults(self) -> Iterator[tuple[str, str]]:
         if self.torque_peak < self.torque_continuous:
             text = (
                 f"must be at least torque_continuous, {self.torque_continuous:g} N m, "
                 f"got {self.torque_peak:g} N m"
             )
-            found.append(("torque_peak", text))
+            yield ("torque_peak", text)
         peak, continuous = self.current_peak, self.current_continuous
         if peak is not None and continuous is not None and peak < continuous:
             text = f"must be at least current_continuous, {continuous:g} A, got {peak:g} A"
-            found.append(("current_peak", text))
-        if found:
-            raise problems(*found)
-        return self
+            yield ("current_peak", text)
 
 
 class Brake(Section):
@@ -166,26 +160,21 @@ class Winch(Section):
     brake: Brake | None = None
     """The holding brake; by default one that holds whatever comes."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Winch:
-        found = []
+    def _faults(self) -> Iterator[tuple[str, str]]:
         motor, drive = self.motor, self.drive
         if isinstance(motor, DCMotor):
             if drive.speed is None:
-                found.append(("drive.speed", "is missing: a DC motor needs its highest speed"))
+                yield ("drive.speed", "is missing: a DC motor needs its highest speed")
         else:
             if drive.speed is not None and drive.speed > motor.maximum_speed:
                 text = (
                     f"must be at most the motor's maximum_speed, {motor.maximum_speed:g} rad/s, "
                     f"got {drive.speed:g} rad/s"
                 )
-                found.append(("drive.speed", text))
+                yield ("drive.speed", text)
             for name in ("voltage", "current_continuous", "current_peak"):
                 if getattr(drive, name) is not None:
-                    found.append((f"drive.{name}", "is for a DC motor only; an AC motor has none"))
-        if found:
-            raise problems(*found)
-        return self
+                    yield (f"drive.{name}", "is for a DC motor only; an AC motor has none")
 
     @property
     def inertia(self) -> float:

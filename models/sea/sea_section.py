@@ -9,7 +9,7 @@ period of a sea by its wind) is the default of its field, made from them: so eve
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
@@ -102,12 +102,8 @@ class SeaTable(Section):
     density: tuple[Annotated[float, Quantity("spectral density", 0.0, 1e6)], ...]
     """Variance density of the elevation at each frequency."""
 
-    @model_validator(mode="after")
-    def _check(self) -> SeaTable:
-        found = row_faults(np.array(self.omega), np.array(self.density))
-        if found:
-            raise problems(*found)
-        return self
+    def _faults(self) -> list[tuple[str, str]]:
+        return row_faults(np.array(self.omega), np.array(self.density))
 
 
 class SeaSpreading(Section):
@@ -285,13 +281,10 @@ class GaussianSwell(_SeaByPeak):
 
     takes = "peak_period and width"
 
-    @model_validator(mode="after")
-    def _check(self) -> GaussianSwell:
+    def _faults(self) -> Iterator[tuple[str, str]]:
         low, high = gaussian_widths(2.0 * math.pi / self.peak_period)
         if not low <= self.width <= high:
-            text = f"must be {range_text(low, high, 'rad/s')}, got {self.width!r}"
-            raise problems(("width", text))
-        return self
+            yield ("width", f"must be {range_text(low, high, 'rad/s')}, got {self.width!r}")
 
     def _form(self) -> dict[str, Any]:
         return {**super()._form(), "width": self.width}
@@ -321,12 +314,9 @@ class _SeaByWind(SeaSection):
             return ()
         return (cls._period, "significant_height") if cls._period else ("significant_height",)
 
-    @model_validator(mode="after")
-    def _check(self) -> _SeaByWind:
+    def _faults(self) -> Iterator[tuple[str, str]]:
         if self.wind_speed is not None and self._period in self.model_fields_set:
-            text = "is not for a sea by its wind_speed, which gives the period"
-            raise problems((self._period, text))
-        return self
+            yield (self._period, "is not for a sea by its wind_speed, which gives the period")
 
 
 class Bretschneider1975Sea(_SeaByWind):
@@ -376,18 +366,10 @@ class PiersonMoskowitzSea(_SeaByWind):
 class _SeaOfData(SeaSection):
     """A sea whose height and peak follow from what it is made of."""
 
-    @model_validator(mode="after")
-    def _check(self) -> _SeaOfData:
-        found = self._faults()
-        if not found and self.significant_height > _HIGHEST:
+    def _faults(self) -> Iterator[tuple[str, str]]:
+        if self.significant_height > _HIGHEST:
             text = f"must be in (0, 30] m, got {self.significant_height:.4g} from the data"
-            found = [("significant_height", text)]
-        if found:
-            raise problems(*found)
-        return self
-
-    def _faults(self) -> list[tuple[str, str]]:
-        raise NotImplementedError
+            yield ("significant_height", text)
 
 
 def _height_of_rows(data: dict[str, Any]) -> float:
@@ -432,11 +414,11 @@ class MeasuredSea(_SeaOfData):
                 raise custom_error(str(error)) from None
         return record
 
-    def _faults(self) -> list[tuple[str, str]]:
-        if (self.table is None) != (self.file is None):
-            return []
-        text = "is missing: the measured spectrum needs a table or a file"
-        return [("table", text if self.table is None else "must be left out, or file")]
+    def _faults(self) -> Iterator[tuple[str, str]]:
+        if (self.table is None) == (self.file is None):
+            text = "is missing: the measured spectrum needs a table or a file"
+            yield ("table", text if self.table is None else "must be left out, or file")
+        yield from super()._faults()
 
     def _form(self) -> dict[str, Any]:
         return {"table": _rows(**{name: getattr(self, name) for name in _ROWS})}
@@ -487,16 +469,15 @@ class SumSea(_SeaOfData):
 
     takes = "parts"
 
-    def _faults(self) -> list[tuple[str, str]]:
+    def _faults(self) -> Iterator[tuple[str, str]]:
+        yield from super()._faults()
         if not 1 <= len(self.parts) <= _MOST_PARTS:
-            return [("parts", f"must have 1 to {_MOST_PARTS} seas, got {len(self.parts)}")]
-        found = []
+            yield ("parts", f"must have 1 to {_MOST_PARTS} seas, got {len(self.parts)}")
         for index, part in enumerate(self.parts):
             try:
                 part.to_spectrum()
             except InputError as error:  # a form that is not defined for its values
-                found.append((f"parts.{index}", str(error)))
-        return found
+                yield (f"parts.{index}", str(error))
 
     def _form(self) -> dict[str, Any]:
         return {"parts": tuple(part.to_spectrum() for part in self.parts)}

@@ -11,13 +11,13 @@ to port, 180 deg head sea.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..basics import ascending_fault
-from ..casefile import DataFile, Quantity, Section, problems
+from ..casefile import DataFile, Quantity, Section
 from .crane import Point, crane_tip
 
 
@@ -41,20 +41,15 @@ class HeaveTable(Section):
     """How far the heave is ahead of the wave at the hook, at each frequency (e^{+i omega t}); by
     default 0."""
 
-    @model_validator(mode="after")
-    def _check(self) -> HeaveTable:
-        found = []
+    def _faults(self) -> Iterator[tuple[str, str]]:
         fault = ascending_fault(self.omega)
         if fault:
-            found.append(("omega", fault))
+            yield ("omega", fault)
         for name in ("amplitude", "phase"):
             values = getattr(self, name)
             if values is not None and len(values) != len(self.omega):
                 text = f"must have as many entries as omega, {len(self.omega)}, got {len(values)}"
-                found.append((name, text))
-        if found:
-            raise problems(*found)
-        return self
+                yield (name, text)
 
 
 class Hook(Section):
@@ -152,30 +147,23 @@ class Vessel(Section):
     """What the RAO is above its table: `hold` keeps the last value, `zero` is 0, `decay` falls
     as 1/omega^2."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Vessel:
+    def _faults(self) -> Iterator[tuple[str, str]]:
         extra = [name for name in _GO_WITH_RAOS if getattr(self, name) is not None]
-        found = []
         if self.heave_rao is not None:
-            found += [
-                (name, "goes with raos; heave_rao is that of one hook in one heading already")
-                for name in (["raos"] if self.raos is not None else []) + extra
-            ]
+            for name in (["raos"] if self.raos is not None else []) + extra:
+                yield (name, "goes with raos; heave_rao is that of one hook in one heading already")
         elif self.raos is None:
             what = f"; {', '.join(extra)} alone {'does' if len(extra) == 1 else 'do'} not do"
             text = "is missing: give it, the heave of the hook, or raos with hook and heading"
-            found.append(("heave_rao", text + (what if extra else "")))
+            yield ("heave_rao", text + (what if extra else ""))
         else:
             if self.hook is None and self.crane is None:
-                found.append(("hook", "is missing: raos need the place of the hook, or a crane"))
+                yield ("hook", "is missing: raos need the place of the hook, or a crane")
             if self.hook is not None and self.crane is not None:
-                found.append(("crane", "must not be given beside hook: both say where the tip is"))
+                yield ("crane", "must not be given beside hook: both say where the tip is")
             if self.heading is None:
                 text = "is missing: raos need the heading of the waves (180 deg: head sea)"
-                found.append(("heading", text))
-        if found:
-            raise problems(*found)
-        return self
+                yield ("heading", text)
 
     @property
     def hook_point(self) -> Point | None:
