@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from .limits import GainBounds as GainBounds
     from .limits import Gains as Gains
     from .limits import Limits as Limits
-    from .rig import Payload as Payload
-    from .rig import Rope as Rope
+    from .payload import Payload as Payload
+    from .payload import Rope as Rope
     from .sensors import MRU as MRU
     from .sensors import Encoder as Encoder
     from .sensors import LoadCell as LoadCell

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from models import InputError, PhysicsWarning, bundled_cases, load_case, write_text_atomically
 from models.casefile import read_yaml, yaml_text
-from models.rig.rig import StochasticDrag
+from models.rig.payload import StochasticDrag
 
 NAMES = [name for name, _ in bundled_cases()]
 CASES_FOLDER = Path(__file__).parents[3] / "models" / "cases"

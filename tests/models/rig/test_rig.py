@@ -13,7 +13,7 @@ from models import InputError
 from models.basics import GRAVITY
 from models.rig import ACMotor, GainBounds, Gains, Payload, Rope, Sensors, Winch
 from models.rig.drum import Drum
-from models.rig.rig import EnergyDrag, GivenDrag, StochasticDrag
+from models.rig.payload import EnergyDrag, GivenDrag, StochasticDrag
 from models.rig.tables import (
     ADDED_MASS_PRISM,
     DRAG_COEFFICIENTS,
