@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .limits import Gains as Gains
     from .limits import Limits as Limits
     from .payload import Payload as Payload
-    from .payload import Rope as Rope
+    from .rope import Rope as Rope
     from .sensors import MRU as MRU
     from .sensors import Encoder as Encoder
     from .sensors import LoadCell as LoadCell

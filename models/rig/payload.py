@@ -1,8 +1,7 @@
-"""Rope and payload: the sections of the case file, and what follows from them.
+"""Payload: the section of the case file, its virtual mass and its drag.
 
-A section holds what the file says; everything derived (stiffness, virtual mass, drag
-coefficients) is a property beside it, so that a changed field changes all that hangs on it.
-The formulas are those of the 1975 thesis, eq. 1, 5 and 13.
+A section holds what the file says; everything derived is a property beside it, so that a changed
+field changes all that hangs on it.  The formulas are those of the 1975 thesis, eq. 5 and 13.
 """
 
 from __future__ import annotations
@@ -15,96 +14,7 @@ from pydantic import Field
 
 from ..basics import GRAVITY, SEA_WATER_DENSITY
 from ..casefile import Quantity, Section
-from .tables import DRAG_COEFFICIENTS, STEEL_DENSITY, prism_added_mass
-
-
-class Rope(Section):
-    """The rope between the drum and the payload."""
-
-    alternatives = (("modulus", "axial_stiffness"),)
-
-    diameter: Annotated[float, Quantity("length", 0.005, 0.3)]
-    """Nominal diameter."""
-    modulus: Annotated[float, Quantity("pressure", 1e8, 3e11)] | None = None
-    """Young's modulus on the nominal circle of the rope (not on its metal area), or give
-    `axial_stiffness`."""
-    axial_stiffness: Annotated[float, Quantity("force", 1e4, 1e11)] | None = None
-    """Axial stiffness EA of the rope, or give `modulus`."""
-    mass_per_length: Annotated[float, Quantity("mass per length", 0.01, 1000.0)]
-    """Mass of the rope per length, in air."""
-    submerged_weight_per_length: (
-        Annotated[float, Quantity("force per length", 0.0, 10000.0)] | None
-    ) = None
-    """Weight of the rope per length less its buoyancy; by default that of solid steel in sea
-    water."""
-    length: Annotated[float, Quantity("length", 1.0, 12000.0)]
-    """Length paid out, from the drum to the payload."""
-    damping_ratio: Annotated[float, Quantity("ratio", 0.0, 0.5)] = 0.002
-    """Internal damping as a fraction of critical at the first axial mode (Kelvin-Voigt)."""
-    masses: Annotated[int | Literal["auto"], Quantity("count", 1, 40, word="auto")] = "auto"
-    """Number of lumped masses that stand for the rope; `auto` takes as many as the bandwidth
-    of the loop needs."""
-    lumping: Literal["distributed", "thesis"] = "distributed"
-    """How the rope's mass is lumped: `distributed` along the rope (a single mass takes a third
-    of it), or `thesis`: all of it at the payload, with `masses: 1` only."""
-
-    def _faults(self) -> Iterator[tuple[str, str]]:
-        if (self.modulus is None) == (self.axial_stiffness is None):
-            given = "both" if self.modulus is not None else "neither"
-            yield ("", f"give either modulus or axial_stiffness, got {given}")
-        if self.lumping == "thesis" and self.masses != 1:
-            text = (
-                f"'thesis' puts all of the rope at the payload: needs masses 1, got {self.masses!r}"
-            )
-            yield ("lumping", text)
-        weight = self.submerged_weight_per_length
-        if weight is not None and weight > self.mass_per_length * GRAVITY:
-            yield (
-                "submerged_weight_per_length",
-                f"must be at most the weight in air, {self.mass_per_length * GRAVITY:.4g} N/m "
-                f"({self.mass_per_length:g} kg/m), got {weight:g} N/m",
-            )
-
-    @property
-    def area(self) -> float:
-        """Area of the nominal circle [m2]."""
-        return math.pi * self.diameter**2 / 4.0
-
-    @property
-    def ea(self) -> float:
-        """Axial stiffness EA [N]."""
-        if self.axial_stiffness is not None:
-            return self.axial_stiffness
-        return (self.modulus or 0.0) * self.area
-
-    @property
-    def stiffness(self) -> float:
-        """Stiffness K = EA/L of the rope paid out [N/m]."""
-        return self.ea / self.length
-
-    @property
-    def mass(self) -> float:
-        """Mass of the rope paid out [kg]."""
-        return self.mass_per_length * self.length
-
-    @property
-    def submerged_weight(self) -> float:
-        """Weight of the rope paid out less its buoyancy [N]."""
-        per_length = self.submerged_weight_per_length
-        if per_length is None:
-            buoyancy = 1.0 - SEA_WATER_DENSITY / STEEL_DENSITY
-            per_length = self.mass_per_length * GRAVITY * buoyancy
-        return per_length * self.length
-
-    @property
-    def wave_speed(self) -> float:
-        """Speed of axial waves along the rope, sqrt(EA / mass per length) [m/s]."""
-        return math.sqrt(self.ea / self.mass_per_length)
-
-    @property
-    def travel_time(self) -> float:
-        """Time that an axial wave takes from the drum to the payload [s]."""
-        return self.length / self.wave_speed
+from .tables import DRAG_COEFFICIENTS, prism_added_mass
 
 
 class GivenDrag(Section):
