@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from .contenders import Contender as Contender
     from .contenders import contenders_of as contenders_of
     from .named import PREDICTIVE as PREDICTIVE
-    from .named import controller_by_name as controller_by_name
     from .named import controller_of as controller_of
     from .named import known_controllers as known_controllers
     from .recipe import Recipe as Recipe

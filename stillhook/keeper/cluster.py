@@ -14,6 +14,7 @@ import functools
 import pickle
 import queue
 import threading
+import time as clock
 import uuid
 from collections.abc import Iterator
 from typing import Any
@@ -23,7 +24,7 @@ from typing_extensions import override
 from models.basics import InputError, SolverError, check_range
 
 from .digest import code_digest
-from .pool import Bench, Died, Pool, Setup, Task
+from .pool import POLL, Bench, Died, Pool, Setup, Task
 
 _AHEAD = 3  # tasks under way for each thread of the cluster
 _PATIENCE = 60.0  # for a scheduler to answer and to have a worker [s]
@@ -68,7 +69,6 @@ class Cluster(Pool):
     @property
     @override
     def idle(self) -> int:
-        self.jobs = max(1, sum(self._running.nthreads().values()))
         return max(0, _AHEAD * self.jobs - len(self._under_way))
 
     @property
@@ -99,6 +99,7 @@ class Cluster(Pool):
         self._stack = contextlib.ExitStack()
         self._running = self._stack.enter_context(self._connected())
         self._code = code_digest(type(setup))
+        self._count_threads()
         # A task of its own and no scattered data: should all its copies be lost with a worker,
         # the scheduler makes it again.
         self._setup = self._running.submit(
@@ -116,6 +117,8 @@ class Cluster(Pool):
         SolverError
             If the cluster is gone, or cannot do the task at all.
         """
+        if clock.monotonic() - self._counted > POLL:
+            self._count_threads()
         try:
             future = self._done.get(timeout=timeout)
         except queue.Empty:
@@ -134,6 +137,11 @@ class Cluster(Pool):
             f"cluster: {task} was lost ({future.status}): the scheduler at "
             f"{self._address or 'the address given'} is gone; what was done is kept"
         )
+
+    def _count_threads(self) -> None:
+        """Ask the scheduler how many workers there are now: a journey, so not for every task."""
+        self.jobs = max(1, sum(self._running.nthreads().values()))
+        self._counted = clock.monotonic()
 
     @contextlib.contextmanager
     def _connected(self) -> Iterator[Any]:

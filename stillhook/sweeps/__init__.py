@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .export import write_result as write_result
     from .figures import sweep_figures as sweep_figures
     from .report import place_of as place_of
     from .report import sweep_data as sweep_data

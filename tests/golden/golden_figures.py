@@ -28,7 +28,7 @@ from models.plant.plant import MEAN_LOSSES
 from models.run.extremes import gumbel_maximum, pareto_maximum
 from models.sea.spreading import Spreading
 from models.vessel.convention import Convention
-from stillhook.controllers import controller_by_name
+from stillhook.controllers.named import controller_by_name
 from synth.loop.assess import Assessment
 from synth.question.question import pose
 from synth.question.structure_question import pose_structure

@@ -22,8 +22,9 @@ import stillhook as sh
 from models.basics import InputError
 from models.spread import Uniform
 from stillhook.keeper import Journal, question_in
-from stillhook.sweeps import resume_sweep, sweep, write_result
+from stillhook.sweeps import resume_sweep, sweep
 from stillhook.sweeps import store as stores
+from stillhook.sweeps.export import write_result
 from stillhook.sweeps.store import JOURNAL, RESULT
 from stillhook.sweeps.time_cases import TimeQuestion
 
