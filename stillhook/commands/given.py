@@ -1,4 +1,4 @@
-"""What the user gave: a case with changes, gains as text, and the same as a command again."""
+"""The case of a command with its changes, gains as text, and both as words of a command again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What varies, as text: ranges, lists, choices and seas on the command line.
+"""Ranges, lists, choices and seas as text on the command line.
 
 --vary rope.length=500..1500     the range, tried at its ends and in between
 --vary payload.mass=40t,50t,60t  the range, tried at these values

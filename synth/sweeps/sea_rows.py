@@ -1,4 +1,4 @@
-"""What shakes each row of a sweep: densities of the hook's motion on common nodes.
+"""Disturbances of each row of a sweep: densities of the hook's motion on common nodes.
 
 Mostly the sea does not vary, or only its height, which is a factor; with its period, a standard
 spectrum keeps its shape, S(omega; H, T) = (H/H0)^2 (T/T0) S(omega T/T0; H0, T0).  Whether that

@@ -52,7 +52,7 @@ from ..declare import (
 )
 from ..given import case_words
 from ..working import Stop, figure_kinds, kept_in, stoppable, tidy
-from .simulate_given import Asked, again, asked_of
+from .simulate_given import SimulationRequest, again, asked_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -200,7 +200,9 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if all(runs.completed for runs in found.compared) else 1
 
 
-def _with_gains(asked: Asked, folder: OutputFolder, stop: Stop, *, shown: bool) -> Asked:
+def _with_gains(
+    asked: SimulationRequest, folder: OutputFolder, stop: Stop, *, shown: bool
+) -> SimulationRequest:
     """Return what is asked with gains for the feedback, optimised if there are none."""
     wanted = any(name.startswith("feedback") for name in asked.controllers)
     if not wanted or asked.design or asked.gains or asked.case.gains is not None:
@@ -223,7 +225,9 @@ def _with_gains(asked: Asked, folder: OutputFolder, stop: Stop, *, shown: bool) 
     return replace(asked, design=design)
 
 
-def _simulated(asked: Asked, target: RunFolder, stop: Stop, tick: _Ticker) -> _Simulated:
+def _simulated(
+    asked: SimulationRequest, target: RunFolder, stop: Stop, tick: _Ticker
+) -> _Simulated:
     """Run every controller with every seed, until all are done or the user asks to stop."""
     found = _Simulated()
     before = 0.0
@@ -269,7 +273,7 @@ def _simulated(asked: Asked, target: RunFolder, stop: Stop, tick: _Ticker) -> _S
     return found
 
 
-def _prepared(asked: Asked, name: str, tune: Callable[[float], None]) -> Series:
+def _prepared(asked: SimulationRequest, name: str, tune: Callable[[float], None]) -> Series:
     feedback = name.startswith("feedback")
     if "mpc" in name:  # whose weights take seconds: tuned here, where it can be told, and kept
         from mpc.winch import tune_weights
@@ -288,7 +292,7 @@ def _prepared(asked: Asked, name: str, tune: Callable[[float], None]) -> Series:
 
 def _finish(
     target: RunFolder,
-    asked: Asked,
+    asked: SimulationRequest,
     compared: Sequence[Runs],
     arguments: argparse.Namespace,
     tick: _Ticker,
@@ -316,7 +320,7 @@ def _finish(
 
 
 def _show(
-    asked: Asked,
+    asked: SimulationRequest,
     found: _Simulated,
     target: RunFolder,
     arguments: argparse.Namespace,
@@ -353,7 +357,7 @@ def _written(target: RunFolder) -> str:
 
 
 def _next(
-    asked: Asked, found: _Simulated, target: RunFolder, arguments: argparse.Namespace
+    asked: SimulationRequest, found: _Simulated, target: RunFolder, arguments: argparse.Namespace
 ) -> list[tuple[str, str]]:
     """Return commands to go on with, each with what it does."""
     words = case_words(arguments, str(target.folder.path / "case.yaml"))

@@ -1,4 +1,4 @@
-"""What the user asked `stillhook simulate` for, read and checked before anything is computed."""
+"""`SimulationRequest`: the request of `stillhook simulate`, read and checked before any run."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ _REPEATED: tuple[tuple[str, object], ...] = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
+class SimulationRequest:
     """What is to be simulated.
 
     Attributes
@@ -87,7 +87,7 @@ class Asked:
     how: SimulationOptions
 
 
-def asked_of(arguments: argparse.Namespace) -> Asked:
+def asked_of(arguments: argparse.Namespace) -> SimulationRequest:
     """Return what the arguments ask for.
 
     Raises
@@ -115,7 +115,7 @@ def asked_of(arguments: argparse.Namespace) -> Asked:
     if lasting is None:
         lasting = _fitting(scenario.duration, hook, sample_time)
     first = arguments.first_seed
-    return Asked(
+    return SimulationRequest(
         case=case,
         scenario=scenario,
         controllers=names,

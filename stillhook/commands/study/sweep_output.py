@@ -1,4 +1,4 @@
-"""What `stillhook sweep` prints and writes: report, folder, figures, commands to go on with."""
+"""Report, folder, figures and further commands of `stillhook sweep`."""
 
 from __future__ import annotations
 
