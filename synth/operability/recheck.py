@@ -86,15 +86,7 @@ def evaluate_in(design: Design, case: Case, drag: float | None = None) -> Assess
         question = pose(case, masses)
         return question.assess(design.gains, None if question.drag is None else drag)
     posed = pose_structure(case, design.structure, masses)
-    law = posed.law
-    problem = posed.problem(())
-    return Assessment(
-        problem.plant,
-        law.controller([design.parameters[p.name] for p in law.parameters]),
-        problem.disturbances,
-        drag=problem.drag,
-        coefficient=None if problem.drag is None else drag,
-    )
+    return posed.problem(()).assess([design.parameters[p.name] for p in posed.law.parameters], drag)
 
 
 def recheck(

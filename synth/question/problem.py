@@ -13,7 +13,7 @@ from models.basics import FloatArray
 from models.plant import LinearPlant
 
 from ..limits import Limit
-from ..loop import Disturbance, DragElement, with_drag
+from ..loop import Assessment, Disturbance, DragElement, with_drag
 from ..structures import ParametrisedController
 
 Values = Sequence[float] | FloatArray
@@ -71,3 +71,13 @@ class Problem:
     def stable(self, values: Values, coefficient: float | None = None) -> bool:
         """Return whether the closed loop is stable."""
         return self.abscissa(values, coefficient) < -_DECAY
+
+    def assess(self, values: Values, coefficient: float | None = None) -> Assessment:
+        """Return the closed loop in numbers, its drag solved for where no coefficient is given."""
+        return Assessment(
+            self.plant,
+            self.law.controller([float(v) for v in values]),
+            self.disturbances,
+            drag=self.drag,
+            coefficient=None if self.drag is None else coefficient,
+        )

@@ -19,7 +19,6 @@ from scipy.stats import qmc
 from models.basics import FloatArray, InputError, read_only, share
 
 from ..limits import Limit, MaxSensitivity
-from ..loop import Assessment
 from ..question import PAYLOAD, Objective
 from ..search import Progress
 from .family import Member
@@ -151,12 +150,7 @@ def figures_of(
 def exact_figures(plants: FamilyPlants, values: Sequence[float], member: Member) -> Figures:
     """Return what gains do to one member: every limit, refined nodes, exact delays."""
     problem = plants.scenario(member).problem
-    assessment = Assessment(
-        problem.plant,
-        problem.law.controller([float(v) for v in values]),
-        problem.disturbances,
-        drag=problem.drag,
-    )
+    assessment = problem.assess(values)
     growth = float(assessment.poles.real.max())
     if growth >= 0.0:
         return _unstable(member, growth)

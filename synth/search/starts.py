@@ -18,7 +18,6 @@ from scipy.stats import qmc
 
 from models.basics import FloatArray
 
-from ..loop import Assessment
 from ..question import Goal, Problem
 from ..structures import pace
 from .nodes import cost_nodes, margin_nodes
@@ -178,16 +177,7 @@ def coarse_programme(
     **options: Any,
 ) -> Programme:
     """Return a programme on nodes that suit all the starts."""
-    assessments = [
-        Assessment(
-            problem.plant,
-            problem.law.controller([float(v) for v in begin]),
-            problem.disturbances,
-            drag=problem.drag,
-            coefficient=start_coefficient(problem),
-        )
-        for begin in begins
-    ]
+    assessments = [problem.assess(begin, start_coefficient(problem)) for begin in begins]
     return Programme(
         problem,
         cost_nodes(problem, assessments, rtol=1e-4),

@@ -112,8 +112,7 @@ class _Gears:
             {"limits.drive": "report", **gear_changes(self.case, gear, radius)}
         )
         posed = Posed.of(case, self.structure, self.masses)
-        enforced = self.case.limits.drive == "enforce"
-        return posed.problem((*posed.loop, *(posed.drive if enforced else ())))
+        return posed.asked_by(self.case)
 
     def at(self, gear: float, radius: float) -> Answer | None:
         """Return the optimum behind a gear, from the nearest that is known."""
@@ -213,8 +212,7 @@ def gear_changes(case: Case, gear: float, radius: float | None = None) -> dict[s
 
 def _begin(first: StructureDesign) -> Answer | None:
     posed = Posed.of(first.case, first.structure, first.masses)
-    enforced = first.case.limits.drive == "enforce" and first.drive_kept
-    problem = posed.problem((*posed.loop, *(posed.drive if enforced else ())))
+    problem = posed.asked_by(first.case) if first.drive_kept else posed.problem(posed.loop)
     values = [first.parameters[p.name] for p in problem.law.parameters]
     coefficient = first.drag if problem.drag is not None else None
     return follow(problem, [np.array(values)], coefficient=coefficient)

@@ -84,6 +84,11 @@ class Posed:
         """Return the problem with some limits."""
         return self.question.problem(limits)
 
+    def asked_by(self, case: Case) -> Problem:
+        """Return the problem with the limits that a case enforces."""
+        drive = self.drive if case.limits.drive == "enforce" else ()
+        return self.problem((*self.loop, *drive))
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Answer:
@@ -195,8 +200,7 @@ def designed(
 ) -> StructureDesign | None:
     """Return the best gains of a case close to a known answer, verified; None if none keep it."""
     posed = Posed.of(case, structure, masses)
-    enforced = case.limits.drive == "enforce"
-    problem = posed.problem((*posed.loop, *(posed.drive if enforced else ())))
+    problem = posed.asked_by(case)
     begins = [near.carried(problem), near.solved.values]
     answer = follow(problem, begins, near=near, fine=True)
     if answer is None:

@@ -83,7 +83,7 @@ class FrontWalk:
         stable = [b for b in self.begins if problem.stable(b[1], b[2])]
         self.reference = min((b[1] for b in stable), key=problem.abscissa)
         self._assessments = [
-            _assessed(problem, values, coefficient) for _, values, coefficient in stable
+            problem.assess(values, coefficient) for _, values, coefficient in stable
         ]
         poles = [assessment.poles for assessment in self._assessments[:4]]
         nodes = cost_nodes(problem, self._assessments[:_VIEWS], rtol=1e-5)
@@ -273,16 +273,6 @@ def _from(order: Sequence[int], first: int) -> list[int]:
     """Return the part of an order from one of its entries on."""
     listed = list(order)
     return listed[listed.index(first) :]
-
-
-def _assessed(problem: Problem, values: FloatArray, coefficient: float | None) -> Assessment:
-    return Assessment(
-        problem.plant,
-        problem.law.controller([float(v) for v in values]),
-        problem.disturbances,
-        drag=problem.drag,
-        coefficient=coefficient,
-    )
 
 
 def exchanged(walk: FrontWalk, tell: Progress) -> list[tuple[float, ParetoPoint | None]]:

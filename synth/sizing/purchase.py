@@ -330,7 +330,7 @@ def worth(
     if not design.parameters or not design.drive_kept:
         return result
     posed = Posed.of(design.case, design.structure, design.masses)
-    problem = _problem(posed, design.case)
+    problem = posed.asked_by(design.case)
     coefficient = design.drag if problem.drag is not None else None
     here = follow(problem, [begin_from(problem, design)], coefficient=coefficient)
     if here is None:
@@ -423,12 +423,7 @@ def _changed(design: StructureDesign, here: Answer, item: Item, factor: float) -
     case = item.case(design.case, factor)
     if case is None:
         return None
-    return _problem(Posed.of(case, design.structure, design.masses), design.case)
-
-
-def _problem(posed: Posed, case: Case) -> Problem:
-    drive: Sequence[Limit] = posed.drive if case.limits.drive == "enforce" else ()
-    return posed.problem((*posed.loop, *drive))
+    return Posed.of(case, design.structure, design.masses).asked_by(design.case)
 
 
 def _sentence(result: Worth) -> str:

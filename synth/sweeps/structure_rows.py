@@ -92,14 +92,8 @@ class StructureRows:
         case = self.spread.case_at(row)
         posed = pose_structure(case, self.design.structure, self.design.masses)
         own = {**self.design.parameters, **self.spread.gains(row)}
-        problem = posed.problem(())
-        return Assessment(
-            problem.plant,
-            posed.law.controller([own[p.name] for p in posed.law.parameters]),
-            problem.disturbances,
-            drag=problem.drag,
-            coefficient=self.spread.drag(row) if problem.drag is not None else None,
-        )
+        values = [own[p.name] for p in posed.law.parameters]
+        return posed.problem(()).assess(values, self.spread.drag(row))
 
     def _measure(self, metric: FrequencyMetric, assessment: Assessment, row: FloatArray) -> float:
         static = assessment.plant.static
