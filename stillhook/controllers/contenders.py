@@ -45,8 +45,8 @@ class Contender:
     @property
     def needs(self) -> str:
         """The design that is to be found for it, as for `design_law`; empty if none."""
-        given = self.recipe is None or self.recipe.design is not None
-        return "" if self.recipe is None or given else self.recipe.needs
+        recipe = self.recipe
+        return recipe.needs if recipe is not None and recipe.design is None else ""
 
     @property
     def portable(self) -> bool:

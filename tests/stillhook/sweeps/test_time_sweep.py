@@ -340,9 +340,3 @@ def test_a_controller_that_cannot_leave_its_process_is_run_in_it():
 def test_a_controller_without_a_case_wants_one():
     with pytest.raises(InputError, match="'mpc' knows of no case: say case="):
         sweep("mpc", SPREAD, samples=1, **HOW)
-
-
-def test_an_object_cannot_follow_the_case():
-    recipe = recipe_of(LinearFeedback(CASE, GAINS), "sweep")
-    with pytest.raises(InputError, match="as an object cannot follow the case"):
-        recipe.follow(CASE, starts=1)
