@@ -191,51 +191,39 @@ def _uses(
 def _record(
     question: DesignQuestion,
     gains: Mapping[str, float],
-    assessment: Assessment,
+    assessment: Assessment | None,
     uses: Mapping[str, LimitUse],
     *,
     ok: bool,
     status: str,
 ) -> GainDesign:
-    fixed = question.case.payload.fixed_drag
+    """Return a design in the sea asked for; `assessment` is None where the loop is unstable."""
+    drag = question.drag_before
+    if assessment is not None:
+        fixed = question.case.payload.fixed_drag
+        drag = assessment.coefficient if question.drag is not None else float(fixed or 0.0)
     return GainDesign(
         case=question.case,
         gains=dict(gains),
         ok=ok,
         status=status,
         significant_height=question.case.sea.significant_height,
-        payload_rms=assessment.sigma(PAYLOAD),
+        payload_rms=assessment.sigma(PAYLOAD) if assessment is not None else np.inf,
         payload_rms_before=question.payload_rms_before,
         hook_rms=float(question.hook.displacement.rms),
-        margins=assessment.margins,
+        margins=assessment.margins if assessment is not None else None,
         limits=uses,
-        drag=assessment.coefficient if question.drag is not None else float(fixed or 0.0),
+        drag=drag,
         drag_before=question.drag_before,
         masses=question.masses,
     )
 
 
 def _unstable(question: DesignQuestion, gains: Mapping[str, float], growth: float) -> GainDesign:
-    status = (
-        f"unstable: grows by a factor e every {1.0 / growth:.3g} s"
-        if growth > 0.0
-        else "no stabilising gains were found"
-    )
-    return GainDesign(
-        case=question.case,
-        gains=dict(gains),
-        ok=False,
-        status=status,
-        significant_height=question.case.sea.significant_height,
-        payload_rms=np.inf,
-        payload_rms_before=question.payload_rms_before,
-        hook_rms=float(question.hook.displacement.rms),
-        margins=None,
-        limits={},
-        drag=question.drag_before,
-        drag_before=question.drag_before,
-        masses=question.masses,
-    )
+    status = "no stabilising gains were found"
+    if growth > 0.0:
+        status = f"unstable: grows by a factor e every {1.0 / growth:.3g} s"
+    return _record(question, gains, None, {}, ok=False, status=status)
 
 
 def _verified(
