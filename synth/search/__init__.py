@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from .polishing import assessment_of as assessment_of
     from .polishing import polish as polish
     from .polishing import thinned as thinned
-    from .programme import Pace as Pace
     from .programme import Programme as Programme
     from .programme import Solution as Solution
+    from .programme import SolverPace as SolverPace
     from .starts import begin_points as begin_points
     from .starts import briskest as briskest
     from .starts import coarse_programme as coarse_programme

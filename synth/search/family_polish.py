@@ -18,7 +18,7 @@ from ..question import FamilyLoop, FamilyProblem, Problem
 from .family_programme import FamilyProgramme, FamilySolved
 from .nodes import cost_nodes, margin_nodes
 from .polishing import KEPT, assessment_of, thinned
-from .programme import Pace
+from .programme import SolverPace
 
 PER_DECADE = 16  # margin nodes of the first pass; the exchange finds what lies between
 _ROUNDS = 10  # of the exchange of nodes
@@ -72,7 +72,11 @@ def polish_family(
 def _near(
     programme: FamilyProgramme, start: FloatArray, tighten: dict[tuple[int, str], float]
 ) -> FamilySolved | None:
-    for pace, reach in ((Pace.THERE, _REACH), (Pace.NEAR, _REACH), (Pace.FAR, None)):
+    for pace, reach in (
+        (SolverPace.THERE, _REACH),
+        (SolverPace.NEAR, _REACH),
+        (SolverPace.FAR, None),
+    ):
         solved = programme.solve(start, reach, tighten, pace)
         if solved.converged and programme.family.stable(solved.values, solved.coefficients):
             return solved

@@ -22,7 +22,7 @@ import numpy as np
 from models.basics import FloatArray, Quadrature
 
 from ..question import FamilyLoop, FamilyProblem, Goal, LoopSymbols, Objective, Values
-from .programme import Guard, Pace, Solution, solver_options
+from .programme import Guard, Solution, SolverPace, solver_options
 
 _ROOM = 12.0  # how far the logarithms of drags and of the cost may move: e^12
 
@@ -140,7 +140,7 @@ class FamilyProgramme:
             "g": constraints,
         }
         self._options = solver_options(tolerance, max_iterations)
-        self._solvers: dict[Pace, Any] = {}
+        self._solvers: dict[SolverPace, Any] = {}
 
     def _stable(self, x: FloatArray) -> bool:
         return self.family.stable(self._values(x), self._coefficients(x))
@@ -183,7 +183,7 @@ class FamilyProgramme:
         start: FloatArray,
         reach: float | None = None,
         tighten: Mapping[tuple[int, str], float] | None = None,
-        pace: Pace = Pace.FAR,
+        pace: SolverPace = SolverPace.FAR,
     ) -> FamilySolved:
         """Return IPOPT's answer from a start; see `synth.search.programme.Programme.solve`."""
         family, count = self.family, self.family.scales.size

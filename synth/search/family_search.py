@@ -23,7 +23,7 @@ from .family_programme import FamilyProgramme, FamilySolved
 from .multistart import Progress, Start
 from .nodes import cost_nodes, margin_nodes
 from .polishing import KEPT, thinned
-from .programme import Pace
+from .programme import SolverPace
 from .starts import candidates, pick_spread, stabilise
 
 _CANDIDATES = 512
@@ -154,7 +154,7 @@ def search_family(
     tell("starts", count, count)
     if not first:
         solved = min(
-            (programme.solve(programme.pack(b), pace=Pace.NEAR) for b in begins[:2]),
+            (programme.solve(programme.pack(b), pace=SolverPace.NEAR) for b in begins[:2]),
             key=lambda s: (not s.converged, programme.violations(programme.pack(s.values))[1]),
         )
         assessments, excess = assessments_of(family, solved)
@@ -240,7 +240,7 @@ def _second_pass(
     programme = coarse_programme(family, [s.values for s in first], reference, held)
     pairs = []
     for old in first:
-        new = programme.solve(programme.pack(old.values, old.coefficients), pace=Pace.NEAR)
+        new = programme.solve(programme.pack(old.values, old.coefficients), pace=SolverPace.NEAR)
         sound = new.converged and family.stable(new.values, new.coefficients)
         pairs.append((old, new if sound else old))
     return sorted(pairs, key=lambda pair: pair[1].objective)

@@ -20,7 +20,7 @@ from ..loop import Assessment
 from ..question import Goal, Problem
 from .nodes import cost_nodes, margin_nodes
 from .polishing import KEPT, assess, polish, thinned
-from .programme import Pace, Programme, Solution
+from .programme import Programme, Solution, SolverPace
 from .starts import begin_points, briskest, coarse_programme, pick_spread, start_coefficient
 
 Progress = Callable[[str, int, int], None]
@@ -180,7 +180,7 @@ def _once_more(programme: Programme, records: list[Start], solves: list[Solution
                 ends.append((merit, k))
     for _, k in sorted(ends)[:_SECOND_TRIES]:
         x = programme.pack(solves[k].values, solves[k].coefficient)
-        solved = programme.solve(x, pace=Pace.NEAR)
+        solved = programme.solve(x, pace=SolverPace.NEAR)
         if solved.converged and programme.problem.stable(solved.values, solved.coefficient):
             solves[k] = solved
             records[k] = replace(
@@ -248,7 +248,7 @@ def _second_pass(
     sound: dict[Solution, Solution] = {}  # from an answer to the one it began at
     for old in first:
         start = programme.pack(old.values, old.coefficient)
-        for reach, pace in ((_BASIN, Pace.NEAR), (None, Pace.FAR)):
+        for reach, pace in ((_BASIN, SolverPace.NEAR), (None, SolverPace.FAR)):
             new = programme.solve(start, reach, pace=pace)
             if new.converged and problem.stable(new.values, new.coefficient):
                 sound[new] = old

@@ -16,7 +16,7 @@ from models.basics import FloatArray
 from ..loop import Assessment
 from ..question import Goal, Problem
 from .nodes import cost_nodes, margin_nodes
-from .programme import Pace, Programme, Solution
+from .programme import Programme, Solution, SolverPace
 
 KEPT = 1e-5  # a limit counts as kept up to this relative excess
 _MOST_CRITICAL = 300  # frequencies that one assessment adds
@@ -102,9 +102,9 @@ def _any_pace(
         if near is not None and programme.problem.stable(near.values, near.coefficient):
             return near
     if excess < _CLOSE:
-        tries = [(Pace.THERE, _REACH), (Pace.NEAR, _REACH)]
+        tries = [(SolverPace.THERE, _REACH), (SolverPace.NEAR, _REACH)]
     else:
-        tries = [(Pace.NEAR, _REACH), (Pace.FAR, _REACH), (Pace.NEAR, _FAR_REACH)]
+        tries = [(SolverPace.NEAR, _REACH), (SolverPace.FAR, _REACH), (SolverPace.NEAR, _FAR_REACH)]
     for pace, reach in tries:
         solved = programme.solve(start, reach, tighten, pace)
         if solved.converged and programme.problem.stable(solved.values, solved.coefficient):
@@ -133,7 +133,7 @@ def _tightened(
             if over > 0.5 * KEPT:
                 tighten[name] = tighten.get(name, 0.0) + 1.1 * over
         start = programme.pack(solved.values, solved.coefficient, solved.extra)
-        again = programme.solve(start, _REACH, tighten, Pace.NEAR)
+        again = programme.solve(start, _REACH, tighten, SolverPace.NEAR)
         if not (again.converged and problem.stable(again.values, again.coefficient)):
             return answer
         solved = again

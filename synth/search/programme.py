@@ -110,7 +110,7 @@ def solver_options(tolerance: float, max_iterations: int) -> dict[str, Any]:
     }
 
 
-class Pace(Enum):
+class SolverPace(Enum):
     """How IPOPT goes about a start, by its barrier.
 
     From afar the adaptive barrier finds the way.  From the answer itself a large barrier would
@@ -205,7 +205,7 @@ class Programme:
         }
         self._cost = objective
         self._options = solver_options(tolerance, max_iterations)
-        self._solvers: dict[Pace, Any] = {}
+        self._solvers: dict[SolverPace, Any] = {}
 
     def _stable(self, x: FloatArray) -> bool:
         """Return whether the loop of the programme's vector is stable."""
@@ -215,7 +215,7 @@ class Programme:
         scales = np.array([p.scale for p in parameters])
         return self.problem.stable(x[:count] * scales, coefficient)
 
-    def _solver(self, pace: Pace) -> Any:
+    def _solver(self, pace: SolverPace) -> Any:
         if pace not in self._solvers:
             options = {**self._options, **pace.value}
             self._solvers[pace] = ca.nlpsol("synthesis", "ipopt", self._statement, options)
@@ -262,7 +262,7 @@ class Programme:
         start: FloatArray,
         reach: float | None = None,
         tighten: Mapping[str, float] | None = None,
-        pace: Pace = Pace.FAR,
+        pace: SolverPace = SolverPace.FAR,
     ) -> Solution:
         """Return IPOPT's answer from a start.
 

@@ -30,10 +30,10 @@ from ..loop import Assessment
 from ..question import PAYLOAD, Goal, Problem, StructureQuestion, pose_structure
 from ..search import (
     Found,
-    Pace,
     Programme,
     Progress,
     Solution,
+    SolverPace,
     assess,
     assessment_of,
     begin_points,
@@ -325,7 +325,7 @@ def _fewer(assessment: Assessment, problem: Problem, held: FloatArray) -> FloatA
 
 
 def _solved(programme: Programme, start: FloatArray, *, first: bool) -> Solution | None:
-    for pace in (Pace.FAR, Pace.NEAR) if first else (Pace.NEAR, Pace.FAR):
+    for pace in (SolverPace.FAR, SolverPace.NEAR) if first else (SolverPace.NEAR, SolverPace.FAR):
         solved = programme.solve(start, pace=pace)
         if solved.converged and programme.problem.stable(solved.values, solved.coefficient):
             return solved

@@ -24,10 +24,10 @@ from ..loop import Assessment
 from ..question import Problem
 from ..search import (
     KEPT,
-    Pace,
     Programme,
     Progress,
     Solution,
+    SolverPace,
     assessment_of,
     cost_nodes,
     margin_nodes,
@@ -201,7 +201,7 @@ class FrontWalk:
                 near = programme.follow(start, last, tighten)
                 if near is not None and stable(near.values, near.coefficient):
                     return near
-        for pace in (Pace.NEAR, Pace.FAR):
+        for pace in (SolverPace.NEAR, SolverPace.FAR):
             solved = programme.solve(x, tighten=tighten, pace=pace)
             if solved.converged and stable(solved.values, solved.coefficient):
                 return solved
@@ -351,7 +351,7 @@ class _Stretch:
             tighten = {**hairs, walk.name: walk.steps[i] + hairs.get(walk.name, 0.0)}
             x = programme.pack(self._solved[i].values, self._solved[i].coefficient)
             again = programme.follow(x, last, tighten)
-            for pace in (Pace.NEAR, Pace.FAR, None):
+            for pace in (SolverPace.NEAR, SolverPace.FAR, None):
                 if again is not None and self._sound(again):
                     self._solved[i] = last = again
                     self._assessments[i] = assessment_of(self._own[i], again)

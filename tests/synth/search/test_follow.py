@@ -8,7 +8,7 @@ import pytest
 from models import load_case
 from models.basics import one_thread
 from synth.question import pose
-from synth.search import Pace, Programme, assessment_of, cost_nodes, margin_nodes, search
+from synth.search import Programme, SolverPace, assessment_of, cost_nodes, margin_nodes, search
 
 CASES = {
     "one spring": ("thesis-1975", {}),
@@ -33,7 +33,7 @@ def solved(request):
             tolerance=1e-10,
         )
         start = programme.pack(values, found.solved.coefficient)
-        answer = programme.solve(start, pace=Pace.NEAR)
+        answer = programme.solve(start, pace=SolverPace.NEAR)
     assert answer.converged
     return programme, answer
 
@@ -65,7 +65,7 @@ def test_a_tighter_limit_is_followed_with_multipliers_and_without(solved):
         start = programme.pack(answer.values, answer.coefficient)
         cold = programme.follow(start, None, tighten)
         warm = programme.follow(start, answer, tighten)
-        ipopt = programme.solve(start, tighten=tighten, pace=Pace.NEAR)
+        ipopt = programme.solve(start, tighten=tighten, pace=SolverPace.NEAR)
     assert warm is not None
     assert cold is not None
     assert max(warm.iterations, cold.iterations) <= 8
