@@ -123,14 +123,9 @@ def table_text(depths: Sequence[AtDepth]) -> str:
                     "" if contour.headings is None else f"{np.degrees(contour.headings[h]):.6g}"
                 )
                 for p, period in enumerate(contour.periods):
-                    row = [
-                        f"{at.rope.length:g}",
-                        at.rope.layer or "",
-                        system,
-                        heading,
-                        f"{period:.6g}",
-                    ]
-                    row += [_figure(contour.limit[h, p]), str(contour.binding[h, p])]
+                    row = [f"{at.rope.length:g}", at.rope.layer or "", system, heading]
+                    row += [f"{period:.6g}", _figure(contour.limit[h, p])]
+                    row += [str(contour.binding[h, p])]
                     writer.writerow([*row, *(_figure(v) for v in every[:, h, p])])
     return out.getvalue()
 

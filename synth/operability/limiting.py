@@ -113,7 +113,7 @@ class SeaStates:
         still = np.all(weighted == 0.0, axis=1)  # no motion, no drag
         return np.where(still, max(low, 0.0), np.where(good, C, np.nan))
 
-    def look(self, heights: FloatArray, index: IndexArray) -> tuple[SeaMoments, FloatArray]:
+    def moments_at(self, heights: FloatArray, index: IndexArray) -> tuple[SeaMoments, FloatArray]:
         """Return moments and drag coefficients at heights (r,) [m] in headings `index` (r,)."""
         densities = self.densities(heights, index)
         C = self.coefficients(densities)
@@ -174,7 +174,7 @@ def limiting_heights(
     # All headings and heights are rows of one array: drag, moments and verdicts in a few calls.
     grid = np.geomspace(LOWEST, highest, _STEPS)
     row_heading = np.repeat(np.arange(headings), grid.size)
-    moments, C = states.look(np.tile(grid, headings), row_heading)
+    moments, C = states.moments_at(np.tile(grid, headings), row_heading)
     excess = np.array([c.excess(moments, np.isfinite(C)) for c in criteria])
     excess = excess.reshape(count, headings, grid.size)
     broken = excess > 0.0
@@ -191,7 +191,7 @@ def limiting_heights(
     drag = np.full(headings, np.nan)
     some = np.flatnonzero((lowest > 0.0) & np.isfinite(lowest))
     if some.size:
-        drag[some] = states.look(lowest[some], some)[1]
+        drag[some] = states.moments_at(lowest[some], some)[1]
     return ColumnLimits(heights=heights, drag=drag)
 
 
@@ -205,7 +205,7 @@ def _refined(
 ) -> FloatArray:
     def excess(size: FloatArray, w: FloatArray, h: FloatArray) -> FloatArray:
         # Every row is looked at for all criteria, which costs no more than for one.
-        moments, C = states.look(np.exp(size), h.astype(np.intp))
+        moments, C = states.moments_at(np.exp(size), h.astype(np.intp))
         stationary = np.isfinite(C)
         found = np.zeros(size.size)
         for k in np.unique(w.astype(np.intp)):

@@ -90,8 +90,7 @@ def _best(
     question = pose(case, design.masses)
     loop_limits = tuple(limit for limit in question.limits if not limit.drive)
     problem = question.problem_with(loop_limits)
-    scale = design.gains["A"] / question.amplifier
-    own = [scale * design.gains[name] for name in ("a", "a1", "a2")]
+    own = question.law_values(design.gains)
     free = tuning_of(problem, search(problem, _STARTS, seed, [own], None))
     if not free.ok:
         return None

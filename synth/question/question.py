@@ -82,14 +82,17 @@ class DesignQuestion:
             drag=self.drag,
         )
 
+    def law_values(self, gains: Mapping[str, float]) -> list[float]:
+        """Return gains ``A, a, a1, a2`` as the law has them: with its own amplifier."""
+        scale = gains["A"] / self.amplifier
+        return [scale * gains[name] for name in ("a", "a1", "a2")]
+
     def assess(self, gains: Mapping[str, float], coefficient: float | None = None) -> Assessment:
         """Return the closed loop of given gains ``A, a, a1, a2`` in numbers."""
-        scale = gains["A"] / self.amplifier
-        values = [scale * gains[name] for name in ("a", "a1", "a2")]
         problem = self.problem
         return Assessment(
             problem.plant,
-            problem.law.controller(values),
+            problem.law.controller(self.law_values(gains)),
             problem.disturbances,
             drag=self.drag,
             coefficient=coefficient,

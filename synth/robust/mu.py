@@ -245,9 +245,7 @@ def _parts(
         law = design.posed.law
         return design.controller, law, [design.parameters[p.name] for p in law.parameters]
     question = pose(design.sea_case, design.masses)
-    scale = design.gains["A"] / question.amplifier
-    values = [scale * design.gains[name] for name in ("a", "a1", "a2")]
-    law = question.problem.law
+    law, values = question.problem.law, question.law_values(design.gains)
     return law.controller(values), law, values
 
 

@@ -187,13 +187,12 @@ def fixed_design(design: GainDesign | StructureDesign) -> FixedDesign:
         )
     case = design.sea_case
     question = pose(case, design.masses)
-    scale = design.gains["A"] / question.amplifier
     return FixedDesign(
         case=case,
         masses=design.masses,
         law=question.structure.bind(question.plant),
         names=("a", "a1", "a2"),
-        values=tuple(scale * design.gains[name] for name in ("a", "a1", "a2")),
+        values=tuple(question.law_values(design.gains)),
         units={},
         measurements=None,
         reference=question.drag_before,

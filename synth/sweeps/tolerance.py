@@ -140,8 +140,7 @@ def radius_of(design: GainDesign | StructureDesign) -> GainRadius:
             plant = with_drag(plant, problem.drag, design.drag)
         return gain_radius(plant, law, [design.parameters[p.name] for p in law.parameters])
     question = pose(design.sea_case, design.masses)
-    scale = design.gains["A"] / question.amplifier
-    values = [scale * design.gains[name] for name in ("a", "a1", "a2")]
+    values = question.law_values(design.gains)
     return gain_radius(design.assessment.plant, question.problem.law, values)
 
 

@@ -108,7 +108,7 @@ def test_so_it_is_where_the_drag_changes_with_the_sea(name: str) -> None:
 def test_the_response_is_not_linear_in_the_height_where_the_drag_is_not() -> None:
     asked = pose_operability(dragged(), ())
     states = SeaStates.of(asked.held, sea_column(asked.case, 7.0))
-    moments, C = states.look(np.array([0.5, 2.0]), np.array([0, 0]))
+    moments, C = states.moments_at(np.array([0.5, 2.0]), np.array([0, 0]))
     assert C[1] > 1.5 * C[0]
     sigma = moments.sigma("payload.displacement")
     assert sigma[1] < 3.0 * sigma[0]
@@ -224,7 +224,7 @@ def test_a_higher_sea_moves_everything_more(period: float, height: float, factor
     for system in asked.systems.values():
         states = SeaStates.of(system, sea_column(asked.case, period))
         both = np.array([height, factor * height])
-        moments, C = states.look(both, np.array([0, 0]))
+        moments, C = states.moments_at(both, np.array([0, 0]))
         for name in moments.m0:
             assert moments.sigma(name)[1] > moments.sigma(name)[0]
         assert np.all(np.isfinite(C))
@@ -426,7 +426,9 @@ def test_a_loop_that_too_much_drag_destabilises_works_below_that() -> None:
     height = float(edged.heights[0, 0])
     assert height > float(edged.heights[1, 0])
     states = SeaStates.of(asked.loop, column)
-    assert states.look(np.array([height]), np.array([0]))[1][0] == pytest.approx(4e3, rel=1e-6)
+    assert states.moments_at(np.array([height]), np.array([0]))[1][0] == pytest.approx(
+        4e3, rel=1e-6
+    )
 
 
 def _fields(system: object) -> list[str]:
