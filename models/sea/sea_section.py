@@ -519,7 +519,7 @@ def _stamp(file: str) -> tuple[int, int]:
 @lru_cache(maxsize=64)
 def _spectrum(section: SeaSection, stamps: tuple[tuple[int, int], ...]) -> SeaSpectrum:
     del stamps  # a part of the cache's key only
-    # Here, so that reading a case does not load scipy.
+    # Here, so that a case file is read without the numerics.
     from .sea import SeaSpectrum
     from .spreading import Spreading
 

@@ -26,7 +26,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import gammaln, roots_gegenbauer
 
 from ..basics import FloatArray, InputError, check_range
 
@@ -90,6 +89,8 @@ class Spreading:
         FloatArray
             D, same shape [1/rad].
         """
+        from scipy.special import gammaln  # here, so that a long-crested sea does not load it
+
         turned = np.asarray(angle, dtype=np.float64)
         offset = np.mod(turned + math.pi, 2.0 * math.pi) - math.pi
         base = np.maximum(np.cos(self._scale * offset), 0.0)
@@ -123,6 +124,8 @@ class Spreading:
         InputError
             If the heading is not finite or the count below one.
         """
+        from scipy.special import roots_gegenbauer
+
         mean = check_range("spreading", "mean_heading", mean_heading, unit="rad")
         number = _NODES[self.kind] if count is None else count
         if number < 1:
