@@ -88,11 +88,6 @@ def load_design(path: str | Path) -> GainDesign:
     ------
     InputError
         If there is no such file, it is not a design, or a field is missing, unknown or wrong.
-
-    Warns
-    -----
-    PhysicsWarning
-        For each implausible figure of its case, as when the case was loaded.
     """
     content, reader = _opened(path, _KEY, "a design file")
     design: GainDesign = reader.value(GainDesign, content, ())
