@@ -8,9 +8,8 @@ long as there is any.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..controllers import Contender, StoredDesign
 from ..keeper import POLL, Died, Processes
@@ -19,7 +18,8 @@ from .cell import Cell, ComparisonQuestion, Trace
 from .comparison import Comparison
 from .store import Store
 
-Progress = Callable[[str, int, int], None]
+if TYPE_CHECKING:
+    from ..text import Progress
 
 
 @dataclass(kw_only=True)

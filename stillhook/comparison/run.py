@@ -14,6 +14,7 @@ import sys
 import time as clock
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from models.basics import InputError, check_range
 from models.case import Case
@@ -23,11 +24,14 @@ from ..controllers import contenders_of
 from ..keeper import Processes, usable_cores
 from ..runs import seconds_of, seeds_of
 from .bench import CellSetup
-from .campaign import Campaign, Progress
+from .campaign import Campaign
 from .cell import ComparisonQuestion
 from .comparison import Comparison
 from .mismatch import Mismatch
 from .store import STORE, Store
+
+if TYPE_CHECKING:
+    from ..text import Progress
 
 _LONGEST = 1e6  # run [s]
 
@@ -149,7 +153,7 @@ def compare(
             heights=levels,
             seeds=numbers,
             store=store,
-            progress=progress or _silent,
+            progress=progress or (lambda what, done, total: None),
         )
         complete = True
         try:
@@ -181,7 +185,3 @@ def _jobs(jobs: int | None) -> int:
     if jobs is not None:
         return int(check_range("compare", "jobs", jobs, low=1, high=512))
     return usable_cores()
-
-
-def _silent(what: str, done: int, total: int) -> None:
-    """Tell nobody."""

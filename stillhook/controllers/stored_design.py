@@ -13,20 +13,21 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from models.case import Case
 from synth.design import GainDesign, StructureDesign, Tuning
 from synth.loop import LinearController
 
+if TYPE_CHECKING:
+    from ..text import Progress
+
 EAGER = "-eager"
 """Ending of the designs that ignore the drive's limits."""
 HALF = "-half"
 """Ending of the designs that keep them in a sea of half the height."""
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from ..keeper import Pool
-    from .time_sweep import Progress
+    from ..text import Progress
 
 SAMPLES = {"frequency": 10_000, "time": 256}
 """Cases of a sweep unless told otherwise, by its mode."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import time as clock
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,7 +31,7 @@ from .time_metrics import METRICS, STATUS
 if TYPE_CHECKING:
     import xarray as xr
 
-Progress = Callable[[str, int, int], None]
+    from ..text import Progress
 
 _TOLD = 20  # reasons of failed cases that a result tells
 
@@ -78,7 +78,7 @@ def run_sweep(
     if len(rows) != draw.samples:
         raise InputError(f"sweep: the spread gives {len(rows)} cases, not {draw.samples}")
     _check(question, spread)
-    tell = progress or _silent
+    tell = progress or (lambda what, done, total: None)
     template = template_of(question, spread, draw, rows)
     used = engine_of(engine, question, jobs)
     messages: dict[int, str] = {}
@@ -269,7 +269,3 @@ def _check(question: TimeQuestion, spread: Spread) -> None:
                 f"sweep: fault.at must be before the end of the run, {question.duration:g} s, got "
                 f"up to {latest:g} s; vary it too, or run for longer"
             )
-
-
-def _silent(what: str, done: int, total: int) -> None:
-    """Tell nobody."""
