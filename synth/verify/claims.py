@@ -1,221 +1,176 @@
 """Protocols of the claims that are checked: a problem's answer, a design and its figures.
 
-`synth.design` keeps them.  The check thus knows none of the code that it checks, not even its
-types.
+The check knows none of the code that it checks, not even its types: what the members mean is
+said where they are kept, in `synth.design` and in what that is made of.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
+from models.basics import FloatArray
 from models.case import Case
 from models.plant import LinearPlant
 
-from .recompute import ControllerMatrices, SpectralSource
+
+class ControllerMatrices(Protocol):
+    """A controller x' = A x + B y, u = C x + D y with names for y and u."""
+
+    @property
+    def A(self) -> FloatArray: ...
+    @property
+    def B(self) -> FloatArray: ...
+    @property
+    def C(self) -> FloatArray: ...
+    @property
+    def D(self) -> FloatArray: ...
+    @property
+    def measurements(self) -> tuple[str, ...]: ...
+    @property
+    def inputs(self) -> tuple[str, ...]: ...
+
+
+class SpectralSource(Protocol):
+    """One disturbance of a loop; `Source` is one."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def density(self) -> Callable[[FloatArray], FloatArray]: ...
+    @property
+    def band(self) -> tuple[float, float] | None: ...
+    @property
+    def splits(self) -> tuple[float, ...]: ...
 
 
 class LimitClaim(Protocol):
     """The use of a limit: value, bound, and whether the design had to keep it."""
 
     @property
-    def value(self) -> float:
-        """The value that is claimed."""
-
+    def value(self) -> float: ...
     @property
-    def bound(self) -> float:
-        """Its bound."""
-
+    def bound(self) -> float: ...
     @property
-    def enforced(self) -> bool:
-        """Whether the bound binds the design."""
+    def enforced(self) -> bool: ...
 
 
 class StatedLimit(Protocol):
     """A limit of a problem; `limit_demand` reads its further fields by its class."""
 
     @property
-    def name(self) -> str:
-        """As in reports."""
-
+    def name(self) -> str: ...
     @property
-    def bound(self) -> float:
-        """The bound."""
-
+    def bound(self) -> float: ...
     @property
-    def outputs(self) -> tuple[str, ...]:
-        """The signals that it is about."""
+    def outputs(self) -> tuple[str, ...]: ...
 
 
 class QuadraticDrag(Protocol):
     """Quadratic drag force = -C velocity, C = quadratic sqrt(8/pi) sigma of the velocity."""
 
     @property
-    def quadratic(self) -> float:
-        """Q of the drag force q |v| v [N s2/m2]."""
-
+    def quadratic(self) -> float: ...
     @property
-    def velocity(self) -> str:
-        """Name of the velocity among the plant's outputs."""
-
+    def velocity(self) -> str: ...
     @property
-    def force(self) -> str:
-        """Name of the force among the plant's disturbances."""
-
+    def force(self) -> str: ...
     @property
-    def reference(self) -> float:
-        """The coefficient that the plant already holds [N s/m]."""
+    def reference(self) -> float: ...
 
 
 class NamedParameter(Protocol):
     """A parameter of a structure."""
 
     @property
-    def name(self) -> str:
-        """Its name."""
+    def name(self) -> str: ...
 
 
 class ControllerLaw(Protocol):
     """A structure on its plant: from its parameters to the controller."""
 
     @property
-    def parameters(self) -> Sequence[NamedParameter]:
-        """The parameters in their order."""
-
-    def controller(self, values: Sequence[float]) -> ControllerMatrices:
-        """Return the controller of parameter values."""
+    def parameters(self) -> Sequence[NamedParameter]: ...
+    def controller(self, values: Sequence[float]) -> ControllerMatrices: ...
 
 
 class TunedProblem(Protocol):
     """The question that a tuning answers."""
 
     @property
-    def plant(self) -> LinearPlant:
-        """The plant, its drag that before compensation."""
-
+    def plant(self) -> LinearPlant: ...
     @property
-    def law(self) -> ControllerLaw:
-        """The structure on it."""
-
+    def law(self) -> ControllerLaw: ...
     @property
-    def disturbances(self) -> Sequence[SpectralSource]:
-        """What shakes it."""
-
+    def disturbances(self) -> Sequence[SpectralSource]: ...
     @property
-    def minimise(self) -> Mapping[str, float]:
-        """Weights on the variances of its outputs, by name."""
-
+    def minimise(self) -> Mapping[str, float]: ...
     @property
-    def limits(self) -> Sequence[StatedLimit]:
-        """The limits that bind."""
-
+    def limits(self) -> Sequence[StatedLimit]: ...
     @property
-    def drag(self) -> QuadraticDrag | None:
-        """Drag to be linearised with the response."""
+    def drag(self) -> QuadraticDrag | None: ...
 
 
 class TuningClaims(Protocol):
     """The answer to a problem, see `synth.design.Tuning`."""
 
     @property
-    def problem(self) -> TunedProblem:
-        """The question."""
-
+    def problem(self) -> TunedProblem: ...
     @property
-    def ok(self) -> bool:
-        """Whether it counts as good."""
-
+    def ok(self) -> bool: ...
     @property
-    def cost(self) -> float:
-        """Square root of the weighted variance."""
-
+    def cost(self) -> float: ...
     @property
-    def parameters(self) -> Mapping[str, float]:
-        """Parameters of the structure by name."""
-
+    def parameters(self) -> Mapping[str, float]: ...
     @property
-    def controller(self) -> ControllerMatrices | None:
-        """The controller that they make."""
-
+    def controller(self) -> ControllerMatrices | None: ...
     @property
-    def margins(self) -> object | None:
-        """Stability margins, with the names of `CurveMargins`."""
-
+    def margins(self) -> object | None: ...
     @property
-    def limits(self) -> Mapping[str, LimitClaim]:
-        """Use of each limit by name."""
-
+    def limits(self) -> Mapping[str, LimitClaim]: ...
     @property
-    def coefficient(self) -> float | None:
-        """Drag coefficient that agrees with the response [N s/m]."""
+    def coefficient(self) -> float | None: ...
 
 
 class DesignClaims(Protocol):
     """What every design of a winch says, see `synth.design.GainDesign`."""
 
     @property
-    def case(self) -> Case:
-        """The case asked about."""
-
+    def case(self) -> Case: ...
     @property
-    def masses(self) -> int:
-        """Rope masses of the design plant."""
-
+    def masses(self) -> int: ...
     @property
-    def payload_rms(self) -> float:
-        """Standard deviation of the payload's motion [m]."""
-
+    def payload_rms(self) -> float: ...
     @property
-    def payload_rms_before(self) -> float:
-        """The same with the drum held [m]."""
-
+    def payload_rms_before(self) -> float: ...
     @property
-    def hook_rms(self) -> float:
-        """Standard deviation of the hook's motion [m]."""
-
+    def hook_rms(self) -> float: ...
     @property
-    def limits(self) -> Mapping[str, LimitClaim]:
-        """Use of every limit by name."""
-
+    def limits(self) -> Mapping[str, LimitClaim]: ...
     @property
-    def drag(self) -> float:
-        """Linear drag coefficient [N s/m]."""
-
+    def drag(self) -> float: ...
     @property
-    def drag_before(self) -> float:
-        """The same with the drum held [N s/m]."""
+    def drag_before(self) -> float: ...
 
 
 class GainClaims(DesignClaims, Protocol):
     """Gains of the payload feedback and what they do, see `synth.design.GainDesign`."""
 
     @property
-    def ok(self) -> bool:
-        """Whether it counts as good."""
-
+    def ok(self) -> bool: ...
     @property
-    def sea_case(self) -> Case:
-        """The case in the sea that the figures hold for."""
-
+    def sea_case(self) -> Case: ...
     @property
-    def gains(self) -> Mapping[str, float]:
-        """``A, a, a1, a2`` of u = -A (a P'' + a1 P' + a2 P)."""
-
+    def gains(self) -> Mapping[str, float]: ...
     @property
-    def margins(self) -> object | None:
-        """Stability margins, with the names of `CurveMargins`."""
+    def margins(self) -> object | None: ...
 
 
 class StructureClaims(DesignClaims, Protocol):
     """A structure's controller and what it does, see `synth.design.StructureDesign`."""
 
     @property
-    def measurements(self) -> tuple[str, ...]:
-        """What the structure hears."""
-
+    def measurements(self) -> tuple[str, ...]: ...
     @property
-    def parts(self) -> Mapping[str, float]:
-        """What each disturbance alone leaves of the payload's motion [m]."""
-
-    def tuning(self) -> TuningClaims:
-        """Return the answer to its problem."""
+    def parts(self) -> Mapping[str, float]: ...
+    def tuning(self) -> TuningClaims: ...

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -48,15 +47,7 @@ def winding_of_plant(plant: LinearPlant, law: LawMatrices, marks: npt.ArrayLike 
     through = np.eye(len(plant.inputs)) - law.D @ plant.D
     limit = 1.0 if any(plant.delays) else float(np.linalg.det(through))
     if limit == 0.0:
-        return Winding(
-            unstable=-1,
-            marginal=0,
-            open_loop=0,
-            radius=math.inf,
-            tail=math.inf,
-            points=0,
-            failure="the loop is not well posed: I - D_c D is singular",
-        )
+        return Winding(failure="the loop is not well posed: I - D_c D is singular")
     return count_unstable(loop.difference, poles=poles, marks=marks, at_infinity=limit)
 
 

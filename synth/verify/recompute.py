@@ -11,7 +11,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +19,7 @@ import scipy.linalg
 from models.basics import ComplexArray, FloatArray, SolverError
 from models.plant import LinearPlant, PlantResponse, ShapingFilter
 
+from .claims import ControllerMatrices, SpectralSource
 from .integrals import integrate, panels
 from .winding import Function
 
@@ -30,54 +30,6 @@ _RUNG_OUT = 3000.0  # omega times delay where the ringing is too small to matter
 def imaginary(omega: npt.ArrayLike) -> ComplexArray:
     """Return i omega, (k,) [1/s]."""
     return np.asarray(1j * np.asarray(omega, dtype=np.float64), dtype=np.complex128)
-
-
-class ControllerMatrices(Protocol):
-    """A controller x' = A x + B y, u = C x + D y with names for y and u."""
-
-    @property
-    def A(self) -> FloatArray:
-        """State matrix, (n, n)."""
-
-    @property
-    def B(self) -> FloatArray:
-        """From the measurements, (n, ny)."""
-
-    @property
-    def C(self) -> FloatArray:
-        """To the inputs, (nu, n)."""
-
-    @property
-    def D(self) -> FloatArray:
-        """Straight through, (nu, ny)."""
-
-    @property
-    def measurements(self) -> tuple[str, ...]:
-        """Names of y."""
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of u."""
-
-
-class SpectralSource(Protocol):
-    """One disturbance of a loop; `Source` is one."""
-
-    @property
-    def name(self) -> str:
-        """Its name among the plant's disturbances."""
-
-    @property
-    def density(self) -> Callable[[FloatArray], FloatArray]:
-        """One-sided density per rad/s."""
-
-    @property
-    def band(self) -> tuple[float, float] | None:
-        """Band that holds its variance [rad/s]; None is the half line."""
-
-    @property
-    def splits(self) -> tuple[float, ...]:
-        """Kinks of the density [rad/s]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -17,7 +17,7 @@ import numpy as np
 from models.basics import White, one_thread
 from models.plant import LinearPlant
 
-from .claims import TuningClaims
+from .claims import ControllerMatrices, TuningClaims
 from .demands import limit_demand
 from .nyquist import CurveMargins
 from .recheck import (
@@ -32,7 +32,7 @@ from .recheck import (
     winding_check,
     winding_of_plant,
 )
-from .recompute import ControllerMatrices, LawMatrices, Loop, imaginary, lyapunov_variances, moments
+from .recompute import LawMatrices, Loop, imaginary, lyapunov_variances, moments
 from .verification import Check, Verification, agreement, failure
 
 _DECAY = 1e-10  # of a pole, over the size of the fastest one, to count as stable

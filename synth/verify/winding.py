@@ -84,12 +84,12 @@ class Winding:
         Why there is no count; empty if there is one.
     """
 
-    unstable: int
-    marginal: int
-    open_loop: int
-    radius: float
-    tail: float
-    points: int
+    unstable: int = -1
+    marginal: int = 0
+    open_loop: int = 0
+    radius: float = np.inf
+    tail: float = np.inf
+    points: int = 0
     failure: str = ""
 
     @property
@@ -194,15 +194,7 @@ def count_unstable(
     radius, tail = _radius(scaled, 10.0 * largest)
 
     def failed(why: str) -> Winding:
-        return Winding(
-            unstable=-1,
-            marginal=0,
-            open_loop=open_loop,
-            radius=radius,
-            tail=tail,
-            points=points,
-            failure=why,
-        )
+        return Winding(open_loop=open_loop, radius=radius, tail=tail, points=points, failure=why)
 
     if tail > _LOOSE_TAIL:
         return failed(f"the loop gain does not fall off: |D/D(inf) - 1| is still {tail:.3g}")
