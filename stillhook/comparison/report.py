@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from ..text import (
-    Column,
     Drawing,
     OutputFolder,
     Report,
     Section,
     Table,
+    columns,
     csv_text,
     data_table,
     json_data,
@@ -134,21 +134,15 @@ def comparison_data(found: Comparison) -> dict[str, Any]:
 def _with_contenders(report: Report, found: Comparison) -> Report:
     """Return the report with who took part, what they know, and how their designs came about."""
     about = [(each.name, each.what, each.knows) for each in found.contenders]
-    columns = (Column("contender", ""), Column("what", "what it is"), Column("what it knows"))
     notes = [
         (each.name, height, found.note(each, height))
         for each in found.contenders
         for height in found.heights
         if found.note(each, height)
     ]
-    heads = (
-        Column("contender", ""),
-        Column("H_s [m]", write=lambda height: f"{height:.4g}"),
-        Column("note"),
-    )
-    tables = [Table(columns=columns, rows=about)]
+    tables = [Table(columns=columns("contender=; what it is; what it knows"), rows=about)]
     if notes:
-        tables.append(Table(columns=heads, rows=notes))
+        tables.append(Table(columns=columns("contender=; H_s [m]; note"), rows=notes))
     return replace(report, sections=[*report.sections, Section("Who takes part", tables)])
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from models.basics import mean_interval
 
-from ..text import Column, Table, Written, count, duration, listed, number, quantity, scale
+from ..text import Column, Table, Written, columns, count, duration, listed, number, quantity, scale
 
 if TYPE_CHECKING:
     from .comparison import Comparison
@@ -67,16 +67,15 @@ def table_at(found: Comparison, height: float) -> Table:
                 float(row["of the floor"]),
             )
         )
-    columns = (
+    heads = (
         Column("contender", f"H_s {height:.4g} m"),
         Column("rms", write=lambda value: f"{number(value / factor)} {unit}"),
         Column("interval", "95 % interval"),
         Column("largest", write=lambda value: number(value / factor)),
         Column("saturated", "sat.", write=lambda share: f"{share:.3g} %"),
-        Column("lost"),
-        Column("of_the_floor", "/ floor"),
+        *columns("lost; of_the_floor=/ floor"),
     )
-    return Table(columns=columns, rows=rows)
+    return Table(columns=heads, rows=rows)
 
 
 def left_out(found: Comparison) -> list[str]:

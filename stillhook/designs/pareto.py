@@ -17,6 +17,7 @@ from ..text import (
     Section,
     Table,
     annotate,
+    columns,
     drawn,
     headline,
     number,
@@ -79,15 +80,14 @@ def pareto_report(front: ParetoFront) -> Report:
         text += f"; no point holds at {len(front.lost)} bounds"
     passed, asked = front.verified
     names = list(front.points[0].parameters)
-    columns = (
-        Column("bound", front.against, write=lambda bound: _value_text(front, bound)),
-        Column("payload_rms", "payload rms", unit="m"),
-        Column("max_sensitivity", "M_s"),
-        Column("torque_rms", "torque rms", unit="N m"),
-        *(Column(name) for name in names),
-    )
     table = Table(
-        columns=columns,
+        columns=(
+            Column("bound", front.against, write=lambda bound: _value_text(front, bound)),
+            *columns(
+                "payload_rms=payload rms [m]; max_sensitivity=M_s; torque_rms=torque rms [N m]"
+            ),
+            *map(Column, names),
+        ),
         rows=[
             (p.bound, p.payload_rms, p.max_sensitivity, p.torque_rms, *p.parameters.values())
             for p in front.points

@@ -21,13 +21,13 @@ from ..text import (
     Report,
     Section,
     Table,
+    columns,
     data_table,
     drawn,
     headline,
     new_figure,
     number,
     pairs,
-    percent,
     quantity,
     scale,
     typeset,
@@ -139,11 +139,9 @@ def schedule_report(schedule: GainSchedule) -> Report:
         (float(length), *map(float, row))
         for length, row in zip(schedule.lengths, schedule.gains, strict=True)
     ]
-    columns = (
-        Column("rope_length", "rope", unit="m", digits=4),
-        *(Column(name, digits=5) for name in schedule.names),
-    )
-    items: list[Item] = [Table(columns=columns, rows=rows)]
+    gains = (f"; {name} [5]" for name in schedule.names)
+    heads = columns(f"rope_length=rope [m 4]{''.join(gains)}")
+    items: list[Item] = [Table(columns=heads, rows=rows)]
     if schedule.points:
         caption = "Gains over the rope's length"
         items.append(Drawing("schedule", caption, lambda: schedule_figure(schedule)))
@@ -181,19 +179,13 @@ def _scenarios(design: RobustDesign) -> Table:
         tightest, off = s.tightest, None if s.radius is None else s.radius.box
         row = (k + 1, s.payload_rms, s.payload_rms_before, s.max_sensitivity, s.delay, s.disk, off)
         rows.append((*row, *((tightest.use, tightest.name) if tightest else (None, ""))))
-    columns = (
-        Column("scenario", ""),
-        Column("payload_rms", "payload", unit="m"),
-        Column("payload_rms_held", "held", unit="m"),
-        Column("max_sensitivity", "M_s"),
+    heads = (
+        *columns("scenario=; payload_rms=payload [m]; held=held [m]; max_sensitivity=M_s"),
         Column("delay", write=lambda s: quantity(s, "s") if math.isfinite(s) else "any"),
-        Column("disk"),
-        Column("gains_off", "gains off", write=lambda share: f"{100.0 * share:.0f} %"),
-        Column("use", write=percent),
-        Column("of", left=True),
+        *columns("disk; gains_off=gains off [%]; use [%]; of <"),
     )
     notes = [f"{k + 1}: {s.name}" for k, s in enumerate(design.scenarios[:_ROWS])]
     notes.append("gains off: by how much all may be off at once before a loop is unstable")
     if len(design.scenarios) > _ROWS:
         notes.append(f"and {len(design.scenarios) - _ROWS} more, in scenarios.csv")
-    return Table(columns=columns, rows=rows, notes=tuple(notes))
+    return Table(columns=heads, rows=rows, notes=tuple(notes))

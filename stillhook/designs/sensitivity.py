@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from ..text import (
     Report,
     Section,
     Table,
+    Written,
+    columns,
     data_table,
     drawn,
     headline,
@@ -133,18 +135,15 @@ def sensitivity_report(study: Sensitivity, moved: Sequence[Moved], wide: Wide | 
         notes.append(f"{rest} (all in the table written)")
     notes += [f"{p}: something steps at its value, so that it has no elasticity" for p in
               study.stepping]  # fmt: skip
-    columns = (
-        Column("path", "one per cent more of"),
-        Column("payload_rms", "payload rms", write=_signed),
-        Column("max_sensitivity", "M_s", write=_signed),
-        Column("torque_rms", "torque", write=_signed),
-        Column("speed_rms", "speed", write=_signed),
-    )
+    moves = ("payload_rms", "max_sensitivity", "torque_rms", "speed_rms")
+    heads = map(Column, moves, ("payload rms", "M_s", "torque", "speed"))
     rows = [
-        (e.path, e.payload_rms, e.max_sensitivity, e.torque_rms, e.speed_rms)
-        for e in study.elasticities[:_ROWS]
+        (entry.path, *(Written(v, f"{v:+.3f} %") for v in (getattr(entry, name) for name in moves)))
+        for entry in study.elasticities[:_ROWS]
     ]
-    elasticities = Table(columns=columns, rows=rows, notes=tuple(notes))
+    elasticities = Table(
+        columns=(Column("path", "one per cent more of"), *heads), rows=rows, notes=tuple(notes)
+    )
     tornado = Drawing("tornado", "One per cent more of each", lambda: tornado_figure(study))
     sections = [Section("", [elasticities, tornado])]
     if moved:
@@ -185,17 +184,14 @@ def indices_table(wide: Wide) -> Table:
 
 
 def _moved(moved: Sequence[Moved]) -> Table:
-    columns = (
-        Column("path", f"{100.0 * moved[0].share:+.3g} % on"),
-        Column("payload_rms", "payload rms", unit="m", digits=4),
-        Column("max_sensitivity", "M_s"),
-    )
+    share = f"{100.0 * moved[0].share:+.3g} % on"
+    heads = columns(f"path={share}; payload_rms=payload rms [m 4]; max_sensitivity=M_s")
     rows = [
         (m.path, *((m.payload_rms, m.max_sensitivity) if math.isfinite(m.payload_rms) else
                    ("unstable", "")))
         for m in moved
     ]  # fmt: skip
-    return Table(columns=columns, rows=rows)
+    return Table(columns=heads, rows=rows)
 
 
 def _indices(wide: Wide) -> Table:
@@ -210,21 +206,13 @@ def _indices(wide: Wide) -> Table:
         for k in order
     ]
     lost = f"{studies[0].unstable} of {studies[0].evaluations} cases are unstable"
-    share: Any = {"write": lambda value: f"{100.0 * value:.1f} %"}
-    columns = (
-        Column("path", "over its range"),
-        Column("rms_first", "rms: alone", **share),
-        Column("rms_total", "in all", **share),
-        Column("modulus_first", "1/M_s: alone", **share),
-        Column("modulus_total", "in all", **share),
+    heads = (
+        *columns("path=over its range; rms_first=rms: alone [%]; rms_total=in all [%]"),
+        *columns("modulus_first=1/M_s: alone [%]; modulus_total=in all [%]"),
         Column("mu_star", "Morris mu*", write=lambda value: f"{value:.3f}"),
     )
     notes = (f"{lost}{', and left out' if studies[0].unstable else ''}",)
-    return Table(columns=columns, rows=rows, notes=notes)
-
-
-def _signed(value: float) -> str:
-    return f"{value:+.3f} %"
+    return Table(columns=heads, rows=rows, notes=notes)
 
 
 def _about(study: Sensitivity) -> str:

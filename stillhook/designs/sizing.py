@@ -14,7 +14,6 @@ from ..text import (
     DRUM,
     HOOK,
     REFERENCE,
-    Column,
     Drawing,
     Item,
     Report,
@@ -22,6 +21,7 @@ from ..text import (
     Table,
     Written,
     annotate,
+    columns,
     drawn,
     headline,
     number,
@@ -173,12 +173,7 @@ def size_report(sizing: Sizing) -> Report:
 
 def co_design_report(found: CoDesign) -> Report:
     """Return what the payload moves over gear and drum, the best pair marked."""
-    columns = (
-        Column("gear", digits=4),
-        Column("drum", unit="m"),
-        Column("payload_rms", "payload rms", unit="m", digits=4),
-        Column("limited_by", "limited by", left=True),
-    )
+    heads = columns("gear [4]; drum [m]; payload_rms=payload rms [m 4]; limited_by=limited by <")
     rows = [
         (
             p.gear,
@@ -190,7 +185,7 @@ def co_design_report(found: CoDesign) -> Report:
     ]
     best = (found.gear, found.radius)
     marked = tuple(k for k, p in enumerate(found.points) if (p.gear, p.radius) == best)
-    table = Table(columns=columns, rows=rows, marked=marked, most=_POINTS)
+    table = Table(columns=heads, rows=rows, marked=marked, most=_POINTS)
     return Report(
         name=found.case.name,
         about=f"gear and gains together, {found.structure}",
@@ -226,15 +221,9 @@ def worth_report(result: Worth) -> Report:
         notes.append("*: a margin is given away, not bought; the gear is chosen")
     if idle:
         notes.append(f"worth nothing here: {', '.join(idle)}")
-    columns = (
-        Column("item", ""),
-        Column("is"),
-        Column("one_per_cent", "1 % of it"),
-        Column("per_step", "per step"),
-        Column("twice_rms", "twice as good", unit="m"),
-    )
+    heads = columns("item=; is; one_per_cent=1 % of it; per step; twice_rms=twice as good [m]")
     drawing = Drawing("worth", "What is worth buying", lambda: worth_figure(result))
-    items: list[Item] = [Table(columns=columns, rows=rows, notes=tuple(notes)), drawing]
+    items: list[Item] = [Table(columns=heads, rows=rows, notes=tuple(notes)), drawing]
     return Report(status=result.status, ok=result.ok, sections=[Section("", items)], **head)
 
 
@@ -247,16 +236,12 @@ def _motors(sizing: Sizing) -> Table:
             figures = (motor.power, motor.torque_continuous, motor.torque_peak, motor.inertia)
         rows.append((point.gear, *figures, _bound_by(point.binding)))
     best = sizing.chosen.gear if sizing.chosen is not None else None
-    columns = (
-        Column("gear"),
-        Column("power", unit="W"),
-        Column("torque_continuous", "continuous", unit="N m"),
-        Column("torque_peak", "peak", unit="N m"),
-        Column("inertia", unit="kg m2"),
-        Column("limited_by", "limited by", left=True),
+    heads = columns(
+        "gear; power [W]; torque_continuous=continuous [N m]; torque_peak=peak [N m]; "
+        "inertia [kg m2]; limited_by=limited by <"
     )
     marked = tuple(k for k, point in enumerate(sizing.points) if point.gear == best)
-    return Table(columns=columns, rows=rows, marked=marked, most=_POINTS)
+    return Table(columns=heads, rows=rows, marked=marked, most=_POINTS)
 
 
 def _bound_by(binding: Sequence[str]) -> str:

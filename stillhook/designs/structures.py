@@ -20,12 +20,12 @@ from ..text import (
     Report,
     Section,
     Table,
+    columns,
     count,
     drawn,
     headline,
     new_figure,
     pairs,
-    percent,
     quantity,
     typeset,
 )
@@ -136,18 +136,14 @@ def structures(designs: Sequence[StructureDesign], *, bound: bool = True) -> Fig
 
 def structures_table(designs: Sequence[StructureDesign], *, bound: bool = True) -> Table:
     """Return the designs, one a row; `bound` asks for the bounds beside them too."""
-    columns = (
-        Column("structure"),
-        Column("payload_rms", "payload", unit="m"),
-        Column("over_best", "over best"),
-        *(Column(name, write=percent) for name in SHARES),
-        Column("max_sensitivity", "M_s"),
+    shares = "".join(f"; {name} [%]" for name in SHARES)
+    heads = (
+        *columns(f"structure; payload_rms=payload [m]; over best{shares}; max_sensitivity=M_s"),
         Column("delay", write=lambda s: "any" if math.isinf(s) else quantity(s, "s")),
-        Column("torque", write=percent),
-        Column("limited_by", "limited by", left=True),
+        *columns("torque [%]; limited_by=limited by <"),
     )
     return Table(
-        columns=columns,
+        columns=heads,
         rows=[_row(design, bound=bound) for design in designs],
         notes=(bounds_note(designs),) if bound else (),
         broken=tuple(k for k, design in enumerate(designs) if not design.ok),

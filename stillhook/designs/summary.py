@@ -13,9 +13,9 @@ from synth.design import GainDesign, LimitUse
 
 from ..text import (
     Bar,
-    Column,
     Table,
     Written,
+    columns,
     decibels,
     duration,
     number,
@@ -74,14 +74,10 @@ def motion_table(design: GainDesign) -> Table:
     found = [("hook", view.hook_motion), ("payload, drum held", view.before)]
     if view.after is not None:
         found.append(("payload, with these gains", view.after))
-    columns = (
-        Column("motion", ""),
-        Column("rms", unit="m"),
-        Column("significant_height", "significant height", unit="m"),
-        Column("largest", f"largest in {duration(design.case.limits.exposure_time)}", unit="m"),
-    )
+    largest = f"largest in {duration(design.case.limits.exposure_time)}"
+    heads = columns(f"motion=; rms [m]; significant height [m]; largest={largest} [m]")
     rows = [(name, m.rms, m.significant_height, m.largest) for name, m in found]
-    return Table(columns=columns, rows=rows)
+    return Table(columns=heads, rows=rows)
 
 
 def effect(design: GainDesign) -> str:
@@ -116,14 +112,8 @@ def gain_table(design: GainDesign) -> Table:
     ):
         value = design.gains[name]
         rows.append((name, acts_on, value, amplifier * value, _gain_unit(design, *per)))
-    columns = (
-        Column("gain"),
-        Column("acts_on", "on the payload's", left=True),
-        Column("value", digits=4),
-        Column("product", "A times it", digits=4),
-        Column("unit", "", left=True),
-    )
-    return Table(columns=columns, rows=rows)
+    heads = "gain; acts_on=on the payload's <; value [4]; product=A times it [4]; unit=<"
+    return Table(columns=columns(heads), rows=rows)
 
 
 def command_text(design: GainDesign) -> str:
@@ -177,12 +167,8 @@ def limit_table(design: GainDesign) -> Table:
         notes.append("price: what the payload's rms would lose if the bound were 1 % looser")
     if not all(use.enforced for use in uses):
         notes.append("reported: the case asks for the figure only (limits.drive: report)")
-    columns = (
-        Column("limit", ""),
-        *(Column(name) for name in ("value", "bound", "use")),
-        Column("price", "price" if priced else ""),
-    )
-    return Table(columns=columns, rows=rows, notes=tuple(notes))
+    heads = columns(f"limit=; value; bound; use; price={'price' if priced else ''}")
+    return Table(columns=heads, rows=rows, notes=tuple(notes))
 
 
 def label_of(design: GainDesign, name: str) -> str:
@@ -230,9 +216,9 @@ def required_table(design: GainDesign) -> Table | None:
         needed = _measured(use, value, size=use.bound)
         rows.append((label_of(design, name), _measured(use, use.bound), needed))
     wanted = f"needed in H_s {design.case.sea.significant_height:.3g} m"
-    columns = (Column("limit", "limit that breaks"), Column("is"), Column("needed", wanted))
+    heads = columns(f"limit=limit that breaks; is; needed={wanted}")
     note = f"All figures below are those in H_s {design.significant_height:.3g} m"
-    return Table(columns=columns, rows=rows, notes=(note,))
+    return Table(columns=heads, rows=rows, notes=(note,))
 
 
 def _limit_row(design: GainDesign, use: LimitUse) -> tuple[str, Written, Written, Bar, Written]:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from models.basics import Interval, Share, share
 from models.case import Case
 
-from ..text import Column, Table, Written, duration, number, quantity, scale
+from ..text import Column, Table, Written, columns, duration, number, quantity, scale
 from .runs import Runs, main_quantity
 
 _KWH = 3.6e6  # [J]
@@ -143,15 +143,15 @@ def tables_of(compared: Sequence[Runs]) -> list[Table]:
     if len(compared) > 1:
         return [_beside(group, rows, compared) for group, rows in groups.items()]
     several = len(compared[0].judged) > 1
-    columns = (
-        Column("mean", "mean" if several else ""),
-        Column("interval", "95 % interval" if several else ""),
-        Column("note", "", left=True),
+    heads = columns(
+        "quantity=; mean; interval=95 % interval; note=<"
+        if several
+        else "quantity=; mean=; interval=; note=<"
     )
     return [
         Table(
             title=group,
-            columns=(Column("quantity", ""), *columns),
+            columns=heads,
             rows=[
                 (
                     row.label,

@@ -23,6 +23,7 @@ from ..text import (
     Section,
     Table,
     Written,
+    columns,
     drawn,
     duration,
     heading_text,
@@ -246,14 +247,10 @@ def motion_report(survey: HookSurvey) -> Report:
     """Return the hook's motion as the case has it, over peak periods and over headings."""
     case, own = survey.case, survey.own
     longest, share = duration(own.duration), f"{100.0 * own.probability:g} % below"
-    columns = [
-        Column("motion", "hook"),
-        *(Column(name) for name in ("rms", "2 rms")),
-        Column("zero_crossing_period", "T_z", unit="s"),
-        Column("width", digits=2),
-        Column("largest", f"{longest} max"),
-        Column("fractile", share),
-    ]
+    heads = columns(
+        "motion=hook; rms; 2 rms; zero_crossing_period=T_z [s]; width [2]; "
+        f"largest={longest} max; fractile={share}"
+    )
     rows = [
         (
             {"velocity": "speed"}.get(m.name, m.name),
@@ -267,7 +264,7 @@ def motion_report(survey: HookSurvey) -> Report:
         for m in own.motions
     ]
     note = f"width: 0 is a sine; {longest} max: most probable; {share}: that fractile of it"
-    table = Table(columns=tuple(columns), rows=rows, notes=(note,))
+    table = Table(columns=heads, rows=rows, notes=(note,))
     sections = [Section("", [table, pairs(_demand(survey))]), _periods(survey)]
     if survey.headings.size:
         sections.append(_headings(survey))
@@ -326,16 +323,11 @@ def _periods(survey: HookSurvey) -> Section:
         notes.append("too steep: such waves break, seas of this H_s and T_p are not observed")
     if not survey.headings.size:
         notes.append("over the peak period only: heave_rao holds for one hook in one heading")
-    columns = (
-        Column("peak_period", "T_p", unit="s"),
-        Column("displacement", unit="m"),
-        Column("speed", unit="m/s"),
-        Column("acceleration", unit="m/s2"),
-        Column("largest_speed", "max speed", unit="m/s"),
-        Column("power", unit="W"),
-        Column("remark", "", left=True),
+    heads = columns(
+        "peak_period=T_p [s]; displacement [m]; speed [m/s]; acceleration [m/s2]; "
+        "largest_speed=max speed [m/s]; power [W]; remark=<"
     )
-    table = Table(columns=columns, rows=rows, notes=tuple(notes))
+    table = Table(columns=heads, rows=rows, notes=tuple(notes))
     return Section(f"over the peak period, rms{what}", [table])
 
 
@@ -353,18 +345,15 @@ def _headings(survey: HookSurvey) -> Section:
             row.append(Written(rms, quantity(rms, "m/s", size=size) + mark))
             row += [demand.velocity.largest, demand.peak_power]
         rows.append(row)
-    columns = [Column("heading", "towards", write=lambda degrees: f"{degrees:.4g} deg")]
+    heads = [Column("heading", "towards", write=lambda degrees: f"{degrees:.4g} deg")]
     for side in sides:
-        columns.append(Column(side))
-        columns.append(
-            Column(f"{side} largest", "max", write=lambda v: quantity(v, "m/s", size=size))
-        )
-        columns.append(Column(f"{side} power", "power", unit="W"))
+        largest = Column(f"{side} largest", "max", write=lambda v: quantity(v, "m/s", size=size))
+        heads += [Column(side), largest, Column(f"{side} power", "power", unit="W")]
     # So many that the one with the least speed is among them.
     every = max(1, -(-len(rows) // _ROWS))
     shown = [row for h, row in enumerate(rows) if h % every == 0 or h == best[1]]
     note = "0 following, 90 from starboard, 180 head sea, 270 from port; * least speed"
-    table = Table(columns=tuple(columns), rows=shown, notes=(note,))
+    table = Table(columns=tuple(heads), rows=shown, notes=(note,))
     period = quantity(float(survey.peak_periods[t]), "s")
     title = f"over the waves' heading, T_p {period}: rope speed rms, largest, power"
     return Section(title, [table])

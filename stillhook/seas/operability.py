@@ -18,6 +18,7 @@ from ..text import (
     Report,
     Section,
     Table,
+    columns,
     csv_text,
     data_table,
     pairs,
@@ -132,16 +133,15 @@ def _drawings(study: Operability) -> list[Drawing]:
 
 def _contours(at: AtDepth) -> Table:
     names = [n for n in _WHO if n in at.contours]
-    columns = [Column("peak_period", "T_p", write=lambda period: f"{period:.3g} s")]
+    heads = [Column("peak_period", "T_p", write=lambda period: f"{period:.3g} s")]
     for name in names:
-        columns.append(Column(name, _WHO[name]))
-        columns.append(Column(f"{name}_set_by", "set by", left=True))
+        heads += columns(f"{name}={_WHO[name]}; {name}_set_by=set by <")
     rows = []
     for p, period in enumerate(at.main.periods):
         rows.append((float(period), *(c for n in names for c in _cells(at.contours[n], p))))
     turns = "H_s [m] in the worst and the best heading; what binds in the worst"
     notes = (turns,) if at.main.headings is not None else ()
-    return Table(columns=tuple(columns), rows=rows, notes=notes, most=_ROWS)
+    return Table(columns=tuple(heads), rows=rows, notes=notes, most=_ROWS)
 
 
 def _cells(contour: Contour, p: int) -> tuple[str, str]:
@@ -168,15 +168,15 @@ def _shares(study: Operability) -> list[Item]:
         if study.headings is not None:
             best = [at.workable[n].best_heading or 0.0 for n in names]
             rows.append(("  best heading", *best, ""))
-    columns = (
+    heads = (
         Column("rope", write=lambda length: f"{length:g} m"),
         *(Column(n, _WHO[n], write=percent) for n in names),
-        Column("lost_to", "lost to", left=True),
+        *columns("lost to <"),
     )
     outside = first.workable["held"].outside
     beyond = f"{percent(outside)} of the time has periods outside the contour: not workable"
     notes = (beyond,) if outside > 5e-4 else ()
-    items: list[Item] = [Table(columns=columns, rows=rows, notes=notes)]
+    items: list[Item] = [Table(columns=heads, rows=rows, notes=notes)]
     months = {n: s.by_month for n, s in first.workable.items() if s.by_month}
     if months:
         known = sorted(next(iter(months.values())))
@@ -185,13 +185,9 @@ def _shares(study: Operability) -> list[Item]:
             for n in ("held", "loop", "reoptimised")
             if n in months
         ]
-        heads = [Column(_MONTHS[m - 1], write=lambda v: f"{100.0 * v:.0f}") for m in known]
+        each = [Column(_MONTHS[m - 1], write=lambda v: f"{100.0 * v:.0f}") for m in known]
         note = f"% of each month with {first.rope.length:g} m of rope"
-        items.append(Table(columns=(Column("system", ""), *heads), rows=shares, notes=(note,)))
-    columns = (
-        Column("operation", "rules of thumb, 1975 thesis, Table 2"),
-        Column("safe", write=percent),
-        Column("marginal", "or marginal", write=percent),
-    )
+        items.append(Table(columns=(Column("system", ""), *each), rows=shares, notes=(note,)))
+    heads = columns("operation=rules of thumb, 1975 thesis, Table 2; safe [%]; or marginal [%]")
     rules = [(rule.operation, safe, marginal) for rule, safe, marginal in study.rules()]
-    return [*items, Table(columns=columns, rows=rules)]
+    return [*items, Table(columns=heads, rows=rules)]

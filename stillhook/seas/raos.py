@@ -15,11 +15,12 @@ from ..text import (
     DRUM,
     HOOK,
     REFERENCE,
-    Column,
     Drawing,
     Report,
     Section,
     Table,
+    Written,
+    columns,
     drawn,
     headline,
     new_figure,
@@ -91,33 +92,20 @@ def rao_report(raos: VesselRaos, check: LongWaveCheck, *, stem: str = "raos") ->
 
 def long_waves(check: LongWaveCheck) -> Section:
     """Return the motions in long waves beside those that they have to be."""
-    columns = (
-        Column("heading", write=lambda degrees: f"{degrees:.0f} deg"),
-        Column("motion", left=True),
-        *(
-            column
-            for name in ("found", "expected")
-            for column in (
-                Column(name, write=lambda size: f"{size:.3f}"),
-                Column(f"{name}_phase", "phase"),
-            )
-        ),
-        Column("verdict", "", left=True),
+    heads = columns(
+        "heading; motion <; found; found_phase=phase; expected; expected_phase=phase; verdict=<"
     )
     rows = [
         (
-            row.heading_deg,
+            Written(row.heading_deg, f"{row.heading_deg:.0f} deg"),
             row.motion,
-            abs(row.found),
-            _phase(row.found),
-            abs(row.expected),
-            _phase(row.expected),
+            *(c for x in (row.found, row.expected) for c in (_size(x), _phase(x))),
             row.verdict,
         )
         for row in check.rows
     ]
     title = f"Long waves, {check.omega:.3g} rad/s; angles over the wave slope"
-    return Section(title, [Table(columns=columns, rows=rows)])
+    return Section(title, [Table(columns=heads, rows=rows)])
 
 
 def long_wave_verdict(check: LongWaveCheck) -> str:
@@ -169,6 +157,10 @@ def largest_motions(raos: VesselRaos) -> str:
             f"{raos.heading_deg[column]:.4g} deg)"
         )
     return ", ".join(texts)
+
+
+def _size(value: complex) -> Written:
+    return Written(abs(value), f"{abs(value):.3f}")
 
 
 def _phase(value: complex) -> str:

@@ -13,13 +13,13 @@ from ..text import (
     AFTER,
     BEFORE,
     HOOK,
-    Column,
     Drawing,
     Item,
     Report,
     Section,
     Table,
     annotate,
+    columns,
     data_table,
     drawn,
     headline,
@@ -214,8 +214,8 @@ def _quality(records: SeaRecords) -> Table:
     rows: list[tuple[str, int, str]] = [("read", quality.read, "")]
     rows += [(f"rejected: {one.reason}", one.count, one.example) for one in quality.rejections]
     rows.append(("kept", quality.kept, ""))
-    columns = (Column("records"), Column("count", ""), Column("first", left=True))
-    return Table(columns=columns, rows=rows, notes=tuple(quality.notes))
+    heads = columns("records; count=; first <")
+    return Table(columns=heads, rows=rows, notes=tuple(quality.notes))
 
 
 def _statistics(records: SeaRecords) -> list[Item]:
@@ -228,7 +228,6 @@ def _statistics(records: SeaRecords) -> list[Item]:
             f"{first} to {last} UTC, {records.omega.size} frequencies from {low:.3g} to "
             f"{high:.3g} Hz"
         )
-    columns = (Column("quantity", ""), *map(Column, ("mean", "lowest", "median", "highest")))
     rows = [
         (label, *(float(f(values)) for f in (np.mean, np.min, np.median, np.max)))
         for label, values in (
@@ -237,7 +236,7 @@ def _statistics(records: SeaRecords) -> list[Item]:
             ("T_z [s]", records.zero_crossing_period),
         )
     ]
-    return [*items, Table(columns=columns, rows=rows)]
+    return [*items, Table(columns=columns("quantity=; mean; lowest; median; highest"), rows=rows)]
 
 
 def _facts(sea: SeaSpectrum) -> list[tuple[str, str]]:

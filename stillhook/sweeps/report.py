@@ -14,13 +14,13 @@ from models.case import Case
 from models.spread import Spread
 
 from ..text import (
-    Column,
     Item,
     OutputFolder,
     Report,
     Section,
     Table,
     Written,
+    columns,
     count,
     json_text,
     number,
@@ -155,12 +155,9 @@ def _quantiles(summary: SweepSummary) -> Table:
         factor, shown = scale(unit, max(abs(value) for value in values))
         texts = (Written(value, number(value / factor)) for value in values)
         rows.append((name.replace("_", " "), *texts, "" if unit == "1" else shown))
-    columns = (
-        Column("name", "of those that hold" if summary.in_time else "of those stable"),
-        *map(Column, ("5 %", "median", "95 %", "largest")),
-        Column("unit", left=True),
-    )
-    return Table(columns=columns, rows=rows)
+    those = "of those that hold" if summary.in_time else "of those stable"
+    heads = columns(f"name={those}; 5 %; median; 95 %; largest; unit <")
+    return Table(columns=heads, rows=rows)
 
 
 def _worst(result: xr.Dataset, case_number: int) -> str:

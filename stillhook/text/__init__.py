@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from .table import Section as Section
     from .table import Table as Table
     from .table import Written as Written
+    from .table import columns as columns
     from .table import csv_text as csv_text
     from .table import data_table as data_table
     from .table import json_data as json_data

@@ -69,6 +69,32 @@ class Column:
         return str(cell) if whole else quantity(float(cell), self.unit, self.digits)
 
 
+def columns(text: str) -> tuple[Column, ...]:
+    """Return columns from their headings with semicolons between, ``name=heading [unit digits] <``.
+
+    The name in data is the heading where none is given; ``[%]`` writes a share in percent, and
+    ``<`` stands words to the left.
+
+    Examples
+    --------
+    >>> gear, power, by = columns("gear; power=rated power [W 4]; by=limited by <")
+    >>> gear.text(14.8123), power.heading, power.text(70.0), by.left
+    ('14.8', 'rated power', '70.00 W', True)
+    """
+    found = []
+    for part in text.split(";"):
+        name, _, heading = part.rpartition("=")
+        heading, left = heading.strip().removesuffix("<").rstrip(), heading.rstrip().endswith("<")
+        heading, _, inside = heading.removesuffix("]").partition("[")
+        unit, _, last = inside.rpartition(" ")
+        unit, digits = (unit, int(last)) if last.isdigit() else (inside, 3)
+        heading, write = heading.rstrip(), percent if unit == "%" else None
+        unit = "" if write else unit
+        key = name.strip() or heading
+        found.append(Column(key, heading, unit=unit, digits=digits, left=left, write=write))
+    return tuple(found)
+
+
 @dataclass(frozen=True)
 class Written:
     """A figure in words of its own, as ``no bound`` for infinity."""
@@ -148,8 +174,7 @@ def pairs(rows: Sequence[tuple[str, str]], title: str = "") -> Table:
 
 def remarks(title: str, rows: Sequence[tuple[str, str, str]]) -> Table:
     """Return a table of labels, figures and remarks."""
-    columns = (Column("name", ""), Column("figure", ""), Column("remark", "", left=True))
-    return Table(title=title, columns=columns, rows=rows)
+    return Table(title=title, columns=columns("name=; figure=; remark=<"), rows=rows)
 
 
 def data_table(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> Table:

@@ -61,9 +61,13 @@ def show(item: Report | Table, out: Console) -> None:
     grid.show_header = not bare
     if item.title and item.title != item.headings[0]:
         out.print(item.title, style="bold", soft_wrap=True)
-    for k, (column, heading) in enumerate(zip(item.columns, item.headings, strict=True)):
+    texts = {row: item.cells(row) for row in item.shown}
+    # A column in which nothing stands would take room for nothing.
+    used = [k for k in range(len(item.columns)) if not k or any(t[k] for t in texts.values())]
+    for k in used:
+        column, heading = item.columns[k], item.headings[k]
         # The last words give way where the line is full.
-        words = column.left and k == len(item.columns) - 1
+        words = column.left and k == used[-1]
         grid.add_column(
             heading,
             justify="left" if column.left or k == 0 else "right",
@@ -71,12 +75,10 @@ def show(item: Report | Table, out: Console) -> None:
             overflow="fold" if words else "ellipsis",
             style="dim" if bare and k == 0 else None,
         )
-    for k in item.shown:
-        cells: list[str | Text] = list(item.cells(k))
-        for at, cell in enumerate(item.rows[k]):
-            if isinstance(cell, Bar):
-                cells[at] = _bar(cell)
-        grid.add_row(*cells, style="red" if k in item.broken else None)
+    for row, cells in texts.items():
+        raw = item.rows[row]
+        shown = [_bar(cell) if isinstance(cell := raw[k], Bar) else cells[k] for k in used]
+        grid.add_row(*shown, style="red" if row in item.broken else None)
     indent = (0, 0, 0, 0 if wide else 2)
     out.print(Padding(grid, indent, expand=False))
     for note in item.notes:
