@@ -231,12 +231,12 @@ def schedule_gains(
     if not 0.0 < shortest < longest:
         raise InputError(f"gain schedule: lengths must be two ascending ones, got {lengths}")
     check_range("gain schedule", "checks", checks, low=5, high=500)
-    work = _Work(case, np.geomspace(shortest, longest, int(checks)), seed, progress)
+    work = _ScheduleSearch(case, np.geomspace(shortest, longest, int(checks)), seed, progress)
     return work.schedule(close)
 
 
-class _Work:
-    """What one schedule takes: the loop at each checked length, its own best gains."""
+class _ScheduleSearch:
+    """The search for one schedule: the loop at each checked length, and its own best gains."""
 
     def __init__(
         self, case: Case, lengths: FloatArray, seed: int, progress: Progress | None

@@ -27,7 +27,7 @@ _PROBES = np.geomspace(0.05, 50.0, 60)
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Law:
+class _Scaling:
     """How the density follows from the case's own: a factor, a stretch, or not at all."""
 
     height: str | None = None
@@ -49,10 +49,10 @@ class SeaRows:
         self._columns = [j for j, p in enumerate(spread.paths) if p.startswith(_SEA)]
         self._known: dict[bytes, HookMotion] = {}
         names = {spread.paths[j] for j in self._columns}
-        self._law: _Law | None = _Law()
+        self._scaling: _Scaling | None = _Scaling()
         if names:
-            self._law = self._tried(
-                _Law(
+            self._scaling = self._tried(
+                _Scaling(
                     height=_HEIGHT if _HEIGHT in names else None,
                     period=next((p for p in _PERIODS if p in names), None),
                 ),
@@ -62,7 +62,7 @@ class SeaRows:
     @property
     def varies(self) -> bool:
         """Whether rows differ in more than a factor."""
-        return self._law is None or self._law.period is not None
+        return self._scaling is None or self._scaling.period is not None
 
     def frame(self) -> tuple[float, float, list[float]]:
         """Return the band that holds all densities, and their kinks [rad/s]."""
@@ -76,10 +76,10 @@ class SeaRows:
 
     def factors(self, rows: FloatArray) -> FloatArray:
         """Return the factor on the common density of each row, (n,) or (1,)."""
-        if self._law is None or self._law.height is None or not len(rows):
+        if self._scaling is None or self._scaling.height is None or not len(rows):
             return np.ones(1)
-        j = self.spread.paths.index(self._law.height)
-        factor: FloatArray = (rows[:, j] / self.spread.nominal[self._law.height]) ** 2
+        j = self.spread.paths.index(self._scaling.height)
+        factor: FloatArray = (rows[:, j] / self.spread.nominal[self._scaling.height]) ** 2
         return factor
 
     def density(self, omega: FloatArray) -> FloatArray:
@@ -90,21 +90,21 @@ class SeaRows:
         """Return density over factor of each row at the nodes, (n, k); None if it is common."""
         if not self.varies:
             return None
-        if self._law is None:
+        if self._scaling is None:
             return np.stack([np.asarray(self._own(row).density(omega)) for row in rows])
-        assert self._law.period is not None
-        j = self.spread.paths.index(self._law.period)
-        stretch = rows[:, j] / self.spread.nominal[self._law.period]
+        assert self._scaling.period is not None
+        j = self.spread.paths.index(self._scaling.period)
+        stretch = rows[:, j] / self.spread.nominal[self._scaling.period]
         sea = np.asarray(self.hook.sea.density((stretch[:, None] * omega).ravel()))
         heave = np.abs(self.hook.rao.response(omega)) ** 2
         return np.asarray(sea.reshape(len(rows), -1) * stretch[:, None] * heave)
 
-    def _tried(self, law: _Law, names: set[str]) -> _Law | None:
-        """Return the law if it holds on some rows and nothing else of the sea varies."""
-        if names - {law.height, law.period}:
+    def _tried(self, scaling: _Scaling, names: set[str]) -> _Scaling | None:
+        """Return the scaling if it holds on some rows and nothing else of the sea varies."""
+        if names - {scaling.height, scaling.period}:
             return None
-        self._law = law
-        if law.period is not None:
+        self._scaling = scaling
+        if scaling.period is not None:
             plain = np.abs(self.hook.rao.response(_PROBES)) ** 2 * self.hook.sea.density(_PROBES)
             if not np.allclose(plain, self.hook.density(_PROBES), rtol=_AGREE, atol=0.0):
                 return None
@@ -115,7 +115,7 @@ class SeaRows:
             found = found * self.factors(row[None])[0]
             if np.any(np.abs(found - own) > _AGREE * np.maximum(own, 1e-12 * own.max())):
                 return None
-        return law
+        return scaling
 
     def _some(self, count: int) -> list[FloatArray]:
         """Return rows at the ends of what varies of the sea, and some in between."""
