@@ -1,10 +1,8 @@
-"""The linear quadratic Gaussian controller, and its reduction to a few states.
+"""Linear quadratic Gaussian designs, and their reduction to a few states or to a static gain.
 
-For white noise and a full-order controller it is the optimum that `synth.design.tuning` must find,
-and so its test oracle; for everything else (a spectrum with a peak, delays, limits, a controller of
-lower order, a static gain) it is a good place to start from.  Two Riccati equations, solved by
-SciPy, and a balanced truncation of what the controller makes of the innovations, in the manner of
-Liu and Anderson, "Controller reduction via stable factorization and balancing" (Int. J. Control 44,
+A good place to start a search of free controllers from: two Riccati equations, solved by SciPy,
+and a balanced truncation of what the controller makes of the innovations, in the manner of Liu
+and Anderson, "Controller reduction via stable factorization and balancing" (Int. J. Control 44,
 1986).
 """
 
@@ -17,14 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
 
-from models.basics import (
-    BoolArray,
-    FloatArray,
-    InputError,
-    SynthesisError,
-    White,
-    balanced_truncation,
-)
+from models.basics import BoolArray, FloatArray, SynthesisError, balanced_truncation
 from models.plant import LinearPlant
 
 from ..loop import LinearController
@@ -46,67 +37,6 @@ class LqgEstimator:
     gain: FloatArray
     V: FloatArray
     Y: FloatArray
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LQG:
-    """The optimal controller of full order; `cost` is the root of the weighted variance."""
-
-    controller: LinearController
-    cost: float
-    regulator: LqgRegulator
-    estimator: LqgEstimator
-
-
-def lqg(plant: LinearPlant, *, minimise: Mapping[str, float], spectrum: Mapping[str, White]) -> LQG:
-    """Return the controller that minimises a weighted variance under white noise.
-
-    Parameters
-    ----------
-    plant
-        A plant without delays and rates.
-    minimise
-        Weights on the variances of performance outputs by name; together they must weigh
-        every input.
-    spectrum
-        White noises by the name of their disturbance; together they must disturb every
-        measurement.
-
-    Raises
-    ------
-    InputError
-        If a name is unknown, or the plant has delays or rates.
-    SynthesisError
-        If an input is free of charge, a measurement is free of noise, a weighted output
-        hears white noise directly, or a Riccati equation has no stabilising solution.
-    """
-    if any(plant.delays) or plant.rates:
-        raise InputError("LQG: the plant must have neither delays nor rates")
-    for kind, known, given in (
-        ("output", plant.outputs, minimise),
-        ("disturbance", plant.disturbances, spectrum),
-    ):
-        for name in given:
-            if name not in known:
-                raise InputError(
-                    f"LQG: there is no {kind} {name!r}; there are: {', '.join(known) or 'none'}"
-                )
-    weights = np.array([minimise.get(name, 0.0) for name in plant.outputs])
-    noise = np.array([spectrum[n].intensity if n in spectrum else 0.0 for n in plant.disturbances])
-    if np.any(weights @ plant.Fz**2 @ noise > 0.0):
-        raise SynthesisError("LQG: a weighted output hears white noise directly: infinite cost")
-    Q, R, S = weighing(plant.Cz, plant.Dz, weights)
-    feedback = regulator(plant, Q, R, S)
-    kalman = estimator(plant, *_noises(plant, noise))
-    variance = np.trace(plant.E.T @ feedback.X @ plant.E * noise) + np.trace(
-        feedback.gain.T @ R @ feedback.gain @ kalman.Y
-    )
-    return LQG(
-        controller=reduced(plant, feedback, kalman, len(plant.states)),
-        cost=float(np.sqrt(variance)),
-        regulator=feedback,
-        estimator=kalman,
-    )
 
 
 def regulator(plant: LinearPlant, Q: FloatArray, R: FloatArray, S: FloatArray) -> LqgRegulator:
@@ -220,7 +150,7 @@ def designs(
     effort = np.einsum("kzu,z->ku", np.abs(response.zu) ** 2, weights)
     heard = np.sum(np.abs(response.yw) ** 2, axis=2)
     Q, R, S = weighing(plant.Cz, plant.Dz, weights)
-    W, V, U = _noises(plant, np.ones(len(plant.disturbances)))
+    W, V, U = plant.E @ plant.E.T, plant.F @ plant.F.T, plant.E @ plant.F.T
     regulators, filters = [], []
     for k in range(-1, len(effort)):
         # From the highest frequency, where the least is added, down.
@@ -231,15 +161,6 @@ def designs(
         with contextlib.suppress(SynthesisError):
             filters.append(estimator(plant, W, V + noise, U))
     return regulators, filters
-
-
-def _noises(plant: LinearPlant, intensity: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return W, V, U of independent white noises."""
-    return (
-        (plant.E * intensity) @ plant.E.T,
-        (plant.F * intensity) @ plant.F.T,
-        (plant.E * intensity) @ plant.F.T,
-    )
 
 
 def _riccati(

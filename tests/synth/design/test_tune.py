@@ -18,6 +18,7 @@ from loop_numbers import (
     two_carts,
     with_full_state,
 )
+from lqg_optimum import lqg
 from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov
 from scipy.optimize import brentq, differential_evolution, minimize
 
@@ -27,7 +28,6 @@ from synth import LowOrder, MaxSensitivity, Rms, StaticGain, White, tune
 from synth.loop import LinearController
 from synth.structures import ParametrisedController
 from synth.structures.low_order import LowOrderLaw
-from synth.structures.lqg import lqg
 
 WHITE = {"f": White(1.0), "n": White(0.01)}
 WEIGHTS = {"x": 1.0, "effort": 0.1}

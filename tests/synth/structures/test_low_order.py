@@ -17,6 +17,7 @@ from loop_numbers import (
     two_carts,
     with_full_state,
 )
+from lqg_optimum import lqg
 from scipy.integrate import quad
 from scipy.stats import qmc
 
@@ -26,7 +27,7 @@ from synth.loop import Disturbance, LinearController, Phasor, disturbances
 from synth.question import Problem
 from synth.search.starts import candidates, crossover_grid
 from synth.structures import LowOrder, ParametrisedController, reduced, weighing
-from synth.structures.lqg import designs, lqg, regulator
+from synth.structures.lqg import designs, regulator
 from synth.structures.whitened import whitened
 
 WHITE = {"f": White(1.0), "n": White(0.01)}
