@@ -206,6 +206,7 @@ def worst_members(
     found = figures_of(plants, values, members)
     best = sorted(found, key=lambda f: -f.hurt(level))[:_TOP]
     width = 0.25
+    # Between the ends only where one looks: the worst so far are looked at more and more closely.
     for _ in range(_ZOOMS if family.continuous else 0):
         around = [m for f in best for m in _around(plants, f.member, width, seed)]
         seed += 1

@@ -101,6 +101,7 @@ def limit_cycles(loop: TorqueLoop, *, harmonics: int = 1) -> tuple[LimitCycle, .
         cycle = _balanced(loop, guess)
         if cycle is not None and not any(_alike(cycle, other) for other in found):
             found.append(replace(cycle, stable=_attracts(loop, cycle)))
+    # Harmonics join one by one: each balance begins at the one before, where it nearly holds.
     for _ in range(1, harmonics):
         more = [replace(c, harmonics=np.append(c.harmonics, np.zeros(1))) for c in found]
         found = [c for c in (_balanced(loop, guess) for guess in more) if c is not None]
@@ -142,6 +143,8 @@ def clipped_harmonics(
 def _guesses(loop: TorqueLoop) -> list[LimitCycle]:
     """Return where the loop is on the verge, at the amplitude that has that gain."""
     grid = loop.grid
+    # Quadratic drag is not known before the motion is: each drag of a range has its crossings,
+    # and the balance then makes drag and motion agree.
     drags = loop.quadratic * _SPEEDS if loop.quadratic > 0.0 else np.zeros(1)
     found = []
     for drag in drags:

@@ -207,6 +207,8 @@ def indices_of(
         raise InputError("sensitivity: Sobol's indices need independent ranges, got correlations")
     A, B = _pair(spread, samples, seed)
     d = A.shape[1]
+    # Radial sampling: A with column k of B differs from A by that number alone, and from B by all
+    # the others, which is what first-order and total indices compare.
     crossed = []
     for k in range(d):
         rows = A.copy()

@@ -134,6 +134,8 @@ def variance_gradient(
     s = np.asarray(1j * omega, dtype=np.complex128)
     loop = _Loop(plant, controller, s)
     row = plant.outputs.index(output)
+    # One adjoint solution serves all disturbances; each brings a forward solution of its own, and
+    # the slope in every entry of a matrix is a product of the two sides.
     to_x, to_y, to_u = loop.adjoint(row)
     blocks = {name: np.zeros(getattr(plant, name).shape) for name in BLOCKS}
     delays = np.zeros(len(plant.delays))
@@ -150,6 +152,7 @@ def variance_gradient(
         _gather(blocks, loop, g, (to_x, to_y), (x, u, powers, columns), row)
         delays += np.real(-(g * s)[:, None] * to_y * y).sum(axis=0)
         law[:, 0, :] += (g * to_u)[:, None] * loop.late * y
+    # d ln sigma = dm0 / (2 m0)
     half = 0.5 / total
     return Gradient(
         value=float(np.sqrt(total)),
