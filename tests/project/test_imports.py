@@ -126,7 +126,7 @@ def test_a_contract_bites(tmp_path, file, text, broken):
     assert broken is None or broken in run.stdout
 
 
-@pytest.mark.parametrize("package", ["models", "synth", "mpc"])
+@pytest.mark.parametrize("package", PACKAGES)
 def test_a_circle_for_types_alone_is_found(tmp_path, package):
     skeleton(tmp_path)
     room = next(path for path in sorted((tmp_path / package).iterdir()) if path.is_dir())
