@@ -9,8 +9,7 @@ The state chi holds, in this order,
 * those of a filter whose white-noise response has the spectrum of the hook's motion
   (`models.plant.shaping`), so that to predict the state is to predict the sea;
 * the error of the reference unit, a Butterworth low-pass of second order (`models.sensing.mru`),
-and a slow
-  one, of which the case does not speak (`ProcessNoise.unit`);
+  and a slow one, of which the case does not speak (`ProcessNoise.unit`);
 * constants that are to be estimated: a force on the payload, a torque at the motor, the bias of
   the accelerometer and of the tension.  Without them a load of another weight would be held off
   its place.  (Where the payload's zero is, a heavier load has stretched the rope by more: seen from
