@@ -7,7 +7,7 @@ is a shaded edge, because nothing can lie below it on the linear plant.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -177,15 +177,8 @@ def _lines(found: Comparison, factor: float, unit: str) -> Figure:
             continue
         # Beside each other, so that intervals do not hide each other.
         shift = 0.02 * wide * (place / several - 0.5)
-        axes.plot(
-            np.array(at) + shift,
-            middle,
-            color=colour,
-            linestyle=_line(each.name),
-            marker=mark,
-            markersize=4.5,
-            label=each.name,
-        )
+        style: Any = {"linestyle": _line(each.name), "marker": mark, "markersize": 4.5}
+        axes.plot(np.array(at) + shift, middle, color=colour, label=each.name, **style)
         for height, value in zip(at, middle, strict=True):
             mean = found.rms(each.name, height)
             if math.isfinite(mean.low):
@@ -195,16 +188,8 @@ def _lines(found: Comparison, factor: float, unit: str) -> Figure:
         edge = found.cliff(each.name)
         if not math.isnan(edge) and edge in at and each.group != "brake":
             fell = True
-            axes.plot(
-                edge + shift,
-                middle[at.index(edge)],
-                marker="x",
-                color=BROKEN,
-                markersize=11,
-                markeredgewidth=2.2,
-                linestyle="none",
-                zorder=5,
-            )
+            place_of = (edge + shift, middle[at.index(edge)])
+            axes.plot(*place_of, "x", color=BROKEN, markersize=11, markeredgewidth=2.2, zorder=5)
     if fell:
         axes.plot([], [], "x", color=BROKEN, markeredgewidth=2.2, label="first loses the load")
     _span(axes, found, factor)

@@ -18,7 +18,7 @@ from ..text import (
     Drawing,
     OutputFolder,
     Report,
-    Section,
+    ReportSection,
     Table,
     columns,
     csv_text,
@@ -57,9 +57,9 @@ def comparison_report(found: Comparison) -> Report:
         status="" if found.complete else stopped,
         ok=not any(cell.status in ("failed", "died") for cell in found.cells),
         sections=[
-            Section("", [*sentences_of(found), *drawings]),
-            Section("", [*(table for table in tables if table.rows), LEGEND]),
-            Section("", left_out(found)),
+            ReportSection("", [*sentences_of(found), *drawings]),
+            ReportSection("", [*(table for table in tables if table.rows), LEGEND]),
+            ReportSection("", left_out(found)),
         ],
     )
 
@@ -143,7 +143,7 @@ def _with_contenders(report: Report, found: Comparison) -> Report:
     tables = [Table(columns=columns("contender=; what it is; what it knows"), rows=about)]
     if notes:
         tables.append(Table(columns=columns("contender=; H_s [m]; note"), rows=notes))
-    return replace(report, sections=[*report.sections, Section("Who takes part", tables)])
+    return replace(report, sections=[*report.sections, ReportSection("Who takes part", tables)])
 
 
 def _runs(found: Comparison) -> Table:

@@ -33,7 +33,7 @@ HOOK = "hook.heave"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Motion:
+class GaussianMotion:
     """A Gaussian motion in three figures and one period.
 
     Attributes
@@ -70,7 +70,7 @@ class MotionView:
 
     @cached_property
     def hook(self) -> HookMotion:
-        """Motion of the hook."""
+        """GaussianMotion of the hook."""
         return hook_of(self.design.sea_case)
 
     @property
@@ -112,17 +112,17 @@ class MotionView:
         return float(low), float(high)
 
     @cached_property
-    def hook_motion(self) -> Motion:
+    def hook_motion(self) -> GaussianMotion:
         """The hook's motion."""
         found = self.hook.displacement
         return self._motion(found.rms, found.zero_crossing_period)
 
     @cached_property
-    def before(self) -> Motion:
+    def before(self) -> GaussianMotion:
         """The payload's motion with the drum held."""
         rms = self.design.payload_rms_before
         if not math.isfinite(rms):
-            return Motion(rms=math.inf, mean_period=math.nan, largest=math.inf)
+            return GaussianMotion(rms=math.inf, mean_period=math.nan, largest=math.inf)
         peak, damping = self._resonance
         low, high = self.hook.band
         powers = np.array([[0.0], [2.0]])
@@ -142,7 +142,7 @@ class MotionView:
         return self._motion(rms, zero_crossing_period(m0, m2))
 
     @cached_property
-    def after(self) -> Motion | None:
+    def after(self) -> GaussianMotion | None:
         """The payload's motion with the gains; None if the loop is unstable."""
         if not self.compensated:
             return None
@@ -158,10 +158,10 @@ class MotionView:
         # A resonance of height h has a damping ratio of about 1/(2 h).
         return peak, peak / (2.0 * max(height, 1.0))
 
-    def _motion(self, rms: float, period: float) -> Motion:
+    def _motion(self, rms: float, period: float) -> GaussianMotion:
         time = self.design.case.limits.exposure_time
         largest = most_probable_maximum(rms, period, time)
-        return Motion(rms=rms, mean_period=period, largest=largest)
+        return GaussianMotion(rms=rms, mean_period=period, largest=largest)
 
 
 def hook_of(case: Case) -> HookMotion:

@@ -43,7 +43,7 @@ _MOST = 20_000  # points
 
 
 @dataclass(frozen=True, kw_only=True)
-class Window:
+class PlaneWindow:
     """The part of the plane that is shown: real part from `left` to `right`, |imag| to `high`."""
 
     left: float
@@ -120,16 +120,16 @@ def _finding(design: GainDesign) -> str:
     return text
 
 
-def _window(design: GainDesign) -> Window:
+def _window(design: GainDesign) -> PlaneWindow:
     half = _HALF
     if design.margins is not None and design.margins.gain_down > 0.0:
         # A curve that crosses the axis beyond -1 is shown there, if that is not too far away.
         half = min(max(half, 0.65 / design.margins.gain_down), _WIDEST)
     left, right = -1.0 - half, half - 0.5
-    return Window(left=left, right=right, high=0.42 * (right - left))
+    return PlaneWindow(left=left, right=right, high=0.42 * (right - left))
 
 
-def _smooth(loop: LoopGain, grid: FloatArray, window: Window) -> ComplexArray:
+def _smooth(loop: LoopGain, grid: FloatArray, window: PlaneWindow) -> ComplexArray:
     """Return the curve, close enough points within the window to look smooth."""
     omega, gain = grid, loop(grid)
     reach = 1.5 * window.width
@@ -165,7 +165,7 @@ def _circles(design: GainDesign, axes: Axes) -> None:
         draw(peak, BROKEN if peak > bound else AFTER, f"$M_s$ = {number(peak)}")
 
 
-def _arrows(axes: Axes, gain: ComplexArray, window: Window) -> None:
+def _arrows(axes: Axes, gain: ComplexArray, window: PlaneWindow) -> None:
     """Show which way the frequency grows, where the curve is in view."""
     inside = window.holds(gain)
     path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(gain)) * inside[1:])])
@@ -180,7 +180,7 @@ def _arrows(axes: Axes, gain: ComplexArray, window: Window) -> None:
             )
 
 
-def _remarks(design: GainDesign, axes: Axes, window: Window) -> None:
+def _remarks(design: GainDesign, axes: Axes, window: PlaneWindow) -> None:
     margins = design.margins
     if margins is None:
         return

@@ -14,7 +14,7 @@ from ..text import (
     Column,
     Drawing,
     Report,
-    Section,
+    ReportSection,
     Table,
     annotate,
     columns,
@@ -98,7 +98,7 @@ def pareto_report(front: ParetoFront) -> Report:
     )
     drawing = Drawing("pareto", "What stillness costs", lambda: pareto_figure(front))
     status = f"{text}; {passed} of {asked} checked by other code"
-    return Report(status=status, sections=[Section("", [table, drawing])], **head)
+    return Report(status=status, sections=[ReportSection("", [table, drawing])], **head)
 
 
 def _finding(front: ParetoFront) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from synth.design import GainDesign
 
-from ..text import Drawing, OutputFolder, Report, Section, markdown, pairs
+from ..text import Drawing, OutputFolder, Report, ReportSection, markdown, pairs
 from .design_file import design_text
 from .figures import limits, payload_spectrum, responses
 from .nyquist import nyquist
@@ -42,8 +42,8 @@ def design_report(design: GainDesign, *, bound: bool = True) -> Report:
     over = "Payload over hook and drum over hook"
     curve = "Nyquist curve of the loop, broken at the command"
     sections = [
-        Section("", [needed] if needed is not None else []),
-        Section(
+        ReportSection("", [needed] if needed is not None else []),
+        ReportSection(
             "Payload motion",
             [
                 motion_table(design),
@@ -54,15 +54,15 @@ def design_report(design: GainDesign, *, bound: bool = True) -> Report:
         ),
     ]
     if has_gains(design):
-        sections.append(Section("Gains", [f"`{command_text(design)}`", gain_table(design)]))
+        sections.append(ReportSection("Gains", [f"`{command_text(design)}`", gain_table(design)]))
     if margins is not None:
-        sections.append(Section("Margins", [margins]))
+        sections.append(ReportSection("Margins", [margins]))
     if has_gains(design):
-        sections.append(Section("", [Drawing("nyquist", curve, lambda: nyquist(design))]))
+        sections.append(ReportSection("", [Drawing("nyquist", curve, lambda: nyquist(design))]))
     if design.limits:
         drawing = Drawing("limits", "Use of the limits", lambda: limits(design))
-        sections.append(Section("Limits", [limit_table(design), drawing]))
-    sections.append(Section("What this rests on", [pairs(facts(design, bound=bound))]))
+        sections.append(ReportSection("Limits", [limit_table(design), drawing]))
+    sections.append(ReportSection("What this rests on", [pairs(facts(design, bound=bound))]))
     return Report(
         name=design.case.name,
         about=" ".join(design.case.description.split()),

@@ -19,7 +19,7 @@ from ..text import (
     Drawing,
     Item,
     Report,
-    Section,
+    ReportSection,
     Table,
     columns,
     data_table,
@@ -129,7 +129,7 @@ def robust_report(design: RobustDesign) -> Report:
         about="one set of gains",
         status=design.status,
         ok=design.ok,
-        sections=[Section("", items)],
+        sections=[ReportSection("", items)],
     )
 
 
@@ -150,7 +150,7 @@ def schedule_report(schedule: GainSchedule) -> Report:
         about="gains over the rope's length",
         status=schedule.status,
         ok=schedule.ok,
-        sections=[Section("", items)],
+        sections=[ReportSection("", items)],
     )
 
 

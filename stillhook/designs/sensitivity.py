@@ -17,7 +17,7 @@ from ..text import (
     Column,
     Drawing,
     Report,
-    Section,
+    ReportSection,
     Table,
     Written,
     columns,
@@ -145,14 +145,14 @@ def sensitivity_report(study: Sensitivity, moved: Sequence[Moved], wide: Wide | 
         columns=(Column("path", "one per cent more of"), *heads), rows=rows, notes=tuple(notes)
     )
     tornado = Drawing("tornado", "One per cent more of each", lambda: tornado_figure(study))
-    sections = [Section("", [elasticities, tornado])]
+    sections = [ReportSection("", [elasticities, tornado])]
     if moved:
-        sections.append(Section("", [_moved(moved)]))
+        sections.append(ReportSection("", [_moved(moved)]))
     if wide is not None:
         studies, cases = wide[0], f"{wide[0][0].evaluations} cases each"
         about = f"{cases}, {studies[0].unstable} unstable and left out"
         indices = Drawing("indices", "Indices", lambda: indices_figure(studies, about))
-        sections.append(Section("", [_indices(wide), indices]))
+        sections.append(ReportSection("", [_indices(wide), indices]))
     return Report(
         name=study.design.case.name,
         about=_about(study),

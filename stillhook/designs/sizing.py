@@ -17,7 +17,7 @@ from ..text import (
     Drawing,
     Item,
     Report,
-    Section,
+    ReportSection,
     Table,
     Written,
     annotate,
@@ -58,25 +58,14 @@ def size_figure(sizing: Sizing) -> Figure:
     names = list(dict.fromkeys(_limit(p.binding) for p in points))
     for k, name in enumerate(names):
         at = [i for i, p in enumerate(points) if _limit(p.binding) == name]
-        axes.plot(
-            [points[i].gear for i in at],
-            [power[i] / factor for i in at],
-            linestyle="none",
-            color=(AFTER, DRUM, BEFORE, HOOK, REFERENCE)[k % 5],
-            marker=_MARKS[k % len(_MARKS)],
-            markersize=5.0,
-            label=f"bound by {name}",
-        )
+        colour, mark = (AFTER, DRUM, BEFORE, HOOK, REFERENCE)[k % 5], _MARKS[k % len(_MARKS)]
+        style: Any = {"linestyle": "none", "marker": mark, "markersize": 5.0, "color": colour}
+        gears, powers = [points[i].gear for i in at], [power[i] / factor for i in at]
+        axes.plot(gears, powers, label=f"bound by {name}", **style)
+    why = f"no motor: {', '.join(dict.fromkeys(q.binding[0] for q in lost))}"
     for k, p in enumerate(lost):
-        axes.axvline(
-            p.gear,
-            color=HOOK,
-            linewidth=0.8,
-            linestyle=":",
-            label=f"no motor: {', '.join(dict.fromkeys(q.binding[0] for q in lost))}"
-            if k == 0
-            else None,
-        )
+        label = None if k else why
+        axes.axvline(p.gear, color=HOOK, linewidth=0.8, linestyle=":", label=label)
     chosen = sizing.chosen
     if chosen is not None and chosen.motor is not None:
         text = f"{quantity(chosen.motor.power, 'W')} at {chosen.gear:g}"
@@ -115,16 +104,10 @@ def worth_figure(result: Worth) -> Figure:
         after = row.twice_rms / size
         axes.barh(k, after - top, left=top, color=colour, height=0.62)
         inside = top - after > 0.3 * (top - least)  # of a long bar, else to its left
-        axes.annotate(
-            quantity(row.twice_rms, "m"),
-            (after, k),
-            xytext=(4.0 if inside else -4.0, 0.0),
-            textcoords="offset points",
-            ha="left" if inside else "right",
-            va="center",
-            color="white" if inside else REFERENCE,
-            fontsize=9.0,
-        )
+        side, colour = ("left", "white") if inside else ("right", REFERENCE)
+        place: Any = {"xytext": (4.0 if inside else -4.0, 0.0), "textcoords": "offset points"}
+        words: Any = {"ha": side, "va": "center", "color": colour, "fontsize": 9.0}
+        axes.annotate(quantity(row.twice_rms, "m"), (after, k), **place, **words)
     labels = [f"{typeset(row.item.name)}  {_change(row)}" for row in rows]
     axes.set_yticks(range(len(rows)), labels)
     axes.invert_yaxis()
@@ -167,7 +150,7 @@ def size_report(sizing: Sizing) -> Report:
         about=f"payload {target} rms in H_s {height:.3g} m, {sizing.structure}",
         status=sizing.status,
         ok=sizing.ok,
-        sections=[Section("", items), Section("", [pairs(around)])],
+        sections=[ReportSection("", items), ReportSection("", [pairs(around)])],
     )
 
 
@@ -191,7 +174,7 @@ def co_design_report(found: CoDesign) -> Report:
         about=f"gear and gains together, {found.structure}",
         status=found.status,
         ok=found.ok,
-        sections=[Section("", [table])],
+        sections=[ReportSection("", [table])],
     )
 
 
@@ -224,7 +207,7 @@ def worth_report(result: Worth) -> Report:
     heads = columns("item=; is; one_per_cent=1 % of it; per step; twice_rms=twice as good [m]")
     drawing = Drawing("worth", "What is worth buying", lambda: worth_figure(result))
     items: list[Item] = [Table(columns=heads, rows=rows, notes=tuple(notes)), drawing]
-    return Report(status=result.status, ok=result.ok, sections=[Section("", items)], **head)
+    return Report(status=result.status, ok=result.ok, sections=[ReportSection("", items)], **head)
 
 
 def _motors(sizing: Sizing) -> Table:

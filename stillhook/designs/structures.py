@@ -18,7 +18,7 @@ from ..text import (
     Column,
     Drawing,
     Report,
-    Section,
+    ReportSection,
     Table,
     columns,
     count,
@@ -167,8 +167,8 @@ def structures_report(designs: Sequence[StructureDesign], *, bound: bool = True)
         about=count(len(designs), "structure"),
         status=f"hook {hook} rms; with the drum held the payload moves {held} rms",
         sections=[
-            Section("", [table, *([drawing] * stable)]),
-            Section("Limited by", [limits, *failed]),
+            ReportSection("", [table, *([drawing] * stable)]),
+            ReportSection("Limited by", [limits, *failed]),
         ],
     )
 

@@ -90,14 +90,8 @@ def comparison(compared: Sequence[Runs]) -> Figure:
             axes.plot(spread, found / factor, ".", color=REFERENCE, markersize=4, alpha=0.7)
         if math.isfinite(mean.low):
             low = max(mean.low, 0.0 if not wide else floor * factor) / factor
-            axes.errorbar(
-                place + 0.24,
-                mean.mean / factor,
-                yerr=[[mean.mean / factor - low], [mean.high / factor - mean.mean / factor]],
-                color=REFERENCE,
-                capsize=4,
-                linewidth=1.4,
-            )
+            ends = (low, mean.mean / factor, mean.high / factor)
+            _interval(axes, place + 0.24, ends, REFERENCE)
     if wide:
         logarithmic(axes)
         axes.set_ylim(bottom=floor)
@@ -189,17 +183,15 @@ def _gumbel_line(
     times = np.geomspace(block, 1.2 * reach, 50)
     levels = estimate.value + estimate.scale * np.log(times / estimate.duration)
     axes.plot(times, levels / factor, color=colour, linewidth=1.6, label=label)
-    axes.errorbar(
-        estimate.duration,
-        estimate.value / factor,
-        yerr=[
-            [(estimate.value - estimate.low) / factor],
-            [(estimate.high - estimate.value) / factor],
-        ],
-        color=colour,
-        capsize=4,
-        linewidth=1.4,
-    )
+    ends = (estimate.low / factor, estimate.value / factor, estimate.high / factor)
+    _interval(axes, estimate.duration, ends, colour)
+
+
+def _interval(axes: Axes, x: float, ends: tuple[float, float, float], colour: str) -> None:
+    """Draw an interval, of which the lower end, the middle and the upper end are given."""
+    low, middle, high = ends
+    arms = [[middle - low], [high - middle]]
+    axes.errorbar(x, middle, yerr=arms, color=colour, capsize=4, linewidth=1.4)
 
 
 def _crests(runs: Runs) -> tuple[FloatArray, FloatArray, tuple[float, float]]:

@@ -25,7 +25,7 @@ from ..text import (
     Item,
     OutputFolder,
     Report,
-    Section,
+    ReportSection,
     Table,
     count,
     csv_text,
@@ -83,9 +83,9 @@ def runs_report(compared: Sequence[Runs]) -> Report:
         about=about,
         ok=all(runs.completed for runs in compared),
         sections=[
-            Section("", heads),
-            Section("", tables),
-            Section("", [*closing, *drawings]),
+            ReportSection("", heads),
+            ReportSection("", tables),
+            ReportSection("", [*closing, *drawings]),
             *_events(compared),
         ],
     )
@@ -294,7 +294,7 @@ def _with_each(report: Report, compared: Sequence[Runs]) -> Report:
     """Return the report of several controllers with the tables of each of them alone."""
     if len(compared) < 2:
         return report
-    own = [Section(runs.controller, [*tables_of([runs])]) for runs in compared]
+    own = [ReportSection(runs.controller, [*tables_of([runs])]) for runs in compared]
     return replace(report, sections=[*report.sections, *own])
 
 
@@ -312,12 +312,12 @@ def _event_table(compared: Sequence[Runs]) -> Table:
     )
 
 
-def _events(compared: Sequence[Runs]) -> list[Section]:
+def _events(compared: Sequence[Runs]) -> list[ReportSection]:
     """Return what happened: first what all runs have in common, then run by run."""
     told = {(runs.controller, run.seed): _told(run) for runs in compared for run in runs}
     common = [line for line in next(iter(told.values())) if all(line in t for t in told.values())]
     common = common if len(told) > 1 else []
-    sections = [Section("in every run", _first(common))] if common else []
+    sections = [ReportSection("in every run", _first(common))] if common else []
     for runs in compared:
         own = {
             run.seed: [line for line in told[runs.controller, run.seed] if line not in common]
@@ -325,11 +325,11 @@ def _events(compared: Sequence[Runs]) -> list[Section]:
         }
         eventful = [(seed, lines) for seed, lines in own.items() if lines]
         for seed, lines in eventful[:_RUNS]:
-            sections.append(Section(f"{runs.controller}, seed {seed}", _first(lines)))
+            sections.append(ReportSection(f"{runs.controller}, seed {seed}", _first(lines)))
         if len(eventful) > _RUNS:
             rest = count(len(eventful) - _RUNS, "more run")
             text = f"and {rest} of {runs.controller} with events, see events.csv"
-            sections.append(Section("", [text]))
+            sections.append(ReportSection("", [text]))
     return sections
 
 

@@ -221,62 +221,38 @@ def draw_station(axes: Axes, x: float, scene: Scene, at: int) -> list[Artist]:
         "linestyle": ":" if slack else "-",
     }
     spokes = [turned + k * 2.0 * math.pi / 3.0 for k in range(3)]
+
+    def line(
+        ends: tuple[float, ...], heights: tuple[float, ...], width: float, order: int, **style: Any
+    ) -> Line2D:
+        placed = {"transform": ship} | style
+        return Line2D(ends, heights, linewidth=width, zorder=order, **placed)
+
+    top = centre[1] + _RADIUS
+    wheel: Any = {"facecolor": "white", "edgecolor": DRUM, "linewidth": 1.8, "zorder": 5}
+    box: Any = {"facecolor": AFTER, "edgecolor": "white", "linewidth": 0.6, "zorder": 5}
+    plates: Any = {"facecolor": _HULL, "edgecolor": REFERENCE, "linewidth": 0.8, "zorder": 4}
+    cut: Any = {"color": REFERENCE, "transform": broken}
     artists: list[Artist] = [
         Line2D([x, x], [hook, payload], linewidth=1.2, zorder=3, **rope),
+        # The rope is too long to be drawn: a gap between two strokes.
         Rectangle((-0.05, -0.03), 0.1, 0.06, color="white", transform=broken, zorder=3),
+        *(line((-0.05, 0.05), (y - 0.02, y + 0.02), 0.9, 3, **cut) for y in (-0.03, 0.03)),
+        Polygon(hull, transform=ship, **plates),
+        line((-0.2, 0.0), (deck, 0.0), 1.8, 4, color=REFERENCE),
+        line((centre[0], 0.0), (top, 0.0), 1.2, 4, **rope),
+        Circle(centre, _RADIUS, transform=ship, **wheel),
         *(
-            Line2D(
-                [-0.05, 0.05],
-                [y - 0.02, y + 0.02],
-                color=REFERENCE,
-                linewidth=0.9,
-                transform=broken,
-                zorder=3,
-            )
-            for y in (-0.03, 0.03)
-        ),
-        Polygon(
-            hull, facecolor=_HULL, edgecolor=REFERENCE, linewidth=0.8, transform=ship, zorder=4
-        ),
-        Line2D([-0.2, 0.0], [deck, 0.0], color=REFERENCE, linewidth=1.8, transform=ship, zorder=4),
-        Line2D(
-            [centre[0], 0.0],
-            [centre[1] + _RADIUS, 0.0],
-            linewidth=1.2,
-            transform=ship,
-            zorder=4,
-            **rope,
-        ),
-        Circle(
-            centre,
-            _RADIUS,
-            facecolor="white",
-            edgecolor=DRUM,
-            linewidth=1.8,
-            transform=ship,
-            zorder=5,
-        ),
-        *(
-            Line2D(
-                [centre[0], centre[0] + _RADIUS * math.cos(angle)],
-                [centre[1], centre[1] + _RADIUS * math.sin(angle)],
+            line(
+                (centre[0], centre[0] + _RADIUS * math.cos(angle)),
+                (centre[1], centre[1] + _RADIUS * math.sin(angle)),
+                1.0 if k else 2.2,  # the thick spoke shows how far the drum has turned
+                5,
                 color=DRUM,
-                linewidth=2.2 if k == 0 else 1.0,
-                transform=ship,
-                zorder=5,
             )
             for k, angle in enumerate(spokes)
         ),
-        Rectangle(
-            (-0.5 * _BOX, 0.0),
-            _BOX,
-            _BOX,
-            facecolor=AFTER,
-            edgecolor="white",
-            linewidth=0.6,
-            transform=load,
-            zorder=5,
-        ),
+        Rectangle((-0.5 * _BOX, 0.0), _BOX, _BOX, transform=load, **box),
     ]
     for artist in artists:
         axes.add_artist(artist)

@@ -1,4 +1,4 @@
-"""What of a run to look at: its envelope as a whole, and the minute that matters most.
+"""Windows of a run: its envelope as a whole, and the minute that matters most.
 
 A run has more samples than a figure has dots.  The envelope keeps every peak of what is stored;
 the window is where the payload is farthest from where it should be, or where it touches down.

@@ -20,7 +20,7 @@ from ..text import (
     Column,
     Drawing,
     Report,
-    Section,
+    ReportSection,
     Table,
     Written,
     columns,
@@ -265,7 +265,7 @@ def motion_report(survey: HookSurvey) -> Report:
     ]
     note = f"width: 0 is a sine; {longest} max: most probable; {share}: that fractile of it"
     table = Table(columns=heads, rows=rows, notes=(note,))
-    sections = [Section("", [table, pairs(_demand(survey))]), _periods(survey)]
+    sections = [ReportSection("", [table, pairs(_demand(survey))]), _periods(survey)]
     if survey.headings.size:
         sections.append(_headings(survey))
     drawings = [
@@ -276,7 +276,7 @@ def motion_report(survey: HookSurvey) -> Report:
         name=case.name,
         about=sea_words(case),
         status=vessel_words(case),
-        sections=[*sections, Section("", drawings)],
+        sections=[*sections, ReportSection("", drawings)],
     )
 
 
@@ -309,7 +309,7 @@ def _demand(survey: HookSurvey) -> list[tuple[str, str]]:
     ]
 
 
-def _periods(survey: HookSurvey) -> Section:
+def _periods(survey: HookSurvey) -> ReportSection:
     side, heading = own_place(survey)
     what = "" if not survey.headings.size else f", {heading_text(survey.headings[heading])}"
     rows = []
@@ -328,10 +328,10 @@ def _periods(survey: HookSurvey) -> Section:
         "largest_speed=max speed [m/s]; power [W]; remark=<"
     )
     table = Table(columns=heads, rows=rows, notes=tuple(notes))
-    return Section(f"over the peak period, rms{what}", [table])
+    return ReportSection(f"over the peak period, rms{what}", [table])
 
 
-def _headings(survey: HookSurvey) -> Section:
+def _headings(survey: HookSurvey) -> ReportSection:
     t = survey.nearest_period
     sides = [side_of(point) for point in survey.points]
     size, best = float(np.max(survey.rms("velocity")[:, :, t])), survey.best
@@ -356,4 +356,4 @@ def _headings(survey: HookSurvey) -> Section:
     table = Table(columns=tuple(heads), rows=shown, notes=(note,))
     period = quantity(float(survey.peak_periods[t]), "s")
     title = f"over the waves' heading, T_p {period}: rope speed rms, largest, power"
-    return Section(title, [table])
+    return ReportSection(title, [table])

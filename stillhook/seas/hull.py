@@ -14,7 +14,7 @@ from ..text import (
     REFERENCE,
     Drawing,
     Report,
-    Section,
+    ReportSection,
     drawn,
     headline,
     new_figure,
@@ -108,9 +108,9 @@ def hull_report(vessel: HullVessel, check: LongWaveCheck, *, stem: str = "raos")
         status=long_wave_verdict(check),
         mark="ok" if check.ok else "DOUBTFUL",
         sections=[
-            Section("", [afloat, motions, pairs(_about(vessel)), *drawings]),
+            ReportSection("", [afloat, motions, pairs(_about(vessel)), *drawings]),
             long_waves(check),
-            Section("", [f"note: {warning}" for warning in vessel.warnings]),
+            ReportSection("", [f"note: {warning}" for warning in vessel.warnings]),
         ],
     )
 

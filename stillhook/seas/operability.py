@@ -16,7 +16,7 @@ from ..text import (
     Item,
     OutputFolder,
     Report,
-    Section,
+    ReportSection,
     Table,
     columns,
     csv_text,
@@ -43,13 +43,13 @@ def operability_report(study: Operability, checks: Sequence[ContourCheck] = ()) 
     sections = []
     for at in study.depths:
         margin = [study.margin_text(at)] if study.design is not None else []
-        sections.append(Section(f"rope {at.rope}", [*margin, _contours(at)]))
+        sections.append(ReportSection(f"rope {at.rope}", [*margin, _contours(at)]))
     if study.headings is None:
         note = "no headings: the vessel is given by the heave of its hook alone"
-        sections.insert(0, Section("", [note]))
+        sections.insert(0, ReportSection("", [note]))
     if study.scatter is not None:
         source = study.scatter.source
-        sections.append(Section(f"workable share of the year, {source}", _shares(study)))
+        sections.append(ReportSection(f"workable share of the year, {source}", _shares(study)))
     rows = []
     if checks:
         worst = max(check.difference for check in checks)
@@ -59,7 +59,7 @@ def operability_report(study: Operability, checks: Sequence[ContourCheck] = ()) 
     if not study.wanted:
         rows.append(("payload", "no bound on its motion was given: --payload-rms, --payload-max"))
     rows.append(("perfect", "a winch that holds the rope's upper end still, by its own limits"))
-    sections.append(Section("", [pairs(rows), *_drawings(study)]))
+    sections.append(ReportSection("", [pairs(rows), *_drawings(study)]))
     works = any(float(at.main.limit.max()) > 0.0 for at in study.depths)
     return Report(
         name=study.case.name,

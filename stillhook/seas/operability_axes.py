@@ -1,4 +1,4 @@
-"""What the figures of operability have in common: colours of limits, the steepest seas, axes."""
+"""Common parts of the figures of operability: colours of limits, the steepest seas, axes."""
 
 from __future__ import annotations
 
@@ -106,6 +106,13 @@ def shade(axes: Axes, periods: FloatArray, limit: FloatArray) -> None:
         # Lines that leave for infinity do so between two periods.
         below = np.interp(T, periods, np.minimum(limit, 1e3))
         axes.fill_between(T, 0.0, np.minimum(below, steepest(T)), color=SHADE, linewidth=0.0)
+
+
+def limit_line(
+    axes: Axes, periods: FloatArray, heights: FloatArray, top: float, colour: Any, **style: Any
+) -> None:
+    """Draw a limit of H_s over the period, up to somewhat above the figure's `top`."""
+    axes.plot(periods, np.minimum(heights, 2.0 * top), color=colour, **style)
 
 
 def draw_steepest(axes: Axes, periods: FloatArray, top: float) -> None:

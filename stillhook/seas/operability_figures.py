@@ -8,7 +8,7 @@ shaded; the maker's lines of heave over period.  Roses and scatter diagrams are 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from ..text import AFTER, BEFORE, REFERENCE, drawn, panel
 from .operability_axes import (
     SHADE,
     draw_steepest,
+    limit_line,
     limit_text,
     line_of,
     own_heading,
@@ -30,6 +31,8 @@ from .operability_axes import (
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+_HELD = (0, (2, 1))  # dashes of the drum held
 
 
 @drawn
@@ -55,33 +58,17 @@ def contour_figure(study: Operability, at: AtDepth | None = None) -> Figure:
         if heights.min() > top:
             continue  # above the figure: that it is not reached says enough
         colour, dashes = line_of(criterion.name)
-        shown = np.minimum(heights, 2.0 * top)
-        binds = bool(np.any(contour.binding[h] == criterion.name))
-        axes.plot(
-            periods,
-            shown,
-            color=colour,
-            linestyle=dashes,
-            linewidth=2.2 if binds else 1.3,
-            marker="o" if periods.size == 1 else None,
-            label=limit_text(criterion),
-        )
+        width = 2.2 if np.any(contour.binding[h] == criterion.name) else 1.3
+        dot = "o" if periods.size == 1 else None
+        style = {"linestyle": dashes, "linewidth": width, "marker": dot}
+        limit_line(axes, periods, heights, top, colour, label=limit_text(criterion), **style)
     if "loop" in at.contours:
-        axes.plot(
-            periods,
-            np.minimum(held, 2.0 * top),
-            color=BEFORE,
-            linestyle=(0, (2, 1)),
-            label="drum held: what binds first",
-        )
+        text = "drum held: what binds first"
+        limit_line(axes, periods, held, top, BEFORE, linestyle=_HELD, label=text)
     if "reoptimised" in at.contours:
-        axes.plot(
-            periods,
-            np.minimum(at.contours["reoptimised"].limit[h], 2.0 * top),
-            color=AFTER,
-            linestyle=(0, (6, 1.5, 1, 1.5)),
-            label="gains anew for each sea",
-        )
+        anew = at.contours["reoptimised"].limit[h]
+        style = {"linestyle": (0, (6, 1.5, 1, 1.5)), "label": "gains anew for each sea"}
+        limit_line(axes, periods, anew, top, AFTER, **style)
     draw_steepest(axes, periods, top)
     axes.set_ylim(0.0, top)
     periods_axis(axes, periods)
@@ -126,25 +113,9 @@ def capability_figure(study: Operability, at: AtDepth | None = None) -> Figure:
         )
     if asked:
         T, most, rms = np.array(asked).T
-        axes.plot(
-            T,
-            most,
-            color=AFTER,
-            marker="o",
-            linestyle="none",
-            markersize=4.5,
-            label="hook at the limiting $H_s$: largest",
-        )
-        axes.plot(
-            T,
-            4.0 * rms,
-            color=AFTER,
-            marker="o",
-            markerfacecolor="white",
-            linestyle="none",
-            markersize=4.5,
-            label="... significant",
-        )
+        dots: Any = {"color": AFTER, "marker": "o", "linestyle": "none", "markersize": 4.5}
+        axes.plot(T, most, label="hook at the limiting $H_s$: largest", **dots)
+        axes.plot(T, 4.0 * rms, markerfacecolor="white", label="... significant", **dots)
     axes.set_ylim(0.0, top)
     axes.set_xlim(lines.periods[0], lines.periods[-1])
     axes.set_xlabel("period of the heave [s]")
@@ -173,22 +144,12 @@ def depth_figure(study: Operability) -> Figure:
     for at, limit, held, colour in zip(study.depths, limits, helds, colours, strict=True):
         layer = f", layer {at.rope.layer}" if at.rope.layer else ""
         layer += ": works in no sea" if limit.max() == 0.0 else ""
-        axes.plot(
-            study.periods,
-            np.minimum(limit, 2.0 * top),
-            color=colour,
-            label=f"{at.rope.length:g} m{layer}",
-        )
+        text = f"{at.rope.length:g} m{layer}"
+        limit_line(axes, study.periods, limit, top, colour, label=text)
         if "loop" in at.contours:
-            axes.plot(
-                study.periods,
-                np.minimum(held, 2.0 * top),
-                color=colour,
-                linestyle=(0, (2, 1)),
-                linewidth=1.2,
-            )
+            limit_line(axes, study.periods, held, top, colour, linestyle=_HELD, linewidth=1.2)
     if "loop" in study.depths[0].contours:
-        axes.plot([], [], color=REFERENCE, linestyle=(0, (2, 1)), label="drum held")
+        axes.plot([], [], color=REFERENCE, linestyle=_HELD, label="drum held")
     draw_steepest(axes, study.periods, top)
     axes.set_ylim(0.0, top)
     periods_axis(axes, study.periods)

@@ -14,6 +14,7 @@ from synth.operability import AtDepth, Operability
 from ..text import AFTER, BEFORE, DRUM, HOOK, drawn, headline, new_figure
 from .operability_axes import (
     draw_steepest,
+    limit_line,
     limit_text,
     own_heading,
     pale,
@@ -120,22 +121,17 @@ def scatter_figure(study: Operability, at: AtDepth | None = None) -> Figure:
         if name not in at.contours:
             continue
         contour = at.contours[name]
-        limit = np.minimum(contour.limit[h], 2.0 * top)
         worked = at.workable[name].share
         label = f"{text}: {100.0 * worked:.0f} % of the year"
         if name == main:
             shade(axes, contour.periods, contour.limit[h])
-        axes.plot(contour.periods, limit, color=colour, label=label, zorder=3)
+        limit_line(axes, contour.periods, contour.limit[h], top, colour, label=label, zorder=3)
         best = at.workable[name].best_heading
         if best is not None:
-            axes.plot(
-                contour.periods,
-                np.minimum(contour.weathervaning, 2.0 * top),
-                color=colour,
-                linestyle=(0, (4, 2)),
-                label=f"... best heading: {100.0 * best:.0f} %",
-                zorder=3,
-            )
+            style: Any = {"linestyle": (0, (4, 2)), "zorder": 3}
+            label = f"... best heading: {100.0 * best:.0f} %"
+            vaning = contour.weathervaning
+            limit_line(axes, contour.periods, vaning, top, colour, label=label, **style)
     draw_steepest(axes, at.main.periods, top)
     axes.set_ylim(0.0, top)
     periods_axis(axes, at.main.periods)

@@ -17,7 +17,7 @@ from ..text import (
     REFERENCE,
     Drawing,
     Report,
-    Section,
+    ReportSection,
     Table,
     Written,
     columns,
@@ -83,14 +83,14 @@ def rao_report(raos: VesselRaos, check: LongWaveCheck, *, stem: str = "raos") ->
         status=long_wave_verdict(check),
         mark="ok" if check.ok else "DOUBTFUL" if check.long else "not checked",
         sections=[
-            Section("", [pairs(_facts(raos)), drawing]),
-            Section("Found and converted", [f"- {note}" for note in raos.notes]),
+            ReportSection("", [pairs(_facts(raos)), drawing]),
+            ReportSection("Found and converted", [f"- {note}" for note in raos.notes]),
             long_waves(check),
         ],
     )
 
 
-def long_waves(check: LongWaveCheck) -> Section:
+def long_waves(check: LongWaveCheck) -> ReportSection:
     """Return the motions in long waves beside those that they have to be."""
     heads = columns(
         "heading; motion <; found; found_phase=phase; expected; expected_phase=phase; verdict=<"
@@ -105,7 +105,7 @@ def long_waves(check: LongWaveCheck) -> Section:
         for row in check.rows
     ]
     title = f"Long waves, {check.omega:.3g} rad/s; angles over the wave slope"
-    return Section(title, [Table(columns=heads, rows=rows)])
+    return ReportSection(title, [Table(columns=heads, rows=rows)])
 
 
 def long_wave_verdict(check: LongWaveCheck) -> str:

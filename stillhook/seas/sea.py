@@ -16,7 +16,7 @@ from ..text import (
     Drawing,
     Item,
     Report,
-    Section,
+    ReportSection,
     Table,
     annotate,
     columns,
@@ -137,7 +137,9 @@ def sea_report(sea: SeaSpectrum, *, name: str, extra: Sequence[tuple[str, str]] 
     )
     items: list[Item] = [pairs([*_facts(sea), *extra]), drawing]
     height = quantity(sea.significant_height, "m")
-    return Report(name=name, status=f"{sea.kind}, H_s {height}", sections=[Section("", items)])
+    return Report(
+        name=name, status=f"{sea.kind}, H_s {height}", sections=[ReportSection("", items)]
+    )
 
 
 def records_report(
@@ -176,9 +178,9 @@ def records_report(
         about=records.file_format,
         status=str(records.quality),
         sections=[
-            Section("", [_quality(records)]),
-            Section("", _statistics(records)),
-            Section(f"Record {chosen}, {at}", [pairs(_facts(sea)), *drawings]),
+            ReportSection("", [_quality(records)]),
+            ReportSection("", _statistics(records)),
+            ReportSection(f"Record {chosen}, {at}", [pairs(_facts(sea)), *drawings]),
         ],
     )
 

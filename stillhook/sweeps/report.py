@@ -17,7 +17,7 @@ from ..text import (
     Item,
     OutputFolder,
     Report,
-    Section,
+    ReportSection,
     Table,
     Written,
     columns,
@@ -67,10 +67,10 @@ def sweep_report(result: xr.Dataset, name: str, *, worst: int = 0) -> Report:
     told = ", ".join(varied_paths(result))
     first, *others = summary.sentences
     items: list[Item] = [*others, *list(result.attrs.get("messages", []))[:3]]
-    sections = [Section("", items), Section("", [_quantiles(summary)])]
+    sections = [ReportSection("", items), ReportSection("", [_quantiles(summary)])]
     if worst:
         lines = [_worst(result, number) for number in worst_cases(result, worst)]
-        sections.append(Section("The worst", lines))
+        sections.append(ReportSection("The worst", lines))
     return Report(
         name=name,
         about=f"{count(summary.cases, 'case')}, varying {told}",

@@ -1,4 +1,4 @@
-"""What a sweep says: how many cases hold, how the numbers are distributed, which are the worst.
+"""Summary and worst cases of a sweep: how many hold, and how their numbers are distributed.
 
     Dataset --> SweepSummary.of, worst_cases, case_at --> the command line, reports, the next case
 

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from .table import Drawing as Drawing
     from .table import Item as Item
     from .table import Report as Report
-    from .table import Section as Section
+    from .table import ReportSection as ReportSection
     from .table import Table as Table
     from .table import Written as Written
     from .table import columns as columns

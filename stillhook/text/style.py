@@ -1,4 +1,4 @@
-"""How all figures look: one size, one grid, colours that everybody can tell apart.
+"""The style of all figures: one size, one grid, colours that everybody can tell apart.
 
 The colours are those of Okabe and Ito (2008).  A colour means the same thing in every figure:
 grey the hook, vermilion the payload with the drum held, blue the payload with the gains, green

@@ -195,7 +195,7 @@ Item = Table | Drawing | str
 
 
 @dataclass(frozen=True)
-class Section:
+class ReportSection:
     """A part of a report: tables, drawings and sentences under a title."""
 
     title: str
@@ -227,7 +227,7 @@ class Report:
     status: str = ""
     ok: bool | None = None
     mark: str = ""
-    sections: Sequence[Section] = ()
+    sections: Sequence[ReportSection] = ()
 
     @property
     def verdict_mark(self) -> str:
@@ -289,7 +289,7 @@ def json_data(item: Any) -> Any:
     if isinstance(item, Report):
         head = {"name": item.name, "about": item.about, "ok": item.ok, "status": item.status}
         return {**head, "sections": [json_data(section) for section in item.sections]}
-    if isinstance(item, Section):
+    if isinstance(item, ReportSection):
         return {"title": item.title, "items": [json_data(each) for each in item.items]}
     if isinstance(item, Drawing):
         return {"figure": item.name, "caption": item.caption}

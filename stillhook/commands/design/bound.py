@@ -6,7 +6,7 @@ import argparse
 
 from models.basics import InputError, check_range
 
-from ...text import Report, Section, progress
+from ...text import Report, ReportSection, progress
 from ..declare import CASE, real, text, whole
 from ..given import case_words, given_case
 from ..working import conclude
@@ -48,6 +48,6 @@ def run(arguments: argparse.Namespace) -> int:
         name=case.name,
         status=verdict,
         ok=None if found.feasible else False,
-        sections=[Section("", [rest])] if rest else [],
+        sections=[ReportSection("", [rest])] if rest else [],
     )
     return conclude(report, arguments, following=lambda: following)

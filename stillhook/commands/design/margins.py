@@ -6,7 +6,7 @@ import argparse
 
 from models.basics import InputError, check_range
 
-from ...text import Report, Section
+from ...text import Report, ReportSection
 from ..declare import CASE, DESIGN, repeated, whole
 from ..given import case_words, given_case
 from ..given_design import given_design
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
         about=first,
         status=found.status,
         ok=found.ok,
-        sections=[Section("", rest)],
+        sections=[ReportSection("", rest)],
     )
     return conclude(report, arguments, following=lambda: again)
 

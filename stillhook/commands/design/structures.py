@@ -18,7 +18,7 @@ from ...designs import (
 from ...text import (
     OutputFolder,
     Progress,
-    Section,
+    ReportSection,
     console,
     folder_name,
     markdown,
@@ -102,11 +102,11 @@ def optimise_one(arguments: argparse.Namespace) -> int:
     report = structures_report([design], bound=arguments.bound and not arguments.quiet)
     sections = list(report.sections)
     if not arguments.quiet and arguments.bound and (text := bound_sentence(design)):
-        sections.append(Section("", [pairs([("bound", text)])]))
+        sections.append(ReportSection("", [pairs([("bound", text)])]))
     if design.parameters:
         units = design.units
         rows = [(k, f"{number(v, 6)} {units.get(k, '')}") for k, v in design.parameters.items()]
-        sections.append(Section("Parameters", [pairs(rows)]))
+        sections.append(ReportSection("Parameters", [pairs(rows)]))
     verdict = f"{design.structure}: {design.status}"
     report = replace(report, about=report.status, status=verdict, ok=design.ok, sections=sections)
     return conclude(report, arguments, written=[written], result=lambda: design_data(design))

@@ -8,7 +8,7 @@ from models.basics import KINDS
 from models.operation import Option, WordOption, scenario_names, scenario_options
 
 from ...controllers import PREDICTIVE
-from ...text import Report, Section, pairs, quantity
+from ...text import Report, ReportSection, pairs, quantity
 from ..declare import positional
 from ..working import conclude
 
@@ -31,7 +31,9 @@ def run(arguments: argparse.Namespace) -> int:
     if name is not None:
         options = scenario_options(name)  # an unknown name ends here
         told = pairs([(key, _text(option)) for key, option in options.items()])
-        report = Report(name=name, about=scenario_names()[name], sections=[Section("", [told])])
+        report = Report(
+            name=name, about=scenario_names()[name], sections=[ReportSection("", [told])]
+        )
         key, option = next(iter(options.items()))
         command = f"stillhook simulate CASE --scenario {name} --option '{key}={_example(option)}'"
         return conclude(report, arguments, following=lambda: [("with an option", command)])
@@ -39,8 +41,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     texts = {name: CONTROLLER_TEXTS.get(name, "") for name in CONTROLLERS}
     sections = [
-        Section("Scenarios (--scenario)", [pairs(list(scenario_names().items()))]),
-        Section("Controllers (--controller)", [pairs(list({**texts, **PREDICTIVE}.items()))]),
+        ReportSection("Scenarios (--scenario)", [pairs(list(scenario_names().items()))]),
+        ReportSection("Controllers (--controller)", [pairs(list({**texts, **PREDICTIVE}.items()))]),
     ]
     following = [
         ("the options of one scenario", "stillhook scenarios landing"),

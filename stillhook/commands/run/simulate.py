@@ -28,7 +28,7 @@ from ...runs import (
 )
 from ...text import (
     OutputFolder,
-    Section,
+    ReportSection,
     commands,
     console,
     count,
@@ -336,7 +336,7 @@ def _show(
         f"left out: {error if name in str(error) else f'{name}: {error}'}"
         for name, error in found.left_out.items()
     ]
-    show(replace(report, sections=[*report.sections, Section("", left)]), out)
+    show(replace(report, sections=[*report.sections, ReportSection("", left)]), out)
     out.print()
     out.print(_written(target), soft_wrap=True)
     commands(_next(asked, found, target, arguments), out)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from ...text import Report, Section, pairs
+from ...text import Report, ReportSection, pairs
 from ..declare import Declaration
 from ..working import conclude
 
@@ -15,5 +15,5 @@ def run(arguments: argparse.Namespace) -> int:
     """List the cases; return 0."""
     from models import bundled_cases
 
-    report = Report(name="bundled cases", sections=[Section("", [pairs(bundled_cases())])])
+    report = Report(name="bundled cases", sections=[ReportSection("", [pairs(bundled_cases())])])
     return conclude(report, arguments)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from ...text import (
     Report,
-    Section,
+    ReportSection,
     duration,
     heading_words,
     number,
@@ -59,7 +59,9 @@ def check_report(case: Case, hook: HookMotion) -> Report:
         remarks("sensors and limits", _limits(case)),
     ]
     about = " ".join(case.description.split())
-    return Report(name=case.name, about=about, status="no errors", sections=[Section("", tables)])
+    return Report(
+        name=case.name, about=about, status="no errors", sections=[ReportSection("", tables)]
+    )
 
 
 def _sea(case: Case, hook: HookMotion) -> Rows:

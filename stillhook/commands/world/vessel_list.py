@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from ...text import Report, Section, pairs
+from ...text import Report, ReportSection, pairs
 from ..declare import Declaration
 from ..working import conclude
 
@@ -18,5 +18,5 @@ def run(arguments: argparse.Namespace) -> int:
     found = bundled_vessels()
     rows = [("look at one", f"stillhook vessel import {name}") for name, _ in found[:1]]
     rows.append(("a vessel from its main dimensions", "stillhook vessel hull --help"))
-    report = Report(name="bundled vessels", sections=[Section("", [pairs(found)])])
+    report = Report(name="bundled vessels", sections=[ReportSection("", [pairs(found)])])
     return conclude(report, arguments, following=lambda: rows)
