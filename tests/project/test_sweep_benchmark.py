@@ -51,7 +51,7 @@ def test_table_goes_into_the_page_and_the_file(
     benchmark_of_sweeps: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     module = benchmark_of_sweeps
-    page, data = tmp_path / "page.md", tmp_path / "data.csv"
+    page, data = tmp_path / "page.md", tmp_path / "sweep.csv"
     page.write_text(f"before\n{module.BEGIN}\nold\n{module.END}\nafter\n", encoding="utf-8")
     monkeypatch.setattr(module, "PAGE", page)
     monkeypatch.setattr(module, "DATA", data)
@@ -64,5 +64,5 @@ def test_table_goes_into_the_page_and_the_file(
     assert "old" not in text
     assert text.startswith("before\n")
     assert text.endswith("after\n")
-    assert data.read_text(encoding="utf-8").splitlines()[1] == "one,1000,3,2.5,2500"
+    assert data.read_text(encoding="utf-8").splitlines()[2] == "one,1000,3,2.5,2500"
     assert np.isfinite(rows[0].each)
