@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING
 from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .encounter import Encounter as Encounter
-    from .hook import HookMotion as HookMotion
-    from .hook import HookRecord as HookRecord
-    from .hook_demand import HookDemand as HookDemand
-    from .hook_survey import HookSurvey as HookSurvey
-    from .hook_survey import hook_motion as hook_motion
+    from .encounter import Encounter
+    from .hook import HookMotion, HookRecord
+    from .hook_demand import HookDemand
+    from .hook_survey import HookSurvey, hook_motion
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

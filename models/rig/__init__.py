@@ -9,20 +9,10 @@ from typing import TYPE_CHECKING
 from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .limits import GainBounds as GainBounds
-    from .limits import Gains as Gains
-    from .limits import Limits as Limits
-    from .payload import Payload as Payload
-    from .rope import Rope as Rope
-    from .sensors import MRU as MRU
-    from .sensors import Encoder as Encoder
-    from .sensors import LoadCell as LoadCell
-    from .sensors import PayloadSensor as PayloadSensor
-    from .sensors import Sensors as Sensors
-    from .sensors import Telemetry as Telemetry
-    from .winch import ACMotor as ACMotor
-    from .winch import DCMotor as DCMotor
-    from .winch import Drive as Drive
-    from .winch import Winch as Winch
+    from .limits import GainBounds, Gains, Limits
+    from .payload import Payload
+    from .rope import Rope
+    from .sensors import MRU, Encoder, LoadCell, PayloadSensor, Sensors, Telemetry
+    from .winch import ACMotor, DCMotor, Drive, Winch
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING
 from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .records import SeaRecords as SeaRecords
-    from .records import read_seas as read_seas
-    from .scatter import Scatter as Scatter
-    from .scatter_files import read_scatter as read_scatter
-    from .scatter_files import write_scatter as write_scatter
-    from .sea import SeaSpectrum as SeaSpectrum
-    from .sea_section import Sea as Sea
-    from .spreading import Spreading as Spreading
+    from .records import SeaRecords, read_seas
+    from .scatter import Scatter
+    from .scatter_files import read_scatter, write_scatter
+    from .sea import SeaSpectrum
+    from .sea_section import Sea
+    from .spreading import Spreading
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -9,12 +9,8 @@ from typing import TYPE_CHECKING
 from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .kernel import Kernel as Kernel
-    from .simulate import Progress as Progress
-    from .simulate import run_simulation as run_simulation
-    from .simulation import EASE as EASE
-    from .simulation import Simulation as Simulation
-    from .simulation import SimulationOptions as SimulationOptions
-    from .simulation import prepare as prepare
+    from .kernel import Kernel
+    from .simulate import Progress, run_simulation
+    from .simulation import EASE, Simulation, SimulationOptions, prepare
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

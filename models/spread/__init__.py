@@ -11,18 +11,9 @@ from typing import TYPE_CHECKING
 from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .distributions import Distribution as Distribution
-    from .distributions import LogNormal as LogNormal
-    from .distributions import Normal as Normal
-    from .distributions import Samples as Samples
-    from .distributions import Triangular as Triangular
-    from .distributions import Uniform as Uniform
-    from .fields import ALIASES as ALIASES
-    from .fields import DRAG as DRAG
-    from .fields import GAINS as GAINS
-    from .fields import Field as Field
-    from .fields import field_of as field_of
-    from .sampling import METHODS as METHODS
-    from .spread import Spread as Spread
+    from .distributions import Distribution, LogNormal, Normal, Samples, Triangular, Uniform
+    from .fields import ALIASES, DRAG, GAINS, Field, field_of
+    from .sampling import METHODS
+    from .spread import Spread
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -12,22 +12,18 @@ from typing import TYPE_CHECKING
 from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .crane import Point as Point
-    from .crane import across as across
-    from .crane import place_text as place_text
-    from .crane import side_of as side_of
-    from .hook_operator import equivalent as equivalent
-    from .hook_operator import heave_operators as heave_operators
-    from .hook_operator import hook_operators as hook_operators
-    from .hook_operator import hook_rao as hook_rao
-    from .hook_operator import sea_directions as sea_directions
-    from .hook_operator import speed_remark as speed_remark
-    from .hook_operator import vessel_raos as vessel_raos
-    from .raos import MODES as MODES
-    from .raos import VesselRaos as VesselRaos
-    from .vessel import HeaveRao as HeaveRao
-    from .vessel import OutsideShare as OutsideShare
-    from .vessel_section import HeaveTable as HeaveTable
-    from .vessel_section import Vessel as Vessel
+    from .crane import Point, across, place_text, side_of
+    from .hook_operator import (
+        equivalent,
+        heave_operators,
+        hook_operators,
+        hook_rao,
+        sea_directions,
+        speed_remark,
+        vessel_raos,
+    )
+    from .raos import MODES, VesselRaos
+    from .vessel import HeaveRao, OutsideShare
+    from .vessel_section import HeaveTable, Vessel
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

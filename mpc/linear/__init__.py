@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .linear import LinearMPC as LinearMPC
-    from .products import Products as Products
-    from .winch_mpc import WinchMPC as WinchMPC
-    from .winch_programme import WATCHED as WATCHED
-    from .winch_programme import path_of_sea as path_of_sea
-    from .winch_programme import sea_at_end as sea_at_end
+    from .linear import LinearMPC
+    from .products import Products
+    from .winch_mpc import WinchMPC
+    from .winch_programme import WATCHED, path_of_sea, sea_at_end
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .comparison import Comparison as Comparison
-    from .report import comparison_data as comparison_data
-    from .report import comparison_report as comparison_report
-    from .report import write_comparison as write_comparison
-    from .run import compare as compare
-    from .words import sentences_of as sentences_of
+    from .comparison import Comparison
+    from .report import comparison_data, comparison_report, write_comparison
+    from .run import compare
+    from .words import sentences_of
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -10,12 +10,8 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .bound import Bound as Bound
-    from .case import DesignBound as DesignBound
-    from .case import bound_beside as bound_beside
-    from .case import bound_for as bound_for
-    from .case import exact_sensors as exact_sensors
-    from .check import verify_bound as verify_bound
-    from .check import weighted_rms as weighted_rms
+    from .bound import Bound
+    from .case import DesignBound, bound_beside, bound_for, exact_sensors
+    from .check import verify_bound, weighted_rms
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

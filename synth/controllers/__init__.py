@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .constant_tension import ConstantTension as ConstantTension
-    from .controllers import CONTROLLERS as CONTROLLERS
-    from .controllers import BrakeOn as BrakeOn
-    from .controllers import controller_named as controller_named
-    from .feed_forward import VelocityFeedForward as VelocityFeedForward
-    from .linear_feedback import LinearFeedback as LinearFeedback
+    from .constant_tension import ConstantTension
+    from .controllers import CONTROLLERS, BrakeOn, controller_named
+    from .feed_forward import VelocityFeedForward
+    from .linear_feedback import LinearFeedback
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

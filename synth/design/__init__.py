@@ -10,19 +10,11 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .design import GainDesign as GainDesign
-    from .infeasible import shortfall as shortfall
-    from .optimise import evaluate_gains as evaluate_gains
-    from .optimise import optimise_gains as optimise_gains
-    from .structure_design import SOURCE_NAMES as SOURCE_NAMES
-    from .structure_design import StructureDesign as StructureDesign
-    from .structure_search import design_of as design_of
-    from .structure_search import optimise_structure as optimise_structure
-    from .structure_search import verified as verified
-    from .tuning import LimitUse as LimitUse
-    from .tuning import Tuning as Tuning
-    from .tuning import limit_uses as limit_uses
-    from .tuning import tune as tune
-    from .tuning import tuning_of as tuning_of
+    from .design import GainDesign
+    from .infeasible import shortfall
+    from .optimise import evaluate_gains, optimise_gains
+    from .structure_design import SOURCE_NAMES, StructureDesign
+    from .structure_search import design_of, optimise_structure, verified
+    from .tuning import LimitUse, Tuning, limit_uses, tune, tuning_of
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .contour import Contour as Contour
-    from .criteria import Criterion as Criterion
-    from .depths import AtDepth as AtDepth
-    from .recheck import ContourCheck as ContourCheck
-    from .result import Operability as Operability
-    from .study import operability as operability
+    from .contour import Contour
+    from .criteria import Criterion
+    from .depths import AtDepth
+    from .recheck import ContourCheck
+    from .result import Operability
+    from .study import operability
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -10,18 +10,11 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .family import DiscreteValues as DiscreteValues
-    from .family import Family as Family
-    from .family import SeaState as SeaState
-    from .family import sea_states as sea_states
-    from .mu import Robustness as Robustness
-    from .mu import robustness as robustness
-    from .perturbation import GainRadius as GainRadius
-    from .perturbation import gain_radius as gain_radius
-    from .robust import optimise_robust as optimise_robust
-    from .robust_result import RobustDesign as RobustDesign
-    from .robust_result import ScenarioResult as ScenarioResult
-    from .schedule import GainSchedule as GainSchedule
-    from .schedule import schedule_gains as schedule_gains
+    from .family import DiscreteValues, Family, SeaState, sea_states
+    from .mu import Robustness, robustness
+    from .perturbation import GainRadius, gain_radius
+    from .robust import optimise_robust
+    from .robust_result import RobustDesign, ScenarioResult
+    from .schedule import GainSchedule, schedule_gains
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -9,13 +9,9 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .elasticity import sensitivity as sensitivity
-    from .global_indices import SobolIndices as SobolIndices
-    from .global_indices import sobol_indices as sobol_indices
-    from .results import Elasticity as Elasticity
-    from .results import Moved as Moved
-    from .results import Sensitivity as Sensitivity
-    from .screening import Screening as Screening
-    from .screening import morris_screening as morris_screening
+    from .elasticity import sensitivity
+    from .global_indices import SobolIndices, sobol_indices
+    from .results import Elasticity, Moved, Sensitivity
+    from .screening import Screening, morris_screening
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -10,14 +10,9 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .codesign import CoDesign as CoDesign
-    from .codesign import co_design as co_design
-    from .pareto import ParetoFront as ParetoFront
-    from .pareto import pareto_front as pareto_front
-    from .purchase import Worth as Worth
-    from .purchase import WorthRow as WorthRow
-    from .purchase import worth as worth
-    from .sizing import Sizing as Sizing
-    from .sizing import size_winch as size_winch
+    from .codesign import CoDesign, co_design
+    from .pareto import ParetoFront, pareto_front
+    from .purchase import Worth, WorthRow, worth
+    from .sizing import Sizing, size_winch
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

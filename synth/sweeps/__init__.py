@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .dataset import case_of as case_of
-    from .dataset import spread_of as spread_of
-    from .frequency import FrequencyEngine as FrequencyEngine
-    from .frequency import frequency_sweep as frequency_sweep
-    from .metrics import METRICS as METRICS
-    from .tolerance import gain_tolerance as gain_tolerance
+    from .dataset import case_of, spread_of
+    from .frequency import FrequencyEngine, frequency_sweep
+    from .metrics import METRICS
+    from .tolerance import gain_tolerance
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)
