@@ -105,6 +105,33 @@ def parse_gains(text: str) -> dict[str, float]:
     return gains
 
 
+def parse_options(texts: Sequence[str]) -> dict[str, Any]:
+    """Return options of a scenario from texts KEY=VALUE.
+
+    Raises
+    ------
+    InputError
+        If a text is not of that form, or a key comes twice.
+
+    Examples
+    --------
+    >>> parse_options(["height=6 m", "count=3", "lost=mru"])
+    {'height': '6 m', 'count': 3, 'lost': 'mru'}
+    """
+    from models.casefile import read_yaml
+
+    options: dict[str, Any] = {}
+    for text in texts:
+        key, sign, value = text.partition("=")
+        key = key.strip().replace("-", "_")
+        if not sign or not key:
+            raise InputError(f"--option: must be KEY=VALUE, as in 'height=6 m', got {text!r}")
+        if key in options:
+            raise InputError(f"--option: {key} is given twice")
+        options[key], _ = read_yaml(value, f"--option {key}")
+    return options
+
+
 def gains_text(gains: Mapping[str, float]) -> str:
     """Return gains as `parse_gains` reads them, to eight digits: enough to keep the limits."""
     return ",".join(f"{name}={gains[name]:.8g}" for name in _NAMES)

@@ -28,15 +28,14 @@ def given_design(case: Case, arguments: argparse.Namespace) -> GainDesign | Stru
     if arguments.design is not None:
         if arguments.gains is not None:
             raise InputError(f"{arguments.command}: give --design or --gains, not both")
-        from ..designs import load_design, load_structure
+        from synth.design import StructureDesign
 
-        try:
-            structure = load_structure(arguments.design)
-        except InputError as error:
-            if "is not a structure's design" not in str(error):
-                raise
-            return evaluate_gains(case, load_design(arguments.design).gains)
-        return replace(structure, case=case)
+        from ..designs import read_design
+
+        design = read_design(arguments.design)
+        if isinstance(design, StructureDesign):
+            return replace(design, case=case)
+        return evaluate_gains(case, design.gains)
     if arguments.gains is not None:
         return evaluate_gains(case, parse_gains(arguments.gains))
     if case.gains is None:

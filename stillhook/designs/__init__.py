@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         design_text,
         load_design,
         load_structure,
+        read_design,
         save_design,
         save_structure,
         structure_text,

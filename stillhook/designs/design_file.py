@@ -148,6 +148,20 @@ def load_structure(path: str | Path) -> StructureDesign:
     return design
 
 
+def read_design(path: str | Path) -> GainDesign | StructureDesign:
+    """Read a design of either kind.
+
+    Raises
+    ------
+    InputError
+        As from `load_design` and `load_structure`.
+    """
+    data, _ = read_yaml(_text(Path(path)), str(path))
+    if isinstance(data, Mapping) and _STRUCTURE in data:
+        return load_structure(path)
+    return load_design(path)
+
+
 def _content(key: str, design: GainDesign | StructureDesign) -> str:
     from .._version import __version__
 

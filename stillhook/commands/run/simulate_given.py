@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ from models.basics import InputError, check_range
 from models.casefile import Quantity, read_yaml
 
 from ...text import told_once
-from ..given import given_case, parse_gains
+from ..given import given_case, parse_gains, parse_options
 
 if TYPE_CHECKING:
     from models import Case
@@ -157,31 +157,6 @@ def parse_controllers(text: str) -> tuple[str, ...]:
     if len(set(names)) != len(names):
         raise InputError(f"--controller: each may be named once, got {text!r}")
     return names
-
-
-def parse_options(texts: Sequence[str]) -> dict[str, Any]:
-    """Return options of a scenario from texts KEY=VALUE.
-
-    Raises
-    ------
-    InputError
-        If a text is not of that form, or a key comes twice.
-
-    Examples
-    --------
-    >>> parse_options(["height=6 m", "count=3", "lost=mru"])
-    {'height': '6 m', 'count': 3, 'lost': 'mru'}
-    """
-    options: dict[str, Any] = {}
-    for text in texts:
-        key, sign, value = text.partition("=")
-        key = key.strip().replace("-", "_")
-        if not sign or not key:
-            raise InputError(f"--option: must be KEY=VALUE, as in 'height=6 m', got {text!r}")
-        if key in options:
-            raise InputError(f"--option: {key} is given twice")
-        options[key], _ = read_yaml(value, f"--option {key}")
-    return options
 
 
 def again(arguments: argparse.Namespace, case: str, **changes: object) -> str:

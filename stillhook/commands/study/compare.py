@@ -147,15 +147,9 @@ def _controllers(text: str | None) -> list[object] | None:
         if not name.endswith((".yaml", ".yml")):
             found.append(name)
             continue
-        from ...designs import load_design, load_structure
+        from ...designs import read_design
 
-        try:
-            found.append((Path(name).stem, load_design(name)))
-        except InputError as error:
-            try:
-                found.append((Path(name).stem, load_structure(name)))
-            except InputError:
-                raise error from None
+        found.append((Path(name).stem, read_design(name)))
     return found
 
 

@@ -15,7 +15,7 @@ from models.basics import InputError, check_range
 
 from ...text import OutputFolder, count, folder_name
 from ..declare import case_argument, choice, group, one_of, repeated, switch, text, whole
-from ..given import case_words, given_case
+from ..given import case_words, given_case, parse_options
 from ..given_design import given_design
 from ..working import counting, tidy
 from .sweep_output import Swept, conclude_sweep
@@ -149,7 +149,7 @@ def _swept(arguments: argparse.Namespace) -> Swept:
                 "duration": arguments.duration,
                 "settle": arguments.settle,
                 "scenario": arguments.scenario,
-                "options": _options(arguments.options),
+                "options": parse_options(arguments.options),
                 "masses": arguments.masses,
                 "design_follows": arguments.follow,
                 "common_seed": arguments.common_seed,
@@ -296,19 +296,6 @@ def _number(text: str) -> float | str:
         return float(text)
     except ValueError:
         return text.strip()
-
-
-def _options(texts: list[str]) -> dict[str, object]:
-    """Return the options of an operation from texts KEY=VALUE."""
-    from models.casefile import read_yaml
-
-    found: dict[str, object] = {}
-    for given in texts:
-        key, sign, value = (part.strip() for part in given.partition("="))
-        if not (key and sign):
-            raise InputError(f"--option: must be KEY=VALUE, as in 'height=6 m', got {given!r}")
-        found[key], _ = read_yaml(value, f"--option {key}")
-    return found
 
 
 def _only_in_time(arguments: argparse.Namespace) -> None:

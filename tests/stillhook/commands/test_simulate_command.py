@@ -26,9 +26,10 @@ import stillhook as sh
 from models.hook import HookMotion
 from models.operation import scenario_names
 from stillhook import cli
+from stillhook.commands.given import parse_options
 from stillhook.commands.run import simulate as command
 from stillhook.commands.run.scenarios import CONTROLLER_TEXTS
-from stillhook.commands.run.simulate_given import parse_controllers, parse_options
+from stillhook.commands.run.simulate_given import parse_controllers
 from synth.controllers import CONTROLLERS
 
 CALM = ("thesis-1975", "--set", "sea.significant_height=0.3")
