@@ -1,7 +1,7 @@
 """`StructureDesign`: the best controller of a structure for a case, with figures and check.
 
 `synth.design.structure_search` makes it; it can be checked again, saved
-(`stillhook.designs.structure_file`) and simulated: its controller is what
+(`stillhook.designs.design_file`) and simulated: its controller is what
 `synth.controllers.linear_feedback.LinearFeedback` takes.
 """
 

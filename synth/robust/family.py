@@ -42,7 +42,7 @@ class SeaState:
         if self.peak_period is None:
             return found
         if case.sea.spectrum == "bretschneider-1975":
-            # The 1975 form peaks at 0.9 T_S / 0.54^(1/4), see `models.sea.section`.
+            # The 1975 form peaks at 0.9 T_S / 0.54^(1/4), see `models.sea.sea_section`.
             period = self.peak_period * 0.54**0.25 / 0.9
             return {**found, "sea.significant_period": period}
         return {**found, "sea.peak_period": self.peak_period}
