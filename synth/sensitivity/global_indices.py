@@ -197,6 +197,7 @@ def indices_of(
     InputError
         As in `sobol_indices`.
     """
+    from scipy.stats import bootstrap
     from scipy.stats import sobol_indices as estimate
 
     check_range("sensitivity", "confidence", confidence, low=0.5, high=0.9999)
@@ -232,14 +233,24 @@ def indices_of(
     answer: Any = estimate(
         func={"f_A": kept[:1], "f_B": kept[1:2], "f_AB": crossings[:, None, :]}, n=kept.shape[1]
     )
-    boot: Any = answer.bootstrap(confidence_level=confidence, n_resamples=resamples)
+    # SciPy's own bootstrap of the indices takes no seed.
+    centred = kept - kept[:2].mean()
+    ends = bootstrap(
+        [np.arange(kept.shape[1])],
+        lambda columns: np.stack(_indices(centred[:, columns])),
+        n_resamples=resamples,
+        confidence_level=confidence,
+        method="BCa",
+        rng=np.random.default_rng(seed),
+    ).confidence_interval
+    intervals = np.stack([ends.low, ends.high], axis=-1)
     return SobolIndices(
         figure=figure,
         paths=spread.paths,
         first=np.ravel(answer.first_order)[:d],
         total=np.ravel(answer.total_order)[:d],
-        first_interval=_interval(boot.first_order)[:d],
-        total_interval=_interval(boot.total_order)[:d],
+        first_interval=intervals[0],
+        total_interval=intervals[1],
         confidence=confidence,
         samples=samples,
         kept=int(kept.shape[1]),
@@ -267,6 +278,12 @@ def on_ranges(spread: Spread, points: FloatArray) -> FloatArray:
     return np.stack(columns, axis=1)
 
 
-def _interval(interval: Any) -> FloatArray:
-    ends = interval.confidence_interval
-    return np.stack([np.ravel(ends.low), np.ravel(ends.high)], axis=1)
+def _indices(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return indices of first and of total order (Saltelli and others 2010, Table 2 (b) and (f)).
+
+    Rows are the values at A, at B and at the crossings, less their common mean.
+    """
+    at_a, at_b, crossed = values[0], values[1], values[2:]
+    variance = np.var(values[:2])
+    first = np.mean(at_b * (crossed - at_a), axis=-1) / variance
+    return first, 0.5 * np.mean((at_a - crossed) ** 2, axis=-1) / variance

@@ -37,6 +37,15 @@ def test_indices_of_ishigamis_function():
     assert found.unstable == 0
 
 
+def test_the_same_seed_gives_the_same_intervals_and_another_seed_others():
+    def found(seed):
+        return indices_of(ishigami, ISHIGAMI, samples=256, seed=seed, resamples=49)
+
+    assert np.array_equal(found(3).first_interval, found(3).first_interval)
+    assert np.array_equal(found(3).total_interval, found(3).total_interval)
+    assert not np.array_equal(found(3).first_interval, found(4).first_interval)
+
+
 def test_one_number_alone_is_to_blame_for_everything():
     one = Spread({"x": Uniform(0.0, 1.0)})
     found = indices_of(lambda rows: rows[:, 0] ** 2, one, samples=1024, resamples=49)
