@@ -38,61 +38,45 @@ to begin with:
 """
 
 
-#: Every command: its name, its module in `stillhook.commands`, what it does.
+#: Every command: its name, its room in `stillhook.commands`, what it does.
 COMMANDS = (
-    (
-        "optimise",
-        "design.optimise",
-        "find the gains that hold the payload stillest within the limits",
-    ),
-    ("structures", "design.structures", "compare controller structures on a case"),
-    ("evaluate", "design.evaluate", "say what given gains do"),
-    ("robust", "design.robust", "find one set of gains for many depths, loads and seas"),
-    (
-        "margins",
-        "design.margins",
-        "say how far the plant's numbers may be off before a design is unstable",
-    ),
-    ("sensitivity", "study.sensitivity", "say which numbers of the case matter most to a design"),
+    ("optimise", "design", "find the gains that hold the payload stillest within the limits"),
+    ("structures", "design", "compare controller structures on a case"),
+    ("evaluate", "design", "say what given gains do"),
+    ("robust", "design", "find one set of gains for many depths, loads and seas"),
+    ("margins", "design", "say how far the plant's numbers may be off before a design is unstable"),
+    ("sensitivity", "study", "say which numbers of the case matter most to a design"),
     (
         "operability",
-        "study.operability",
+        "study",
         "say in which seas the winch can work, what limits it, and how much of the year",
     ),
-    ("pareto", "design.pareto", "draw what stillness costs: torque, margin or delay"),
-    ("size", "design.size", "find the smallest motor and gear that meet a target"),
-    ("worth", "design.worth", "say what each limit, sensor and delay is worth"),
-    ("simulate", "run.simulate", "simulate controllers in a sea, limits and all"),
-    ("compare", "study.compare", "compare controllers in the same seas, limits and all"),
+    ("pareto", "design", "draw what stillness costs: torque, margin or delay"),
+    ("size", "design", "find the smallest motor and gear that meet a target"),
+    ("worth", "design", "say what each limit, sensor and delay is worth"),
+    ("simulate", "run", "simulate controllers in a sea, limits and all"),
+    ("compare", "study", "compare controllers in the same seas, limits and all"),
     (
         "sweep",
-        "study.sweep",
+        "study",
         "try a design or a controller on many cases: what is not known exactly, what fails",
     ),
-    ("scenarios", "run.scenarios", "list the operations and the controllers"),
-    ("bound", "design.bound", "say what no linear controller can do better than"),
-    ("sea", "world.sea", "read wave spectra: what they hold, scatter diagram, one of them"),
+    ("scenarios", "run", "list the operations and the controllers"),
+    ("bound", "design", "say what no linear controller can do better than"),
+    ("sea", "world", "read wave spectra: what they hold, scatter diagram, one of them"),
     (
         "motion",
-        "world.motion",
+        "world",
         "show the hook's motion over headings, periods and sides, and what it asks of a winch",
     ),
     ("vessel", "", "read a vessel's RAOs from a file, or compute them from a hull"),
-    (
-        "vessel import",
-        "world.vessel_import",
-        "read a vessel's RAOs, check them, and keep them in one convention",
-    ),
-    (
-        "vessel hull",
-        "world.vessel_hull",
-        "compute a vessel's RAOs from main dimensions or a mesh (extra: bem)",
-    ),
-    ("vessel list", "world.vessel_list", "list the bundled vessels"),
-    ("check", "world.check", "read a case, and show what follows from it"),
-    ("cases", "world.cases", "list the bundled cases"),
-    ("new", "world.new", "write a commented case file that runs as it is"),
-    ("schema", "world.schema", "write the JSON Schema of a case file, for editors"),
+    ("vessel import", "world", "read a vessel's RAOs, check them, and keep them in one convention"),
+    ("vessel hull", "world", "compute a vessel's RAOs from main dimensions or a mesh (extra: bem)"),
+    ("vessel list", "world", "list the bundled vessels"),
+    ("check", "world", "read a case, and show what follows from it"),
+    ("cases", "world", "list the bundled cases"),
+    ("new", "world", "write a commented case file that runs as it is"),
+    ("schema", "world", "write the JSON Schema of a case file, for editors"),
 )
 
 
@@ -118,7 +102,7 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
     within = {"": parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")}
     plain = [word for word in words or () if not word.startswith("-")]
-    for name, module, help in COMMANDS:
+    for name, room, help in COMMANDS:
         first, _, second = name.partition(" ")
         added = within[first if second else ""].add_parser(
             second or first,
@@ -130,14 +114,15 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
         added.add_argument(
             "--debug", action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS
         )
-        if not module:
+        if not room:
             within[first] = added.add_subparsers(
                 title="what to do", dest="part", metavar="WHAT", required=True
             )
         elif words is None or name.split() == plain[: 2 if second else 1]:
             from .commands.declare import EVERYWHERE, declared
 
-            chosen = import_module(f".commands.{module}", __package__)
+            module = f".commands.{room}.{name.replace(' ', '_')}"
+            chosen = import_module(module, __package__)
             declared(added, (*chosen.ARGUMENTS, EVERYWHERE))
             added.set_defaults(run=chosen.run)
     return parser

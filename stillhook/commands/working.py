@@ -119,8 +119,12 @@ def working(arguments: argparse.Namespace) -> Iterator[Progress]:
 @contextlib.contextmanager
 def counting(arguments: argparse.Namespace) -> Iterator[Progress]:
     """Show how many cases are done, and how fast, until Ctrl-C ends it in order."""
-    shown = not arguments.quiet
-    with stoppable() as stop, progress(shown=shown, pace=_a_minute) as tell:
+    with (
+        stoppable() as stop,
+        progress(
+            shown=not arguments.quiet, pace=lambda speed: f"{number(60.0 * speed, 2)}/min"
+        ) as tell,
+    ):
 
         def step(what: str, done: int, total: int) -> None:
             if stop():
@@ -128,10 +132,6 @@ def counting(arguments: argparse.Namespace) -> Iterator[Progress]:
             tell(what, done, total)
 
         yield step
-
-
-def _a_minute(speed: float) -> str:
-    return f"{number(60.0 * speed, 2)}/min"
 
 
 @contextlib.contextmanager

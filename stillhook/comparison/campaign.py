@@ -72,7 +72,12 @@ class Campaign:
         """Do everything that can be sent to other processes."""
         self._tell("starting")
         while True:
-            todo = [t for t in self._todo() if self._portable(t) and t not in self.under_way]
+            todo = [
+                task
+                for task in self._todo()
+                if task not in self.under_way
+                and (task.kind == "design" or self._names[task.name].portable)
+            ]
             while pool.idle and todo:
                 task = self._next(pool, todo)
                 todo.remove(task)
@@ -196,9 +201,6 @@ class Campaign:
     def _law_of(self, contender: Contender, height: float) -> StoredDesign | None:
         return self.laws.get((contender.needs, self.question.design_height(height)))
 
-    def _portable(self, task: CellTask) -> bool:
-        return task.kind == "design" or self._names[task.name].portable
-
     def _do(self, task: CellTask) -> Any:
         """Do a task in this process."""
         if self._bench is None:
@@ -217,18 +219,19 @@ class Campaign:
     def _take(self, task: CellTask, answer: Any) -> None:
         """Keep an answer."""
         key = (task.name, task.height, task.seed)
-        if isinstance(answer, Died):
+        if isinstance(answer, Died | Refused):
             if task.kind == "design":
                 self.no_design[task.group] = f"no design: {answer.reason}"
-            else:
-                self.cells[key] = _without(task, "died", answer.reason)
-        elif isinstance(answer, Refused):
-            if task.kind == "design":
-                self.no_design[task.group] = f"no design: {answer.reason}"
-            elif answer.always:
+            elif isinstance(answer, Refused) and answer.always:
                 self.refused[task.group] = answer.reason
             else:
-                self.cells[key] = _without(task, "failed", answer.reason)
+                self.cells[key] = Cell(
+                    contender=task.name,
+                    height=task.height,
+                    seed=task.seed,
+                    status="died" if isinstance(answer, Died) else "failed",
+                    message=answer.reason,
+                )
         elif isinstance(answer, StoredDesign):
             self.laws[task.group] = answer
             if self.store is not None:
@@ -249,9 +252,3 @@ def _words(task: CellTask) -> str:
     if task.kind == "design":
         return f"designing {task.name}, H_s {task.height:.4g} m"
     return f"{task.name}, H_s {task.height:.4g} m, seed {task.seed}"
-
-
-def _without(task: CellTask, status: str, message: str) -> Cell:
-    return Cell(
-        contender=task.name, height=task.height, seed=task.seed, status=status, message=message
-    )

@@ -31,6 +31,14 @@ SHORT: Mapping[str, str] = {
 }
 """Short names of what may be off."""
 
+# Paths of the short names that lead to the same place in every case.
+_PATHS: Mapping[str, tuple[str, ...]] = {
+    "payload": ("payload.mass", "payload.added_mass"),
+    "weight": ("payload.submerged_weight",),
+    "delay": ("sensors.telemetry.delay",),
+    "sea": ("sea.significant_height",),
+    "spectrum": ("sea",),
+}
 _OWNER = "--mismatch"
 _HEAVIEST = 1.0 + 1e-6  # of its weight in air may a payload weigh in water
 _SIGNED = re.compile(r"^[+-]\s*[0-9.]")
@@ -105,23 +113,14 @@ class Mismatch:
 
 
 def _paths(name: str, case: Case) -> tuple[str, ...]:
-    rope, sea = case.rope, case.sea
-    if name == "payload":
-        return "payload.mass", "payload.added_mass"
-    if name == "weight":
-        return ("payload.submerged_weight",)
+    if name in _PATHS:
+        return _PATHS[name]
     if name in ("stiffness", "E"):
-        given = getattr(rope, "axial_stiffness", None)
+        given = getattr(case.rope, "axial_stiffness", None)
         return ("rope.modulus" if given is None else "rope.axial_stiffness",)
-    if name == "delay":
-        return ("sensors.telemetry.delay",)
-    if name == "sea":
-        return ("sea.significant_height",)
     if name == "period":
-        own = sea.spectrum == "bretschneider-1975"
+        own = case.sea.spectrum == "bretschneider-1975"
         return ("sea.significant_period" if own else "sea.peak_period",)
-    if name == "spectrum":
-        return ("sea",)
     if "." not in name:
         raise InputError(
             f"{_OWNER}: there is no {name!r}; there are {', '.join(SHORT)}, and paths of the case "

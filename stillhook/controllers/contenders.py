@@ -83,10 +83,7 @@ _SEEN = "all sensors, up to now; plant of the case"
 _ALL = (
     _named("none", "the drum held by its brake", "nothing", "brake"),
     _named(
-        "constant-tension",
-        "the drive keeps the rope's tension",
-        "load cell and motor",
-        "linear",
+        "constant-tension", "the drive keeps the rope's tension", "load cell and motor", "linear"
     ),
     _named(
         "feed-forward",
@@ -115,12 +112,7 @@ _ALL = (
         "three optimised gains, as if the drive had no limits",
         _PAYLOAD,
     ),
-    _linear(
-        "feedback-no-antiwindup",
-        "gains-eager",
-        "the eager one without anti-windup",
-        _PAYLOAD,
-    ),
+    _linear("feedback-no-antiwindup", "gains-eager", "the eager one without anti-windup", _PAYLOAD),
     _linear(
         "combined",
         "combined",
@@ -133,18 +125,8 @@ _ALL = (
         "the same, within the drive's limits in a sea of half the height",
         _BOTH,
     ),
-    _linear(
-        "combined-eager",
-        "combined-eager",
-        "the same, as if the drive had no limits",
-        _BOTH,
-    ),
-    _linear(
-        "combined-no-antiwindup",
-        "combined-eager",
-        "the eager one without anti-windup",
-        _BOTH,
-    ),
+    _linear("combined-eager", "combined-eager", "the same, as if the drive had no limits", _BOTH),
+    _linear("combined-no-antiwindup", "combined-eager", "the eager one without anti-windup", _BOTH),
     _named(
         "mpc",
         "linear MPC, the hook predicted by a Kalman filter",

@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -138,9 +139,30 @@ def sweep(
     nominal = case_of(design, case)
     given = spread_of(spread, nominal, mode)
     if mode == "frequency":
-        return _in_frequency(
-            design, given, nominal, int(wanted), sampling, seed, metrics, chunk, store, progress
+        from synth.sweeps import frequency_sweep
+
+        from .export import check_writable, write_result
+
+        if not isinstance(design, GainDesign | StructureDesign):
+            raise InputError(
+                "sweep: in the frequency domain a design is wanted (GainDesign, StructureDesign), "
+                f"got {design!r}; other controllers are swept with mode='time'"
+            )
+        if store is not None:
+            check_writable(store)
+        found = frequency_sweep(
+            design if design.case is nominal else replace(design, case=nominal),
+            given,
+            samples=int(wanted),
+            sampling=sampling,
+            seed=seed,
+            metrics=metrics,
+            chunk=chunk,
+            progress=progress,
         )
+        if store is not None:
+            write_result(found, store)
+        return found
     from ..controllers import recipe_of
     from ..runs import seconds_of
     from .store import Draw
@@ -246,46 +268,3 @@ def spread_of(
     if "vary" in given:
         return Spread.from_dict(given)
     return Spread(dict(given))
-
-
-def _in_frequency(
-    design: object,
-    spread: Spread,
-    case: Case,
-    samples: int,
-    sampling: str,
-    seed: int,
-    metrics: Sequence[str] | None,
-    chunk: int | None,
-    store: str | Path | None,
-    progress: Progress | None,
-) -> xr.Dataset:
-    """Return the sweep of the linear loop."""
-    from dataclasses import replace
-
-    from synth.sweeps import frequency_sweep
-
-    from .export import check_writable, write_result
-
-    if not isinstance(design, GainDesign | StructureDesign):
-        raise InputError(
-            "sweep: in the frequency domain a design is wanted (GainDesign, StructureDesign), got "
-            f"{design!r}; other controllers are swept with mode='time'"
-        )
-    if store is not None:
-        check_writable(store)
-    if design.case is not case:
-        design = replace(design, case=case)
-    found = frequency_sweep(
-        design,
-        spread,
-        samples=samples,
-        sampling=sampling,
-        seed=seed,
-        metrics=metrics,
-        chunk=chunk,
-        progress=progress,
-    )
-    if store is not None:
-        write_result(found, store)
-    return found

@@ -16,16 +16,7 @@ from typing import TYPE_CHECKING
 from models.basics import StillhookError, SynthesisError
 
 from ...controllers import controller_of
-from ...runs import (
-    RunFolder,
-    Runs,
-    Series,
-    headline_of,
-    keep_worst,
-    runs_data,
-    runs_report,
-    tree,
-)
+from ...runs import RunFolder, Runs, Series, headline_of, keep_worst, runs_data, runs_report, tree
 from ...text import (
     OutputFolder,
     ReportSection,
@@ -167,7 +158,9 @@ def run(arguments: argparse.Namespace) -> int:
         try:
             asked = _with_gains(asked, folder, stop, shown=not arguments.quiet)
             total = len(asked.controllers) * len(asked.seeds) * asked.duration
-            with progress(shown=not arguments.quiet, pace=_times_real) as tell:
+            with progress(
+                shown=not arguments.quiet, pace=lambda speed: f"{number(speed, 2)} x real time"
+            ) as tell:
 
                 def tick(what: str, done: float) -> None:
                     tell(what, done, total)
@@ -367,10 +360,7 @@ def _next(
     rows = []
     if len(asked.controllers) == 1:
         rows.append(
-            (
-                "every controller in the same sea",
-                again(arguments, words, controller="all", **own),
-            )
+            ("every controller in the same sea", again(arguments, words, controller="all", **own))
         )
     if len(asked.seeds) < 10 and not found.compared[0][0].duration > 1e5:
         rows.append(("ten seas", again(arguments, words, seeds=10, **own)))
@@ -382,7 +372,3 @@ def _next(
 
 def _kept(folder: OutputFolder) -> str:
     return f"kept in {folder.path}: {', '.join(kept_in(folder.path)) or 'nothing'}"
-
-
-def _times_real(speed: float) -> str:
-    return f"{number(speed, 2)} x real time"

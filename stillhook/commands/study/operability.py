@@ -53,15 +53,9 @@ ARGUMENTS = (
         text("--payload-rms", "LENGTH", "standard deviation of its motion, as in '50 mm'"),
         text("--payload-significant", "LENGTH", "significant double amplitude, 4 sigma"),
         text(
-            "--payload-max",
-            "LENGTH",
-            "most probable maximum amplitude in the case's exposure time",
+            "--payload-max", "LENGTH", "most probable maximum amplitude in the case's exposure time"
         ),
-        text(
-            "--payload-speed",
-            "SPEED",
-            "most probable maximum of its speed, as in '0.5 m/s'",
-        ),
+        text("--payload-speed", "SPEED", "most probable maximum of its speed, as in '0.5 m/s'"),
     ),
     text(
         "--depths",

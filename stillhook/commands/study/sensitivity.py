@@ -47,9 +47,7 @@ ARGUMENTS = (
             "20 ms..80 ms'; implies --ranges",
         ),
         whole(
-            "--samples",
-            "base points of the indices, a power of two; numbers + 2 cases each",
-            1024,
+            "--samples", "base points of the indices, a power of two; numbers + 2 cases each", 1024
         ),
         whole("--seed", "seed of the draws", 0),
     ),

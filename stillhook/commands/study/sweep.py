@@ -66,10 +66,7 @@ ARGUMENTS = (
         ),
         whole("--samples", "number of cases (default: 10000; with --mode time 256)"),
         text(
-            "--sampling",
-            "METHOD",
-            "sobol (default), lhs, random, grid, corners or given",
-            "sobol",
+            "--sampling", "METHOD", "sobol (default), lhs, random, grid, corners or given", "sobol"
         ),
         whole("--seed", "seed of the draws", 0),
         choice(

@@ -82,11 +82,7 @@ def _sea(case: Case, hook: HookMotion) -> Rows:
             f"seas stay below {number(sea.breaking_steepness, 2)}",
         ),
         *_vessel(case),
-        (
-            "hook, rms",
-            quantity(moved.rms, "m"),
-            f"T_z {quantity(moved.zero_crossing_period, 's')}",
-        ),
+        ("hook, rms", quantity(moved.rms, "m"), f"T_z {quantity(moved.zero_crossing_period, 's')}"),
         ("hook, significant height", quantity(moved.significant_height, "m"), "4 rms"),
         (
             f"hook, largest in {duration(time)}",
@@ -125,6 +121,8 @@ def _rope(case: Case, hook: HookMotion) -> Rows:
     from synth.question import uncompensated
 
     rope, payload = case.rope, case.payload
+    # Of the payload's weight, and half the rope's own.
+    stretch = (payload.submerged_weight + 0.5 * rope.submerged_weight) / rope.stiffness
     drag, rms = uncompensated(case, PlantData.from_case(case), hook)
     modes = _modes(case)
     periods = [quantity(2.0 * math.pi / mode, "s") for mode in modes]
@@ -141,7 +139,7 @@ def _rope(case: Case, hook: HookMotion) -> Rows:
         ("natural period", periods[0], held),
         (
             "stretch at rest",
-            quantity(_stretch(case), "m"),
+            quantity(stretch, "m"),
             f"axial waves need {quantity(rope.travel_time, 's')} end to end",
         ),
         ("linear drag", quantity(drag, "N s/m"), how),
@@ -156,6 +154,7 @@ def _rope(case: Case, hook: HookMotion) -> Rows:
 def _winch(case: Case, hook: HookMotion) -> Rows:
     winch, drive = case.winch, case.winch.drive
     torque = case.static_torque_budget
+    mass = winch.inertia * (winch.gearbox.ratio / case.drum_radius) ** 2
     rope_speed = winch.speed_limit * case.drum_radius / winch.gearbox.ratio
     fastest = hook.velocity.most_probable_maximum(case.limits.exposure_time)
     tension = case.limits.rope_tension_peak
@@ -178,7 +177,7 @@ def _winch(case: Case, hook: HookMotion) -> Rows:
         (
             "inertia",
             quantity(winch.inertia, "kg m2"),
-            f"at the motor ({kind}); {quantity(_rope_mass(case), 'kg')} at the rope",
+            f"at the motor ({kind}); {quantity(mass, 'kg')} at the rope",
         ),
         (
             "power to follow the hook",
@@ -215,15 +214,3 @@ def _modes(case: Case) -> list[float]:
         return [math.sqrt(rope.stiffness / case.moving_mass)]
     mass = case.payload.virtual_mass
     return [float(w) for w in fixed_top_modes(rope.ea, rope.length, rope.mass_per_length, mass, 3)]
-
-
-def _stretch(case: Case) -> float:
-    """Return the elongation of the rope at rest [m]: payload's weight, and half the rope's own."""
-    rope = case.rope
-    return (case.payload.submerged_weight + 0.5 * rope.submerged_weight) / rope.stiffness
-
-
-def _rope_mass(case: Case) -> float:
-    """Return the mass that the winch's inertia is at the rope [kg]."""
-    winch = case.winch
-    return winch.inertia * (winch.gearbox.ratio / case.drum_radius) ** 2

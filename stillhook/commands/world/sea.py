@@ -31,10 +31,7 @@ ARGUMENTS = (
         "case (bundled, .yaml or .toml) to see its sea",
     ),
     text("--read-as", "NAME", "format of the file (default: found out)"),
-    whole(
-        "--record",
-        "record to show, counted from 0 in the order of time (default: the highest)",
-    ),
+    whole("--record", "record to show, counted from 0 in the order of time (default: the highest)"),
     choice(
         "--beyond",
         ("decay", "zero"),
