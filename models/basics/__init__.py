@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .checks import (
         InputError,
         PhysicsWarning,
+        ReadOnlyArrays,
         SolverError,
         StillhookError,
         SynthesisError,

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import fields
 
 import numpy as np
 import numpy.typing as npt
@@ -154,6 +155,15 @@ def read_only(array: npt.ArrayLike) -> FloatArray:
     copy = np.array(array, dtype=np.float64)
     copy.setflags(write=False)
     return copy
+
+
+class ReadOnlyArrays:
+    """Base of frozen dataclasses: every field declared as FloatArray becomes a read-only copy."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):  # type: ignore[arg-type]
+            if field.type == "FloatArray":
+                object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
 
 
 def range_text(

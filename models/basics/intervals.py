@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .arrays import FloatArray
-from .checks import InputError, check_finite, check_range, read_only
+from .checks import InputError, ReadOnlyArrays, check_finite, check_range
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +59,7 @@ class Share:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class FallTime:
+class FallTime(ReadOnlyArrays):
     """How long runs keep lock.
 
     Attributes
@@ -84,11 +84,6 @@ class FallTime:
     kept: FloatArray
     kept_low: FloatArray
     kept_high: FloatArray
-
-    def __post_init__(self) -> None:
-        """Make the arrays read-only."""
-        for name in ("times", "kept", "kept_low", "kept_high"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def mean(self) -> tuple[float, float, float]:

@@ -29,10 +29,10 @@ from ..basics import (
     InputError,
     PhysicsWarning,
     Quadrature,
+    ReadOnlyArrays,
     SpectrumStatistics,
     adaptive_nodes,
     check_range,
-    read_only,
     spectrum_statistics,
 )
 from ..sea import SeaSpectrum
@@ -53,7 +53,7 @@ _SHARE_TO_WARN = 0.05
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class HookRecord:
+class HookRecord(ReadOnlyArrays):
     """A time series of the hook's vertical motion, positive up.
 
     Attributes
@@ -71,11 +71,6 @@ class HookRecord:
     velocity: FloatArray
     acceleration: FloatArray
     seed: int
-
-    def __post_init__(self) -> None:
-        """Make the arrays read-only."""
-        for name in ("time", *_MOTIONS):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def step(self) -> float:

@@ -21,9 +21,9 @@ from ..basics import (
     BoolArray,
     FloatArray,
     InputError,
+    ReadOnlyArrays,
     check_finite,
     check_range,
-    read_only,
     spectral_nodes,
 )
 from ..sea import SeaSpectrum
@@ -51,7 +51,7 @@ _MOTIONS = ("displacement", "velocity", "acceleration")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class HookSurvey:
+class HookSurvey(ReadOnlyArrays):
     """Hook motion over side of the ship, heading and peak period.
 
     Attributes
@@ -83,11 +83,6 @@ class HookSurvey:
     steep: BoolArray
     own: HookDemand
     probability: float = 0.9
-
-    def __post_init__(self) -> None:
-        """Make the arrays read-only."""
-        for name in ("headings", "peak_periods", "moments"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def headings_deg(self) -> FloatArray:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from ..basics import ComplexArray, FloatArray, read_only
+from ..basics import ComplexArray, FloatArray, ReadOnlyArrays
 
 
 def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
@@ -39,7 +39,7 @@ def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class StateSpace:
+class StateSpace(ReadOnlyArrays):
     """Matrices and names of a plant, sampled or not; `LinearPlant` says what they are."""
 
     A: FloatArray
@@ -58,10 +58,6 @@ class StateSpace:
     outputs: tuple[str, ...]
     delays: tuple[float, ...]
     rates: Mapping[str, str]
-
-    def __post_init__(self) -> None:
-        for name in ("A", "B", "E", "C", "D", "F", "Cz", "Dz", "Fz"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     def poles(self) -> ComplexArray:
         """Return the eigenvalues of A, (n,): [1/s], of a sampled plant [-]; delays have none."""

@@ -15,13 +15,13 @@ import numpy as np
 import scipy.linalg
 from scipy.optimize import brentq
 
-from ..basics import FloatArray, InputError, check_range, read_only
+from ..basics import FloatArray, InputError, ReadOnlyArrays, check_range
 
 MAX_MASSES = 40  # more states cost more in every eigenvalue than they add to any design
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RopeLumps:
+class RopeLumps(ReadOnlyArrays):
     """Lengths of rope that the springs and the masses stand for, from the drum down.
 
     Parameters
@@ -35,10 +35,6 @@ class RopeLumps:
 
     springs: FloatArray
     masses: FloatArray
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "springs", read_only(self.springs))
-        object.__setattr__(self, "masses", read_only(self.masses))
 
     @property
     def hanging(self) -> FloatArray:

@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
-from ..basics import ComplexArray, FloatArray, InputError, SolverError, check_range, read_only
+from ..basics import ComplexArray, FloatArray, InputError, ReadOnlyArrays, SolverError, check_range
 
 _NODES = 240
 _TAIL_WEIGHT = 0.03  # of the tail's logarithm against the amplitude
@@ -33,7 +33,7 @@ _LEAST_DAMPING, _MOST_DAMPING = 0.01, 3.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ShapingFilter:
+class ShapingFilter(ReadOnlyArrays):
     """x' = A x + B n, signal C x, its derivative C A x; n is white noise of intensity one.
 
     Attributes
@@ -51,11 +51,6 @@ class ShapingFilter:
     C: FloatArray
     variance_error: float
     shape_error: float
-
-    def __post_init__(self) -> None:
-        """Make the matrices read-only."""
-        for name in ("A", "B", "C"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def order(self) -> int:

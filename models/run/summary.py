@@ -16,7 +16,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, InputError, read_only
+from ..basics import FloatArray, InputError, ReadOnlyArrays
 from .online import Cycles, FirstTime, Flow, Slack, Touchdown
 
 ERROR = "payload.error"
@@ -32,16 +32,11 @@ class NamedQuantity:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Blocks:
+class Blocks(ReadOnlyArrays):
     """Extremes of a signal in each whole block of a run: `maxima` and `minima` (blocks,)."""
 
     maxima: FloatArray
     minima: FloatArray
-
-    def __post_init__(self) -> None:
-        """Make the arrays read-only."""
-        for name in ("maxima", "minima"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -23,6 +23,7 @@ from ..basics import (
     ComplexArray,
     FloatArray,
     InputError,
+    ReadOnlyArrays,
     check_finite,
     check_range,
     check_seed,
@@ -37,7 +38,7 @@ Bias = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MruBlock:
+class MruBlock(ReadOnlyArrays):
     """What the unit shows in a stretch of samples.
 
     Parameters
@@ -51,10 +52,6 @@ class MruBlock:
     heave: FloatArray
     heave_rate: FloatArray
     valid: FloatArray
-
-    def __post_init__(self) -> None:
-        for name in ("heave", "heave_rate", "valid"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

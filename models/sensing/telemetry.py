@@ -23,9 +23,9 @@ from ..basics import (
     BoolArray,
     FloatArray,
     InputError,
+    ReadOnlyArrays,
     check_range,
     check_seed,
-    read_only,
 )
 from ..rig import Telemetry
 from .draws import TELEMETRY, draw
@@ -38,7 +38,7 @@ _ROUNDING = 1e-6  # of a sample: 0.07 s is seven samples of 0.01 s, whatever the
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TelemetryBlock:
+class TelemetryBlock(ReadOnlyArrays):
     """What arrives in a stretch of samples.
 
     Parameters
@@ -55,10 +55,6 @@ class TelemetryBlock:
     weights: FloatArray
     fresh: FloatArray
     age: FloatArray
-
-    def __post_init__(self) -> None:
-        for name in ("weights", "fresh", "age"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from models.basics import FloatArray, InputError, SolverError, check_range, read_only
+from models.basics import FloatArray, InputError, ReadOnlyArrays, SolverError, check_range
 from models.plant import MEAN_LOSSES, Plant, PlantData, build_plant
 from models.sensing import Measurement
 
@@ -66,7 +66,7 @@ class Replay:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Refinement:
+class Refinement(ReadOnlyArrays):
     """The optimum of a record on the nonlinear plant.
 
     Attributes
@@ -95,11 +95,6 @@ class Refinement:
     status: str
     iterations: int
     seconds: float
-
-    def __post_init__(self) -> None:
-        """Make the arrays read-only."""
-        for name in ("time", "payload", "command"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def difference(self) -> float:

@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import scipy.linalg
 
-from models.basics import FloatArray, InputError, read_only
+from models.basics import FloatArray, InputError, ReadOnlyArrays
 from models.plant import MEAN_LOSSES, SPEED_BAND, DriveLimits, Plant, build_plant
 
 from ..winch import command_law
@@ -49,7 +49,7 @@ _SENSORS = ("sensor", "telemetry")  # their states move nothing
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RecordPlant:
+class RecordPlant(ReadOnlyArrays):
     r"""x[k+1] = Phi x[k] + Gamma i[k] + Psi (z, z', at k and k+1), and rows that limit it.
 
     The demand d is the whole one, the static part included, in units of the peak torque; states
@@ -119,12 +119,6 @@ class RecordPlant:
     motor_state: int
     needed: FloatArray
     drag: float
-
-    def __post_init__(self) -> None:
-        """Make the arrays read-only."""
-        for name, value in vars(self).items():
-            if isinstance(value, np.ndarray):
-                object.__setattr__(self, name, read_only(value))
 
     @property
     def inputs(self) -> int:

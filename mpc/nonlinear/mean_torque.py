@@ -18,13 +18,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.basics import FloatArray, read_only
+from models.basics import FloatArray, ReadOnlyArrays
 
 from ..winch import SampledWinch
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Drift:
+class Drift(ReadOnlyArrays):
     """By how much the torque at the start of a sample is over its mean [N m].
 
     Attributes
@@ -40,10 +40,6 @@ class Drift:
     mean: float
     hook: FloatArray
     constants: FloatArray
-
-    def __post_init__(self) -> None:
-        for name in ("state", "hook", "constants"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @classmethod
     def none(cls, size: int) -> Drift:

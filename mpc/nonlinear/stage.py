@@ -29,7 +29,7 @@ import casadi as ca
 import numpy as np
 import scipy.linalg
 
-from models.basics import FloatArray, InputError, SolverError, check_range, read_only
+from models.basics import FloatArray, InputError, ReadOnlyArrays, SolverError, check_range
 from models.plant import zero_order_hold
 from models.simulation import Kernel
 
@@ -49,7 +49,7 @@ _NOTHING = np.zeros(0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Stage:
+class Stage(ReadOnlyArrays):
     """One sample of M sub-steps, m forces and my arguments; `make_stage` makes it.
 
     Attributes
@@ -89,10 +89,6 @@ class Stage:
     C_constants: FloatArray
     own: FloatArray
     kernel: Kernel
-
-    def __post_init__(self) -> None:
-        for name in ("rest", "from_forces", "C", "D", "C_hook", "C_constants", "own"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import FloatArray, read_only
+from models.basics import FloatArray, ReadOnlyArrays
 
 from .horizon import Horizon
 from .regulator import LQRegulator
@@ -38,7 +38,7 @@ IntArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Condensed:
+class Condensed(ReadOnlyArrays):
     """Matrices of the programme; `condense` makes it.
 
     Attributes
@@ -77,13 +77,6 @@ class Condensed:
     rows_constants: FloatArray
     speeds: FloatArray
     cost: float
-
-    def __post_init__(self) -> None:
-        for name in (
-            *("H", "from_state", "from_path", "from_constants", "from_end"),
-            *("rows", "rows_state", "rows_path", "rows_constants", "speeds"),
-        ):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def blocks(self) -> tuple[int, ...]:

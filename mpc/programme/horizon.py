@@ -18,13 +18,13 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import FloatArray, check_range, read_only
+from models.basics import FloatArray, ReadOnlyArrays, check_range
 
 IntArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Horizon:
+class Horizon(ReadOnlyArrays):
     """A sampled plant of one input, and the blocks of its moves.
 
     Parameters
@@ -43,10 +43,6 @@ class Horizon:
     from_constants: FloatArray
     blocks: tuple[int, ...]
     unit: float
-
-    def __post_init__(self) -> None:
-        for name in ("A", "B", "from_path", "from_constants"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @cached_property
     def steps(self) -> int:

@@ -29,11 +29,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from models.basics import FloatArray, SolverError, read_only, solve_discrete_riccati
+from models.basics import FloatArray, ReadOnlyArrays, SolverError, solve_discrete_riccati
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LQRegulator:
+class LQRegulator(ReadOnlyArrays):
     """Gains and value function; `lq_regulator` makes it.
 
     Attributes
@@ -58,10 +58,6 @@ class LQRegulator:
     Phi: FloatArray
     Gamma: FloatArray
     steady: FloatArray
-
-    def __post_init__(self) -> None:
-        for name in ("P", "N", "K", "K_disturbance", "Phi", "Gamma", "steady"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
 
 def lq_regulator(

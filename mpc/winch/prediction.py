@@ -30,7 +30,7 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
-from models.basics import FloatArray, SolverError, read_only
+from models.basics import FloatArray, ReadOnlyArrays, SolverError, read_only
 from models.case import Case
 from models.hook import HookMotion
 from models.plant import MEASUREMENTS, ShapingFilter, fit_shaping_filter
@@ -60,7 +60,7 @@ _SPEED_WINDOW = 0.01  # in which a drive counts an encoder's pulses [s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PredictionModel:
+class PredictionModel(ReadOnlyArrays):
     """Matrices of the augmented state; `prediction_model` makes it.
 
     Attributes
@@ -104,10 +104,6 @@ class PredictionModel:
     C: FloatArray
     R: FloatArray
     hook: FloatArray
-
-    def __post_init__(self) -> None:
-        for name in ("A", "B", "G", "slow", "now", "C", "R", "hook"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def size(self) -> int:

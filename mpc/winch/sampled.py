@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import FloatArray, check_range, read_only
+from models.basics import FloatArray, ReadOnlyArrays, check_range, read_only
 from models.case import Case
 from models.plant import (
     MEAN_LOSSES,
@@ -46,7 +46,7 @@ _OWNER = "predictive control"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SampledWinch:
+class SampledWinch(ReadOnlyArrays):
     """Plant and sensors, sampled; `sampled_winch` makes it.
 
     Attributes
@@ -101,14 +101,6 @@ class SampledWinch:
     sample_time: float
     masses: int
     drag: float
-
-    def __post_init__(self) -> None:
-        for name in (
-            *("A", "B", "from_hook", "from_constants", "payload", "velocity", "speed"),
-            "tension",
-            *("tension_from_hook", "force_felt", "moved"),
-        ):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def dc(self) -> bool:

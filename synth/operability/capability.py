@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import FloatArray, Quadrature, read_only
+from models.basics import FloatArray, Quadrature, ReadOnlyArrays
 
 from ..limits import Continuous, Peak, Power
 from .criteria import Criterion
@@ -30,7 +30,7 @@ from .systems import PerfectSystem
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Capability:
+class Capability(ReadOnlyArrays):
     """Largest regular heave that a winch can follow.
 
     Attributes
@@ -47,11 +47,6 @@ class Capability:
     periods: FloatArray
     criteria: tuple[Criterion, ...]
     heights: FloatArray
-
-    def __post_init__(self) -> None:
-        """Make the arrays read-only."""
-        for name in ("periods", "heights"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def limit(self) -> FloatArray:

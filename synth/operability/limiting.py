@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import elementwise
 
-from models.basics import FloatArray, IndexArray, SolverError, read_only
+from models.basics import FloatArray, IndexArray, ReadOnlyArrays, SolverError
 
 from .columns import SeaColumn
 from .criteria import Criterion, SeaMoments
@@ -130,7 +130,7 @@ class SeaStates:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ColumnLimits:
+class ColumnLimits(ReadOnlyArrays):
     """Limiting significant heights of one peak period.
 
     Attributes
@@ -144,11 +144,6 @@ class ColumnLimits:
 
     heights: FloatArray
     drag: FloatArray
-
-    def __post_init__(self) -> None:
-        """Make the arrays read-only."""
-        for name in ("heights", "drag"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
 
 def limiting_heights(

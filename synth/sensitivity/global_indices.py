@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import FloatArray, InputError, check_range, read_only
+from models.basics import FloatArray, InputError, ReadOnlyArrays, check_range
 from models.spread import Spread
 
 from ..design import GainDesign, StructureDesign
@@ -71,7 +71,7 @@ def evaluate_rows(
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SobolIndices:
+class SobolIndices(ReadOnlyArrays):
     """Sobol's indices of one figure.
 
     Attributes
@@ -104,10 +104,6 @@ class SobolIndices:
     kept: int
     evaluations: int
     unstable: int
-
-    def __post_init__(self) -> None:
-        for name in ("first", "total", "first_interval", "total_interval"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def share_unstable(self) -> float:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.basics import FloatArray, check_range, read_only
+from models.basics import FloatArray, ReadOnlyArrays, check_range
 from models.spread import Spread
 
 from ..design import GainDesign, StructureDesign
@@ -30,7 +30,7 @@ _ENDS = 0.01  # a normal distribution has no ends: the cube is cut there
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Screening:
+class Screening(ReadOnlyArrays):
     """Elementary effects of every number on the logarithm of one figure.
 
     Attributes
@@ -54,10 +54,6 @@ class Screening:
     evaluations: int
     unstable: int
     lost: FloatArray
-
-    def __post_init__(self) -> None:
-        for name in ("mean_size", "mean", "spread", "lost"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     def __str__(self) -> str:
         """Return a small tree, the largest first."""

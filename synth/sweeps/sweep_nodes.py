@@ -19,9 +19,9 @@ from models.basics import (
     FloatArray,
     FrequencyAxis,
     Quadrature,
+    ReadOnlyArrays,
     cut_panels,
     longest_panel,
-    read_only,
 )
 
 _SHORT = 0.12  # panels shorter than this, in ln omega, get the 7-point rule
@@ -53,7 +53,7 @@ _RULES = {
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SweepNodes:
+class SweepNodes(ReadOnlyArrays):
     """Nodes with two rules on them.
 
     Attributes
@@ -67,10 +67,6 @@ class SweepNodes:
 
     omega: FloatArray
     weights: FloatArray
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "omega", read_only(self.omega))
-        object.__setattr__(self, "weights", read_only(self.weights))
 
     def __len__(self) -> int:
         return int(self.omega.size)
