@@ -26,7 +26,7 @@ import casadi as ca
 import numpy as np
 
 from ..basics import FloatArray, SolverError, check_range, pick, read_only
-from .equations import INPUTS, MEASUREMENTS, RATES, build_equations, displacement_names
+from .equations import INPUTS, MEASUREMENTS, RATES, Equations, build_equations, displacement_names
 from .linear import LinearPlant
 from .plant_data import PlantData, as_plant_data
 from .rope import RopeLumps, lump_rope
@@ -92,7 +92,7 @@ class OperatingPoint:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Plant:
+class Plant(Equations):
     """The symbolic plant; `build_plant` makes it.
 
     Parameters
@@ -122,15 +122,8 @@ class Plant:
 
     data: PlantData
     lumps: RopeLumps
-    states: tuple[str, ...]
-    inputs: tuple[str, ...]
-    disturbances: tuple[str, ...]
-    measurements: tuple[str, ...]
-    outputs: tuple[str, ...]
-    parameters: Mapping[str, float]
-    function: ca.Function
-    jacobians: ca.Function
-    units: Mapping[str, str]
+    inputs: tuple[str, ...] = INPUTS
+    measurements: tuple[str, ...] = MEASUREMENTS
 
     @property
     def masses(self) -> int:
@@ -235,18 +228,10 @@ class Plant:
         rest = self.operating_point({**changes, **MEAN_LOSSES})
         hauling = self.operating_point(changes)
         w = np.zeros(len(self.disturbances))
-        blocks = [np.asarray(b) for b in self.jacobians(rest.x, rest.u, w, rest.p)]
-        A, B, E, C, D, F, Cz, Dz, Fz = blocks
+        names = ("A", "B", "E", "C", "D", "F", "Cz", "Dz", "Fz")
+        blocks = zip(names, self.jacobians(rest.x, rest.u, w, rest.p), strict=True)
         return LinearPlant(
-            A=A,
-            B=B,
-            E=E,
-            C=C,
-            D=D,
-            F=F,
-            Cz=Cz,
-            Dz=Dz,
-            Fz=Fz,
+            **{name: np.asarray(block) for name, block in blocks},
             states=self.states,
             inputs=self.inputs,
             disturbances=self.disturbances,
@@ -308,19 +293,7 @@ def build_plant(
     equations = build_equations(
         data, lumps, limits=limits, travel=travel, surroundings=surroundings
     )
-    return Plant(
-        data=data,
-        lumps=lumps,
-        states=equations.states,
-        inputs=INPUTS,
-        disturbances=equations.disturbances,
-        measurements=MEASUREMENTS,
-        outputs=equations.outputs,
-        parameters=equations.parameters,
-        function=equations.function,
-        jacobians=equations.jacobians,
-        units=equations.units,
-    )
+    return Plant(**vars(equations), data=data, lumps=lumps)
 
 
 def _elongations(lumps: RopeLumps, values: Mapping[str, float]) -> FloatArray:

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -92,35 +93,22 @@ class SignalStatistics:
     def of(
         cls,
         *,
-        name: str,
-        unit: str,
-        mean: float,
         standard_deviation: float,
-        minimum: float,
-        minimum_time: float,
-        maximum: float,
-        maximum_time: float,
         cycles: Cycles | None,
         sample_time: float,
+        **about: Any,
     ) -> SignalStatistics:
-        """Return the statistics of a signal, with its cycles if they were counted."""
-        plain = cls(
-            name=name,
-            unit=unit,
-            mean=mean,
-            standard_deviation=standard_deviation,
-            minimum=minimum,
-            minimum_time=minimum_time,
-            maximum=maximum,
-            maximum_time=maximum_time,
-            significant=4.0 * standard_deviation,
-        )
+        """Return the statistics of a signal, with its cycles if they were counted.
+
+        Name, unit, mean and extremes are as the attributes.
+        """
+        about |= {"standard_deviation": standard_deviation, "significant": 4.0 * standard_deviation}
         if cycles is None:
-            return plain
+            return cls(**about)
         count, crests, troughs = cycles.count, cycles.crests, cycles.troughs
         for array in (crests, troughs):
             array.setflags(write=False)
-        about: dict[str, object] = {
+        about |= {
             "level": cycles.level,
             "cycles": count,
             "crest": cycles.crest,
@@ -135,7 +123,7 @@ class SignalStatistics:
                 heights = np.sort(crests.astype(np.float64) - troughs)
                 about["significant"] = float(heights[-math.ceil(count / 3) :].mean())
                 about["significant_source"] = "cycles"
-        return cls(**{**plain.__dict__, **about})
+        return cls(**about)
 
     @property
     def rms(self) -> float:

@@ -11,10 +11,12 @@ from __future__ import annotations
 
 import math
 import time as clock
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
+from typing_extensions import override
 
 from ..basics import FloatArray, SolverError, check_range
 from ..run import Event
@@ -28,13 +30,17 @@ if TYPE_CHECKING:
 Ran = tuple[FloatArray, FloatArray, Trip | None]
 
 
-class Stepper(Protocol):
+class Stepper(ABC):
     """Runs the loop of one run; made anew for each."""
 
-    seconds: list[float]
-    fallbacks: dict[str, int]
-    events: list[Event]
+    def __init__(self, simulation: Simulation) -> None:
+        self._signals = simulation.loop.signals
+        self._sample_time = simulation.loop.sample_time
+        self.seconds: list[float] = []
+        self.fallbacks: dict[str, int] = {}
+        self.events: list[Event] = []
 
+    @abstractmethod
     def run(
         self,
         state: FloatArray,
@@ -66,17 +72,14 @@ def stepper_for(simulation: Simulation) -> Stepper:
     return _Fused(simulation) if simulation.fused else _FromPython(simulation)
 
 
-class _Fused:
+class _Fused(Stepper):
     """The controller is part of the recursion."""
 
     def __init__(self, simulation: Simulation) -> None:
+        super().__init__(simulation)
         self._kernel = simulation.kernels[0]
-        self._signals = simulation.loop.signals
-        self._sample_time = simulation.loop.sample_time
-        self.seconds: list[float] = []
-        self.fallbacks: dict[str, int] = {}
-        self.events: list[Event] = []
 
+    @override
     def run(
         self,
         state: FloatArray,
@@ -93,24 +96,21 @@ class _Fused:
         return after, log, trip
 
 
-class _FromPython:
+class _FromPython(Stepper):
     """The controller is called between the two halves of a sample."""
 
     def __init__(self, simulation: Simulation) -> None:
+        super().__init__(simulation)
         deadline = simulation.options.deadline
         if deadline is not None:
             check_range("simulation", "deadline", deadline, low=0.0, unit="s", open_low=True)
         self._measure, self._advance = simulation.kernels
         self._controller = simulation.controller
-        self._signals = simulation.loop.signals
-        self._sample_time = simulation.loop.sample_time
         self._deadline = math.inf if deadline is None else deadline
         self._command = simulation.rest.command
         self._controller.reset()
-        self.seconds: list[float] = []
-        self.fallbacks: dict[str, int] = {}
-        self.events: list[Event] = []
 
+    @override
     def run(
         self,
         state: FloatArray,

@@ -127,7 +127,7 @@ def force_law(
     if losses or travel is not None:
         speed, force = of(_SPEED), ca.SX(0)
         top = held[0] if 0 in held else of("spring.0")
-        mean = 0.5 * (1.0 / data.gear_efficiency + data.gear_efficiency)
+        mean = data.mean_gear_factor
         gear: ca.SX = ca.SX(mean)
         if losses:
             way = ca.tanh(speed / _TURN)
@@ -194,8 +194,9 @@ class _Rope:
         column = self._moves[k] / self._masses[k]
         if k > 0:
             return np.asarray(column - self._moves[k - 1] / self._masses[k - 1])
-        mean = 0.5 * (1.0 / data.gear_efficiency + data.gear_efficiency)
-        column = column - self.unit(_SPEED) * mean * self.haul_per_angle / data.inertia
+        column = (
+            column - self.unit(_SPEED) * data.mean_gear_factor * self.haul_per_angle / data.inertia
+        )
         if "load_cell.tension" in self._states:
             cell = self._winch.case.sensors.load_cell
             bandwidth = 0.0 if cell is None else cell.bandwidth

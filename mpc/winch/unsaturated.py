@@ -150,16 +150,11 @@ class Unsaturated:
         row = model.hook[0, at]
         return math.sqrt(max(float(row @ P @ row), 0.0))
 
-    def payload_rms_under(self, truth: PredictionModel) -> float:
-        """Return the payload's rms [m] with the noises of another model of the same winch."""
-        return self._rms_under(truth)[0]
+    def rms_under(self, truth: PredictionModel) -> tuple[float, float]:
+        """Return the rms of payload [m] and input d [N m] with the noises of another model.
 
-    def torque_rms_under(self, truth: PredictionModel) -> float:
-        """Return the rms of the input d [N m] with the noises of another model."""
-        return self._rms_under(truth)[1]
-
-    def _rms_under(self, truth: PredictionModel) -> tuple[float, float]:
-        """Return the rms of payload [m] and input [N m]; infinite if the loop is not stable."""
+        It is one of the same winch; both are infinite if the loop is not stable.
+        """
         Ac, Bc, Cc, Dc = self.controller
         A, B, C = truth.A, truth.B, truth.C
         winch = truth.winch

@@ -234,7 +234,7 @@ def _search(
             loop = Unsaturated(model=believed, regulator=regulator(planned, float(weight)))
             rms: tuple[float, ...] = ()
             for plant in (*others, model):  # most candidates fail on one that is off: those first
-                rms = (loop.payload_rms_under(plant), *rms)
+                rms = (loop.rms_under(plant)[0], *rms)
                 if not math.isfinite(rms[0]):
                     return None
         except SolverError:
@@ -303,7 +303,7 @@ def saturates(model: PredictionModel) -> bool:
     """Return whether the peak torque is too small for what a stiff loop would ask of the drive."""
     believed = with_noise(model, ProcessNoise(force=0.01, torque=0.02, rope=0.5, sensors=1e-3))
     loop = Unsaturated(model=believed, regulator=regulator(believed, 0.1))
-    asked = abs(model.winch.rest_torque) + _SATURATED * loop.torque_rms_under(model)
+    asked = abs(model.winch.rest_torque) + _SATURATED * loop.rms_under(model)[1]
     return bool(asked > model.winch.case.winch.drive.torque_peak)
 
 
