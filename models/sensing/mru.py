@@ -7,12 +7,18 @@ run, a chunk after the other, from the true motion of the hook:
 
 The high-pass takes the drift out of an integrated acceleration and puts a phase lead into slow
 heave; the error is what data sheets state as 5 cm or 5 %, whichever is greater.
+
+Its low-passes, of the second order after Butterworth, are one complex number each.  The filter
+q'' + sqrt(2) w q' + w^2 q = input has the poles w (-1 +- i)/sqrt(2).  Its two real states are the
+real and imaginary part of one mode, m = q' - conj(pole) q, which obeys m' = pole m + input.  A long
+series then needs one recursion of the first order, which runs at the speed of compiled code, and
+can be cut anywhere.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -31,7 +37,6 @@ from ..basics import (
 )
 from ..rig import MRU
 from .draws import MRU_ERROR, draw
-from .lowpass import from_mode, integrate_to, low_pass_pole, mode_recursion, noise_root, to_mode
 from .telemetry import Interval, check_intervals, during
 
 Bias = tuple[float, float, float, float]
@@ -368,3 +373,67 @@ def _motions(displacement: npt.ArrayLike, velocity: npt.ArrayLike) -> tuple[Floa
             f"got {len(v)} and {len(z)}"
         )
     return z, v
+
+
+def low_pass_pole(corner: float) -> complex:
+    """Return the pole in the upper half plane [rad/s] of a low-pass with this corner [rad/s]."""
+    return corner * complex(-1.0, 1.0) / math.sqrt(2.0)
+
+
+def to_mode(value: npt.ArrayLike, rate: npt.ArrayLike, pole: complex) -> ComplexArray:
+    """Return the mode of a filter's value and its derivative."""
+    v, r = np.asarray(value, dtype=np.float64), np.asarray(rate, dtype=np.float64)
+    return np.asarray(r - pole.conjugate() * v, dtype=np.complex128)
+
+
+def from_mode(modes: ComplexArray, pole: complex) -> tuple[FloatArray, FloatArray]:
+    """Return the filter's value and its derivative from its mode."""
+    value = modes.imag / pole.imag
+    return value, modes.real + pole.real * value
+
+
+def mode_recursion(factor: complex, first: complex, drive: ComplexArray) -> ComplexArray:
+    """Return x[0] = first, x[k + 1] = factor x[k] + drive[k]."""
+    from scipy.signal import lfilter
+
+    driven = np.concatenate(([first], drive)).astype(np.complex128)
+    return np.asarray(lfilter([1.0], [1.0, -factor], driven), dtype=np.complex128)
+
+
+def integrate_to(
+    integrand: Callable[[FloatArray], ComplexArray], end: float, rate: float
+) -> ComplexArray:
+    """Return the integral from 0 to `end`, by Gauss-Legendre panels shorter than 1/rate."""
+    panels = math.ceil(end * rate)
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    edges = np.linspace(0.0, end, panels + 1)
+    half = 0.5 * np.diff(edges)
+    t = (edges[:-1, None] + half[:, None] * (1.0 + nodes)).ravel()
+    return np.asarray(integrand(t) @ (half[:, None] * weights).ravel(), dtype=np.complex128)
+
+
+def noise_root(corner: float, step: float) -> FloatArray:
+    """Return what a time step adds to white noise behind the low-pass, of variance 1 in all.
+
+    Parameters
+    ----------
+    corner
+        Corner frequency [rad/s].
+    step
+        Time step [s].
+
+    Returns
+    -------
+    ndarray
+        Lower triangular root (2, 2) of the covariance that value and derivative gain.
+    """
+    pole = low_pass_pole(corner)
+
+    def integrand(t: FloatArray) -> ComplexArray:
+        impulse, rate = from_mode(np.exp(pole * t), pole)
+        return np.array((impulse**2, impulse * rate, rate**2), dtype=np.complex128)
+
+    # From the integral itself: P - Phi P Phi' would lose all digits at short steps.
+    strength = 2.0 * math.sqrt(2.0) * corner**3
+    a, b, c = strength * integrate_to(integrand, step, abs(pole)).real
+    return np.linalg.cholesky(np.array([[a, b], [b, c]]))

@@ -5,32 +5,39 @@
 The plant is that of the case with everything a design leaves out: quadratic drag, slack rope,
 limits of the drive, dry friction, losses of the gear both ways, the brake.  A controller that is
 a recursion runs inside the compiled loop; any other object with `step` is called from Python once
-in a sample (`models.simulation.steppers`).  Either way every random number is drawn in advance,
-from the seed alone, so that a run can be repeated to the last bit.
+in a sample.  Either way every random number is drawn in advance, from the seed alone, so that a run
+can be repeated to the last bit.
 
 Whatever happens on the way (the end of the stroke, a controller that returns no number, a
 diverging plant, Ctrl-C) ends in a `Run` that says what happened and when, with everything
 simulated up to then.
+
+A controller in Python may fail: return no number, take too long, raise.  Its last good command is
+then held, and the run counts how often and says when it happened first; the load never sees a
+command that is not a number.
 """
 
 from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 
 import numpy as np
+from typing_extensions import override
 
-from ..basics import FloatArray, check_range, check_seed
+from ..basics import FloatArray, SolverError, check_range, check_seed
 from ..run import Accumulator, Event, Run, Timings
-from ..sensing import holds_brake
+from ..sensing import Measurement, holds_brake
 from .simulation import Simulation
-from .steppers import stepper_for
+from .trips import Trip, TripLimit, find_trip
 
 Progress = Callable[[float], None]
 
 CHUNK = 8192  # samples between two looks at trips, Ctrl-C and progress
 STORED = 40_000  # samples that a run keeps unless told otherwise
+Ran = tuple[FloatArray, FloatArray, Trip | None]
 
 
 def run_simulation(
@@ -84,7 +91,7 @@ def run_simulation(
     )
     store = _Store(dt, samples, options.store_step)
     rows = simulation.rows(check_seed(owner, seed), wanted)
-    stepper = stepper_for(simulation)
+    stepper = _Fused(simulation) if simulation.fused else _FromPython(simulation)
     foresee = getattr(simulation.controller, "foresee", None)
     if foresee is not None:  # a controller with perfect preview, for reference
         foresee(rows.motions[0])
@@ -151,6 +158,137 @@ def run_simulation(
             fallbacks=stepper.fallbacks,
         ),
     )
+
+
+class Stepper(ABC):
+    """Runs the loop of one run; made anew for each."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._signals = simulation.loop.signals
+        self._sample_time = simulation.loop.sample_time
+        self.seconds: list[float] = []
+        self.fallbacks: dict[str, int] = {}
+        self.events: list[Event] = []
+
+    @abstractmethod
+    def run(
+        self,
+        state: FloatArray,
+        rows: FloatArray,
+        parameters: FloatArray,
+        first: int,
+        limits: Sequence[TripLimit],
+    ) -> Ran:
+        """Run over rows, to their end or to the first trip, whose row is the last of the log.
+
+        Parameters
+        ----------
+        state, rows, parameters
+            As for `Kernel.run`.
+        first
+            Number of the first sample.
+        limits
+            What to watch.
+
+        Returns
+        -------
+        state, log, trip
+            The state after the last row of the log, the log, and the trip if there was one.
+        """
+
+
+class _Fused(Stepper):
+    """The controller is part of the recursion."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        super().__init__(simulation)
+        self._kernel = simulation.kernels[0]
+
+    @override
+    def run(
+        self,
+        state: FloatArray,
+        rows: FloatArray,
+        parameters: FloatArray,
+        first: int,
+        limits: Sequence[TripLimit],
+    ) -> Ran:
+        after, log = self._kernel.run(state, rows, parameters)
+        trip = find_trip(limits, self._signals, log, first, self._sample_time)
+        if trip is not None and trip.sample - first + 1 < len(log):
+            # Once more, up to the sample where it happened.
+            after, log = self._kernel.run(state, rows[: trip.sample - first + 1], parameters)
+        return after, log, trip
+
+
+class _FromPython(Stepper):
+    """The controller is called between the two halves of a sample."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        super().__init__(simulation)
+        deadline = simulation.options.deadline
+        if deadline is not None:
+            check_range("simulation", "deadline", deadline, low=0.0, unit="s", open_low=True)
+        self._measure, self._advance = simulation.kernels
+        self._controller = simulation.controller
+        self._deadline = math.inf if deadline is None else deadline
+        self._command = simulation.rest.command
+        self._controller.reset()
+
+    @override
+    def run(
+        self,
+        state: FloatArray,
+        rows: FloatArray,
+        parameters: FloatArray,
+        first: int,
+        limits: Sequence[TripLimit],
+    ) -> Ran:
+        log = np.empty((len(rows), len(self._signals)))
+        given = np.empty(rows.shape[1] + 1)
+        watched = [limit for limit in limits if limit.signal in self._signals]
+        columns = [self._signals.index(limit.signal) for limit in watched]
+        for k, row in enumerate(rows):
+            time = (first + k) * self._sample_time
+            state, seen = self._measure.step(state, row, parameters)
+            given[:-1] = row
+            given[-1] = self._ask(Measurement(seen), time)
+            state, log[k] = self._advance.step(state, given, parameters)
+            for limit, column in zip(watched, columns, strict=True):
+                if not limit.low <= log[k, column] <= limit.high:
+                    trip = find_trip(
+                        limits, self._signals, log[k : k + 1], first + k, self._sample_time
+                    )
+                    if trip is not None:
+                        return state, log[: k + 1], trip
+        return state, log, None
+
+    def _ask(self, measurement: Measurement, time: float) -> float:
+        """Return the controller's command, or the one before if it has none."""
+        began = clock.perf_counter()
+        try:
+            command = float(self._controller.step(measurement, time))
+        except (ArithmeticError, SolverError, TypeError, ValueError) as error:
+            command = math.nan
+            self._held("failed", time, f"the controller failed ({error})")
+        else:
+            if not math.isfinite(command):
+                self._held("not a number", time, "the controller returned no number")
+        taken = clock.perf_counter() - began
+        self.seconds.append(taken)
+        if taken > self._deadline:
+            late = f"the controller took {1e3 * taken:.3g} ms"
+            self._held("late", time, f"{late}, its deadline is {1e3 * self._deadline:.3g} ms")
+        elif math.isfinite(command):
+            self._command = command
+        return self._command
+
+    def _held(self, kind: str, time: float, text: str) -> None:
+        """Count a command that was not used, and tell of the first."""
+        if kind not in self.fallbacks:
+            told = f"{text}: the command before is held (told once)"
+            self.events.append(Event(time=time, kind="controller", text=told))
+        self.fallbacks[kind] = self.fallbacks.get(kind, 0) + 1
 
 
 class _DivergedError(Exception):

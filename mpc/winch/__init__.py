@@ -11,8 +11,7 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .estimator import WinchEstimator
     from .planning import plan_model
-    from .prediction import PredictionModel, prediction_model, with_noise
-    from .process_noise import ProcessNoise
+    from .prediction import PredictionModel, ProcessNoise, prediction_model, with_noise
     from .regulation import regulator
     from .sampled import SampledWinch, command_law
     from .weights import Weights, tune_weights

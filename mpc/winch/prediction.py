@@ -18,26 +18,30 @@ The state chi holds, in this order,
 
 `mpc.winch.estimator` makes a Kalman filter of it, `mpc.linear.winch_programme` the quadratic
 programme.
+
+A filter that trusts a model of a lightly damped rope to the last digit is right on that rope and
+unstable on one that is a little softer.  Noise on rope, load and drive, and sensors that are
+trusted less than they might be, buy robustness with a little of the performance;
+`mpc.winch.weights` finds how much of each, `with_noise` puts it into a model.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
 import scipy.linalg
 
-from models.basics import FloatArray, ReadOnlyArrays, SolverError, read_only
+from models.basics import FloatArray, ReadOnlyArrays, SolverError, check_range, read_only
 from models.case import Case
 from models.hook import HookMotion
 from models.plant import MEASUREMENTS, ShapingFilter, fit_shaping_filter
 from models.sensing import MEASURED, MruModel, SensorModel
 
 from ..programme import noisy_hold, root_of
-from .process_noise import ProcessNoise
 from .sampled import SampledWinch, sampled_winch
 
 _OWNER = "prediction model"
@@ -57,6 +61,46 @@ _SPARE = 2  # samples by which the telemetry may be later than the case says
 # drift a little, or the filter would stop listening to it.
 _DRIFT, _DRIFT_TIME = (0.02, 0.02, 2e-4, 0.005), 1000.0
 _SPEED_WINDOW = 0.01  # in which a drive counts an encoder's pulses [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProcessNoise:
+    """Standard deviations of what the model leaves out.
+
+    Parameters
+    ----------
+    force
+        White force on the payload that adds up to this in a second, over the static tension.
+    torque
+        The same at the motor, over the peak torque.
+    rope
+        Change of speed of each mass along the rope in a second, over the rms speed of the hook.
+    sensors
+        Error at every sample of a sensor, besides what the case says of it, over the rms of the
+        hook's motion (for a tension: over the static one).
+    unit
+        Slow error of the reference unit, of which the case says nothing, over the rms of the hook's
+        motion.  A filter that holds it to be impossible takes it for a sea of thirty standard
+        deviations.
+
+    Raises
+    ------
+    InputError
+        If one is negative, or `sensors` is not above zero.
+    """
+
+    force: float = 1e-4
+    torque: float = 1e-3
+    rope: float = 1e-4
+    sensors: float = 1e-4
+    unit: float = 0.05
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            above = field.name == "sensors"
+            check_range(
+                "process noise", field.name, getattr(self, field.name), low=0.0, open_low=above
+            )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

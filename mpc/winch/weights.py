@@ -28,8 +28,7 @@ from models.basics import FloatArray, SolverError, check_range
 from models.case import Case
 
 from .planning import plan_model
-from .prediction import PredictionModel, prediction_model, with_noise
-from .process_noise import ProcessNoise
+from .prediction import PredictionModel, ProcessNoise, prediction_model, with_noise
 from .regulation import regulator
 from .unsaturated import Unsaturated
 

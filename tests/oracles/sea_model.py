@@ -19,7 +19,7 @@ from models.basics import FloatArray, read_only
 from models.hook import HookMotion
 from models.plant import ShapingFilter
 from models.sensing import MruModel
-from models.sensing.lowpass import noise_root
+from models.sensing.mru import noise_root
 
 _PANEL = 0.25  # [rad/s], of the quadrature over the true spectrum
 _BUTTERWORTH = math.sqrt(2.0)

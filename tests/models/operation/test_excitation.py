@@ -17,9 +17,14 @@ from scipy.spatial.transform import Rotation
 from models import InputError, PhysicsWarning, load_case
 from models.operation import RecordMotion, SineMotion, SixDofMotion, SpectrumMotion
 from models.operation.contact_scenarios import boat_motion, surface_motion
-from models.operation.excitation import SECOND_BODY, SURFACE, StillMotion
+from models.operation.excitation import (
+    SECOND_BODY,
+    SURFACE,
+    LongRecord,
+    StillMotion,
+    seed_for,
+)
 from models.operation.hermite import interpolated
-from models.operation.long_record import LongRecord, seed_for
 from models.operation.six_dof import tip_heave
 
 NAMES = ("displacement", "velocity", "acceleration")
