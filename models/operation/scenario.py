@@ -29,10 +29,6 @@ if TYPE_CHECKING:
     from .excitation import MotionSource
 
 
-def _nothing() -> Mapping[str, object]:
-    return MappingProxyType({})
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scenario:
     """An operation.
@@ -97,13 +93,11 @@ class Scenario:
     mru_outages: tuple[Period, ...] = ()
     telemetry_delays: tuple[Late, ...] = ()
     mru_biases: tuple[Bias, ...] = ()
-    parameter_changes: Mapping[float, Mapping[str, float | None]] = field(
-        default_factory=lambda: MappingProxyType({})
-    )
+    parameter_changes: Mapping[float, Mapping[str, float | None]] = field(default_factory=dict)
     surroundings: Surroundings | None = None
-    motions: Mapping[str, MotionSource] = field(default_factory=lambda: MappingProxyType({}))
+    motions: Mapping[str, MotionSource] = field(default_factory=dict)
     initial_haul: float = 0.0
-    case_changes: Mapping[str, object] = field(default_factory=_nothing)
+    case_changes: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         owner = f"scenario {self.name}"

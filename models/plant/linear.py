@@ -117,7 +117,6 @@ class LinearPlant(StateSpace):
                     f"ask for, got {matrix.shape}"
                 )
             object.__setattr__(self, name, read_only(matrix))
-        taken: dict[str, str] = {}
         for kind, names, letter, count in (
             ("states", states, "x", n),
             ("inputs", inputs, "u", nu),
@@ -126,14 +125,11 @@ class LinearPlant(StateSpace):
             ("outputs", outputs, "z", nz),
         ):
             object.__setattr__(self, kind, signal_names(_OWNER, kind, names, letter, count))
-        for kind in ("inputs", "disturbances"):
-            for name in getattr(self, kind):
-                if name in taken:
-                    raise InputError(
-                        f"{_OWNER}: names of inputs and disturbances must differ, got "
-                        f"{name!r} in both"
-                    )
-                taken[name] = kind
+        for name in self.disturbances:
+            if name in self.inputs:
+                raise InputError(
+                    f"{_OWNER}: names of inputs and disturbances must differ, got {name!r} in both"
+                )
         object.__setattr__(self, "delays", signal_delays(_OWNER, self.measurements, delays))
         object.__setattr__(self, "rates", signal_rates(_OWNER, self.disturbances, rates or {}))
         known = {*self.states, *self.inputs, *self.disturbances}

@@ -122,11 +122,6 @@ class TelemetrySchedule:
         high = _snapped(high + latest / self.sample_time)
         return range(math.floor(low), math.ceil(high) + 1)
 
-    @property
-    def taps(self) -> int:
-        """Number of messages to remember, the one sent at this very sample included."""
-        return self.lags.stop
-
     def block(self, start: int, count: int) -> TelemetryBlock:
         """Return what arrives at the samples from `start` on.
 
@@ -135,9 +130,9 @@ class TelemetrySchedule:
         start, count
             First sample, not negative, and number of samples.
         """
-        if self._steady and start >= self.taps:
+        if self._steady and start >= self.lags.stop:
             return self._steady_block(count)
-        arrival, content, usable = self._messages(start - self.taps, start + count)
+        arrival, content, usable = self._messages(start - self.lags.stop, start + count)
         inside = usable & (arrival >= start) & (arrival < start + count)
         best = np.full(count + 1, -math.inf)
         best[0] = self._known_before(start)
@@ -217,10 +212,10 @@ class TelemetrySchedule:
 
     def _usable(self, first: int, stop: int) -> BoolArray:
         sent = np.arange(first, stop)
-        bad = self._lost(first, stop) if self.telemetry.dropout > 0.0 else sent < -self.taps
+        bad = self._lost(first, stop) if self.telemetry.dropout > 0.0 else sent < -self.lags.stop
         for intervals in (self.outages, self.broken):
             bad = bad | during(intervals, sent, self.sample_time)
-        return np.asarray(~bad & (sent >= -self.taps))
+        return np.asarray(~bad & (sent >= -self.lags.stop))
 
     def _lost(self, first: int, stop: int) -> BoolArray:
         """Return which messages are lost.
@@ -232,14 +227,14 @@ class TelemetrySchedule:
         after_one, after_lost = self._chain
         back = 256
         while True:
-            low = max(first - back, -self.taps)
+            low = max(first - back, -self.lags.stop)
             number = self._uniform(low, stop)[:, 0]
             lost = number < after_one
             decided = lost | (number >= after_lost)
-            if low == -self.taps:
+            if low == -self.lags.stop:
                 lost[0], decided[0] = number[0] < self.telemetry.dropout, True
             at = np.maximum.accumulate(np.where(decided, np.arange(len(number)), -1))
-            if low == -self.taps or at[first - low] >= 0:
+            if low == -self.lags.stop or at[first - low] >= 0:
                 break
             back *= 4
         # Messages before the very first do not exist; `_usable` drops them.
@@ -248,22 +243,22 @@ class TelemetrySchedule:
 
     def _uniform(self, first: int, stop: int) -> FloatArray:
         """Return the numbers of the messages `first` to `stop`; zero before the very first."""
-        skipped = max(-self.taps - first, 0)
-        begin = first + skipped + self.taps
+        skipped = max(-self.lags.stop - first, 0)
+        begin = first + skipped + self.lags.stop
         numbers = draw(self.seed, TELEMETRY, begin, stop - first - skipped, 2, "uniform")
         return np.concatenate((np.zeros((skipped, 2)), numbers)) if skipped else numbers
 
     def _known_before(self, start: int) -> float:
         """Return the moment [sample] of what is known just before a sample."""
-        stop, width = start, 2 * self.taps + 64
-        while stop > -self.taps:
-            first = max(stop - width, -self.taps)
+        stop, width = start, 2 * self.lags.stop + 64
+        while stop > -self.lags.stop:
+            first = max(stop - width, -self.lags.stop)
             arrival, content, usable = self._messages(first, stop)
             found = content[usable & (arrival < start)]
             if found.size:  # whatever was sent earlier is older
                 return float(found.max())
             stop, width = first, min(4 * width, 65536)
-        return float(-self.taps)
+        return float(-self.lags.stop)
 
 
 def check_intervals(owner: str, name: str, intervals: Sequence[Interval]) -> tuple[Interval, ...]:

@@ -99,7 +99,6 @@ def run_simulation(
     status, message = "completed", ""
     state, mru, trip_time = simulation.start(rows), rows.start(), math.nan
     breaks = simulation.schedule.breaks
-    progress = progress or _silent
     try:
         while store.seen < samples:
             first = store.seen
@@ -124,13 +123,14 @@ def run_simulation(
                     trip_time = trip.time
                     events.append(trip.event)
                     rows.trip(chunk, store.seen, trip_time)
-            progress(store.seen / samples)
+            if progress is not None:
+                progress(store.seen / samples)
     except KeyboardInterrupt:
         status, message = "interrupted", f"interrupted at {store.seen * dt:.6g} s"
     except _DivergedError as error:
         status, message = "diverged", str(error)
         events.append(Event(time=store.seen * dt, kind="diverged", text=message))
-    events += stepper.events
+    events = [event for event in events + stepper.events if event.time <= store.seen * dt]
     time, values = store.arrays(len(loop.signals))
     wall = clock.perf_counter() - began
     return Run(
@@ -147,7 +147,7 @@ def run_simulation(
         time=time,
         values=values,
         statistics=accumulator.result(),
-        events=tuple(sorted(_until(events, store.seen * dt), key=lambda event: event.time)),
+        events=tuple(sorted(events, key=lambda event: event.time)),
         status=status,
         message=message,
         timings=Timings.of(
@@ -338,11 +338,3 @@ def _finite(log: FloatArray) -> int:
         return len(log)
     bad = ~np.isfinite(log.sum(axis=1))
     return int(np.argmax(bad)) if bad.any() else len(log)
-
-
-def _until(events: list[Event], end: float) -> list[Event]:
-    return [event for event in events if event.time <= end]
-
-
-def _silent(share: float) -> None:
-    """Tell nobody how far the run is."""

@@ -279,11 +279,7 @@ def prepare(
     limits = DriveLimits.from_case(case) if options.limits is None else options.limits
     masses = options.masses
     surroundings = scenario.surroundings
-    farthest = (
-        max(abs(move.distance) for move in scenario.profile.moves)
-        if scenario.profile.moves
-        else 0.0
-    )
+    farthest = max((abs(move.distance) for move in scenario.profile.moves), default=0.0)
     travels = max(farthest, abs(scenario.initial_haul)) > _TRAVELS
     travel = DrumTravel.from_case(case) if travels else None
     plant = build_plant(case, masses, limits=limits, travel=travel, surroundings=surroundings)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from models.basics import FloatArray, read_only
+from models.basics import FloatArray, ReadOnlyArrays
 
 from .certificate import Certificate, certify, rollout
 from .plant import Hold
@@ -33,7 +33,7 @@ _AT_LIMIT = 1e-3  # closer to a limit than this share of it counts as at the lim
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Clairvoyant:
+class Clairvoyant(ReadOnlyArrays):
     """The floor of a record, with the motion that reaches it.
 
     Attributes
@@ -96,8 +96,7 @@ class Clairvoyant:
 
     def __post_init__(self) -> None:
         """Make arrays and mapping read-only."""
-        for name in ("time", "hook", "payload", "haul", "torque", "speed", "command"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        super().__post_init__()
         object.__setattr__(self, "shares", MappingProxyType(dict(self.shares)))
 
     @property

@@ -145,7 +145,7 @@ def refine(floor: Clairvoyant, *, max_iterations: int = 300, tolerance: float = 
     problem, linear = floor.problem, floor.problem.plant
     N, n = problem.samples, len(linear.states)
     plant = _plant(floor)
-    advance, limits, lower = _functions(floor, plant)
+    advance, limits = _functions(floor, plant)
     y = rollout(problem, floor.solution.start, floor.solution.inputs)
     # Deviations from the motion that holds the payload still, in the linear plant's units: next to
     # zero where no limit binds.
@@ -164,7 +164,7 @@ def refine(floor: Clairvoyant, *, max_iterations: int = 300, tolerance: float = 
     variables, constraints = ca.veccat(X, U), ca.vertcat(gaps, *rows)
     size = rows[0].numel()
     high = np.concatenate([np.zeros(gaps.numel()), np.ones(2 * size)])
-    low = np.concatenate([np.zeros(gaps.numel()), np.tile(lower, 2 * N)])
+    low = np.concatenate([np.zeros(gaps.numel()), -np.ones(2 * size)])
     bound = np.full(variables.numel(), math.inf)
     floor_bound = -bound
     if problem.start is not None:
@@ -226,8 +226,8 @@ def _plant(floor: Clairvoyant) -> Plant:
     return build_plant(bare, masses)
 
 
-def _functions(floor: Clairvoyant, plant: Plant) -> tuple[ca.Function, ca.Function, FloatArray]:
-    """Return one sample, (x, command, hook ends) -> x; limits at a state; their lower ends."""
+def _functions(floor: Clairvoyant, plant: Plant) -> tuple[ca.Function, ca.Function]:
+    """Return one sample, (x, command, hook ends) -> x, and limits at a state, of size one."""
     linear = floor.problem.plant
     changes = {}
     if plant.data.gear_efficiency < 1.0:
@@ -272,6 +272,5 @@ def _functions(floor: Clairvoyant, plant: Plant) -> tuple[ca.Function, ca.Functi
     rows = [a * demand + b * speed for a, b in linear.windows]
     if math.isfinite(floor.limits.power):
         rows.append(linear.peak * demand * speed / floor.limits.power)
-    lower = -np.ones(len(rows))
     limits = ca.Function("limits", [x, u, ends], [ca.vertcat(*rows)])
-    return advance, limits, lower
+    return advance, limits

@@ -61,7 +61,7 @@ class Products:
         programme: Condensed,
         limits: Mapping[str, tuple[float, float]],
         covariance: FloatArray | None,
-        believed: PredictionModel | None = None,
+        believed: PredictionModel,
     ) -> Products:
         """Return the products of a programme.
 
@@ -75,9 +75,8 @@ class Products:
             None where the hook's path is that of the model's own sea; where it comes with each
             step, the covariance of the sea's estimate, (nh, nh).
         believed
-            The estimator's model, whose A it is; by default that of the programme.
+            The estimator's model, whose A it is.
         """
-        over = (model if believed is None else believed).A
         p, winch, nb = programme, model.winch, len(programme.blocks)
         # A violation of one per cent is to cost the same whatever is limited: rows in units of
         # their larger bound.
@@ -118,7 +117,7 @@ class Products:
         return cls(
             size=model.size,
             moves=nb,
-            matrix=np.ascontiguousarray(np.vstack([over, gradient, free * scale[:, None]])),
+            matrix=np.ascontiguousarray(np.vstack([believed.A, gradient, free * scale[:, None]])),
             rows=np.ascontiguousarray(p.rows * scale[:, None]),
             scale=read_only(scale),
             low=read_only(np.maximum(bounds[:, 0] * scale, -_WIDE)),

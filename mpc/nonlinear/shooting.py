@@ -116,9 +116,8 @@ class Shooting:
         products: Products,
         stage: Stage,
         covariance: FloatArray | None,
-        believed: PredictionModel | None = None,
+        believed: PredictionModel,
     ) -> None:
-        over = (model if believed is None else believed).A
         p, winch = programme, model.winch
         self.stage, self.programme = stage, p
         N, nb, n, nr = p.steps, len(p.blocks), winch.size, len(p.at)
@@ -151,7 +150,7 @@ class Shooting:
         lengths = np.array(p.blocks, dtype=np.float64)
         weight[:, of] = -weights.weight * p.unit * np.outer(lengths, winch.steady)
         rows = products.matrix[products.size + products.moves :]
-        self._matrix = np.ascontiguousarray(np.vstack([over, chi, rows, beyond, weight]))
+        self._matrix = np.ascontiguousarray(np.vstack([believed.A, chi, rows, beyond, weight]))
         self._parts = np.cumsum([size, len(y), len(o) + nr, n])
         along = [both[:, path], products.path_free, weights.N[:, :nh] @ end_of_path]
         self._along = np.ascontiguousarray(np.vstack(along))

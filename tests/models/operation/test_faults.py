@@ -48,7 +48,7 @@ def test_messages_sent_in_the_period_are_late_by_so_much_more(delay, extra, star
     schedule = TelemetrySchedule(Telemetry(delay=delay), step, seed=1, late=late)
     # By the definition: of the messages that have arrived, the newest counts.
     wanted = np.full(n, -np.inf)
-    for j in range(-schedule.taps, n):
+    for j in range(-schedule.lags.stop, n):
         transit = delay / step + (extra / step if start <= j < start + length else 0.0)
         nearest = round(transit)
         transit = float(nearest) if abs(transit - nearest) < 1e-6 else transit
@@ -57,7 +57,7 @@ def test_messages_sent_in_the_period_are_late_by_so_much_more(delay, extra, star
             first = max(arrival, 0)
             wanted[first:] = np.maximum(wanted[first:], arrival - transit)
     found = known(schedule, n, chunk)
-    assert np.abs(found - wanted)[schedule.taps + 1 :].max() < 1e-6
+    assert np.abs(found - wanted)[schedule.lags.stop + 1 :].max() < 1e-6
 
 
 def test_the_sensors_remember_as_many_messages_as_the_latest_needs():

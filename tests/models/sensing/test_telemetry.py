@@ -44,7 +44,7 @@ schedules = st.builds(
 
 def lost_messages(schedule, count):
     """Which of the first messages are lost, by walking along the chain one by one."""
-    link, before = schedule.telemetry, schedule.taps
+    link, before = schedule.telemetry, schedule.lags.stop
     numbers = draw(schedule.seed, TELEMETRY, 0, count + before, 2, "uniform")[:, 0]
     length = max(link.dropout_length / TS, 1.0 / (1.0 - link.dropout))
     stays = 1.0 - 1.0 / length if link.dropout else 0.0
@@ -57,7 +57,7 @@ def lost_messages(schedule, count):
 
 def by_events(schedule, count):
     """Fresh and content [sample], message by message as they come in."""
-    link, before = schedule.telemetry, schedule.taps
+    link, before = schedule.telemetry, schedule.lags.stop
     numbers = draw(schedule.seed, TELEMETRY, 0, count + before, 2, "uniform")
     lost = lost_messages(schedule, count)
 
@@ -87,7 +87,7 @@ class TestSchedule:
     def test_without_delay_everything_is_known_at_once(self):
         schedule = TelemetrySchedule(Telemetry(), TS, 0)
         block = schedule.block(0, 100)
-        assert schedule.taps == 1
+        assert schedule.lags.stop == 1
         assert np.array_equal(block.weights, np.ones((100, 1)))
         assert np.array_equal(block.fresh, np.ones(100))
         assert np.array_equal(block.age, np.zeros(100))
@@ -105,7 +105,7 @@ class TestSchedule:
         schedule = TelemetrySchedule(Telemetry(delay=delay), TS, 0)
         block = schedule.block(5, 50)
         assert list(schedule.lags) == lags
-        assert schedule.taps == lags[-1] + 1
+        assert schedule.lags.stop == lags[-1] + 1
         np.testing.assert_allclose(block.weights, np.tile(weights, (50, 1)), atol=1e-12)
         np.testing.assert_allclose(block.age, delay, rtol=1e-12)
         assert block.fresh.all()
