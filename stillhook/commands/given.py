@@ -56,18 +56,45 @@ def parse_changes(texts: Sequence[str]) -> dict[str, Any]:
     >>> parse_changes(["rope.length=800 m", "limits.roll_off=null", "vessel.below=zero"])
     {'rope.length': '800 m', 'limits.roll_off': None, 'vessel.below': 'zero'}
     """
+    return read_pairs("--set", "PATH=VALUE, as in rope.length=800", texts)
+
+
+def split_pairs(
+    option: str, form: str, texts: Sequence[str], *, empty: bool = False
+) -> dict[str, str]:
+    """Return texts by name from texts NAME=TEXT.
+
+    Parameters
+    ----------
+    option, form
+        The option and how it is written, for messages.
+    texts
+        What was given.
+    empty
+        Whether nothing may stand after the sign.
+
+    Raises
+    ------
+    InputError
+        If a text is not of that form, or a name comes twice.
+    """
+    found: dict[str, str] = {}
+    for text in texts:
+        name, sign, value = (part.strip() for part in text.partition("="))
+        if not (sign and name and (value or empty)):
+            raise InputError(f"{option}: must be {form}, got {text!r}")
+        if name in found:
+            raise InputError(f"{option}: {name} is given twice")
+        found[name] = value
+    return found
+
+
+def read_pairs(option: str, form: str, texts: Sequence[str]) -> dict[str, Any]:
+    """Return values by name as `split_pairs` does, each read as in a case file."""
     from models.casefile import read_yaml
 
-    changes: dict[str, Any] = {}
-    for text in texts:
-        path, sign, value = text.partition("=")
-        path = path.strip()
-        if not sign or not path:
-            raise InputError(f"--set: must be PATH=VALUE, as in rope.length=800, got {text!r}")
-        if path in changes:
-            raise InputError(f"--set: {path} is given twice")
-        changes[path], _ = read_yaml(value, f"--set {path}")
-    return changes
+    pairs = split_pairs(option, form, texts, empty=True)
+    return {name: read_yaml(text, f"{option} {name}")[0] for name, text in pairs.items()}
 
 
 def parse_gains(text: str) -> dict[str, float]:
@@ -118,18 +145,9 @@ def parse_options(texts: Sequence[str]) -> dict[str, Any]:
     >>> parse_options(["height=6 m", "count=3", "lost=mru"])
     {'height': '6 m', 'count': 3, 'lost': 'mru'}
     """
-    from models.casefile import read_yaml
-
-    options: dict[str, Any] = {}
-    for text in texts:
-        key, sign, value = text.partition("=")
-        key = key.strip().replace("-", "_")
-        if not sign or not key:
-            raise InputError(f"--option: must be KEY=VALUE, as in 'height=6 m', got {text!r}")
-        if key in options:
-            raise InputError(f"--option: {key} is given twice")
-        options[key], _ = read_yaml(value, f"--option {key}")
-    return options
+    parts = [text.partition("=") for text in texts]
+    plain = [f"{key.replace('-', '_') if sign else key}{sign}{value}" for key, sign, value in parts]
+    return read_pairs("--option", "KEY=VALUE, as in 'height=6 m'", plain)
 
 
 def gains_text(gains: Mapping[str, float]) -> str:

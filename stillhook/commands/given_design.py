@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from models import Case
     from synth.design import GainDesign, StructureDesign
+
+
+def design_words(arguments: argparse.Namespace) -> list[str]:
+    """Return the words of a command that name the same design again."""
+    if arguments.design is not None:
+        return [f"--design {shlex.quote(arguments.design)}"]
+    if arguments.gains is not None:
+        return [f"--gains {shlex.quote(arguments.gains)}"]
+    return []
 
 
 def given_design(case: Case, arguments: argparse.Namespace) -> GainDesign | StructureDesign:

@@ -16,6 +16,8 @@ from models.casefile import read_yaml
 from models.sea import read_scatter
 from synth.robust import DiscreteValues, SeaState, sea_states
 
+from .given import split_pairs
+
 
 def parse_vary(texts: Sequence[str]) -> dict[str, list[Any] | DiscreteValues]:
     """Return values by path from texts PATH=LOW..HIGH, PATH=A,B,.. or PATH=A|B|..
@@ -31,15 +33,8 @@ def parse_vary(texts: Sequence[str]) -> dict[str, list[Any] | DiscreteValues]:
     {'depth': [500, 1500], 'payload': ['40 t', '60 t']}
     """
     found: dict[str, list[Any] | DiscreteValues] = {}
-    for text in texts:
-        path, sign, value = (part.strip() for part in text.partition("="))
-        if not sign or not path or not value:
-            raise InputError(
-                f"--vary: must be PATH=LOW..HIGH or PATH=A,B,C, as in rope.length=500..1500, "
-                f"got {text!r}"
-            )
-        if path in found:
-            raise InputError(f"--vary: {path} is given twice")
+    form = "PATH=LOW..HIGH or PATH=A,B,C, as in rope.length=500..1500"
+    for path, value in split_pairs("--vary", form, texts).items():
         if "|" in value:
             found[path] = DiscreteValues(*(_read(part, path) for part in value.split("|")))
         elif ".." in value:

@@ -22,6 +22,7 @@ from ..text import (
     Report,
     commands,
     console,
+    folder_name,
     json_data,
     json_text,
     number,
@@ -152,9 +153,24 @@ def kept_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
 
 
-def prepared(arguments: argparse.Namespace, default: str | Path) -> OutputFolder:
+def place_for(arguments: argparse.Namespace, name: str, ending: str = "") -> Path:
+    """Return where results go: the place that is given, or one in ``out`` by a name."""
+    return Path(arguments.out or Path("out") / f"{folder_name(name)}{ending}")
+
+
+def prepared(arguments: argparse.Namespace, name: str, ending: str = "") -> OutputFolder:
     """Return the folder for the results, with the figures that the arguments ask for."""
-    return OutputFolder.prepare(arguments.out or default, figure_kinds(arguments))
+    return OutputFolder.prepare(place_for(arguments, name, ending), figure_kinds(arguments))
+
+
+def prepared_table(
+    arguments: argparse.Namespace, name: str, table: str
+) -> tuple[OutputFolder, Path]:
+    """Return the folder for a vessel, and its table there: the file that is given, or `table`."""
+    target = place_for(arguments, name)
+    alone = target.suffix.lower() in {".csv", ".nc"}
+    folder = OutputFolder.prepare(target.parent if alone else target, figure_kinds(arguments))
+    return folder, target if alone else folder.path / table
 
 
 def figure_kinds(arguments: argparse.Namespace) -> tuple[str, ...]:

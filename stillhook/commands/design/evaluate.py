@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
             f"{case.source}: gains: the case has none in use; give them, as in "
             "--gains A=1,a=0,a1=0,a2=0.5"
         )
-    folder = None if arguments.out is None else prepared(arguments, arguments.out)
+    folder = None if arguments.out is None else prepared(arguments, case.name)
     from synth import evaluate_gains
 
     from ...designs import design_data, design_report, write_report

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 
-from models.basics import InputError, check_range
+from models.basics import check_range
 
 from ...text import Report, ReportSection
 from ..declare import CASE, DESIGN, repeated, whole
-from ..given import case_words, given_case
+from ..given import case_words, given_case, split_pairs
 from ..given_design import given_design
 from ..working import conclude, working
 
@@ -64,12 +64,8 @@ def parse_off(texts: list[str]) -> dict[str, float | str]:
     {'payload.mass': 0.3, 'delay': '20 ms'}
     """
     found: dict[str, float | str] = {}
-    for text in texts:
-        path, sign, width = (part.strip() for part in text.partition("="))
-        if not (path and sign and width):
-            raise InputError(f"--off: must be PATH=SHARE, as in payload.mass=0.3, got {text!r}")
-        if path in found:
-            raise InputError(f"--off: {path} is given twice")
+    form = "PATH=SHARE, as in payload.mass=0.3"
+    for path, width in split_pairs("--off", form, texts).items():
         try:
             found[path] = float(width)
         except ValueError:

@@ -6,11 +6,10 @@ import argparse
 import math
 import shlex
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...designs import AT_LEAST, LIMITS
-from ...text import OutputFolder, folder_name, number, progress
+from ...text import OutputFolder, number, progress
 from ..declare import CASE, NO_BOUND, results_folder, text, whole
 from ..given import case_words, gains_text, given_case
 from ..working import conclude, interruptible, kept_in, prepared
@@ -43,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.structure is not None:
         return optimise_one(arguments)
     case = given_case(arguments)
-    folder = prepared(arguments, Path("out") / folder_name(case.name))
+    folder = prepared(arguments, case.name)
     folder.write("case.yaml", case.to_yaml())
     from synth import optimise_gains
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from ...text import folder_name
 from ..declare import CASE, choice, results_folder, text, whole
 from ..given import case_words, gains_text, given_case
 from ..vary import parse_range
@@ -34,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     case = given_case(arguments)
     between = parse_range("--between", arguments.between) if arguments.between else None
-    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}-pareto")
+    folder = prepared(arguments, case.name, "-pareto")
     folder.write("case.yaml", case.to_yaml())
     with working(arguments) as step:
         front = pareto_front(

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 import shlex
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from models.basics import InputError
 
-from ...text import OutputFolder, csv_text, folder_name
+from ...text import OutputFolder, csv_text
 from ..declare import CASE, STRUCTURE, choice, repeated, results_folder, text, whole
 from ..given import case_words, gains_text, given_case
 from ..vary import parse_range, parse_seas, parse_vary
@@ -59,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
             "robust: nothing varies; give --vary (as in --vary rope.length=500..1500), --seas, "
             "--scatter or --schedule"
         )
-    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}-robust")
+    folder = prepared(arguments, case.name, "-robust")
     folder.write("case.yaml", case.to_yaml())
     if arguments.schedule is not None:
         return _scheduled(case, arguments, folder)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from models.basics import InputError, check_range
 
-from ...text import OutputFolder, folder_name
+from ...text import OutputFolder
 from ..declare import CASE, STRUCTURE, results_folder, switch, text, whole
 from ..given import case_words, given_case
 from ..vary import parse_range
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     radius = parse_range("--radius", arguments.radius) if arguments.radius else None
     case = given_case(arguments)
     structure_named(arguments.structure, case)
-    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}-size")
+    folder = prepared(arguments, case.name, "-size")
     if arguments.co_design:
         return _co_designed(case, arguments, gear, radius, folder)
     from synth.sizing import size_winch

@@ -20,7 +20,6 @@ from ...text import (
     Progress,
     ReportSection,
     console,
-    folder_name,
     markdown,
     number,
     pairs,
@@ -60,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     case = given_case(arguments)
     for name in names:
         structure_named(name, case)  # an unknown name ends here, not after minutes
-    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}")
+    folder = prepared(arguments, case.name)
     folder.write("case.yaml", case.to_yaml())
     designs: list[StructureDesign] = []
     with working(arguments) as tell:
@@ -94,7 +93,7 @@ def optimise_one(arguments: argparse.Namespace) -> int:
 
     case = given_case(arguments)
     structure_named(arguments.structure, case)
-    folder = prepared(arguments, Path("out") / folder_name(case.name))
+    folder = prepared(arguments, case.name)
     folder.write("case.yaml", case.to_yaml())
     with working(arguments) as tell:
         design = _design(case, arguments.structure, arguments, tell, arguments.structure)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 import math
 import shlex
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from models.basics import check_range
 
-from ...text import OutputFolder, folder_name
+from ...text import OutputFolder
 from ..declare import CASE, STRUCTURE, results_folder, whole
 from ..given import case_words, given_case
 from ..working import conclude, prepared, working
@@ -36,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_range("worth", "--seed", arguments.seed, low=0)
     case = given_case(arguments)
     structure_named(arguments.structure, case)
-    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}-worth")
+    folder = prepared(arguments, case.name, "-worth")
     folder.write("case.yaml", case.to_yaml())
     with working(arguments) as step:
         result = worth(

@@ -10,7 +10,6 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from models.basics import StillhookError, SynthesisError
@@ -23,7 +22,6 @@ from ...text import (
     commands,
     console,
     count,
-    folder_name,
     json_text,
     number,
     progress,
@@ -42,7 +40,7 @@ from ..declare import (
     whole,
 )
 from ..given import case_words
-from ..working import Stop, figure_kinds, kept_in, stoppable, tidy
+from ..working import Stop, figure_kinds, kept_in, place_for, stoppable, tidy
 from .simulate_given import SimulationRequest, again, asked_of
 
 if TYPE_CHECKING:
@@ -149,8 +147,7 @@ ARGUMENTS = (
 def run(arguments: argparse.Namespace) -> int:
     """Simulate, show and save; return the exit status."""
     asked = asked_of(arguments)
-    name = f"{folder_name(asked.case.name)}-{asked.scenario.name}"
-    place = Path(arguments.out or Path("out") / name)
+    place = place_for(arguments, asked.case.name, f"-{asked.scenario.name}")
     several = len(asked.controllers) > 1
     with tidy(place), stoppable() as stop:
         folder = OutputFolder.prepare(place, figure_kinds(arguments))

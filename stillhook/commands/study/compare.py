@@ -14,10 +14,10 @@ from pathlib import Path
 from models.basics import InputError, check_range
 
 from ...comparison import Comparison, comparison_report, write_comparison
-from ...text import OutputFolder, console, count, folder_name, pairs, show
+from ...text import OutputFolder, console, count, pairs, show
 from ..declare import CASE, choice, switch, text, whole
 from ..given import case_words, given_case
-from ..working import conclude, counting, figure_kinds, tidy
+from ..working import conclude, counting, figure_kinds, place_for, tidy
 
 _MANY = 10_000  # seeds: more than anybody wants on purpose
 
@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
     wanted = _controllers(arguments.controllers)
     heights = _heights(arguments.hs)
     case = given_case(arguments)
-    place = Path(arguments.out or Path("out") / f"{folder_name(case.name)}-compare")
+    place = place_for(arguments, case.name, "-compare")
     with tidy(place), counting(arguments) as step:
         found = compare(
             case,

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import argparse
 import shlex
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.basics import InputError, parse_quantity
 
-from ...text import OutputFolder, Progress, folder_name
+from ...text import OutputFolder, Progress
 from ..declare import CASE, DESIGN, group, results_folder, switch, text
 from ..given import case_words, gains_text, given_case
 from ..given_design import given_design
@@ -83,8 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("operability: --held goes without --design, --gains and --reoptimise")
     highest = _length("--highest", arguments.highest)
     case = given_case(arguments)
-    name = f"{folder_name(case.name)}-operability"
-    folder = prepared(arguments, Path("out") / name)
+    folder = prepared(arguments, case.name, "-operability")
     from synth.operability import operability
 
     from ...seas import operability_report, write_operability

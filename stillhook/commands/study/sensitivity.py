@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import shlex
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from models.basics import InputError, check_range, read_quantity
 
-from ...text import csv_text, folder_name
+from ...text import csv_text
 from ..declare import CASE, DESIGN, group, repeated, results_folder, switch, text, whole
 from ..given import case_words, given_case
-from ..given_design import given_design
+from ..given_design import design_words, given_design
 from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
@@ -61,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     share = _share(arguments.plus)
     case = given_case(arguments)
     design = given_design(case, arguments)
-    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}-sensitivity")
+    folder = prepared(arguments, case.name, "-sensitivity")
     from synth.sensitivity import sensitivity
 
     with working(arguments) as step:
@@ -78,11 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
     if wide is not None:
         written.append(folder.write("indices.csv", csv_text(indices_table(wide))))
     written += folder.draw(report.drawings)
-    words = case_words(arguments, None)
-    if arguments.design:
-        words += f" --design {shlex.quote(arguments.design)}"
-    elif arguments.gains:
-        words += f" --gains {shlex.quote(arguments.gains)}"
+    words = " ".join([case_words(arguments), *design_words(arguments)])
     ranges = [] if wide else [("over whole ranges", f"stillhook sensitivity {words} --ranges")]
     following = [
         *ranges,

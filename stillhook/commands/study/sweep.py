@@ -7,22 +7,35 @@ Ctrl-C; what was run in time until then is kept, and the same command, or --resu
 from __future__ import annotations
 
 import argparse
+import json
 import shlex
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from models.basics import InputError, check_range
+from models.spread import Spread
 
-from ...text import OutputFolder, count, folder_name
+from ...sweeps import (
+    ATTRIBUTE,
+    STATUS,
+    place_of,
+    sweep_figures,
+    sweep_report,
+    varied_paths,
+    worst_cases,
+    write_sweep,
+)
+from ...text import OutputFolder, console, count, picture, show
 from ..declare import case_argument, choice, group, one_of, repeated, switch, text, whole
-from ..given import case_words, given_case, parse_options
-from ..given_design import given_design
-from ..working import counting, tidy
-from .sweep_output import Swept, conclude_sweep
+from ..given import case_words, given_case, parse_options, split_pairs
+from ..given_design import design_words, given_design
+from ..working import conclude, counting, place_for, tidy
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from models import Case
-    from models.spread import Spread
 
 _MOST = 100  # of the worst cases that are told
 
@@ -109,6 +122,18 @@ ARGUMENTS = (
 )
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Swept:
+    """A sweep that was made: its case, what varied, and what came of it."""
+
+    case: Case
+    design: object
+    spread: Spread
+    result: xr.Dataset
+    folder: Path
+    words: str
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Sweep, show and save; return the exit status."""
     check_range("sweep", "--worst", arguments.worst, low=0, high=_MOST)
@@ -117,7 +142,7 @@ def run(arguments: argparse.Namespace) -> int:
     complete = int(result.attrs.get("complete", 1)) == 1
     if not complete and not (result["status"] >= 0).any():
         raise KeyboardInterrupt("no case was finished")
-    status = conclude_sweep(swept, arguments)
+    status = _concluded(swept, arguments)
     if not complete:
         there = count(int((result["status"] >= 0).sum()), "case")
         raise KeyboardInterrupt(
@@ -137,7 +162,7 @@ def _swept(arguments: argparse.Namespace) -> Swept:
     case = given_case(arguments)
     design = given_pilot(case, arguments)
     spread = given_spread(case, arguments)
-    place = Path(arguments.out or Path("out") / f"{folder_name(case.name)}-sweep")
+    place = place_for(arguments, case.name, "-sweep")
     with tidy(place):
         folder = OutputFolder.prepare(place).path
         options: dict[str, Any] = {}
@@ -231,8 +256,6 @@ def given_spread(case: Case, arguments: argparse.Namespace) -> Spread | None:
     InputError
         If a file is none, or a text is not of the form PATH=RANGE.
     """
-    from models.spread import Spread
-
     from ...sweeps import fault_spread
 
     del case
@@ -273,17 +296,12 @@ def parse_ranges(texts: list[str]) -> dict[str, Any]:
     """
     from models.spread import Uniform
 
+    form = "PATH=WIDTH or PATH=LOW..HIGH, as in payload.mass=30% or 'delay=20 ms..80 ms'"
     found: dict[str, Any] = {}
-    for given in texts:
-        path, sign, value = (part.strip() for part in given.partition("="))
+    for path, value in split_pairs("--vary", form, texts).items():
         ends = [_number(part) for part in value.split("..")]
-        if not (path and sign and value) or len(ends) > 2 or "" in ends:
-            raise InputError(
-                "--vary: must be PATH=WIDTH or PATH=LOW..HIGH, as in payload.mass=30% or "
-                f"'delay=20 ms..80 ms', got {given!r}"
-            )
-        if path in found:
-            raise InputError(f"--vary: {path} is given twice")
+        if len(ends) > 2 or "" in ends:
+            raise InputError(f"--vary: must be {form}, got '{path}={value}'")
         found[path] = Uniform(*ends)
     return found
 
@@ -318,3 +336,72 @@ def _only_in_time(arguments: argparse.Namespace) -> None:
     wrong = [name for name, there in given.items() if there]
     if wrong:
         raise InputError(f"sweep: {', '.join(wrong)}: only with --mode time")
+
+
+def _concluded(swept: Swept, arguments: argparse.Namespace) -> int:
+    """Write and print what the sweep says; return the exit status."""
+    result, most = swept.result, arguments.worst
+    written = write_sweep(swept.folder, result, swept.case, swept.spread, worst=most)
+    if arguments.figures:
+        # Clouds of ten thousand points: as pixels, unless asked otherwise.
+        written += _figures(swept, arguments.format or "png")
+    report = sweep_report(result, swept.case.name, worst=most)
+    if arguments.quiet:
+        show(replace(report, sections=report.sections[:1]), console())
+        return 0 if report.ok else 1
+    worst = worst_cases(result, most) if most else []
+    return conclude(
+        report, arguments, written=written, following=lambda: _next(swept, worst, arguments)
+    )
+
+
+def _figures(swept: Swept, kind: str) -> list[Path]:
+    """Draw and write the figures; return their files."""
+    from synth.design import GainDesign, StructureDesign
+
+    linear = isinstance(swept.design, GainDesign | StructureDesign)
+    in_time = swept.result.attrs.get("mode") == "time"
+    design: Any = swept.design if linear and not in_time else None
+    result = swept.result
+    if in_time:
+        result = result.isel(case=result["status"].to_numpy() != STATUS["not run"])
+    figures = sweep_figures(result, design)
+    folder = OutputFolder(swept.folder)
+    return [folder.write(f"{n}.{kind}", picture(f, kind)) for n, f in figures.items()]
+
+
+def _next(swept: Swept, worst: list[int], arguments: argparse.Namespace) -> list[tuple[str, str]]:
+    """Return the commands to go on with."""
+    folder = swept.folder
+    found = []
+    if worst:
+        file = shlex.quote(str(folder / "worst.yaml"))
+        found.append(("what the worst case would take", f"stillhook optimise {file}"))
+        if swept.result.attrs.get("mode") == "time":
+            at = place_of(swept.result, worst[0])
+            seed = int(swept.result["seed"].to_numpy()[at])
+            words = ["stillhook simulate", file, *_controller_words(swept, arguments)]
+            words.append(f"--first-seed {seed} --duration '{_duration(swept.result):g} s'")
+            found.append(("see the worst case again", " ".join(words)))
+    if swept.words and swept.result.attrs.get("mode") != "time":
+        same = " ".join([swept.words, *design_words(arguments)])
+        again = f"--spread {shlex.quote(str(folder / 'spread.yaml'))}"
+        place = shlex.quote(f"{folder}-time")
+        command = f"stillhook sweep {same} --mode time --out {place}"
+        if "drag" not in varied_paths(swept.result):
+            command += f" {again}"
+        found.append(("the same in time, with limits and slack rope", command))
+    return found
+
+
+def _duration(result: xr.Dataset) -> float:
+    """Return the length of the runs [s]."""
+    return float(json.loads(result.attrs[ATTRIBUTE])["duration"])
+
+
+def _controller_words(swept: Swept, arguments: argparse.Namespace) -> list[str]:
+    """Return the words for `stillhook simulate`; gains of a design stand in the case file."""
+    header = json.loads(swept.result.attrs[ATTRIBUTE])["controller"]
+    if header["kind"] == "name":
+        return [] if header["name"] == "feedback" else [f"--controller {header['name']}"]
+    return [] if header["law"]["kind"] == "gains" else design_words(arguments)

@@ -10,13 +10,12 @@ import argparse
 import math
 import shlex
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from models.basics import InputError
 
 from ...seas import motion_report, own_place
-from ...text import OutputFolder, console, folder_name, show
+from ...text import OutputFolder, console, show
 from ..declare import CASE, real, results_folder, text
 from ..given import case_words, given_case
 from ..working import conclude, prepared
@@ -62,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
             "heading; give vessel.raos, hook and heading to look at others"
         )
     survey = hook_motion(case, headings=headings, peak_periods=periods, fractile=arguments.fractile)
-    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}-motion")
+    folder = prepared(arguments, case.name, "-motion")
     report = motion_report(survey)
     written = [
         folder.write("case.yaml", survey.case.to_yaml()),

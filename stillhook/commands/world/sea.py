@@ -18,7 +18,7 @@ from models.basics import InputError, check_range
 from models.sea import read_seas, write_scatter
 
 from ...seas import records_report, records_table, sea_report
-from ...text import csv_text, folder_name, told_once
+from ...text import csv_text, told_once
 from ..declare import choice, positional, real, results_folder, text, whole
 from ..working import conclude, prepared
 
@@ -59,8 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     sea = records.sea(chosen, beyond=arguments.beyond)
     steps = {"height_step": arguments.height_step, "period_step": arguments.period_step}
     report = records_report(records, chosen, sea, name=arguments.file, steps=steps)
-    named_after = f"{folder_name(Path(arguments.file).name)}-sea"
-    folder = prepared(arguments, Path("out") / named_after)
+    folder = prepared(arguments, Path(arguments.file).name, "-sea")
     written = [folder.write("records.csv", csv_text(records_table(records)))]
     write_scatter(folder.path / "scatter.csv", records.scatter(**steps))
     written += [folder.path / "scatter.csv", *folder.draw(report.drawings)]
@@ -81,7 +80,7 @@ def _of_case(arguments: argparse.Namespace) -> int:
     with told_once():
         case = load_case(arguments.file)
         sea = case.sea.to_spectrum()
-    folder = prepared(arguments, Path("out") / f"{folder_name(case.name)}-sea")
+    folder = prepared(arguments, case.name, "-sea")
     steepness = ("steepness", f"{case.sea.steepness:.3g}")
     report = sea_report(sea, name=case.name, extra=[steepness])
     written = folder.draw(report.drawings)

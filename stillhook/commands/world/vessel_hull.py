@@ -6,7 +6,6 @@ import argparse
 import math
 import os
 import shlex
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,10 +14,10 @@ from models.basics import InputError, check_range
 from models.vessel.readers import check_long_waves, write_raos
 
 from ...seas import hull_report
-from ...text import OutputFolder, folder_name, progress
+from ...text import progress
 from ..declare import choice, declared, group, real, switch, text, whole
 from ..vary import parse_range
-from ..working import conclude, figure_kinds
+from ..working import conclude, prepared_table
 
 if TYPE_CHECKING:
     from models.vessel.hull import Hull
@@ -105,7 +104,8 @@ def run(arguments: argparse.Namespace) -> int:
         check_range("hull", "--threads", arguments.threads, low=1, high=1024)
     radii = _numbers("--radii", arguments.radii, 3) if arguments.radii else (None, None, None)
     hull = _hull(arguments)
-    folder, table = _place(arguments, hull)
+    # Made and tried before anything long begins.
+    folder, table = prepared_table(arguments, hull.name, "raos.nc")
     with progress(shown=not arguments.quiet) as tell:
         vessel = vessel_from_hull(
             hull,
@@ -181,14 +181,6 @@ def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
     if len(found) != count:
         raise InputError(f"hull: {option} must be {count} numbers with commas, got {text!r}")
     return found
-
-
-def _place(arguments: argparse.Namespace, hull: Hull) -> tuple[OutputFolder, Path]:
-    """Return the folder, made and tried before anything long begins, and the table in it."""
-    target = Path(arguments.out or Path("out") / folder_name(hull.name))
-    alone = target.suffix.lower() in {".csv", ".nc"}
-    folder = OutputFolder.prepare(target.parent if alone else target, figure_kinds(arguments))
-    return folder, target if alone else folder.path / "raos.nc"
 
 
 def _command(arguments: argparse.Namespace) -> str:

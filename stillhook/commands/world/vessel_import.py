@@ -10,9 +10,9 @@ from models.basics import InputError
 from models.vessel.readers import check_long_waves, read_raos, write_raos
 
 from ...seas import rao_report
-from ...text import OutputFolder, folder_name, told_once
+from ...text import told_once
 from ..declare import choice, positional, real, switch, text
-from ..working import conclude, figure_kinds
+from ..working import conclude, prepared_table
 
 ARGUMENTS = (
     positional(
@@ -66,10 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
             symmetry=arguments.symmetry,
             check=arguments.check,
         )
-    target = Path(arguments.out or Path("out") / folder_name(raos.name))
-    alone = target.suffix.lower() in {".csv", ".nc"}
-    folder = OutputFolder.prepare(target.parent if alone else target, figure_kinds(arguments))
-    table = target if alone else folder.path / "raos.csv"
+    folder, table = prepared_table(arguments, raos.name, "raos.csv")
     if table.exists() and Path(arguments.file).exists() and table.samefile(arguments.file):
         raise InputError(f"{table}: is the file itself; --out must name another")
     report = rao_report(raos, check_long_waves(raos), stem=table.stem)
