@@ -13,8 +13,7 @@ from typing import Any
 from models.basics import PhysicsWarning, StillhookError
 
 from ..controllers import Contender, StoredDesign, design_law
-from .cell import ComparisonQuestion
-from .floor import prepare
+from .cell import ComparisonQuestion, prepare
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -121,6 +121,8 @@ def compare(
     if design_at not in ("each", "case"):
         raise InputError(f"compare: design_at must be one of each, case; got {design_at!r}")
     check_range("compare", "starts", starts, low=1, high=4096)
+    if jobs is not None:
+        check_range("compare", "jobs", jobs, low=1, high=512)
     waves = EASE + 10.0 * case.sea.spectral_peak_period
     asked = seconds_of("compare: settle", settle, high=_LONGEST, positive=False)
     usual = max(min(waves, 0.1 * lasting), min(EASE, 0.5 * lasting))
@@ -138,7 +140,7 @@ def compare(
     levels = _heights(case, heights)
     for height in levels:
         question.true(height)  # what is wrong with a sea or a mismatch is said at once
-    workers = min(_jobs(jobs), len(contenders) * len(levels) * len(numbers))
+    workers = min(int(jobs or usable_cores()), len(contenders) * len(levels) * len(numbers))
     began = clock.perf_counter()
     with contextlib.ExitStack() as stack:
         store = None
@@ -179,9 +181,3 @@ def _heights(case: Case, heights: Sequence[float] | None) -> tuple[float, ...]:
     if not found or len(set(found)) != len(found):
         raise InputError(f"compare: heights must be distinct, at least one, got {list(found)}")
     return tuple(sorted(found))
-
-
-def _jobs(jobs: int | None) -> int:
-    if jobs is not None:
-        return int(check_range("compare", "jobs", jobs, low=1, high=512))
-    return usable_cores()

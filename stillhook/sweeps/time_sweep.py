@@ -8,6 +8,7 @@ The driver knows which cases are done and hands out the others; it never looks i
 from __future__ import annotations
 
 import contextlib
+import math
 import sys
 import time as clock
 from collections.abc import Iterator
@@ -101,8 +102,14 @@ def run_sweep(
                 if answered is not None:
                     task, result = answered
                     if isinstance(result, Died):
-                        result = _died(question, task, result.reason)
-                    keeper.put(task.index, row_of(result))
+                        result = CaseResult(
+                            index=task.index,
+                            status="died",
+                            message=result.reason,
+                            values=dict.fromkeys(question.metrics, math.nan),
+                        )
+                    code, held = STATUS[result.status], result.status == "completed"
+                    keeper.put(task.index, {"status": code, "stable": float(held), **result.values})
                     wall += result.wall if result.status != "died" else 0.0
                     done += 1
                     if result.message and len(messages) < _TOLD:
@@ -189,15 +196,6 @@ def template_of(question: TimeQuestion, spread: Spread, draw: Draw, rows: FloatA
     return xr.Dataset(variables, coords=coordinates, attrs=attributes)
 
 
-def row_of(result: CaseResult) -> dict[str, float]:
-    """Return the row of a result by variable."""
-    return {
-        "status": STATUS[result.status],
-        "stable": float(result.status == "completed"),
-        **result.values,
-    }
-
-
 def engine_of(wanted: str | Pool | None, question: TimeQuestion, jobs: int | None = None) -> Pool:
     """Return the pool that is meant: every one gives the same numbers.
 
@@ -240,12 +238,6 @@ def engine_of(wanted: str | Pool | None, question: TimeQuestion, jobs: int | Non
             '(it was made at a prompt or in a script); put it in a module, or take engine="serial"'
         )
     return found
-
-
-def _died(question: TimeQuestion, task: CaseTask, reason: str) -> CaseResult:
-    """Return the result of a case whose process was killed once too often."""
-    values = dict.fromkeys(question.metrics, float("nan"))
-    return CaseResult(index=task.index, status="died", message=reason, values=values)
 
 
 def _check(question: TimeQuestion, spread: Spread) -> None:
