@@ -169,7 +169,7 @@ def idle(
         duration=DURATION,
         sleep=sleep,
     )
-    draw = Draw(samples=cases, sampling="sobol", seed=0, common=False)
+    draw = Draw(samples=cases, sampling="sobol", seed=0, common_seed=False)
     with tempfile.TemporaryDirectory() as folder:
         watch = Watch()
         found = run_sweep(

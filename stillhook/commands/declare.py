@@ -117,7 +117,6 @@ DESIGN: Declaration = design_argument
 NO_BOUND = switch(
     "--no-bound", "do not compare with the best that any linear controller could do (2 s a design)"
 )
-SEED = whole("--seed", "seed of the random numbers", 0)
 STRUCTURE = text(
     "--structure", "NAME", "controller structure (default: payload-feedback)", "payload-feedback"
 )

@@ -95,9 +95,8 @@ class StoredDesign:
             return cls(
                 kind="gains" if design.margins is not None else "none", values=gains, **about
             )
-        if design.margins is None or not design.parameters:
-            return cls(kind="none", values={}, **about)
-        controller = design.controller
+        found = design.margins is not None and bool(design.parameters)
+        controller = design.controller if found else None
         if controller is None:
             return cls(kind="none", values={}, **about)
         values: dict[str, Any] = {k: getattr(controller, k).tolist() for k in ("A", "B", "C", "D")}

@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING
 import xarray as xr
 
 from .export import table_of, write_result
+from .words import SweepSummary, case_at, worst_cases
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped]
 
     from models.case import Case
-
-    from .words import SweepSummary
 
 
 @xr.register_dataset_accessor("sweep")  # type: ignore[no-untyped-call]
@@ -38,20 +37,14 @@ class SweepAccessor:
 
     def summary(self) -> SweepSummary:
         """Return the share that is stable with its interval, and quantiles of every number."""
-        from .words import SweepSummary
-
         return SweepSummary.of(self._result)
 
     def worst(self, count: int = 5, *, by: str = "payload_rms") -> list[int]:
         """Return the numbers of the worst cases: those not stable first, then by a variable."""
-        from .words import worst_cases
-
         return worst_cases(self._result, count, by=by)
 
     def case(self, number: int, nominal: Case) -> Case:
         """Return a case of the sweep, to be designed for or run again."""
-        from .words import case_at
-
         return case_at(self._result, number, nominal)
 
     def table(self) -> pd.DataFrame:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,6 +40,8 @@ JOURNAL, RESULT = "journal.jsonl", "result.nc"
 """Names of the files in the folder of a sweep."""
 
 _WHAT = "sweep"
+# What a question holds as plain data: all but the case and how the controller is made.
+_PLAIN = tuple(each.name for each in fields(TimeQuestion) if each.name not in ("case", "recipe"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +56,7 @@ class Draw:
         Method of `Spread.sample`.
     seed
         Of the draws and of the runs.
-    common
+    common_seed
         Whether all runs have the same seed.
     first
         Number of the first case: a part of a longer sweep.
@@ -63,7 +65,7 @@ class Draw:
     samples: int
     sampling: str
     seed: int
-    common: bool
+    common_seed: bool
     first: int = 0
 
 
@@ -74,21 +76,8 @@ def header_of(question: TimeQuestion, spread: Spread, draw: Draw) -> dict[str, A
         "case": question.case.to_dict(),
         "controller": question.recipe.to_dict(),
         "spread": spread.to_dict(),
-        "samples": draw.samples,
-        "first": draw.first,
-        "sampling": draw.sampling,
-        "seed": draw.seed,
-        "common_seed": draw.common,
-        "metrics": list(question.metrics),
-        "duration": question.duration,
-        "settle": question.settle,
-        "scenario": question.scenario,
-        "options": {str(key): value for key, value in question.options.items()},
-        "masses": question.masses,
-        "compiled": question.compiled,
-        "design_follows": question.design_follows,
-        "weighed": question.weighed,
-        "starts": question.starts,
+        **asdict(draw),
+        **{name: getattr(question, name) for name in _PLAIN},
         "versions": versions(TimeQuestion),
     }
     plain: dict[str, Any] = json.loads(text_of(found))
@@ -148,25 +137,10 @@ def question_from(header: Mapping[str, Any], source: str) -> tuple[TimeQuestion,
         question = TimeQuestion(
             case=case,
             recipe=recipe,
-            metrics=tuple(header["metrics"]),
-            duration=float(header["duration"]),
-            settle=header["settle"],
-            scenario=header["scenario"],
-            options=header["options"],
-            masses=header["masses"],
-            compiled=header["compiled"],
-            design_follows=header["design_follows"],
-            weighed=header["weighed"],
-            starts=header["starts"],
+            **{name: header[name] for name in _PLAIN},
         )
         spread = Spread.from_dict(header["spread"], source=source).on(case, recipe.gains)
-        draw = Draw(
-            samples=int(header["samples"]),
-            sampling=header["sampling"],
-            seed=int(header["seed"]),
-            common=bool(header["common_seed"]),
-            first=int(header["first"]),
-        )
+        draw = Draw(**{each.name: header[each.name] for each in fields(Draw)})
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     except (KeyError, TypeError, ValueError) as error:

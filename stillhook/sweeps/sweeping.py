@@ -193,7 +193,7 @@ def sweep(
     if first and sampling not in ("sobol", "random"):
         raise InputError(f"sweep: a part of a sweep is of sobol or random, got {sampling!r}")
     draw = Draw(
-        samples=count, sampling=sampling, seed=int(seed), common=common_seed, first=int(first)
+        samples=count, sampling=sampling, seed=int(seed), common_seed=common_seed, first=int(first)
     )
     return run_sweep(question, own, draw, engine=engine, jobs=jobs, store=store, progress=progress)
 

@@ -32,9 +32,8 @@ STATUS: Mapping[str, int] = MappingProxyType(
 payload moves more than the hook with the drive saturated; the supervisor closed the brake; there
 is no such case or controller; the process died of it, twice."""
 
-_SATURATED = (
-    0.05  # share of the second half of a run in which a limit cycle has its drive saturated
-)
+# Share of the second half of a run in which a limit cycle has its drive saturated.
+_SATURATED = 0.05
 _WORSE = 1.0  # of the hook's rms is the payload's error in a limit cycle
 
 

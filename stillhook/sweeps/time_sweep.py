@@ -141,7 +141,7 @@ def tasks_of(
         row, index = rows[place], draw.first + int(place)
         yield CaseTask(
             index=index,
-            seed=seed_of(draw.seed, index, common=draw.common),
+            seed=seed_of(draw.seed, index, common=draw.common_seed),
             changes=spread.changes(row),
             gains=spread.gains(row),
             faults={path: float(row[j]) for j, path in faulty},
@@ -158,7 +158,9 @@ def template_of(question: TimeQuestion, spread: Spread, draw: Draw, rows: FloatA
         "case": ("case", cases, {"long_name": "number of the case"}),
         "seed": (
             "case",
-            np.array([seed_of(draw.seed, int(i), common=draw.common) for i in cases], np.int64),
+            np.array(
+                [seed_of(draw.seed, int(i), common=draw.common_seed) for i in cases], np.int64
+            ),
             {"long_name": "seed of the run"},
         ),
     }

@@ -118,8 +118,8 @@ def _next(
         gains = gains_text(design.gains)
         evaluate = f"stillhook evaluate {shlex.quote(str(path))} --gains {gains}"
         rows.append(("these gains where the payload moves most", evaluate))
-    if any(axis.path == "rope.length" and axis.continuous for axis in design.family.axes):
-        axis = next(a for a in design.family.axes if a.path == "rope.length")
+    lengths = (a for a in design.family.axes if a.path == "rope.length" and a.continuous)
+    if (axis := next(lengths, None)) is not None:
         span = f"{axis.low:g}..{axis.high:g}"
         rows.append(
             ("gains that follow the rope instead", f"stillhook robust {words} --schedule {span}")

@@ -97,7 +97,7 @@ def _over_ranges(
     from ...sweeps import usual_spread
     from .sweep import given_spread
 
-    spread = given_spread(design.case, arguments) or usual_spread(design.case, "frequency")
+    spread = given_spread(arguments) or usual_spread(design.case, "frequency")
     options = {"seed": arguments.seed, "progress": step}
     studies = [
         sobol_indices(design, spread, samples=arguments.samples, figure=figure, **options)

@@ -161,7 +161,7 @@ def _swept(arguments: argparse.Namespace) -> Swept:
         _only_in_time(arguments)
     case = given_case(arguments)
     design = given_pilot(case, arguments)
-    spread = given_spread(case, arguments)
+    spread = given_spread(arguments)
     place = place_for(arguments, case.name, "-sweep")
     with tidy(place):
         folder = OutputFolder.prepare(place).path
@@ -248,7 +248,7 @@ def given_pilot(case: Case, arguments: argparse.Namespace) -> object:
     return str(arguments.controller)
 
 
-def given_spread(case: Case, arguments: argparse.Namespace) -> Spread | None:
+def given_spread(arguments: argparse.Namespace) -> Spread | None:
     """Return what varies; None for the usual.
 
     Raises
@@ -258,7 +258,6 @@ def given_spread(case: Case, arguments: argparse.Namespace) -> Spread | None:
     """
     from ...sweeps import fault_spread
 
-    del case
     parts = []
     if arguments.spread is not None:
         parts.append(Spread.from_yaml(arguments.spread))

@@ -52,8 +52,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Survey the hook's motion, show it and save it; return 0."""
     from models.hook import hook_motion
 
-    headings = _optional("--headings", arguments.headings, 15.0, -360.0, 360.0)
-    periods = _optional("--tp", arguments.tp, 1.0, 1.0, 40.0)
+    headings = periods = None
+    if arguments.headings is not None:
+        headings = parse_steps("--headings", arguments.headings, 15.0, -360.0, 360.0)
+    if arguments.tp is not None:
+        periods = parse_steps("--tp", arguments.tp, 1.0, 1.0, 40.0)
     case = given_case(arguments)
     if headings is not None and case.vessel.raos is None:
         raise InputError(
@@ -105,12 +108,6 @@ def parse_steps(option: str, text: str, step: float, low: float, high: float) ->
     if wrong is not None:
         raise InputError(f"{option}: must be in [{low:g}, {high:g}], got {wrong:g}")
     return values
-
-
-def _optional(
-    option: str, text: str | None, step: float, low: float, high: float
-) -> tuple[float, ...] | None:
-    return None if text is None else parse_steps(option, text, step, low, high)
 
 
 def _next(
