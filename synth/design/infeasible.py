@@ -15,7 +15,15 @@ import numpy as np
 from models.basics import FloatArray
 
 from ..question import DesignQuestion, Goal, Problem
-from ..search import Progress, Solution, assessment_of, briskest, coarse_programme, polish
+from ..search import (
+    Programme,
+    Progress,
+    Solution,
+    assessment_of,
+    briskest,
+    coarse_programme,
+    polish,
+)
 from .tuning import Tuning
 
 _BINDING = 5e-3  # a limit that is used up to this share of itself binds
@@ -83,21 +91,29 @@ def shortfall(
 def _largest_sea(problem: Problem, free: Tuning) -> Solution | None:
     begins = _begins(free)
     programme = coarse_programme(problem, begins, briskest(problem, begins), Goal.SEA)
-    found: list[Solution] = []
-    for begin in begins:
-        for guess in (0.0, -1.5, -4.0):  # from the sea asked for down to a fiftieth of it
-            coefficient = free.coefficient
-            if coefficient is not None:
-                coefficient *= float(np.exp(guess))  # drag goes with the motion, so with the sea
-            solved = programme.solve(programme.pack(begin, coefficient, guess))
-            if solved.converged and problem.stable(solved.values, solved.coefficient):
-                found.append(solved)
-                break
+    seas = (0.0, -1.5, -4.0)  # from the sea asked for down to a fiftieth of it
+    # Drag goes with the motion, so with the sea.
+    drags = [None if free.coefficient is None else free.coefficient * np.exp(sea) for sea in seas]
+    found = _arrived(programme, begins, list(zip(drags, seas, strict=True)))
     if not found:
         return None
     best = max(found, key=lambda s: s.extra)
     polished, _, excess = polish(problem, best, briskest(problem, begins), Goal.SEA)
     return polished if excess <= _KEPT else None
+
+
+def _arrived(
+    programme: Programme, begins: Sequence[FloatArray], tries: Sequence[tuple[float | None, float]]
+) -> list[Solution]:
+    """Return from each point the answer of the first (drag, extra) that leads to a stable one."""
+    found = []
+    for begin in begins:
+        for coefficient, extra in tries:
+            solved = programme.solve(programme.pack(begin, coefficient, extra))
+            if solved.converged and programme.problem.stable(solved.values, solved.coefficient):
+                found.append(solved)
+                break
+    return found
 
 
 def _required(
@@ -107,13 +123,8 @@ def _required(
     begins = [*_begins(free), best.values]
     reference = briskest(problem, begins)
     programme = coarse_programme(problem, begins, reference, Goal.RELAX, relaxed=binding)
-    found: list[Solution] = []
-    for begin in begins:
-        for guess in (0.0, 1.0, 3.0):  # from the limits as they are to twenty times those
-            solved = programme.solve(programme.pack(begin, free.coefficient, guess))
-            if solved.converged and problem.stable(solved.values, solved.coefficient):
-                found.append(solved)
-                break
+    # From the limits as they are to twenty times those.
+    found = _arrived(programme, begins, [(free.coefficient, room) for room in (0.0, 1.0, 3.0)])
     if not found:
         return {}
     least = min(found, key=lambda s: s.extra)

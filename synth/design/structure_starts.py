@@ -16,7 +16,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..loop import Assessment
 from ..question import Problem, StructureQuestion, pose_structure
 from ..search import KEPT, Found, Progress, Solution, polish, search
 from ..structures import TRANSPARENT, LowOrderFeedback, ParametrisedController, WinchLaw
@@ -133,10 +132,9 @@ def no_worse(problem: Problem, found: Found, starts: Sequence[Sequence[float]]) 
 
 def _as_it_is(problem: Problem, values: Sequence[float]) -> Solution | None:
     """Return a known point as an answer; None if it is unstable or breaks a limit."""
-    controller = problem.law.controller(values)
     if not problem.stable(values):
         return None
-    assessment = Assessment(problem.plant, controller, problem.disturbances, drag=problem.drag)
+    assessment = problem.assess(values)
     coefficient = assessment.coefficient if problem.drag is not None else None
     if not problem.stable(values, coefficient):
         return None

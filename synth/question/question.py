@@ -89,14 +89,7 @@ class DesignQuestion:
 
     def assess(self, gains: Mapping[str, float], coefficient: float | None = None) -> Assessment:
         """Return the closed loop of given gains ``A, a, a1, a2`` in numbers."""
-        problem = self.problem
-        return Assessment(
-            problem.plant,
-            problem.law.controller(self.law_values(gains)),
-            problem.disturbances,
-            drag=self.drag,
-            coefficient=coefficient,
-        )
+        return self.problem.assess(self.law_values(gains), coefficient)
 
 
 def pose(case: Case, masses: int | None = None) -> DesignQuestion:
@@ -155,8 +148,7 @@ def assess_gains(
     drag
         Linear drag coefficient [N s/m], if it is known already.
     """
-    question = pose(case, masses)
-    return question.assess(gains, drag if question.drag is not None else None)
+    return pose(case, masses).assess(gains, drag)
 
 
 def uncompensated(case: Case, data: PlantData, hook: HookMotion) -> tuple[float, float]:

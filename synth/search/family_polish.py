@@ -14,7 +14,7 @@ from models.basics import FloatArray
 
 from ..limits import Limit
 from ..loop import Assessment, Disturbance
-from ..question import FamilyLoop, FamilyProblem, Problem
+from ..question import FamilyProblem, Problem
 from .family_programme import FamilyProgramme, FamilySolved
 from .nodes import cost_nodes, margin_nodes
 from .polishing import KEPT, assessment_of, thinned
@@ -102,18 +102,6 @@ def own_limits(family: FamilyProblem) -> Iterator[tuple[int, Limit]]:
             for limit in family.scenarios[i].problem.limits:
                 if limit.drive or i == group[0]:
                     yield i, limit
-
-
-def assessment_from(scenario: FamilyLoop, searched: FloatArray) -> Assessment:
-    """Return a scenario's loop in numbers, drag as its plant holds it."""
-    problem = scenario.problem
-    return Assessment(
-        problem.plant,
-        problem.law.controller([float(v) for v in scenario.values(searched)]),
-        problem.disturbances,
-        drag=problem.drag,
-        coefficient=None if problem.drag is None else problem.drag.reference,
-    )
 
 
 def shaken_by_all(family: FamilyProblem, group: Sequence[int]) -> Problem:

@@ -18,19 +18,18 @@ from models.basics import FloatArray
 
 from ..loop import Assessment
 from ..question import FamilyProblem, Problem, Values
-from .family_polish import PER_DECADE, assessment_from, assessments_of, polish_family, shaken_by_all
+from .family_polish import PER_DECADE, assessments_of, polish_family, shaken_by_all
 from .family_programme import FamilyProgramme, FamilySolved
-from .multistart import Progress, Start
+from .multistart import AGREE, Progress, Start, distinct
 from .nodes import cost_nodes, margin_nodes
 from .polishing import KEPT, thinned
 from .programme import SolverPace
-from .starts import candidates, pick_spread, stabilise
+from .starts import candidates, pick_spread, stabilise, start_coefficient
 
 _CANDIDATES = 512
 _TRIES = 3  # starts that are tried for each that is to arrive
 _SAMPLE = 4  # starts whose loops the nodes of the first pass are made for
 _POLISHED = 12  # distinct answers that are polished at most: the best of the first may leak most
-_AGREE = 1e-4  # answers whose objectives differ by less, relatively, are one answer
 _BROKEN = 3.0  # weight of the largest broken limit in the merit of a candidate
 _WORST = 20.0  # what broken limits may add to the merit of a candidate
 _MOST_VIEWS = 40  # points of which each loop's merit is taken
@@ -137,19 +136,8 @@ def search_family(
         tell("starts", len(first), count)
         solved = programme.solve(programme.pack(begin))
         stable = family.stable(solved.values, solved.coefficients)
-        good = stable and solved.converged
-        records.append(
-            Start(
-                begin=begin,
-                end=solved.values,
-                cost=float(np.exp(solved.objective)) if good else np.inf,
-                converged=solved.converged,
-                stable=stable,
-                message=solved.message,
-                iterations=solved.iterations,
-            )
-        )
-        if good:
+        records.append(Start.of(begin, solved, stable=stable))
+        if stable and solved.converged:
             first.append(solved)
     tell("starts", count, count)
     if not first:
@@ -165,12 +153,8 @@ def search_family(
             starts=tuple(records),
             reference=reference,
         )
-    distinct: list[FamilySolved] = []
-    for solved in sorted(first, key=lambda s: s.objective):
-        if all(abs(solved.objective - other.objective) > _AGREE for other in distinct):
-            distinct.append(solved)
     best: tuple[FamilySolved, tuple[Assessment, ...], float] | None = None
-    sound = _second_pass(family, distinct[:_POLISHED], reference)
+    sound = _second_pass(family, distinct(first, _POLISHED), reference)
     origin = sound[0][0]
     for k, (came_from, solved) in enumerate(sound):
         tell("polish", k, len(sound))
@@ -187,7 +171,7 @@ def search_family(
         assessments=best[1],
         excess=best[2],
         starts=tuple(records),
-        agreed=sum(1 for s in first if abs(s.objective - origin.objective) <= _AGREE),
+        agreed=sum(1 for s in first if abs(s.objective - origin.objective) <= AGREE),
         reference=reference,
     )
 
@@ -256,7 +240,8 @@ def coarse_programme(
     nodes, omega = [], []
     for k, group in enumerate(family.groups):
         first = family.scenarios[group[0]]
-        assessments = [assessment_from(first, begin) for begin in begins[:_SAMPLE]]
+        drag = start_coefficient(first.problem)
+        assessments = [first.problem.assess(first.values(b), drag) for b in begins[:_SAMPLE]]
         nodes.append(cost_nodes(shaken_by_all(family, group), assessments, rtol=1e-4))
         margins = margin_nodes(first.problem, [v.poles for v in assessments], PER_DECADE)
         omega.append(margins if held is None else np.union1d(margins, held[k]))

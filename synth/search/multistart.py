@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -18,14 +19,16 @@ from models.basics import FloatArray
 
 from ..loop import Assessment
 from ..question import Goal, Problem
+from .family_programme import FamilySolved
 from .nodes import cost_nodes, margin_nodes
 from .polishing import KEPT, assess, polish, thinned
 from .programme import Programme, Solution, SolverPace
 from .starts import begin_points, briskest, coarse_programme, pick_spread, start_coefficient
 
 Progress = Callable[[str, int, int], None]
+Answer = TypeVar("Answer", Solution, FamilySolved)
 
-_AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
+AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
 _POLISHED = 6  # distinct answers that are polished at most
 _RESERVE = 16  # further starts for a search of which none arrived
 _SECOND_TRIES = 4  # of starts that gave up on the way to something better
@@ -47,6 +50,19 @@ class Start:
     stable: bool
     message: str
     iterations: int
+
+    @classmethod
+    def of(cls, begin: FloatArray, solved: Solution | FamilySolved, *, stable: bool) -> Start:
+        """Return the record of a solve; one that did not arrive costs without end."""
+        return cls(
+            begin=begin,
+            end=solved.values,
+            cost=float(np.exp(solved.objective)) if stable and solved.converged else np.inf,
+            converged=solved.converged,
+            stable=stable,
+            message=solved.message,
+            iterations=solved.iterations,
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -132,18 +148,7 @@ def _from(
         tell("starts", min(k, count - 1), count)
         solved = programme.solve(programme.pack(begin, coefficient))
         stable = problem.stable(solved.values, solved.coefficient)
-        cost = float(np.exp(solved.objective)) if stable and solved.converged else np.inf
-        records.append(
-            Start(
-                begin=begin,
-                end=solved.values,
-                cost=cost,
-                converged=solved.converged,
-                stable=stable,
-                message=solved.message,
-                iterations=solved.iterations,
-            )
-        )
+        records.append(Start.of(begin, solved, stable=stable))
         solves.append(solved)
     _once_more(programme, records, solves)
     first = [
@@ -183,14 +188,9 @@ def _once_more(programme: Programme, records: list[Start], solves: list[Solution
         solved = programme.solve(x, pace=SolverPace.NEAR)
         if solved.converged and programme.problem.stable(solved.values, solved.coefficient):
             solves[k] = solved
-            records[k] = replace(
-                records[k],
-                end=solved.values,
-                cost=float(np.exp(solved.objective)),
-                converged=True,
-                message=solved.message,
-                iterations=records[k].iterations + solved.iterations,
-            )
+            record = Start.of(records[k].begin, solved, stable=True)
+            iterations = records[k].iterations + solved.iterations
+            records[k] = replace(record, iterations=iterations)
 
 
 def _polished(
@@ -201,21 +201,21 @@ def _polished(
     tell: Progress,
 ) -> Found:
     """Return the best of the distinct answers after polishing."""
-    pairs = _second_pass(problem, _distinct(first), reference)
-    distinct = _distinct(list(pairs))
+    pairs = _second_pass(problem, distinct(first, _POLISHED), reference)
+    answers = distinct(list(pairs), _POLISHED)
     best: tuple[Solution, Assessment, float] | None = None
-    origin = pairs[distinct[0]]
-    for k, solved in enumerate(distinct):
-        tell("polish", k, len(distinct))
+    origin = pairs[answers[0]]
+    for k, solved in enumerate(answers):
+        tell("polish", k, len(answers))
         if best is not None and best[2] <= KEPT and solved.objective > best[0].objective:
             break  # polishing only adds nodes, that is constraints: it cannot get better
         candidate = polish(problem, solved, reference)
         rank = (candidate[2] > KEPT, candidate[0].objective)
         if best is None or rank < (best[2] > KEPT, best[0].objective):
             best, origin = candidate, pairs[solved]
-    tell("polish", len(distinct), len(distinct))
+    tell("polish", len(answers), len(answers))
     assert best is not None
-    agreed = sum(1 for s in first if abs(s.objective - origin.objective) <= _AGREE)
+    agreed = sum(1 for s in first if abs(s.objective - origin.objective) <= AGREE)
     return Found(
         solved=best[0],
         assessment=best[1],
@@ -283,12 +283,12 @@ def least_violation(
     )
 
 
-def _distinct(solved: Sequence[Solution]) -> list[Solution]:
+def distinct(solved: Sequence[Answer], most: int) -> list[Answer]:
     """Return the best few answers whose costs differ."""
-    chosen: list[Solution] = []
+    chosen: list[Answer] = []
     for item in sorted(solved, key=lambda s: s.objective):
-        if all(abs(item.objective - other.objective) > _AGREE for other in chosen):
+        if all(abs(item.objective - other.objective) > AGREE for other in chosen):
             chosen.append(item)
-        if len(chosen) == _POLISHED:
+        if len(chosen) == most:
             break
     return chosen

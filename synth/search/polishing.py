@@ -8,6 +8,7 @@ refined frequencies and adaptive quadrature, not on the nodes it was solved on.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -145,13 +146,8 @@ def _tightened(
 
 def assessment_of(problem: Problem, solved: Solution, amplitude: float = 1.0) -> Assessment:
     """Return a solution in numbers, the disturbances' amplitudes times `amplitude`."""
-    return Assessment(
-        problem.plant,
-        problem.law.controller([float(v) for v in solved.values]),
-        [d.scaled(amplitude) for d in problem.disturbances],
-        drag=problem.drag,
-        coefficient=solved.coefficient,
-    )
+    scaled = tuple(d.scaled(amplitude) for d in problem.disturbances)
+    return replace(problem, disturbances=scaled).assess(solved.values, solved.coefficient)
 
 
 def assess(
