@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -63,33 +64,20 @@ def drive_limits(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
     time = wanted.exposure_time
     limits: list[Limit] = []
 
-    def peak(output: str, bound: float | None) -> None:
+    def add(kind: Callable[..., Limit], output: str, bound: float | None, **more: float) -> None:
         if bound is not None:
+            unit = plant.units[output]
             limits.append(
-                Peak(
-                    bound=bound,
-                    output=output,
-                    static=static[output],
-                    duration=time,
-                    unit=plant.units[output],
-                )
+                kind(bound=bound, output=output, static=static[output], unit=unit, **more)
             )
 
-    def continuous(output: str, bound: float | None) -> None:
-        if bound is not None:
-            limits.append(
-                Continuous(
-                    bound=bound, output=output, static=static[output], unit=plant.units[output]
-                )
-            )
-
-    peak("motor.torque", drive.torque_peak)
-    continuous("motor.torque", drive.torque_continuous)
-    peak("motor.speed", case.winch.speed_limit)
+    add(Peak, "motor.torque", drive.torque_peak, duration=time)
+    add(Continuous, "motor.torque", drive.torque_continuous)
+    add(Peak, "motor.speed", case.winch.speed_limit, duration=time)
     if case.winch.motor.type == "dc":
-        peak("motor.voltage", drive.voltage)
-        peak("motor.current", drive.current_peak)
-        continuous("motor.current", drive.current_continuous)
+        add(Peak, "motor.voltage", drive.voltage, duration=time)
+        add(Peak, "motor.current", drive.current_peak, duration=time)
+        add(Continuous, "motor.current", drive.current_continuous)
     if case.winch.power_limit is not None and math.isfinite(case.winch.power_limit):
         limits.append(
             Power(
@@ -100,17 +88,8 @@ def drive_limits(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
                 duration=time,
             )
         )
-    peak("rope.tension", wanted.rope_tension_peak)
-    if wanted.minimum_tension is not None:
-        limits.append(
-            Minimum(
-                bound=wanted.minimum_tension,
-                output="rope.tension",
-                static=static["rope.tension"],
-                duration=time,
-                unit="N",
-            )
-        )
+    add(Peak, "rope.tension", wanted.rope_tension_peak, duration=time)
+    add(Minimum, "rope.tension", wanted.minimum_tension, duration=time)
     _check_static(case, limits)
     return tuple(limits)
 

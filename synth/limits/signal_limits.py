@@ -22,16 +22,27 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rms(Limit):
-    """Standard deviation of `output` at most `bound`."""
+class _OfOneSignal(Limit):
+    """A limit on one output, by default named after it and the limit's kind."""
 
     output: str
     drive: ClassVar[bool] = True
+    kind: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            object.__setattr__(self, "name", f"{self.output}.{self.kind}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rms(_OfOneSignal):
+    """Standard deviation of `output` at most `bound`."""
+
+    kind: ClassVar[str] = "rms"
 
     def __post_init__(self) -> None:
         check_range("Rms", "bound", self.bound, low=0.0, open_low=True)
-        if not self.name:
-            object.__setattr__(self, "name", f"{self.output}.rms")
+        super().__post_init__()
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
@@ -43,16 +54,11 @@ class Rms(Limit):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Continuous(Limit):
+class Continuous(_OfOneSignal):
     """sqrt(static^2 + sigma^2) of `output` at most the rating `bound`."""
 
-    output: str
     static: float = 0.0
-    drive: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        if not self.name:
-            object.__setattr__(self, "name", f"{self.output}.continuous")
+    kind: ClassVar[str] = "continuous"
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
@@ -64,18 +70,16 @@ class Continuous(Limit):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Peak(Limit):
+class Peak(_OfOneSignal):
     """|static| + k sigma of `output` at most `bound` in `duration` [s]."""
 
-    output: str
     static: float = 0.0
     duration: float = 10800.0
-    drive: ClassVar[bool] = True
+    kind: ClassVar[str] = "peak"
 
     def __post_init__(self) -> None:
         check_range("Peak", "duration", self.duration, low=0.0, unit="s", open_low=True)
-        if not self.name:
-            object.__setattr__(self, "name", f"{self.output}.peak")
+        super().__post_init__()
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
@@ -87,18 +91,13 @@ class Peak(Limit):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Minimum(Limit):
+class Minimum(_OfOneSignal):
     """static - k sigma of `output` at least `bound` in `duration` [s]: a rope that stays taut."""
 
-    output: str
     static: float
     duration: float = 10800.0
     at_least: ClassVar[bool] = True
-    drive: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        if not self.name:
-            object.__setattr__(self, "name", f"{self.output}.least")
+    kind: ClassVar[str] = "least"
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
@@ -134,7 +133,6 @@ class Power(Limit):
     @property
     @override
     def outputs(self) -> tuple[str, ...]:
-        """The outputs whose variances the limit needs."""
         return (self.torque, self.speed)
 
     @override

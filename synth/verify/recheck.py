@@ -11,6 +11,7 @@ import numpy.typing as npt
 from models.basics import ComplexArray, StillhookError
 from models.plant import LinearPlant
 
+from .demands import Demand
 from .nyquist import Curve, CurveMargins
 from .recompute import LawMatrices, Loop, closed_matrices
 from .verification import Check, agreement, failure
@@ -104,8 +105,10 @@ def loop_margins(loop: Loop) -> CurveMargins:
     return found
 
 
-def margin_checks(claimed: object, found: CurveMargins) -> list[Check]:
+def margin_checks(claimed: object | None, found: CurveMargins) -> list[Check]:
     """Return the checks of a `synth.loop.margins.Margins` against figures found by root finding."""
+    if claimed is None:
+        return [failure("margins", "the loop is stable but no margins are claimed")]
 
     def of(name: str) -> tuple[float, float]:
         return float(getattr(claimed, name)), float(getattr(found, name))
@@ -118,6 +121,14 @@ def margin_checks(claimed: object, found: CurveMargins) -> list[Check]:
         agreement("margins.delay", *of("delay"), TIGHT, "[s]", scale=1e-3),
         agreement("margins.disk", *of("disk"), TIGHT),
     ]
+
+
+def limit_check(demand: Demand, claimed: float, found: float) -> Check:
+    """Return the check that two figures of a limit agree."""
+    name = f"limits.{demand.name}"
+    if demand.kind == "gain":
+        return inverse_agreement(name, claimed, found)
+    return agreement(name, claimed, found, TIGHT)
 
 
 def inverse_agreement(name: str, claimed: float, found: float) -> Check:

@@ -7,6 +7,7 @@ one spring, from the rope's closed form written out here once more.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,9 +81,10 @@ class HeldDrum:
         decay[0] += 0.5 * drag / self._mass
         return np.asarray(-decay + 1j * modes, dtype=np.complex128)
 
-    def _integral(self, gain: object, poles: ComplexArray) -> FloatArray:
+    def _integral(
+        self, gain: Callable[[FloatArray], FloatArray], poles: ComplexArray
+    ) -> FloatArray:
         """Return the integrals of gain (k,) times the hook's density, and times omega^2."""
-        assert callable(gain)
         if self.source.band is None:
             raise SolverError("verification: the hook's motion has no band")
         low, high = self.source.band

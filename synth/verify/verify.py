@@ -38,7 +38,7 @@ from .recheck import (
     TIGHT,
     closed_loop_marks,
     guarded,
-    inverse_agreement,
+    limit_check,
     loop_margins,
     margin_checks,
     pole_check,
@@ -240,8 +240,6 @@ class _WinchLoop:
         ]
 
     def margins(self) -> list[Check]:
-        if self.design.margins is None:
-            return [failure("margins", "the loop is stable but no margins are claimed")]
         return margin_checks(self.design.margins, self.curve_margins)
 
     def limits(self) -> list[Check]:
@@ -254,8 +252,7 @@ class _WinchLoop:
                 continue
             use = claims[name]
             value = demand.measured(self.loop, self.curve_margins, self.coarse_moments)
-            compare = inverse_agreement if demand.kind == "gain" else _agree
-            check = compare(f"limits.{name}", use.value, value)
+            check = limit_check(demand, use.value, value)
             note = ""
             if not math.isclose(use.bound, demand.bound, rel_tol=1e-9):
                 note = f"the bound is {use.bound:.6g} but the case says {demand.bound:.6g}"
@@ -350,10 +347,6 @@ class _WinchLoop:
                 f"{check.found:.3g} 1/s): all figures belong to the one-spring model of the case"
             )
         return [replace(check, note=note, counts=False)]
-
-
-def _agree(name: str, claimed: float, found: float) -> Check:
-    return agreement(name, claimed, found, TIGHT)
 
 
 def _source(hook: HookMotion) -> Source:
