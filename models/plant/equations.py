@@ -116,7 +116,9 @@ def build_equations(
     # Rope: position and velocity of the upper end, then of every mass.
     position = [haul + heave, *(x_of[name] for name in displacement_names(n))]
     velocity = [haul_rate + heave_rate, *(x_of[name] for name in _velocities(n))]
-    hanging = _hanging_weights(lumps, p)
+    # The submerged weight below the top of each spring, its tension at rest.
+    of_rope = p["rope.submerged_weight_per_length"] * p["rope.length"]
+    hanging = [p["payload.submerged_weight"] + of_rope * float(part) for part in lumps.hanging]
     tension = []
     for j in range(n):
         k = p["rope.axial_stiffness"] / (length * lumps.springs[j])
@@ -294,12 +296,6 @@ def parameter_values(data: PlantData) -> dict[str, float]:
     if not math.isinf(data.telemetry_bandwidth):
         values["telemetry.bandwidth"] = data.telemetry_bandwidth
     return values
-
-
-def _hanging_weights(lumps: RopeLumps, p: Mapping[str, ca.SX]) -> list[ca.SX]:
-    """Return the submerged weight below the top of each spring, its tension at rest [N]."""
-    rope = p["rope.submerged_weight_per_length"] * p["rope.length"]
-    return [p["payload.submerged_weight"] + rope * float(part) for part in lumps.hanging]
 
 
 def _units(

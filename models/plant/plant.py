@@ -166,7 +166,10 @@ class Plant(Equations):
         # The angle's own equation says that the speed is zero; all nx are kept.
         system = {"x": unknown, "p": symbols, "g": xdot}
         solver = ca.rootfinder("static", "newton", system, _QUIET)
-        stretch = _elongations(self.lumps, values)
+        hanging = values["rope.submerged_weight_per_length"] * values["rope.length"]
+        carried = values["payload.submerged_weight"] + hanging * self.lumps.hanging
+        stretch = carried * values["rope.length"] * self.lumps.springs
+        stretch = stretch / values["rope.axial_stiffness"]
         start = np.zeros(nx)
         first = self.states.index(displacement_names(self.masses)[0]) - 1
         start[first : first + self.masses] = 0.5 * np.cumsum(stretch)
@@ -294,9 +297,3 @@ def build_plant(
         data, lumps, limits=limits, travel=travel, surroundings=surroundings
     )
     return Plant(**vars(equations), data=data, lumps=lumps)
-
-
-def _elongations(lumps: RopeLumps, values: Mapping[str, float]) -> FloatArray:
-    rope = values["rope.submerged_weight_per_length"] * values["rope.length"]
-    carried = values["payload.submerged_weight"] + rope * lumps.hanging
-    return carried * values["rope.length"] * lumps.springs / values["rope.axial_stiffness"]

@@ -127,15 +127,11 @@ class Accumulator:
             check_range(owner, "lock_limit", lock_limit, low=0.0, unit="m", open_low=True)
         if thermal_time is not None:
             check_range(owner, "thermal_time", thermal_time, low=10.0 * sample_time, unit="s")
-        self._error_of = (
-            (self.signals.index("payload.displacement"), self._find("reference.displacement"))
-            if "payload.displacement" in self.signals
-            else None
-        )
-        self.names = (*self.signals, ERROR) if self._error_of else self.signals
+        self._has_error = "payload.displacement" in self.signals
+        self.names = (*self.signals, ERROR) if self._has_error else self.signals
         self._at = {name: i for i, name in enumerate(self.names)}
         self.units = {name: (units or {}).get(name, "") for name in self.signals}
-        if self._error_of:
+        if self._has_error:
             self.units[ERROR] = self.units["payload.displacement"]
         crossed = {name: 0.0 for name in _MOTIONS if name in self._at} | dict(levels or {})
         kept = block_signals if block_signals is not None else _present(_BLOCK_SIGNALS, self.names)
@@ -164,7 +160,7 @@ class Accumulator:
             if "rope.minimum_tension" in self._at
             else None
         )
-        self._lost = FirstTime(lock_limit) if lock_limit is not None and self._error_of else None
+        self._lost = FirstTime(lock_limit) if lock_limit is not None and self._has_error else None
         self._touch = Touchdown() if {"contact.gap", "contact.force"} & set(self._at) else None
         self._thermal_time = thermal_time if "motor.torque" in self._at else None
         self._heat = self._hottest = static_torque**2
@@ -223,9 +219,10 @@ class Accumulator:
         values = self._waiting[:, : self._filled]
         if self._filled == 0:
             return
-        if self._error_of:
-            payload, reference = self._error_of
-            values[-1] = values[payload] - (values[reference] if reference >= 0 else 0.0)
+        if self._has_error:
+            reference = self._at.get("reference.displacement")
+            asked = 0.0 if reference is None else values[reference]
+            values[-1] = values[self._at["payload.displacement"]] - asked
         # A run that diverges goes through inf on its way; that is told, not warned about.
         with np.errstate(invalid="ignore", over="ignore"):
             self._touchdowns(values)
@@ -279,9 +276,6 @@ class Accumulator:
         else:
             approach = np.full(values.shape[1], math.nan)
         self._touch.add(touching, approach, self._first)
-
-    def _find(self, name: str) -> int:
-        return self.signals.index(name) if name in self.signals else -1
 
     def _time(self, number: float) -> float:
         """Time of sample `number` [s]; NaN for a sample that never came."""

@@ -30,7 +30,7 @@ from ..basics import (
     check_seed,
     pick,
 )
-from ..rig import Encoder, LoadCell, PayloadSensor, Telemetry
+from ..rig import Encoder, LoadCell, PayloadSensor
 from .control import HEARD
 from .draws import SENSOR_NOISE, draw
 from .mru import MruBlock
@@ -122,7 +122,8 @@ class SensorModel:
         return cls(
             sample_time=sample_time,
             payload=sensors.payload,
-            lags=_lags(sensors.telemetry, sample_time, late),
+            # They are the same for every seed.
+            lags=TelemetrySchedule(sensors.telemetry, sample_time, seed=0, late=late).lags,
             encoder=sensors.encoder,
             load_cell=sensors.load_cell,
             haul_per_angle=case.drum_radius / case.winch.gearbox.ratio,
@@ -330,8 +331,3 @@ class SensorModel:
 def _rounded(value: ca.SX, step: float) -> ca.SX:
     """Return the nearest multiple of a step."""
     return step * ca.floor(value / step + 0.5)
-
-
-def _lags(telemetry: Telemetry, sample_time: float, late: Sequence[Late]) -> range:
-    """Return the lags of the link's schedule; they are the same for every seed."""
-    return TelemetrySchedule(telemetry, sample_time, seed=0, late=late).lags

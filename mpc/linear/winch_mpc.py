@@ -122,7 +122,9 @@ class WinchMPC(ABC):
             raise InputError(
                 f"{_OWNER}: blocking must be whole numbers of at least 1, got {blocks}"
             )
-        least = _least_tension(case) if minimum_tension is None else minimum_tension
+        least = case.limits.minimum_tension if minimum_tension is None else minimum_tension
+        if least is None:
+            least = _LEAST * case.static_tension
         check_range(_OWNER, "minimum_tension", least, low=0.0, unit="N")
         if deadline is not None:
             check_range(_OWNER, "deadline", deadline, low=0.0, unit="s", open_low=True)
@@ -257,11 +259,6 @@ class WinchMPC(ABC):
         self._counts["safe"] += 1
         winch = self.model.winch
         return winch.torque(winch.rest_command, speed) / self.programme.unit
-
-
-def _least_tension(case: Case) -> float:
-    given = case.limits.minimum_tension
-    return _LEAST * case.static_tension if given is None else float(given)
 
 
 def _soft_limits(

@@ -66,12 +66,6 @@ def forced_response(p: Condensed, stage: Stage, scale: FloatArray) -> tuple[Floa
     chain = np.array(after).reshape(N, n, size)
     G = np.zeros((N * rows, N * size))
     of_y = stage.C @ chain
-
-    def into(target: FloatArray, row: FloatArray, j: int) -> None:
-        """Write what a row of the state at sample j feels of all forces before."""
-        felt = (row @ chain)[:j][::-1]
-        target[: j * size] = felt.reshape(-1)
-
     for j in range(N):
         here = slice(j * rows, (j + 1) * rows)
         G[here, j * size : (j + 1) * size] = stage.own
@@ -86,5 +80,6 @@ def forced_response(p: Condensed, stage: Stage, scale: FloatArray) -> tuple[Floa
         wanted.append((factor * kinds[WATCHED[kind]], int(j)))
     Theta = np.zeros((len(wanted), N * size))
     for target, (row, j) in zip(Theta, wanted, strict=True):
-        into(target, row, j)
+        # What a row of the state at sample j feels of all forces before.
+        target[: j * size] = (row @ chain)[:j][::-1].reshape(-1)
     return G, Theta

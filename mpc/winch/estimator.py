@@ -55,15 +55,19 @@ class WinchEstimator:
     ----------
     state
         chi, (n,); belongs to the last `update`.
+    speed
+        Motor speed at the last update, as estimated [rad/s].
+    covariance, gain
+        Of the one-step prediction, (n, n), and with every signal there, (n, ny).
     """
 
     def __init__(self, model: PredictionModel) -> None:
         self.model = model
-        self._P = kalman_covariance(model)
+        self.covariance = kalman_covariance(model)
         # By what is missing: of the 2^8 sets of signals a few occur, each for many samples.
         self._gains: dict[int, FloatArray] = {}
-        self._all = self._gain(0)
-        self._first = _first_gains(model, self._P)
+        self.gain = self._gain(0)
+        self._first = _first_gains(model, self.covariance)
         self._C = np.ascontiguousarray(model.C)
         self._A = np.ascontiguousarray(model.A)
         self._B = np.ascontiguousarray(model.B[:, 0])
@@ -94,32 +98,17 @@ class WinchEstimator:
         """Forget everything: the load hangs at rest in still water."""
         self.state = np.zeros(self.model.size)
         self._ahead = np.zeros(self.model.size)
-        self._before = 0.0  # motor speed at the sample before, as estimated then
+        self.speed = 0.0
         self._drag = 0.0  # force of quadratic drag at the sample before [N]
         self._begun = False
         self._samples = 0
 
     @property
-    def covariance(self) -> FloatArray:
-        """Covariance of the one-step prediction, (n, n)."""
-        return self._P
-
-    @property
     def sea_covariance(self) -> FloatArray:
         """Covariance of the sea's state once the sample is known, (nh, nh)."""
         at = self.model.sea_at
-        kept = self._P - self._all @ self.model.C @ self._P
+        kept = self.covariance - self.gain @ self.model.C @ self.covariance
         return np.array(0.5 * (kept + kept.T)[at, at])
-
-    @property
-    def gain(self) -> FloatArray:
-        """Gain with every signal there, (n, ny)."""
-        return self._all
-
-    @property
-    def speed(self) -> float:
-        """Motor speed at the last update, as estimated [rad/s]."""
-        return self._before
 
     def update(
         self, measurement: Measurement, held: float = math.nan, applied: float = math.nan
@@ -151,10 +140,10 @@ class WinchEstimator:
                 applied = float(shown[_APPLIED])
             if math.isfinite(held) and math.isfinite(speed):
                 # A torque that is held does as much as one that falls to as much below it.
-                fall = 0.5 * winch.gain * winch.back * (speed - self._before)
+                fall = 0.5 * winch.gain * winch.back * (speed - self.speed)
                 ahead = ahead + self._B * (held + fall)
             elif math.isfinite(applied):  # what is not known is taken as having held the load
-                ahead = ahead + self._B * winch.torque(applied, self._before)
+                ahead = ahead + self._B * winch.torque(applied, self.speed)
             # Quadratic drag at the mean of the velocities before and after: no linear model has it.
             before, after = self._drag, winch.extra_drag(float(self._velocity @ ahead))
             ahead = ahead + self._force * (0.5 * (before + after)) + self._sent * before
@@ -172,7 +161,7 @@ class WinchEstimator:
             if late > self._slack or late < -self._slack:
                 error = y - self._late(float(shown[_AGE])) @ ahead
             # Everything is there, as nearly always: one product, no mask.
-            gain = self._all
+            gain = self.gain
             if self._samples < len(self._first):
                 gain = self._first[self._samples]
                 self._samples += 1
@@ -181,7 +170,7 @@ class WinchEstimator:
             self.state = self._partly(ahead, y, missing, float(shown[_AGE]))
         if not float(np.abs(self.state).max()) < _HUGE:  # no number, or no longer of this world
             self.reset()
-        self._before = float(self._speed @ self.state)
+        self.speed = float(self._speed @ self.state)
         self._drag = winch.extra_drag(float(self._velocity @ self.state))
         return self.state
 
@@ -215,7 +204,7 @@ class WinchEstimator:
         """Return the gain without the measurements whose bits are set."""
         if mask not in self._gains:
             there = np.array([not mask >> k & 1 for k in range(len(MEASURED))])
-            self._gains[mask] = kalman_gain(self.model.C, self.model.R, self._P, there)
+            self._gains[mask] = kalman_gain(self.model.C, self.model.R, self.covariance, there)
         return self._gains[mask]
 
 
