@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .files import (
         GZIP,
         cache_folder,
+        file_stamp,
         read_bytes,
         read_text,
         reason,

@@ -17,6 +17,18 @@ GZIP = b"\x1f\x8b"
 """How a file that is packed with gzip begins."""
 
 
+def file_stamp(path: str | Path) -> tuple[int, int]:
+    """Return when a file was changed [ns] and its size, as a key for what was read from it.
+
+    Zeros where there is no such file: whoever reads it says what is wrong.
+    """
+    try:
+        found = Path(path).stat()
+    except (OSError, ValueError):
+        return 0, 0
+    return found.st_mtime_ns, found.st_size
+
+
 def read_bytes(path: str | Path) -> bytes:
     """Return the contents of a file, unpacked where it is packed with gzip.
 

@@ -18,14 +18,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, InputError, check_range
-from .formats import read_raw
+from ..basics import FloatArray, InputError, check_range, file_stamp, read_bytes
+from .library_files import FORMATS, read_with_library
+from .ndbc import is_ndbc, read_ndbc
 from .quality import QualityControl, RawRecords, TimeArray, sift
 from .scatter import Scatter
 from .table import MOST_ROWS
 
 if TYPE_CHECKING:
     from .sea import SeaSpectrum
+
+_EXTENSIONS = {".spt": "datawell", ".oct": "octopus", ".mat": "xwaves"}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -261,18 +264,75 @@ def read_seas(path: str | Path, *, file_format: str | None = None) -> SeaRecords
         If the file cannot be read, its format is unknown or needs `stillhook[waves]`, or no record
         is left after quality control.
     """
-    try:
-        about = Path(path).stat()
-        stamp = (about.st_mtime_ns, about.st_size)
-    except (OSError, ValueError):
-        stamp = (0, 0)  # whoever reads it says what is wrong
-    return _read(str(path), file_format, stamp)
+    return _read(str(path), file_format, file_stamp(path))
 
 
 @lru_cache(maxsize=4)
 def _read(path: str, file_format: str | None, stamp: tuple[int, int]) -> SeaRecords:
     del stamp  # a part of the cache's key: a file may change under its name
-    return SeaRecords.from_raw(read_raw(path, file_format), path)
+    return SeaRecords.from_raw(_read_raw(path, file_format), path)
+
+
+def _read_raw(path: str, file_format: str | None) -> RawRecords:
+    """Read a file of a given or a guessed format.
+
+    Raises
+    ------
+    InputError
+        If the format is unknown, or its reader refuses the file.
+    """
+    if file_format is not None and file_format not in FORMATS:
+        raise InputError(
+            f"{path}: the format must be one of {', '.join(FORMATS)}; got {file_format!r}"
+        )
+    name = file_format or _guess_format(path)
+    if name == "ndbc":
+        return read_ndbc(path)
+    return read_with_library(path, name)
+
+
+def _guess_format(path: str) -> str:
+    """Return the format of a file, one of :data:`FORMATS`.
+
+    It is told by what is in the file; its name and extension only count for the few formats without
+    a mark of their own.  NetCDF files are all `netcdf`: what they are shows when they are opened.
+
+    Raises
+    ------
+    InputError
+        If it is none that is known.
+    """
+    raw = read_bytes(path)
+    if not raw.strip():
+        raise InputError(f"{path}: is empty; a file of wave spectra is wanted")
+    if raw.startswith((b"CDF\x01", b"CDF\x02", b"CDF\x05", b"\x89HDF")):
+        return "netcdf"
+    head = raw[:4000].decode("utf-8-sig", errors="replace")
+    first = head.lstrip().splitlines()[0] if head.strip() else ""
+    if is_ndbc(head):
+        return "ndbc"
+    if first.startswith("SWAN"):
+        return "swan"
+    if first.startswith(("{", "[")):
+        spotter = any(mark in raw[:200_000] for mark in (b'"waves"', b'"spotterId"'))
+        return "spotter" if spotter else "wavespectra-json"
+    if "WAVEWATCH III" in first:
+        return "ww3-station"
+    if first.startswith("TRIAXYS"):
+        return "triaxys"
+    if first.startswith("Battery Voltage") or "Significant Wave Height" in first:
+        return "spotter"
+    if first.startswith("$PNOR"):
+        return "awac"
+    if "Obscape" in head or first.startswith("# Timestamp"):
+        return "obscape"
+    by_name = _EXTENSIONS.get(Path(path).suffix.lower())
+    if by_name is not None:
+        return by_name
+    raise InputError(
+        f"{path}: is of no format that is known here; its first line is {first!r:.60}.  If it "
+        f"holds spectra all the same, name the format: {', '.join(FORMATS)}"
+    )
 
 
 def _without_empty_columns(raw: RawRecords) -> tuple[FloatArray, FloatArray, list[str]]:

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -215,17 +216,10 @@ def _list(
             raise InputError(f"{owner}:{number}: must have {len(header)} columns, got {len(cells)}")
         for name, index in at.items():
             columns[name].append(_number(cells[index], owner, number, name) * factors[name])
-    arrays = {name: np.array(values) for name, values in columns.items()}
+    arrays: dict[str, Any] = {name: np.array(values) for name, values in columns.items()}
     if period == "zero_crossing_period":
         arrays["peak_period"] = arrays.pop("zero_crossing_period") / ratio
-    return Scatter(
-        significant_height=arrays["significant_height"],
-        peak_period=arrays["peak_period"],
-        occurrence=arrays["occurrence"],
-        month=arrays.get("month"),
-        heading=arrays.get("heading"),
-        source=owner,
-    )
+    return Scatter(**arrays, source=owner)
 
 
 def _is_units_row(cells: Sequence[str]) -> bool:
@@ -275,17 +269,12 @@ def _matrix(
         )
     if not table or not columns:
         raise InputError(f"{owner}: the matrix must have at least one row and one column")
-    shares = np.array(table)
     rows, cols = np.meshgrid(down, columns, indexing="ij")
-    by_name = {down_name: rows, across_name: cols}
+    by_name = {down_name: rows, across_name: cols, "occurrence": np.array(table)}
     if "zero_crossing_period" in by_name:
-        by_name["peak_period"] = by_name["zero_crossing_period"] / ratio
-    return Scatter(
-        significant_height=by_name["significant_height"].ravel(),
-        peak_period=by_name["peak_period"].ravel(),
-        occurrence=shares.ravel(),
-        source=owner,
-    )
+        by_name["peak_period"] = by_name.pop("zero_crossing_period") / ratio
+    arrays: dict[str, Any] = {name: values.ravel() for name, values in by_name.items()}
+    return Scatter(**arrays, source=owner)
 
 
 def _centre(cell: str, owner: str, line: int) -> float:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
@@ -24,7 +23,7 @@ from pydantic import (
     model_validator,
 )
 
-from ..basics import GRAVITY, InputError, range_text
+from ..basics import GRAVITY, InputError, file_stamp, range_text
 from ..casefile import DataFile, Quantity, Section, custom_error, problems
 from .shapes import fully_arisen, gaussian_widths, jonswap_gamma
 from .table import SpectrumTable, row_faults
@@ -193,7 +192,7 @@ class SeaSection(Section):
         InputError
             If the form is not defined for these values, or a file of spectra cannot be read.
         """
-        return _spectrum(self, tuple(_stamp(file) for file in self._files()))
+        return _spectrum(self, tuple(file_stamp(file) for file in self._files()))
 
     def _form(self) -> dict[str, Any]:
         """Return what the kind hands to :class:`SeaSpectrum`, besides height and spreading."""
@@ -505,15 +504,6 @@ def _rows(
     found = read_seas(file or "").sea(record or 0, beyond=beyond or "decay").table
     assert found is not None
     return found
-
-
-def _stamp(file: str) -> tuple[int, int]:
-    """Return time and size of a file, which may change under its name."""
-    try:
-        about = Path(file).stat()
-    except OSError:
-        return (0, 0)  # whoever reads it will say so
-    return about.st_mtime_ns, about.st_size
 
 
 @lru_cache(maxsize=64)

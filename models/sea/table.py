@@ -84,11 +84,8 @@ class SpectrumTable:
         rows, values = self._arrays
         result: FloatArray = np.interp(omega, rows, values, left=0.0, right=0.0)
         if self.beyond == "decay":
-            above = (omega > rows[-1]) & (omega <= _TAIL_END)
-            if np.any(above):
-                result = np.where(
-                    above, values[-1] * (rows[-1] / np.maximum(omega, rows[-1])) ** 5, result
-                )
+            tail = values[-1] * (rows[-1] / np.maximum(omega, rows[-1])) ** 5
+            result = np.where((omega > rows[-1]) & (omega <= _TAIL_END), tail, result)
         return result
 
     @property

@@ -19,11 +19,12 @@ import numpy.typing as npt
 
 from ..basics import FloatArray, InputError, check_range
 from ..case import Case
+from ..casefile import yaml_text
 from ..operation import PREFIX as FAULTS
 from .distributions import Samples, at_ends, distribution_of
 from .fields import ALIASES, DRAG, GAINS, Field, field_of, resolved
 from .sampling import copula_factor, correlated, counted, unit_points
-from .spread_file import read_spread, spread_text
+from .spread_file import read_spread
 
 Pairs = Mapping[tuple[str, str], float]
 
@@ -105,8 +106,7 @@ class Spread:
         InputError
             If it is not one; the message names the path.
         """
-        found, pairs = read_spread(data, source)
-        return cls(found, pairs)
+        return cls(*read_spread(data, source))
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Spread:
@@ -117,8 +117,7 @@ class Spread:
         InputError
             If there is no such file or it is no spread; file and line are named.
         """
-        found, pairs = read_spread(Path(path), str(path))
-        return cls(found, pairs)
+        return cls(*read_spread(Path(path), str(path)))
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -256,11 +255,8 @@ class Spread:
         a family.
         """
         own = self._named(row)
-        found: dict[str, Any] = {
-            path: value
-            for path, value in own.items()
-            if path != DRAG and not path.startswith((GAINS, FAULTS))
-        }
+        plain = (p for p in own if p != DRAG and not p.startswith((GAINS, FAULTS)))
+        found: dict[str, Any] = {path: own[path] for path in plain}
         mass = found.get("payload.mass")
         if mass is not None and self.case is not None:
             payload = self.case.payload
@@ -303,7 +299,7 @@ class Spread:
 
     def to_yaml(self) -> str:
         """Return the spread as YAML text; reading it gives an equal spread."""
-        return spread_text(self.to_dict())
+        return yaml_text(self.to_dict())
 
     def __str__(self) -> str:
         """Return the spread as a small tree."""
@@ -338,30 +334,23 @@ class Spread:
 
     def _try_ends(self) -> None:
         """Try the ends of every range, one path at a time, on the case."""
-        middle = [field.nominal for field in self.fields]
-        for j, (path, distribution) in enumerate(self.distributions.items()):
+        for field, (path, distribution) in zip(
+            self.fields, self.distributions.items(), strict=True
+        ):
             for end in dict.fromkeys(distribution.ends):
-                row = list(middle)
-                row[j] = end
-                field = self.fields[j]
                 if not field.low <= end <= field.high:
                     raise InputError(
                         f"spread: {path} must stay in [{field.low:g}, {field.high:g}] "
                         f"{field.unit}".rstrip()
                         + f", got {end:g}"
                     )
+                if path == DRAG or path.startswith(GAINS):
+                    continue
+                alone = Spread({path: Samples([end])}, None, (field,), self.case)
                 try:
-                    self._alone(path, end)
+                    alone.case_at([end])
                 except InputError as error:
                     raise InputError(f"spread: {path} cannot be {end:g}: {error}") from None
-
-    def _alone(self, path: str, value: float) -> None:
-        """Try one path at a value, all others as they are."""
-        if self.case is None or path == DRAG or path.startswith(GAINS):
-            return
-        j = self.paths.index(path)
-        alone = Spread({path: Samples([value])}, None, (self.fields[j],), self.case)
-        alone.case_at([value])
 
 
 def _words(kind: str, values: Any) -> str:

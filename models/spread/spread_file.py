@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ..basics import InputError
-from ..casefile import line_of, message_line, read_yaml, suggestion, yaml_text
+from ..casefile import line_of, message_line, read_yaml, suggestion
 from .distributions import KINDS, Distribution, Samples, Uniform
 
 Lines = dict[tuple[str | int, ...], int]
@@ -63,11 +63,6 @@ def read_spread(
             raise InputError(_at(source, lines, ("correlations", k), text))
         pairs[str(entry[0]), str(entry[1])] = entry[2]
     return found, pairs
-
-
-def spread_text(data: Mapping[str, Any]) -> str:
-    """Return a spread's contents as YAML."""
-    return yaml_text(dict(data))
 
 
 def _distribution(value: Any) -> Distribution:

@@ -12,12 +12,11 @@ long as they stay as they are, and the operators of a place and a sea are kept.
 
 from __future__ import annotations
 
-import os
 from functools import lru_cache
 
 import numpy as np
 
-from ..basics import ComplexArray, FloatArray, InputError, read_only
+from ..basics import ComplexArray, FloatArray, InputError, file_stamp, read_only
 from ..sea import Spreading
 from .crane import Point
 from .raos import VesselRaos
@@ -47,7 +46,7 @@ def vessel_raos(vessel: Vessel, owner: str = "case") -> VesselRaos:
     if name is None:
         raise InputError(f"{owner}: vessel.raos: is missing: the case has heave_rao only")
     try:
-        raos = _read(name, *_stamp(name))
+        raos = _read(name, *file_stamp(name))
     except InputError as error:
         raise InputError(
             f"{owner}: vessel.raos: {error}; `stillhook vessel import` reads a file with "
@@ -55,7 +54,7 @@ def vessel_raos(vessel: Vessel, owner: str = "case") -> VesselRaos:
         ) from error
     speed = vessel.speed or 0.0
     if abs(raos.speed - speed) > 1e-3:
-        return _read_at(name, *_stamp(name), speed) or raos
+        return _read_at(name, *file_stamp(name), speed) or raos
     return raos
 
 
@@ -174,22 +173,16 @@ def hook_rao(vessel: Vessel, spreading: Spreading | None = None, owner: str = "c
     table = vessel.heave_rao
     if table is not None:
         return HeaveRao(
-            omega=np.asarray(table.omega, dtype=np.float64),
-            amplitude=np.asarray(table.amplitude, dtype=np.float64),
-            phase=None if table.phase is None else np.asarray(table.phase, dtype=np.float64),
-            below=vessel.below,
-            beyond=vessel.beyond,
-        )
+            omega=np.array(table.omega), amplitude=np.array(table.amplitude),
+            phase=None if table.phase is None else np.array(table.phase),
+            below=vessel.below, beyond=vessel.beyond,
+        )  # fmt: skip
     omega, operators, _, weights = hook_operators(vessel, spreading, owner)
     amplitude, phase = equivalent(operators, weights)
     return HeaveRao(
-        omega=omega,
-        amplitude=amplitude,
-        phase=phase,
-        below=vessel.below,
-        beyond=vessel.beyond,
-        owner="vessel.raos",
-    )
+        omega=omega, amplitude=amplitude, phase=phase,
+        below=vessel.below, beyond=vessel.beyond, owner="vessel.raos",
+    )  # fmt: skip
 
 
 def equivalent(operators: ComplexArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -221,15 +214,6 @@ def _read(name: str, modified: int, size: int) -> VesselRaos:
     from .readers import read_raos
 
     return read_raos(name)
-
-
-def _stamp(name: str) -> tuple[int, int]:
-    """Return when a file was changed and its size; nothing for a bundled name."""
-    try:
-        found = os.stat(name)
-    except OSError:
-        return 0, 0
-    return found.st_mtime_ns, found.st_size
 
 
 @lru_cache(maxsize=64)

@@ -103,7 +103,7 @@ class HeaveRao:
     def __post_init__(self) -> None:
         """Check the table and make its arrays read-only."""
         owner = self.owner
-        omega = check_ascending(owner, "omega", check_finite(owner, "omega", self.omega))
+        omega = check_ascending(owner, "omega", self.omega)
         if omega.ndim != 1 or omega.size < 2:
             raise InputError(f"{owner}: omega must have at least 2 rows, got {omega.size}")
         if omega[0] < 0.0:
@@ -149,15 +149,12 @@ class HeaveRao:
             Hook heave per wave elevation [m/m], same shape.
         """
         frequency = np.asarray(omega, dtype=np.float64)
-        rows, _, phases = self._columns()
-        phase = np.interp(frequency, rows, phases)
+        phases = self._phases
+        phase = np.interp(frequency, self.omega, phases)
         if self.below == "unity":
             # Long waves lift the vessel as they lift the water: amplitude 1, phase 0.
-            under = frequency < rows[0]
-            part = np.divide(
-                frequency, rows[0], out=np.ones_like(frequency), where=under & (rows[0] > 0.0)
-            )
-            phase = np.where(under, phases[0] * part, phase)
+            under = frequency < self.omega[0]
+            phase = np.where(under, phases[0] * self._part_below(frequency), phase)
         result: ComplexArray = self.gain(frequency) * np.exp(1j * phase)
         return result
 
@@ -182,9 +179,7 @@ class HeaveRao:
         if self.below == "zero":
             amplitude = np.where(under, 0.0, amplitude)
         elif self.below == "unity":
-            part = np.divide(
-                frequency, rows[0], out=np.ones_like(frequency), where=under & (rows[0] > 0.0)
-            )
+            part = self._part_below(frequency)
             amplitude = np.where(under, 1.0 + (amplitudes[0] - 1.0) * part, amplitude)
         if self.beyond == "zero":
             amplitude = np.where(over, 0.0, amplitude)
@@ -220,12 +215,8 @@ class HeaveRao:
         )
 
         def variance(omega: FloatArray) -> FloatArray:
-            motion: FloatArray = (
-                np.abs(filled.response(omega)) ** 2
-                * spectrum.density(omega)
-                * omega ** (2 * derivative)
-            )
-            return motion
+            energy = np.abs(filled.response(omega)) ** 2 * spectrum.density(omega)
+            return np.asarray(energy * omega ** (2 * derivative))
 
         nodes = adaptive_nodes(
             variance, *spectrum.band, splits=(*spectrum.splits, *self.splits), rtol=1e-8
@@ -240,8 +231,15 @@ class HeaveRao:
             beyond=float(nodes.integrate(np.where(nodes.omega > last, values, 0.0))) / total,
         )
 
-    def _columns(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the table with the phase unwrapped, its first value in (-pi, pi]."""
+    def _part_below(self, omega: FloatArray) -> FloatArray:
+        """Return frequencies over the table's first one, and 1 from there on."""
+        first = self.omega[0]
+        part: FloatArray = np.divide(omega, first, out=np.ones_like(omega), where=omega < first)
+        return part
+
+    @property
+    def _phases(self) -> FloatArray:
+        """The phases unwrapped, the first in (-pi, pi] [rad]."""
         phase = np.zeros_like(self.omega) if self.phase is None else np.unwrap(self.phase)
         turns = math.ceil((phase[0] - math.pi) / (2.0 * math.pi))
-        return self.omega, self.amplitude, phase - 2.0 * math.pi * turns
+        return np.asarray(phase - 2.0 * math.pi * turns)

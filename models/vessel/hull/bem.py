@@ -5,7 +5,8 @@ convention (time factor e^{-i omega t}, forces and motions about the rotation ce
 everything leaves conjugated, about the frame's origin.
 
 A closed hull with a free surface inside would answer at the "irregular" frequencies of that inner
-water, which no ship has.  A lid of panels on it keeps them out.
+water, which no ship has: where water sloshing inside it would resonate, the equations have no
+single answer.  A lid of panels on it keeps them out.
 """
 
 from __future__ import annotations
@@ -22,19 +23,19 @@ import numpy.typing as npt
 from ...basics import (
     GRAVITY,
     SEA_WATER_DENSITY,
+    ComplexArray,
     FloatArray,
     InputError,
     SolverError,
     check_ascending,
     check_range,
     wave_frequency,
+    wave_number,
 )
 from ..crane import Point
 from ..raos import MODES
-from .froude_krylov import froude_krylov
-from .hull import Hull
+from .hull import Hull, panel_areas, patch, quadrature_rule
 from .hydrodynamics import Hydrodynamics
-from .lid import waterplane_lid
 
 Progress = Callable[[int, int], None]
 
@@ -175,6 +176,62 @@ def _mesh(panels: FloatArray, name: str) -> Any:
     return capytaine().Mesh.from_list_of_faces(panels.tolist(), name=name, auto_check=False)
 
 
+def waterplane_lid(hull: Hull) -> FloatArray | None:
+    """Return panels that cover the waterplane (n, 4, 3), or nothing if it is no simple one.
+
+    Panels on the inner water settle what happens at irregular frequencies if they cover it whole:
+    with gaps along the hull, as a lid of squares has them, the first of those frequencies still
+    show.  So the lid is spanned between the two sides of the waterline.
+
+    Parameters
+    ----------
+    hull
+        One whose waterline is cut twice by every line across the ship; not so for a catamaran,
+        a moonpool or a hull that is wholly submerged.
+    """
+    segments = _waterline(hull)
+    if not len(segments):
+        return None
+    low, high = float(segments[..., 0].min()), float(segments[..., 0].max())
+    size = math.sqrt(panel_areas(hull.panels).mean())
+    length = high - low
+    corners = np.unique(np.round(segments[..., 0], 6))
+    # The hull's own stations where they are as far apart as its panels.
+    if 0.5 * length / size < corners.size < 2.0 * length / size + 2.0:
+        stations = corners
+    else:
+        stations = np.linspace(low, high, 2 + math.ceil(length / size))
+    nudge = 1e-7 * length
+    inside = np.clip(stations + nudge, low + nudge, high - nudge)
+    sides = []
+    for x in inside:
+        a, b = segments[:, 0], segments[:, 1]
+        crossed = (np.minimum(a[:, 0], b[:, 0]) <= x) & (x < np.maximum(a[:, 0], b[:, 0]))
+        a, b = a[crossed], b[crossed]
+        part = (x - a[:, 0]) / (b[:, 0] - a[:, 0])
+        y = np.sort(a[:, 1] + part * (b[:, 1] - a[:, 1]))
+        if y.size != 2:
+            return None
+        sides.append(y)
+    across = np.array(sides)
+    # An even number, so that a panel is on one side of a symmetric ship or on the other.
+    count = 2 * max(1, round(float(np.ptp(across, axis=1).max()) / size / 2.0))
+    t = np.linspace(0.0, 1.0, count + 1)
+    y = across[:, :1] * (1.0 - t) + across[:, 1:] * t
+    points = np.stack([np.broadcast_to(stations[:, None], y.shape), y, np.zeros_like(y)], axis=-1)
+    return patch(points)
+
+
+def _waterline(hull: Hull) -> FloatArray:
+    """Return the panels' edges that lie in the waterline, each once (n, 2, 3)."""
+    panels = hull.panels
+    tolerance = 1e-6 * max(hull.length, hull.beam)
+    edges = np.stack([panels, np.roll(panels, -1, axis=1)], axis=2).reshape(-1, 2, 3)
+    long = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1) > tolerance
+    there = np.all(edges[..., 2] > -tolerance, axis=1)
+    return np.asarray(edges[long & there])
+
+
 def _row(
     cpt: Any,
     solver: Any,
@@ -183,7 +240,7 @@ def _row(
     headings: FloatArray,
     depth: float,
     density: float,
-) -> tuple[FloatArray, FloatArray, npt.NDArray[np.complex128]]:
+) -> tuple[FloatArray, FloatArray, ComplexArray]:
     """Return added mass, damping (6, 6) and diffraction force (h, 6) at one frequency."""
     given = {"omega": frequency, "water_depth": depth, "rho": density, "g": GRAVITY, "body": body}
     added, damping = np.empty((6, 6)), np.empty((6, 6))
@@ -200,6 +257,60 @@ def _row(
         result = solver.solve(problem, keep_details=False, _check_wavelength=False)
         force[j] = [result.forces[name] for name in _NAMES]
     return added, damping, np.conj(force)
+
+
+def froude_krylov(
+    hull: Hull,
+    *,
+    omega: float,
+    heading: npt.ArrayLike,
+    point: Point = (0.0, 0.0, 0.0),
+    depth: float = math.inf,
+    density: float = SEA_WATER_DENSITY,
+) -> ComplexArray:
+    """Return force and moment of the undisturbed wave per metre of amplitude (h, 6) [N/m, N].
+
+    It could come from the panel method, by the pressure in the middle of each panel.  For roll that
+    is not good enough: the moment of long waves is a small difference of large parts, as is the
+    metacentric height, and eight panels across the beam put it off by 4 %.  Here the pressure is
+    integrated by a rule that is exact for polynomials of the second degree, as the hydrostatics
+    are, so that long waves roll the ship as they must, whatever the panels.
+
+    Parameters
+    ----------
+    hull
+        Its wetted surface.
+    omega
+        Frequency [rad/s].
+    heading
+        Where the waves travel towards (h,) [rad].
+    point
+        About which the moments are [m].
+    depth
+        Water depth [m].
+    density
+        Of the water [kg/m3].
+
+    Returns
+    -------
+    ComplexArray
+        Time factor e^{+i omega t}, against the elevation at the frame's origin.
+    """
+    k = float(wave_number(omega, depth))
+    direction = np.atleast_1d(np.asarray(heading, dtype=np.float64))
+    points, normals = quadrature_rule(hull.panels)
+    arms = np.cross(points - np.asarray(point), normals)
+    generalised = np.concatenate([normals, arms], axis=1)  # (q, 6), with the weights
+    z = points[:, 2]
+    if math.isinf(depth) or k * depth > 20.0:
+        decay = np.exp(k * z)
+    else:
+        decay = np.cosh(k * (z + depth)) / math.cosh(k * depth)
+    along = points[:, 0] * np.cos(direction)[:, None] + points[:, 1] * np.sin(direction)[:, None]
+    pressure = density * GRAVITY * decay * np.exp(-1j * k * along)
+    # Pressure pushes inwards, against the outward normal.
+    force: ComplexArray = -(pressure @ generalised)
+    return force
 
 
 def shortest_wave(hull: Hull, depth: float = math.inf) -> float:

@@ -86,21 +86,18 @@ class Hydrodynamics:
         omega = check_ascending(owner, "omega", self.omega)
         heading = check_ascending(owner, "heading", self.heading)
         k, h = omega.size, heading.size
-        for name, shape in (("added_mass", (k, 6, 6)), ("damping", (k, 6, 6))):
-            found = np.asarray(getattr(self, name), dtype=np.float64)
+        for name, shape, kind in (
+            ("added_mass", (k, 6, 6), np.float64),
+            ("damping", (k, 6, 6), np.float64),
+            ("excitation", (k, h, 6), np.complex128),
+        ):
+            found = np.array(getattr(self, name), dtype=kind)
             if found.shape != shape or not np.all(np.isfinite(found)):
                 raise InputError(
                     f"{owner}: {name} must be finite numbers of shape {shape}, got {found.shape}"
                 )
-            object.__setattr__(self, name, read_only(found))
-        force = np.array(self.excitation, dtype=np.complex128)
-        if force.shape != (k, h, 6) or not np.all(np.isfinite(force)):
-            raise InputError(
-                f"{owner}: excitation must be finite numbers of shape {(k, h, 6)}, "
-                f"got {force.shape}"
-            )
-        force.setflags(write=False)
-        object.__setattr__(self, "excitation", force)
+            found.setflags(write=False)
+            object.__setattr__(self, name, found)
         object.__setattr__(self, "omega", read_only(omega))
         object.__setattr__(self, "heading", read_only(heading))
 
@@ -186,18 +183,17 @@ class Hydrodynamics:
         tolerance
             Two headings closer than this are the same [rad].
         """
-        sign = MIRRORED
         other = np.mod(-self.heading, 2.0 * math.pi)
         apart = np.abs(np.exp(1j * other)[:, None] - np.exp(1j * self.heading)[None, :])
         new = apart.min(axis=1) > tolerance
         # Seas from ahead and astern are their own mirror image, but for the last digits.
         own = np.diagonal(apart) <= tolerance
-        force = np.where((own[:, None]) & (sign < 0.0), 0.0, self.excitation)
-        force = np.concatenate([force, sign * self.excitation[:, new]], axis=1)
+        force = np.where(own[:, None] & (MIRRORED < 0.0), 0.0, self.excitation)
+        force = np.concatenate([force, MIRRORED * self.excitation[:, new]], axis=1)
         heading = np.concatenate([self.heading, other[new]])
         order = np.argsort(heading)
         # Two like sides never couple a motion that the mirror keeps with one that it turns round.
-        coupled = np.where(np.outer(sign, sign) > 0.0, 1.0, 0.0)
+        coupled = np.where(np.outer(MIRRORED, MIRRORED) > 0.0, 1.0, 0.0)
         return replace(
             self,
             heading=heading[order],

@@ -171,22 +171,15 @@ class Loading:
                     f"m above the keel, for the vessel to float upright; got {kg:g} m"
                 )
         usual = 0.37 * waterplane.beam, 0.25 * waterplane.length, 0.25 * waterplane.length
-        found = []
-        for name, given, value in zip(("roll", "pitch", "yaw"), radii, usual, strict=True):
-            size = max(waterplane.length, waterplane.beam)
-            check_range(
-                "hull",
-                f"radius of gyration of {name}",
-                value if given is None else given,
-                low=0.01 * size,
-                high=2.0 * size,
-                unit="m",
-            )
-            found.append(float(value if given is None else given))
+        size = max(waterplane.length, waterplane.beam)
+        chosen = [usual[i] if given is None else float(given) for i, given in enumerate(radii)]
+        for name, radius in zip(("roll", "pitch", "yaw"), chosen, strict=True):
+            field = f"radius of gyration of {name}"
+            check_range("hull", field, radius, low=0.01 * size, high=2.0 * size, unit="m")
         return cls(
             mass=density * waterplane.volume,
             centre=(buoyancy[0], buoyancy[1], height),
-            radii=(found[0], found[1], found[2]),
+            radii=(chosen[0], chosen[1], chosen[2]),
         )
 
     def metacentric_heights(self, waterplane: Waterplane) -> tuple[float, float]:

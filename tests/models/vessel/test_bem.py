@@ -22,9 +22,8 @@ from models.vessel.hull import (
     usual_frequencies,
     vessel_from_hull,
 )
-from models.vessel.hull.froude_krylov import froude_krylov
+from models.vessel.hull.bem import froude_krylov, waterplane_lid
 from models.vessel.hull.hydrostatics import Loading, Waterplane, mass_matrix, stiffness_matrix
-from models.vessel.hull.lid import waterplane_lid
 from models.vessel.hull.vessel import well_spaced
 
 pytestmark = pytest.mark.ci  # whole optimisations in fixtures
