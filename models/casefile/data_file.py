@@ -22,15 +22,11 @@ FOLDER = "folder"
 """Key of the case file's folder in pydantic's validation context."""
 
 
-def _no_names() -> Collection[str]:
-    return ()
-
-
 @dataclass(frozen=True)
 class DataFile:
     """Metadata of an annotated text field that holds the path of an existing file."""
 
-    names: Callable[[], Collection[str]] = _no_names
+    names: Callable[[], Collection[str]] = tuple
     """Names that stand for bundled data instead of a file; they stay as they are."""
     what: str = "a file"
     """What is wanted, with its article, as in `a RAO file or the name of a bundled vessel`."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
@@ -91,7 +90,14 @@ class Quantity:
     ) -> CoreSchema:
         """Tell pydantic to validate with `read` alone."""
         del source, handler
-        return core_schema.no_info_plain_validator_function(self._validate)
+
+        def validate(value: Any) -> float | int | str:
+            try:
+                return self.read(value)
+            except InputError as error:
+                raise custom_error(str(error)) from None
+
+        return core_schema.no_info_plain_validator_function(validate)
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -109,16 +115,6 @@ class Quantity:
         if self.word:
             choices.append({"const": self.word})
         return {"anyOf": choices, "x-range": self.range, "x-unit": self.shown_unit}
-
-    @property
-    def _validate(self) -> Callable[[Any], float | int | str]:
-        def validate(value: Any) -> float | int | str:
-            try:
-                return self.read(value)
-            except InputError as error:
-                raise custom_error(str(error)) from None
-
-        return validate
 
 
 def _pattern(kind: str) -> str:

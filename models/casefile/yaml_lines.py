@@ -17,9 +17,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
 from ..basics import InputError
-from .messages import message_line
-
-Path = tuple[str | int, ...]
+from .messages import Path, message_line
 
 _DEEPEST = 20
 """Nesting at which reading stops: a case has five levels; an alias may refer to itself."""

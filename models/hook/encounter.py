@@ -30,7 +30,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..basics import GRAVITY, FloatArray, InputError, check_finite, read_only, wave_number
-from ..vessel import HeaveRao, hook_operators, vessel_raos
+from ..vessel import HeaveRao, hook_operators, rao_of_hook, vessel_raos
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -116,14 +116,10 @@ class Encounter:
         )
         operators = None
         if hook:
-            below, beyond = case.vessel.below, case.vessel.beyond
             operators = tuple(
-                HeaveRao(
-                    omega=omega, amplitude=np.abs(column), phase=np.angle(column),
-                    below=below, beyond=beyond, owner="vessel.raos",
-                )
+                rao_of_hook(case.vessel, omega, np.abs(column), np.angle(column))
                 for column in table.T
-            )  # fmt: skip
+            )
         return cls(
             along=speed_along(case, headings),
             weights=weights,

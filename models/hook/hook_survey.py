@@ -28,12 +28,12 @@ from ..basics import (
 )
 from ..sea import SeaSpectrum
 from ..vessel import (
-    HeaveRao,
     Point,
     across,
     equivalent,
     heave_operators,
     hook_rao,
+    rao_of_hook,
     sea_directions,
     vessel_raos,
 )
@@ -283,21 +283,15 @@ def _point(case: Case, waves: _Waves, place: Point, heading: float) -> FloatArra
     angles, weights = sea_directions(heading, case.sea.to_spectrum().spreading)
     operators = heave_operators(raos, place, angles)
 
-    def rao(amplitude: FloatArray) -> HeaveRao:
-        return HeaveRao(
-            omega=raos.omega,
-            amplitude=amplitude,
-            below=case.vessel.below,
-            beyond=case.vessel.beyond,
-            owner="vessel.raos",
-        )
+    def gain(amplitude: FloatArray) -> FloatArray:
+        return rao_of_hook(case.vessel, raos.omega, amplitude).gain(waves.omega)
 
     if not case.vessel.moves:
-        return waves.moments(rao(equivalent(operators, weights)[0]).gain(waves.omega))
+        return waves.moments(gain(equivalent(operators, weights)[0]))
     along = speed_along(case, angles)
     met = Encounter(along=along, weights=weights, depth=raos.depth).frequency(waves.omega)
     parts = [
-        share * waves.moments(rao(np.abs(column)).gain(waves.omega), row)
+        share * waves.moments(gain(np.abs(column)), row)
         for share, column, row in zip(weights, operators.T, met, strict=True)
     ]
     return np.asarray(np.sum(parts, axis=0))

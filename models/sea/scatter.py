@@ -151,18 +151,12 @@ class Scatter:
         classes, which = np.unique(np.stack(keys, axis=1), axis=0, return_inverse=True)
         share = np.zeros(len(classes))
         np.add.at(share, which.ravel(), self.occurrence)
-        at = 2
-        month = heading = None
-        if self.month is not None:
-            month, at = classes[:, at].astype(np.int64), at + 1
-        if self.heading is not None:
-            heading = turn * classes[:, at]
         return Scatter(
             significant_height=(classes[:, 0] + 0.5) * height_step,
             peak_period=(classes[:, 1] + 0.5) * period_step,
             occurrence=share,
-            month=month,
-            heading=heading,
+            month=None if self.month is None else classes[:, 2].astype(np.int64),
+            heading=None if self.heading is None else turn * classes[:, -1],
             source=self.source,
             total=self.total,
         )

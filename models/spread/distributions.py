@@ -218,13 +218,12 @@ class Normal(Bell):
 
     @override
     def _check(self) -> None:
-        check_finite("normal", "mean", [_number(self.mean)])
-        check_range("normal", "sd", _number(self.sd), low=0.0)
         mean, sd = _number(self.mean), _number(self.sd)
+        check_finite("normal", "mean", [mean])
+        check_range("normal", "sd", sd, low=0.0)
         low, high = self.support
-        if not (
-            low < high and ndtr((high - mean) / (sd or 1.0)) > ndtr((low - mean) / (sd or 1.0))
-        ):
+        below, above = (ndtr((end - mean) / (sd or 1.0)) for end in (low, high))
+        if not (low < high and below < above):
             raise InputError(
                 f"normal: nothing of it is left between {low:g} and {high:g} "
                 f"(mean {mean:g}, standard deviation {sd:g})"

@@ -6,6 +6,7 @@ drag coefficient (``drag``); this module is where their units are looked up.
 
 from __future__ import annotations
 
+import math
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -61,8 +62,8 @@ class Field:
     path: str
     kind: str
     nominal: float
-    low: float
-    high: float
+    low: float = -math.inf
+    high: float = math.inf
 
     @property
     def unit(self) -> str:
@@ -95,30 +96,23 @@ def field_of(case: Case, name: str, gains: Mapping[str, float], drag: float | No
             raise InputError(
                 "drag is a number of a design, and there is none; vary payload.drag_coefficient"
             )
-        return Field(path=path, kind="damping", nominal=drag, low=0.0, high=float("inf"))
+        return Field(path=path, kind="damping", nominal=drag, low=0.0)
     if path.startswith(GAINS):
         own = path.removeprefix(GAINS)
         if own not in gains:
             raise InputError(f"{path} is unknown; {suggestion(own, list(gains))}")
-        wide = float("inf")
-        return Field(path=path, kind="number", nominal=float(gains[own]), low=-wide, high=wide)
+        return Field(path=path, kind="number", nominal=float(gains[own]))
+    about: Any
     if path.startswith(FAULTS):  # of the time domain, see models/operation/faults.py
-        fault = fault_of(path)
-        return Field(
-            path=path, kind=fault.kind, nominal=fault.nominal, low=fault.low, high=fault.high
-        )
-    quantity, found = _walk(case, path)
-    if found is None and path in _DERIVED:
-        found = _DERIVED[path](case)
-    if quantity is None or isinstance(found, str | bool) or not isinstance(found, int | float):
-        raise InputError(f"there is no number at {path!r} in this case, got {found!r}")
-    return Field(
-        path=path,
-        kind=quantity.kind,
-        nominal=float(found),
-        low=quantity.low,
-        high=quantity.high,
-    )
+        about = fault_of(path)
+        found = about.nominal
+    else:
+        about, found = _walk(case, path)
+        if found is None and path in _DERIVED:
+            found = _DERIVED[path](case)
+        if about is None or isinstance(found, str | bool) or not isinstance(found, int | float):
+            raise InputError(f"there is no number at {path!r} in this case, got {found!r}")
+    return Field(path=path, kind=about.kind, nominal=float(found), low=about.low, high=about.high)
 
 
 def _walk(case: Case, path: str) -> tuple[Quantity | None, Any]:

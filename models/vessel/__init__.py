@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         heave_operators,
         hook_operators,
         hook_rao,
+        rao_of_hook,
         sea_directions,
         speed_remark,
         vessel_raos,

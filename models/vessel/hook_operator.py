@@ -172,13 +172,19 @@ def hook_rao(vessel: Vessel, spreading: Spreading | None = None, owner: str = "c
     """
     table = vessel.heave_rao
     if table is not None:
+        phase = None if table.phase is None else np.array(table.phase)
         return HeaveRao(
-            omega=np.array(table.omega), amplitude=np.array(table.amplitude),
-            phase=None if table.phase is None else np.array(table.phase),
+            omega=np.array(table.omega), amplitude=np.array(table.amplitude), phase=phase,
             below=vessel.below, beyond=vessel.beyond,
         )  # fmt: skip
     omega, operators, _, weights = hook_operators(vessel, spreading, owner)
-    amplitude, phase = equivalent(operators, weights)
+    return rao_of_hook(vessel, omega, *equivalent(operators, weights))
+
+
+def rao_of_hook(
+    vessel: Vessel, omega: FloatArray, amplitude: FloatArray, phase: FloatArray | None = None
+) -> HeaveRao:
+    """Return an operator made of `vessel.raos`, with the ends that the case wants for it."""
     return HeaveRao(
         omega=omega, amplitude=amplitude, phase=phase,
         below=vessel.below, beyond=vessel.beyond, owner="vessel.raos",

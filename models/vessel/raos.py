@@ -353,13 +353,9 @@ class VesselRaos:
                 )
             values[:, :, MODES.index(mode)] = grid
         return cls(
-            name=name,
-            omega=omega,
-            heading=heading,
-            values=values,
-            depth=depth,
+            name=name, omega=omega, heading=heading, values=values, depth=depth,
             source="waveresponse",
-        )
+        )  # fmt: skip
 
     def _wave_phase(self, omega: FloatArray, heading: FloatArray) -> ComplexArray:
         """Return the elevation at the origin over that at the phase origin (...,)."""

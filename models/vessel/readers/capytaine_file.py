@@ -159,10 +159,10 @@ def _computed(
     spring = _square_matrix(data, "hydrostatic_stiffness", stiffness, "stiffness", dofs, place)
     columns = [place.get(mode) for mode in MODES]
     share = 0.0 if roll_damping is None else roll_damping
+    six = _six(mass, spring, added, damping, columns, omega, heading, share, point, force)
     if len(dofs) > len(place) or None in columns:
         # Other bodies, modes that bend, or a body that is held: the equation of them all.
         if share:
-            six = _six(mass, spring, added, damping, columns, omega, heading, share, point)
             column = place.get("roll")
             if column is None:
                 raise InputError(f"{data.owner}: roll_damping is given, but nothing rolls")
@@ -174,7 +174,6 @@ def _computed(
             values[:, :, MODES.index(mode)] = solved[:, :, column]
         _tell_missing(place, notes)
     else:
-        six = _six(mass, spring, added, damping, columns, omega, heading, share, point, force)
         values = six.motions()
         notes.extend(_missed(six))
     notes.append(
@@ -199,7 +198,7 @@ def _six(
     heading: FloatArray,
     share: float,
     point: Point,
-    force: ComplexArray | None = None,
+    force: ComplexArray,
 ) -> FloatingBody:
     """Return one body with six motions; one that the file lacks has mass alone."""
     there = [i for i, c in enumerate(columns) if c is not None]
@@ -212,8 +211,7 @@ def _six(
     M[at], C[at] = mass[own], spring[own]
     A[:, at[0], at[1]] = added[:, own[0], own[1]]
     B[:, at[0], at[1]] = damping[:, own[0], own[1]]
-    if force is not None:
-        F[:, :, there] = force[:, :, picked]
+    F[:, :, there] = force[:, :, picked]
     order = np.argsort(heading)
     water = Hydrodynamics(
         omega=omega,

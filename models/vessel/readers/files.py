@@ -288,11 +288,8 @@ def _complex(value: complex) -> str:
 def _place(path: str | Path) -> Path:
     """Return the file of a path, or of the name of a bundled vessel."""
     name = str(path)
-    bundled = _bundled(name) if name in _BUNDLED and not Path(path).exists() else None
-    if bundled is not None:
-        return bundled
     if name in _BUNDLED:
-        return Path(path)
+        return (None if Path(path).exists() else _bundled(name)) or Path(path)
     if not Path(name).suffix and "\x00" not in name and not Path(name).exists():
         every = ", ".join(known for known, _ in bundled_vessels())
         raise InputError(

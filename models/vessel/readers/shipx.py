@@ -93,7 +93,7 @@ def parse_shipx(owner: str, text: str, *, speed: float | None = None) -> VesselR
     _, _, draught = lines.next(3, "length, breadth and draught")
     lines.next(2, "the centre of gravity")
     counts = lines.next(4, "the numbers of speeds, headings, frequencies and modes")
-    sizes = [
+    speeds, headings, frequencies, modes = (
         int(check_range(owner, f"number of {what}", value, low=1, high=high))
         for what, value, high in zip(
             ("speeds", "headings", "frequencies", "modes"),
@@ -101,8 +101,7 @@ def parse_shipx(owner: str, text: str, *, speed: float | None = None) -> VesselR
             (100, 1000, 5000, 6),
             strict=True,
         )
-    ]
-    speeds, headings, frequencies, modes = sizes
+    )
     if modes != 6:
         raise InputError(f"{owner}: number of modes must be 6, got {modes}")
     found: dict[float, tuple[list[float], list[tuple[float, float, list[complex]]]]] = {}

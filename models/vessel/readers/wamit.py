@@ -110,12 +110,9 @@ def parse_wamit(
             f"{owner}: the first column must be in (1e-6, 1e6) s or rad/s, got {first:g} to "
             f"{last:g}"
         )
-    cells = _six(owner, convention.omega(rows[:, 0]), rows[:, 1], modes, scaled)
-    omega, heading, table = cells
-    headings = convention.directions(heading)
-    w, b, found = grid(
-        owner, omega, headings, convention.complex_values(table, wave_number(omega, depth))
-    )
+    omega, heading, table = _six(owner, convention.omega(rows[:, 0]), rows[:, 1], modes, scaled)
+    motions = convention.complex_values(table, wave_number(omega, depth))
+    w, b, found = grid(owner, omega, convention.directions(heading), motions)
     return finished(
         VesselRaos(
             name=Path(owner).stem, omega=w, heading=b, values=found, origin=origin,
