@@ -16,13 +16,13 @@ import math
 import os
 import zipfile
 import zlib
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 
 from ...basics import GRAVITY, FloatArray, InputError, cache_folder, replace_atomically
-from ..crane import Point
 from .bem import Progress, solve_hull, versions
 from .hull import Hull
 from .hydrodynamics import Hydrodynamics
@@ -39,7 +39,6 @@ def cached_hydrodynamics(
     *,
     omega: FloatArray,
     heading: FloatArray,
-    point: Point = (0.0, 0.0, 0.0),
     depth: float = math.inf,
     density: float,
     lid: bool = True,
@@ -51,13 +50,14 @@ def cached_hydrodynamics(
 
     Parameters
     ----------
-    hull, omega, heading, point, depth, density, lid, threads, progress
+    hull, omega, heading, depth, density, lid, threads, progress
         As there.
     cache
         Whether to look into the cache and to add to it.
     """
     folder = cache_folder() / "hulls"
-    name = f"{digest_of(hull, omega, heading, point, depth, density, lid)}.npz"
+    inputs = {"depth": float(depth), "density": float(density), "lid": bool(lid)}
+    name = f"{_digest(hull, omega, heading, inputs)}.npz"
     if cache:
         found = _read(folder / name)
         if found is not None:
@@ -68,7 +68,6 @@ def cached_hydrodynamics(
         hull,
         omega=omega,
         heading=heading,
-        point=point,
         depth=depth,
         density=density,
         lid=lid,
@@ -83,25 +82,15 @@ def cached_hydrodynamics(
     return solved, False
 
 
-def digest_of(
-    hull: Hull,
-    omega: FloatArray,
-    heading: FloatArray,
-    point: Point,
-    depth: float,
-    density: float,
-    lid: bool,
-) -> str:
+def _digest(hull: Hull, omega: FloatArray, heading: FloatArray, inputs: Mapping[str, float]) -> str:
     """Return the digest of everything that the coefficients depend on."""
     words = json.dumps(
         {
             "format": _FORMAT,
             "hull": hull.digest,
-            "point": [float(x) for x in point],
-            "depth": float(depth),
-            "density": float(density),
+            "point": [0.0, 0.0, 0.0],
             "gravity": GRAVITY,
-            "lid": bool(lid),
+            **inputs,
             "versions": versions(),
         },
         sort_keys=True,

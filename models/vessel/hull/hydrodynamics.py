@@ -39,6 +39,7 @@ from ..raos import MIRRORED, MODES
 from .hydrostatics import moved, undamped_period
 
 _ROLL = MODES.index("roll")
+_SAME = 1e-6  # rad: two headings that are one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,19 +176,16 @@ class Hydrodynamics:
             worst = max(worst, off / size if size > 0.0 else 0.0)
         return worst
 
-    def mirrored(self, *, tolerance: float = 1e-6) -> Hydrodynamics:
+    def mirrored(self) -> Hydrodynamics:
         """Return the table with the headings of the other side, of a hull that has two like sides.
 
-        Parameters
-        ----------
-        tolerance
-            Two headings closer than this are the same [rad].
+        Two headings closer than 1e-6 rad are the same.
         """
         other = np.mod(-self.heading, 2.0 * math.pi)
         apart = np.abs(np.exp(1j * other)[:, None] - np.exp(1j * self.heading)[None, :])
-        new = apart.min(axis=1) > tolerance
+        new = apart.min(axis=1) > _SAME
         # Seas from ahead and astern are their own mirror image, but for the last digits.
-        own = np.diagonal(apart) <= tolerance
+        own = np.diagonal(apart) <= _SAME
         force = np.where(own[:, None] & (MIRRORED < 0.0), 0.0, self.excitation)
         force = np.concatenate([force, MIRRORED * self.excitation[:, new]], axis=1)
         heading = np.concatenate([self.heading, other[new]])

@@ -252,7 +252,6 @@ def stiffness_matrix(
     point: Point = (0.0, 0.0, 0.0),
     *,
     density: float = SEA_WATER_DENSITY,
-    gravity: float = GRAVITY,
 ) -> FloatArray:
     """Return the hydrostatic stiffness of a freely floating body about a point (6, 6).
 
@@ -276,7 +275,7 @@ def stiffness_matrix(
     found[3, 3] = yy - 2.0 * y * sy + y**2 * area + moment
     found[4, 4] = xx - 2.0 * x * sx + x**2 * area + moment
     found[3, 4] = found[4, 3] = -(xy - x * sy - y * sx + x * y * area)
-    return density * gravity * found
+    return density * GRAVITY * found
 
 
 def undamped_period(inertia: float, stiffness: float) -> float:

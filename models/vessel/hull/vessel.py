@@ -212,7 +212,7 @@ def usual_frequencies(hull: Hull, low: float = 0.15, high: float = 2.0) -> Float
     return np.linspace(low, high, max(4, 1 + math.ceil((high - low) / step - 1e-9)))
 
 
-def well_spaced(body: FloatingBody, *, most: int = _ROWS) -> FloatArray:
+def well_spaced(body: FloatingBody) -> FloatArray:
     """Return frequencies at which the motions tell all their bends.
 
     Beginning with those of the coefficients, the middle of two rows is added wherever a motion
@@ -222,8 +222,6 @@ def well_spaced(body: FloatingBody, *, most: int = _ROWS) -> FloatArray:
     ----------
     body
         With its coefficients.
-    most
-        Rows at most.
     """
     rows = np.array(body.hydrodynamics.omega)
     values = body.motions(rows)
@@ -239,7 +237,7 @@ def well_spaced(body: FloatingBody, *, most: int = _ROWS) -> FloatArray:
         off = (np.abs(exact - straight) / scale).max(axis=(1, 2))
         wanted = np.flatnonzero((off > _BEND) & (np.diff(rows) > 2.0 * _CLOSEST))
         # The worst first, so that the limit on rows cuts where it matters least.
-        wanted = wanted[np.argsort(off[wanted])[::-1][: max(0, most - rows.size)]]
+        wanted = wanted[np.argsort(off[wanted])[::-1][: max(0, _ROWS - rows.size)]]
         if not wanted.size:
             break
         order = np.argsort(np.concatenate([rows, middle[wanted]]))

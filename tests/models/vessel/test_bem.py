@@ -167,7 +167,6 @@ def solved(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[int]:
             added_mass=1e5 * np.broadcast_to(np.eye(6), (len(omega), 6, 6)),
             damping=1e5 * np.broadcast_to(np.eye(6), (len(omega), 6, 6)),
             excitation=force,
-            point=given["point"],
             depth=given["depth"],
         )
 
