@@ -7,13 +7,11 @@ cut.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..basics import FloatArray, check_range
-from .profile import Period
 from .scenario import Scenario
 
 # A sample that falls on the start or the end of something by intention should not miss it by the
@@ -72,8 +70,9 @@ class Schedule:
         last = math.inf if scenario.disengage_at is None else scenario.disengage_at
         # When the controller was engaged last, and whether the brake has been tripped.
         since = np.full(count, scenario.warm_up)
-        tripped = _outside(clock, scenario.brake_trips) == 0.0
-        for _, end in scenario.brake_trips:
+        tripped = np.zeros(count, dtype=np.bool_)
+        for begin, end in scenario.brake_trips:
+            tripped |= (clock >= begin) & (clock < end)
             since = np.where(clock >= end, np.maximum(since, end), since)
         braked = tripped | (clock < since) | (clock >= last + scenario.ramp) | (since > last)
         leaving = _ramp(clock - last, scenario.ramp) if math.isfinite(last) else np.zeros(count)
@@ -112,11 +111,4 @@ def _ramp(clock: FloatArray, duration: float) -> FloatArray:
     if duration <= 0.0:
         return (clock >= 0.0).astype(np.float64)
     result: FloatArray = 0.5 * (1.0 - np.cos(np.pi * np.clip(clock / duration, 0.0, 1.0)))
-    return result
-
-
-def _outside(clock: FloatArray, periods: Sequence[Period]) -> FloatArray:
-    result = np.ones(clock.shape)
-    for start, end in periods:
-        result[(clock >= start) & (clock < end)] = 0.0
     return result

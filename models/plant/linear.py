@@ -331,13 +331,10 @@ class LinearPlant(StateSpace):
         """
         check_range(_OWNER, "dt", dt, low=0.0, unit="s", open_low=True)
         Ad, BEd = zero_order_hold(self.A, np.hstack([self.B, self.E]), dt)
-        same: dict[str, Any] = {
-            field.name: getattr(self, field.name)
-            for field in fields(StateSpace)
-            if field.name not in ("A", "B", "E")
-        }
         nu = self.B.shape[1]
-        return DiscretePlant(dt=float(dt), A=Ad, B=BEd[:, :nu], E=BEd[:, nu:], **same)
+        parts: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(StateSpace)}
+        parts |= {"A": Ad, "B": BEd[:, :nu], "E": BEd[:, nu:]}
+        return DiscretePlant(dt=float(dt), **parts)
 
     def to_control(self, pade_order: int = 6) -> control.StateSpace:
         """Return a python-control system, inputs then disturbances to measurements then outputs.

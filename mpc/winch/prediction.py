@@ -397,18 +397,19 @@ def _unit_error(case: Case, hook: HookMotion, T: float) -> tuple[FloatArray, Flo
     """Return the error (e, e') of the reference unit over a sample, and what is added to it."""
     unit = MruModel(case.sensors.mru, T, float(hook.displacement.rms), seed=0)
     w = 1.0 if case.sensors.mru is None else case.sensors.mru.noise_bandwidth
-    A = np.array([[0.0, 1.0], [-(w**2), -math.sqrt(2.0) * w]])
-    over, added = noisy_hold(A, np.array([[0.0], [1.0]]), T)
-    # variance of e under white noise of intensity one: 1/(2 sqrt(2) w^3)
-    return over, added * unit.error_rms**2 * 2.0 * math.sqrt(2.0) * w**3
+    return _low_pass_error(w, T, unit.error_rms)
 
 
 def _slow_error(hook: HookMotion, T: float) -> tuple[FloatArray, FloatArray]:
     """Return a slow error of the unit (e, e') over a sample, and what adds up to an rms of one."""
-    w = _SLOW * float(hook.velocity.rms / hook.displacement.rms)
+    return _low_pass_error(_SLOW * float(hook.velocity.rms / hook.displacement.rms), T, 1.0)
+
+
+def _low_pass_error(w: float, T: float, rms: float) -> tuple[FloatArray, FloatArray]:
     A = np.array([[0.0, 1.0], [-(w**2), -math.sqrt(2.0) * w]])
     over, added = noisy_hold(A, np.array([[0.0], [1.0]]), T)
-    return over, added * 2.0 * math.sqrt(2.0) * w**3
+    # variance of e under white noise of intensity one: 1/(2 sqrt(2) w^3)
+    return over, added * rms**2 * 2.0 * math.sqrt(2.0) * w**3
 
 
 def _depths(case: Case, T: float) -> dict[str, int]:
