@@ -7,8 +7,9 @@ agrees with the response.  Everything is computed when asked for and kept.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
@@ -102,23 +103,23 @@ class Assessment:
     @cached_property
     def margins(self) -> Margins:
         """Margins of the loops broken at the inputs."""
-        count = len(self.plant.inputs)
         return worst_margins(
-            [loop_margins(self._loop(i), self.grid, self._grid_gain[i]) for i in range(count)]
+            [
+                loop_margins(partial(self.loop_gain, index=i), self.grid, gain)
+                for i, gain in enumerate(self._grid_gain)
+            ]
         )
 
     @cached_property
     def _grid_gain(self) -> list[ComplexArray]:
         """L of each loop on the grid."""
-        blocks = numeric_blocks(self.plant.response(self.grid))
-        differences = return_differences(blocks, self._law(self.grid))
-        return [np.asarray(d, dtype=np.complex128) - 1.0 for d in differences]
+        return self._gains(self.grid)
 
     @cached_property
     def _peaks(self) -> list[tuple[FloatArray, FloatArray]]:
         """Places of the local minima of |1 + L| of each loop, and their values."""
         return [
-            refine_minima(self._distance(i), self.grid, np.abs(1.0 + gain))
+            refine_minima(partial(self._distance, i), self.grid, np.abs(1.0 + gain))
             for i, gain in enumerate(self._grid_gain)
         ]
 
@@ -129,13 +130,12 @@ class Assessment:
 
     def loop_gain(self, omega: FloatArray, index: int = 0) -> ComplexArray:
         """Return L of the loop broken at input `index`, (k,)."""
-        return self._loop(index)(np.asarray(omega, dtype=np.float64))
+        return self._gains(np.asarray(omega, dtype=np.float64))[index]
 
     def response(self, output: str, disturbance: str, omega: FloatArray) -> ComplexArray:
         """Return the closed-loop response of `output` to `disturbance`, (k,)."""
-        blocks = numeric_blocks(self.plant.response(omega))
         pair = (output, disturbance)
-        return np.asarray(closed_loop(blocks, self._law(omega), [pair])[pair])
+        return np.asarray(self._responses(omega, [pair])[pair])
 
     def sigma(self, output: str) -> float:
         """Return the standard deviation of `output`."""
@@ -167,7 +167,7 @@ class Assessment:
     def largest_loop_gain(self, above: float) -> tuple[float, float]:
         """Return the largest |L| from frequency `above` [rad/s] on, and where it is."""
         return self._largest(
-            lambda w: np.max([np.abs(self._loop(i)(w)) for i in range(len(self.plant.inputs))], 0),
+            lambda w: np.max(np.abs(self._gains(w)), 0),
             np.unique(np.append(self.grid[self.grid > above], [above, 10.0 * self.grid[-1]])),
         )
 
@@ -180,27 +180,13 @@ class Assessment:
 
     def spectrum(self, output: str, omega: FloatArray) -> FloatArray:
         """Return the one-sided density of `output` at `omega` [rad/s], (k,)."""
-        pairs = [(output, d.name) for d in self.disturbances]
-        found = closed_loop(numeric_blocks(self.plant.response(omega)), self._law(omega), pairs)
-        parts = [np.abs(found[output, d.name]) ** 2 * d.density(omega) for d in self.disturbances]
-        return np.asarray(np.sum(parts, axis=0), dtype=np.float64)
+        return np.asarray(np.sum(self._spectra([output], omega), axis=0), dtype=np.float64)
 
     def quadrature(self, outputs: Sequence[str], rtol: float = _RTOL) -> Quadrature:
         """Return nodes on which the variance and the second moment of `outputs` are accurate."""
         low, high, half_line = integration_band(self.disturbances, self.poles)
-        pairs = [(output, d.name) for output in outputs for d in self.disturbances]
-
-        def integrands(omega: FloatArray) -> FloatArray:
-            found = closed_loop(numeric_blocks(self.plant.response(omega)), self._law(omega), pairs)
-            rows = [
-                np.abs(found[output, d.name]) ** 2 * d.density(omega)
-                for output in outputs
-                for d in self.disturbances
-            ]
-            return np.array(rows)
-
         return adaptive_nodes(
-            integrands,
+            lambda omega: np.array(self._spectra(outputs, omega)),
             low,
             high,
             splits=[w for d in self.disturbances for w in d.splits],
@@ -222,17 +208,25 @@ class Assessment:
             self._moments[output] = m0, float(nodes.integrate(density * nodes.omega**2))
         return self._moments[output]
 
-    def _loop(self, index: int) -> Callable[[FloatArray], ComplexArray]:
-        def loop(omega: FloatArray) -> ComplexArray:
-            blocks = numeric_blocks(self.plant.response(omega))
-            difference = return_differences(blocks, self._law(omega))[index]
-            return np.asarray(difference, dtype=np.complex128) - 1.0
+    def _responses(
+        self, omega: FloatArray, pairs: Sequence[tuple[str, str]]
+    ) -> Mapping[tuple[str, str], Any]:
+        return closed_loop(numeric_blocks(self.plant.response(omega)), self._law(omega), pairs)
 
-        return loop
+    def _spectra(self, outputs: Sequence[str], omega: FloatArray) -> list[FloatArray]:
+        """Return what each disturbance alone makes of each output, (k,) each."""
+        pairs = [(output, d) for output in outputs for d in self.disturbances]
+        found = self._responses(omega, [(output, d.name) for output, d in pairs])
+        return [np.abs(found[output, d.name]) ** 2 * d.density(omega) for output, d in pairs]
 
-    def _distance(self, index: int) -> Callable[[FloatArray], FloatArray]:
-        loop = self._loop(index)
-        return lambda omega: np.abs(1.0 + loop(omega))
+    def _gains(self, omega: FloatArray) -> list[ComplexArray]:
+        """Return L of each loop, (k,) each."""
+        blocks = numeric_blocks(self.plant.response(omega))
+        differences = return_differences(blocks, self._law(omega))
+        return [np.asarray(d, dtype=np.complex128) - 1.0 for d in differences]
+
+    def _distance(self, index: int, omega: FloatArray) -> FloatArray:
+        return np.abs(1.0 + self._gains(omega)[index])
 
     def _law(self, omega: FloatArray) -> list[list[ComplexArray]]:
         response = self.controller.response_at(1j * omega)
