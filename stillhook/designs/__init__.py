@@ -20,11 +20,10 @@ if TYPE_CHECKING:
         save_structure,
         structure_text,
     )
-    from .pareto import pareto_report
     from .report import design_report, write_report
     from .robust import robust_report, scenario_table, schedule_report
     from .sensitivity import Wide, indices_table, moved_table, sensitivity_report
-    from .sizing import co_design_report, size_report, worth_report
+    from .sizing import co_design_report, pareto_report, size_report, worth_report
     from .structures import structures_report, structures_table
     from .summary import AT_LEAST, LIMITS
 else:

@@ -14,8 +14,7 @@ from synth.design import GainDesign
 
 from ..text import Drawing, OutputFolder, Report, ReportSection, markdown, pairs
 from .design_file import design_text
-from .figures import limits, payload_spectrum, responses
-from .nyquist import nyquist
+from .figures import limits, nyquist, payload_spectrum, responses
 from .summary import (
     command_text,
     effect,

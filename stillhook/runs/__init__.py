@@ -11,8 +11,7 @@ if TYPE_CHECKING:
     from .data import runs_data
     from .report import RunFolder, runs_report, write_runs
     from .runs import TRIPS, Runs, headline_of, keep_worst, tree
-    from .series import Series
-    from .simulation import seconds_of, seeds_of, simulate
+    from .simulation import Series, seconds_of, seeds_of, simulate
     from .window import error_of
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -194,7 +194,7 @@ class RunFolder:
         self.written.append(self.folder.write(name, content))
 
     def _animate(self, compared: Sequence[Runs], tell: Callable[[str, float], None]) -> None:
-        from .animation import animation
+        from .strip import animation
 
         for runs in compared:
             if runs.worst.time.size < 2:

@@ -67,7 +67,7 @@ def traces(run: Run, window: Window | None = None) -> Figure:
     run
         The run, with its traces.
     window
-        What to show on the right; by default `run_window.window_of`.
+        What to show on the right; by default `stillhook.runs.window.window_of`.
 
     Returns
     -------

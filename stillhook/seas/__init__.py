@@ -9,11 +9,15 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .hook import motion_figure, motion_report, own_place
-    from .hull import hull_figure, hull_report
     from .operability import operability_report, workable_table, write_operability
-    from .operability_figures import capability_figure, contour_figure, depth_figure
-    from .operability_site import heading_figure, scatter_figure
-    from .raos import long_wave_verdict, rao_figure, rao_report
+    from .operability_figures import (
+        capability_figure,
+        contour_figure,
+        depth_figure,
+        heading_figure,
+        scatter_figure,
+    )
     from .sea import records_report, records_table, sea_report
+    from .vessel import hull_figure, hull_report, long_wave_verdict, rao_figure, rao_report
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -24,8 +24,13 @@ from ..text import (
     pairs,
     percent,
 )
-from .operability_figures import capability_figure, contour_figure, depth_figure
-from .operability_site import heading_figure, scatter_figure
+from .operability_figures import (
+    capability_figure,
+    contour_figure,
+    depth_figure,
+    heading_figure,
+    scatter_figure,
+)
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,8 +1,7 @@
-"""The figures of operability: H_s over T_p, at several depths, and what the winch can follow.
+"""The figures of operability: H_s over T_p, at several depths, over heading and over the year.
 
 Drawn as people of the trade draw them: one line for each limit with the region below all of them
-shaded; the maker's lines of heave over period.  Roses and scatter diagrams are in
-`stillhook.seas.operability_site`.
+shaded; the maker's lines of heave over period; roses and scatter diagrams.
 """
 
 from __future__ import annotations
@@ -11,26 +10,154 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
-from synth.operability import AtDepth, Operability
+from models.basics import GRAVITY, FloatArray
+from synth.operability import AtDepth, Criterion, Operability
 
-from ..text import AFTER, BEFORE, REFERENCE, drawn, panel
-from .operability_axes import (
-    SHADE,
-    draw_steepest,
-    limit_line,
-    limit_text,
-    line_of,
-    own_heading,
-    periods_axis,
-    shade,
-    steepest,
-    titled,
-    top_of,
+from ..text import (
+    AFTER,
+    BEFORE,
+    DRUM,
+    HOOK,
+    REFERENCE,
+    drawn,
+    headline,
+    new_figure,
+    panel,
+    quantity,
 )
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from synth.operability import Contour
+
+# Colour and dashes of each limit: the same in every figure.
+_LINES: dict[str, tuple[str, Any]] = {
+    "payload": ("#0072b2", "-"),
+    "motor.torque.peak": ("#e69f00", "-"),
+    "motor.torque.continuous": ("#e69f00", (0, (5, 2))),
+    "motor.speed.peak": ("#009e73", "-"),
+    "motor.voltage.peak": ("#56b4e9", "-"),
+    "motor.current.peak": ("#b8860b", (0, (1, 1.2))),
+    "motor.current.continuous": ("#b8860b", (0, (5, 2, 1, 2))),
+    "motor.power.peak": ("#cc79a7", "-"),
+    "rope.tension.peak": ("#444444", "-"),
+    "rope.tension.least": ("#444444", (0, (5, 2))),
+    "stability": ("#000000", (0, (1, 1))),
+}
+_STEEP = "#9a9a9a"
+SHADE = "#cfe3f1"
+DEGREES = 180.0 / math.pi
+_FAR = 3.0  # times what can be reached: beyond, a limit is not shown
+
+
+def limit_text(criterion: Criterion) -> str:
+    """Return a limit with its bound, as ``motor speed 2000 rpm``."""
+    if criterion.limit is None:
+        return criterion.label
+    bound = (
+        quantity(criterion.bound, "rpm")
+        if criterion.unit == "rad/s"
+        else quantity(criterion.bound, criterion.unit)
+    )
+    kind = {"payload.rms": " rms", "payload.significant": " sign.", "payload.max": " max."}
+    return f"{criterion.label} {bound}{kind.get(criterion.name, '')}"
+
+
+def line_of(name: str) -> tuple[str, Any]:
+    """Return the colour and the dashes of a limit's line."""
+    return _LINES.get(name) or _LINES.get(name.partition(".")[0]) or (REFERENCE, "-")
+
+
+def pale(name: str) -> tuple[float, float, float]:
+    """Return the colour of a limit, lighter where its line is dashed, to fill areas with."""
+    from matplotlib.colors import to_rgb
+
+    colour, dashes = line_of(name) if name else ("#f0f0f0", "-")
+    red, green, blue = to_rgb(colour)
+    mixed = 0.15 if dashes == "-" else 0.5
+    return tuple(c + (1.0 - c) * mixed for c in (red, green, blue))  # type: ignore[return-value]
+
+
+def own_heading(study: Operability, contour: Contour) -> int:
+    """Return the row of the case's own heading, or of the nearest."""
+    heading = getattr(study.case.vessel, "heading", None)
+    if contour.headings is None or heading is None:
+        return 0
+    return int(np.abs(np.angle(np.exp(1j * (contour.headings - heading)))).argmin())
+
+
+def steepest(periods: FloatArray) -> FloatArray:
+    """Return the H_s above which seas of a period are not observed [m] (DNV-RP-C205, 3.5.4)."""
+    share = np.clip((periods - 8.0) / 7.0, 0.0, 1.0)
+    slope = 1.0 / 15.0 + share * (1.0 / 25.0 - 1.0 / 15.0)
+    return np.asarray(slope * GRAVITY * periods**2 / (2.0 * math.pi))
+
+
+def top_of(
+    periods: FloatArray, envelopes: list[FloatArray], others: FloatArray | None = None
+) -> float:
+    """Return the upper end of an axis of H_s: room above what can be reached, and no more.
+
+    The next limit above is shown too, if it is not far away.
+    """
+    reached = max(float(np.minimum(e, steepest(periods)).max()) for e in envelopes)
+    room = 1.5 * reached
+    if others is not None:
+        near = np.where(others < steepest(periods), others, np.inf).min(axis=1)
+        above = np.sort(near[near > room])
+        if above.size and above[0] < _FAR * reached:
+            room = 1.15 * float(above[0])
+    return max(room, 0.1)
+
+
+def shade(axes: Axes, periods: FloatArray, limit: FloatArray) -> None:
+    """Shade the seas that are workable: below the limit, and not steeper than seas are."""
+    if periods.size > 1:
+        T = np.linspace(periods[0], periods[-1], 400)
+        # Lines that leave for infinity do so between two periods.
+        below = np.interp(T, periods, np.minimum(limit, 1e3))
+        axes.fill_between(T, 0.0, np.minimum(below, steepest(T)), color=SHADE, linewidth=0.0)
+
+
+def limit_line(
+    axes: Axes, periods: FloatArray, heights: FloatArray, top: float, colour: Any, **style: Any
+) -> None:
+    """Draw a limit of H_s over the period, up to somewhat above the figure's `top`."""
+    axes.plot(periods, np.minimum(heights, 2.0 * top), color=colour, **style)
+
+
+def draw_steepest(axes: Axes, periods: FloatArray, top: float) -> None:
+    """Draw the steepest seas of each period."""
+    T = np.linspace(periods[0], periods[-1], 100)
+    if steepest(T).min() < top:
+        axes.plot(T, steepest(T), color=_STEEP, linestyle=":", linewidth=1.2, label="steepest seas")
+
+
+def periods_axis(axes: Axes, periods: FloatArray) -> None:
+    """Make the x axis that of peak periods."""
+    axes.set_xlabel(r"peak period $T_p$ [s]")
+    if periods.size > 1:
+        axes.set_xlim(periods[0], periods[-1])
+
+
+def titled(figure: Figure, study: Operability, at: AtDepth | None, finding: str) -> Figure:
+    """Set what the figure found as its title, and what it is about in small below; return it.
+
+    `at` is the length of rope; None where the figure shows several.
+    """
+    gamma = f", gamma {study.case.sea.gamma}" if study.case.sea.spectrum == "jonswap" else ""
+    about = f"{study.case.name}: {study.case.sea.spectrum}{gamma}"
+    if at is not None:
+        about += f", {at.rope.length:g} m of rope"
+    if study.headings is not None:
+        h = own_heading(study, study.depths[0].main)
+        about += f", heading {float(study.headings[h]) * DEGREES:.0f} deg"
+    return headline(figure, finding, about)
+
 
 _HELD = (0, (2, 1))  # dashes of the drum held
 
@@ -176,3 +303,195 @@ def _finding(study: Operability, at: AtDepth, h: int) -> str:
     span = f"{low:.2g} m" if math.isclose(low, high, rel_tol=0.02) else f"{low:.2g} to {high:.2g} m"
     who = "" if "loop" in at.contours else ", drum held"
     return f"Workable up to H_s {span}{who}; most often bound by {label}"
+
+
+@drawn
+def heading_figure(study: Operability, at: AtDepth | None = None) -> Figure:
+    """Return two roses over heading, the bow up: the limiting H_s, and the limit that binds.
+
+    Parameters
+    ----------
+    study
+        The study, of a vessel with headings.
+    at
+        The length of rope; by default the first.
+    """
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.patches import Patch
+
+    at = study.depths[0] if at is None else at
+    contour = at.main
+    assert contour.headings is not None
+    # Where the waves come from, seen from the deck: head seas at the top.
+    edges, rows = _around(contour.headings)
+    rings = _edges(contour.periods)
+    figure = new_figure(9.6, 5.6)
+    left = figure.add_subplot(1, 2, 1, projection="polar")
+    right = figure.add_subplot(1, 2, 2, projection="polar")
+    # Above the steepest seas of a period there is nothing to be limited.
+    limit = np.minimum(contour.limit[rows], steepest(contour.periods))
+    levels = _levels(float(limit.max()))
+    bands = BoundaryNorm(levels, 256, extend="neither")
+    mesh = left.pcolormesh(edges, rings, limit.T, cmap="viridis", norm=bands)
+    bar = figure.colorbar(mesh, ax=left, shrink=0.8, pad=0.08, location="bottom")
+    bar.set_label(r"limiting $H_s$ [m], up to the steepest seas")
+    real = contour.limit < steepest(contour.periods)
+    binding = np.where(real, contour.binding, "")
+    names = [str(n) for n in np.unique(binding)]
+    number = np.searchsorted(names, binding[rows])
+    colours = [pale(name) for name in names]
+    right.pcolormesh(
+        edges, rings, number.T, cmap=ListedColormap(colours), vmin=-0.5, vmax=len(names) - 0.5
+    )
+    labels = {c.name: limit_text(c) for c in contour.criteria}
+    right.legend(
+        handles=[
+            Patch(color=colour, label=labels.get(name, "nothing below the steepest seas"))
+            for name, colour in zip(names, colours, strict=True)
+        ],
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.14),
+        fontsize=8.5,
+    )
+    for axes, text in ((left, r"limiting $H_s$"), (right, "what binds")):
+        _rose(axes, contour.periods)
+        axes.set_title(text, fontsize=10.0, loc="center", pad=12.0)
+    best = float(np.degrees(contour.headings[int(limit.mean(axis=1).argmax())]))
+    finding = f"Best on average at a heading of {best:.0f} deg; rings are $T_p$, the bow is up"
+    return headline(figure, finding)
+
+
+@drawn
+def scatter_figure(study: Operability, at: AtDepth | None = None) -> Figure:
+    """Return the scatter diagram with the limits across it, and the share of each month if known.
+
+    Parameters
+    ----------
+    study
+        The study, with a scatter diagram.
+    at
+        The length of rope; by default the first.
+    """
+    at = study.depths[0] if at is None else at
+    scatter = study.scatter
+    assert scatter is not None
+    months = at.workable["held"].by_month
+    main = "loop" if "loop" in at.contours else "held"
+    h = own_heading(study, at.main)
+    figure = new_figure(9.6 if months else 7.2, 4.6)
+    grid = figure.add_gridspec(1, 2 if months else 1, width_ratios=(3, 2) if months else None)
+    axes = figure.add_subplot(grid[0, 0])
+    seas = np.column_stack([scatter.peak_period, scatter.significant_height])
+    states, place = np.unique(np.round(seas, 6), axis=0, return_inverse=True)
+    share = np.bincount(place.ravel(), weights=scatter.occurrence)
+    visible = share > 2e-5
+    size = 260.0 * np.sqrt(share[visible] / share.max())
+    x, y = states[visible].T
+    axes.scatter(x, y, s=size, color=HOOK, alpha=0.45, linewidths=0.0, zorder=2)
+    top = 1.05 * float(states[visible, 1].max())
+    for name, colour, text in (
+        ("held", BEFORE, "drum held"),
+        ("loop", AFTER, "with the design"),
+        ("reoptimised", DRUM, "gains anew for each sea"),
+    ):
+        if name not in at.contours:
+            continue
+        contour = at.contours[name]
+        worked = at.workable[name].share
+        label = f"{text}: {100.0 * worked:.0f} % of the year"
+        if name == main:
+            shade(axes, contour.periods, contour.limit[h])
+        limit_line(axes, contour.periods, contour.limit[h], top, colour, label=label, zorder=3)
+        best = at.workable[name].best_heading
+        if best is not None:
+            style: Any = {"linestyle": (0, (4, 2)), "zorder": 3}
+            label = f"... best heading: {100.0 * best:.0f} %"
+            vaning = contour.weathervaning
+            limit_line(axes, contour.periods, vaning, top, colour, label=label, **style)
+    draw_steepest(axes, at.main.periods, top)
+    axes.set_ylim(0.0, top)
+    periods_axis(axes, at.main.periods)
+    axes.set_ylabel(r"$H_s$ [m]")
+    figure.legend(loc="outside lower center", ncols=3, fontsize=8.5)
+    if months:
+        _months(figure.add_subplot(grid[0, 1]), at)
+    gain = at.workable[main].share - at.workable["held"].share
+    finding = f"Workable {100.0 * at.workable[main].share:.0f} % of the year"
+    if main == "loop":
+        finding += f", {100.0 * at.workable['held'].share:.0f} % with the drum held"
+        if abs(gain) < 5e-3:
+            finding = "Compensation makes no more of the year workable"
+    return titled(figure, study, at, finding)
+
+
+def _months(axes: Axes, at: AtDepth) -> None:
+    """Draw the workable share of each month."""
+    numbers = np.arange(1, 13)
+    bars = [(n, c) for n, c in (("held", BEFORE), ("loop", AFTER)) if n in at.workable]
+    width = 0.8 / len(bars)
+    for k, (name, colour) in enumerate(bars):
+        shares = [100.0 * at.workable[name].by_month.get(int(m), np.nan) for m in numbers]
+        axes.bar(numbers - 0.4 + (k + 0.5) * width, shares, width=width, color=colour)
+    axes.set_xticks(numbers, list("JFMAMJJASOND"))
+    axes.set_ylim(0.0, 100.0)
+    axes.set_ylabel("workable [% of the month]")
+    axes.grid(axis="x", visible=False)
+
+
+def _around(headings: FloatArray) -> tuple[FloatArray, npt.NDArray[np.intp]]:
+    """Return the edges of sectors [rad], waves coming from there, and the rows in their order."""
+    rows = np.arange(headings.size)
+    if headings.size == 1:
+        half = math.radians(15.0)
+        return np.array([headings[0] - half, headings[0] + half]) + math.pi, rows
+    middle = 0.5 * (headings[:-1] + headings[1:])
+    if _goes_round(headings):
+        seam = 0.5 * (headings[-1] + headings[0] + 2.0 * math.pi)
+        return np.concatenate([[seam - 2.0 * math.pi], middle, [seam]]) + math.pi, rows
+    first = headings[0] - 0.5 * (headings[1] - headings[0])
+    last = headings[-1] + 0.5 * (headings[-1] - headings[-2])
+    return np.concatenate([[first], middle, [last]]) + math.pi, rows
+
+
+def _goes_round(headings: FloatArray) -> bool:
+    gaps = np.diff(np.append(headings, headings[0] + 2.0 * math.pi))
+    return bool(gaps.max() < math.radians(91.0))
+
+
+def _edges(periods: FloatArray) -> FloatArray:
+    if periods.size == 1:
+        return np.array([periods[0] - 0.5, periods[0] + 0.5])
+    middle = 0.5 * (periods[:-1] + periods[1:])
+    first, last = 1.5 * periods[0] - 0.5 * periods[1], 1.5 * periods[-1] - 0.5 * periods[-2]
+    return np.concatenate([[first], middle, [last]])
+
+
+def _levels(high: float) -> FloatArray:
+    """Return round bounds of bands of H_s from zero to above a value, five to ten."""
+    steps = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+    step = next((s for s in steps if high / s <= 10.0), steps[-1])
+    return np.asarray(step * np.arange(math.ceil(high / step - 1e-9) + 1.0))
+
+
+def _rose(axes: Any, periods: FloatArray) -> None:
+    """Set a polar axis: bow up, angles counter-clockwise, radius the peak period."""
+    axes.set_theta_zero_location("N")
+    axes.set_theta_direction(1)
+    turns = np.radians(np.arange(0.0, 360.0, 45.0))
+    names = {
+        180.0: "head 180",
+        0.0: "following 0",
+        90.0: "from\nstarboard 90",
+        270.0: "from\nport 270",
+    }
+    labels = []
+    for turn in turns:
+        heading = (math.degrees(turn) + 180.0) % 360.0
+        labels.append(names.get(round(heading, 6), f"{heading:.0f}"))
+    axes.set_xticks(turns, labels, fontsize=8.0)
+    axes.set_ylim(0.0, _edges(periods)[-1])
+    rings = [t for t in (5.0, 10.0, 15.0, 20.0) if t < periods[-1]]
+    axes.set_yticks(rings, [f"{t:g} s" for t in rings], fontsize=7.5, color="white")
+    axes.set_axisbelow(False)
+    axes.grid(color="white", linewidth=0.5, alpha=0.7)
+    axes.tick_params(axis="x", pad=9.0)

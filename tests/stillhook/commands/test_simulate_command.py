@@ -316,7 +316,7 @@ def diverging(monkeypatch, seed: int) -> None:
             return run
         return replace(run, status="diverged", message="the simulation diverged at 12 s")
 
-    monkeypatch.setattr("stillhook.runs.series.run_simulation", stub)
+    monkeypatch.setattr("stillhook.runs.simulation.run_simulation", stub)
 
 
 def test_a_run_that_diverges_ends_with_1(run, monkeypatch):

@@ -13,9 +13,8 @@ import pytest
 from designs import infeasible_design, loopless_design, thesis_design, unstable_design
 
 from models import InputError
-from stillhook.designs.figures import limits, payload_spectrum, responses
+from stillhook.designs.figures import limits, nyquist, payload_spectrum, responses
 from stillhook.designs.motion import MotionView
-from stillhook.designs.nyquist import nyquist
 from stillhook.text import picture
 
 FIGURES = {f.__name__: f for f in (payload_spectrum, responses, nyquist, limits)}

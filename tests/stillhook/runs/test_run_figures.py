@@ -17,11 +17,10 @@ from PIL import Image
 
 import stillhook as sh
 from models.run import Event, NamedQuantity
-from stillhook.runs import animation as animation_module
 from stillhook.runs import runs_report
-from stillhook.runs.animation import animation
+from stillhook.runs import strip as strip_module
 from stillhook.runs.figures import comparison, exceedance
-from stillhook.runs.strip import Scene, strip
+from stillhook.runs.strip import Scene, animation, strip
 from stillhook.runs.trace_figure import traces
 from stillhook.runs.window import Window, envelope, runs_of_true, window_of
 from stillhook.text import picture
@@ -333,8 +332,8 @@ def test_slack_rope_is_told_in_the_strip():
 
 
 def test_an_animation_moves_and_is_small(monkeypatch):
-    monkeypatch.setattr(animation_module, "_FEWEST", 8)
-    monkeypatch.setattr(animation_module, "_MOST", 8)
+    monkeypatch.setattr(strip_module, "_FEWEST", 8)
+    monkeypatch.setattr(strip_module, "_MOST", 8)
     told: list[float] = []
     film = animation(landing()[0], landing().scenario, progress=told.append)
     assert told[-1] == 1.0

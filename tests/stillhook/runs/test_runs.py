@@ -90,7 +90,7 @@ def test_runs_are_a_sequence():
 
 
 def test_everything_is_prepared_once_for_all_seeds(monkeypatch):
-    import stillhook.runs.series as module
+    import stillhook.runs.simulation as module
 
     prepared = []
     original = module.prepare
@@ -194,7 +194,7 @@ def test_a_lift_is_made_with_the_weight_in_air(monkeypatch):
         made.append(controller)
         return prepare(case, controller, *rest)
 
-    monkeypatch.setattr("stillhook.runs.series.prepare", spy)
+    monkeypatch.setattr("stillhook.runs.simulation.prepare", spy)
     sh.simulate(case, "feed-forward", scenario=lift, duration=1.0)
     held = build_plant(lift.case_for(case)).operating_point().command
     under_water = build_plant(case).operating_point().command
