@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -97,6 +96,8 @@ def worth_figure(result: Worth) -> Figure:
     result
         With at least one row.
     """
+    from matplotlib.patches import Patch
+
     rows = [r for r in result.rows if r.gain > 0.0][:_ROWS] or list(result.rows[:1])
     size, unit = scale("m", result.payload_rms)
     figure, axes = panel(height=1.6 + 0.34 * len(rows))
@@ -118,9 +119,9 @@ def worth_figure(result: Worth) -> Figure:
     axes.set_xlim(max(0.0, least - 0.18 * (top - least) - 0.02 * top), top * 1.01)
     axes.set_xlabel(f"payload rms [{unit}]")
     axes.grid(axis="y", visible=False)
-    bought, given = _handles()
-    kinds = {row.item.sold for row in rows}
-    handles = [h for h, sold in ((bought, True), (given, False)) if sold in kinds]
+    kinds = ((True, AFTER, "bought"), (False, HOOK, "given away, or chosen"))
+    sold = {row.item.sold for row in rows}
+    handles = [Patch(color=colour, label=label) for kind, colour, label in kinds if kind in sold]
     axes.legend(handles=handles, loc="lower left")
     first = result.first
     finding = f"Buy first: {first.item.name}" if first is not None else "Nothing is worth it"
@@ -165,7 +166,7 @@ def co_design_report(found: CoDesign) -> Report:
             p.gear,
             p.radius,
             p.payload_rms if math.isfinite(p.payload_rms) else "-",
-            _bound_by(p.binding),
+            ", ".join(p.binding[:2]),
         )
         for p in found.points
     ]
@@ -220,7 +221,7 @@ def _motors(sizing: Sizing) -> Table:
         figures: tuple[float | str, ...] = ("-",) * 4
         if motor is not None:
             figures = (motor.power, motor.torque_continuous, motor.torque_peak, motor.inertia)
-        rows.append((point.gear, *figures, _bound_by(point.binding)))
+        rows.append((point.gear, *figures, ", ".join(point.binding[:2])))
     best = sizing.chosen.gear if sizing.chosen is not None else None
     heads = columns(
         "gear; power [W]; torque_continuous=continuous [N m]; torque_peak=peak [N m]; "
@@ -228,10 +229,6 @@ def _motors(sizing: Sizing) -> Table:
     )
     marked = tuple(k for k, point in enumerate(sizing.points) if point.gear == best)
     return Table(columns=heads, rows=rows, marked=marked, most=_POINTS)
-
-
-def _bound_by(binding: Sequence[str]) -> str:
-    return ", ".join(binding[:2])
 
 
 def _value_text(value: float, unit: str) -> str:
@@ -268,12 +265,6 @@ def _thinned(ticks: list[float]) -> list[float]:
         if not found or tick > 1.12 * found[-1]:
             found.append(tick)
     return found
-
-
-def _handles() -> tuple[object, object]:
-    from matplotlib.patches import Patch
-
-    return Patch(color=AFTER, label="bought"), Patch(color=HOOK, label="given away, or chosen")
 
 
 _FRONT_ROWS = 12  # of the table on the terminal

@@ -143,11 +143,8 @@ def tables_of(compared: Sequence[Runs]) -> list[Table]:
     if len(compared) > 1:
         return [_beside(group, rows, compared) for group, rows in groups.items()]
     several = len(compared[0].judged) > 1
-    heads = columns(
-        "quantity=; mean; interval=95 % interval; note=<"
-        if several
-        else "quantity=; mean=; interval=; note=<"
-    )
+    mean, interval = ("mean", "95 % interval") if several else ("", "")
+    heads = columns(f"quantity=; mean={mean}; interval={interval}; note=<")
     return [
         Table(
             title=group,

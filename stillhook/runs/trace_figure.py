@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from models.basics import FloatArray, InputError
+from models.basics import BoolArray, FloatArray, InputError
 from models.run import ERROR, Event, Run
 
 from ..text import (
@@ -46,13 +45,14 @@ _SLACK = 1.0  # tension below which the rope is slack [N]
 _REACH = 1.6  # a limit farther away than so many times the signal is not drawn
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class _Panel:
     """One row: signals with label and colour, unit, and the limits to shade."""
 
     title: str
     unit: str
     signals: tuple[tuple[str, str, str], ...]
+    _: KW_ONLY
     limits: tuple[float, float] = (-math.inf, math.inf)
     rest: float | None = None
     slack: bool = False
@@ -104,7 +104,9 @@ def traces(run: Run, window: Window | None = None) -> Figure:
     if split:
         for axes in grid[:-1, 0]:
             axes.axvspan(window.start, window.end, color="#f0e442", alpha=0.2, linewidth=0.0)
-        grid[0][1].set_title(_close_up(window), fontsize=9.5, color="#555555")
+        grid[0][1].set_title(
+            f"{window.why}: {window.start:.4g} to {window.end:.4g} s", fontsize=9.5, color="#555555"
+        )
     for row in range(len(panels)):
         grid[row][0].set_ylabel(f"{panels[row].title}\n[{_scale(run, panels[row])[1]}]")
     about = f"{run.case.name}, {run.scenario}, {run.controller}, seed {run.seed}"
@@ -127,42 +129,21 @@ def _panels(run: Run) -> list[_Panel]:
     wide = (*((asked,) if moved else ()), payload)
     small = not moved and _span(run, "payload.displacement") < _SMALL * _span(run, "hook.heave")
     if small:
-        panels = [
-            _Panel(title="hook", unit="m", signals=(hook,)),
-            _Panel(title="payload", unit="m", signals=wide),
-        ]
+        panels = [_Panel("hook", "m", (hook,)), _Panel("payload", "m", wide)]
     else:
-        panels = [_Panel(title="hook, payload", unit="m", signals=(hook, *wide))]
+        panels = [_Panel("hook, payload", "m", (hook, *wide))]
     if moved:
-        error = (ERROR, "", AFTER)
-        panels.append(_Panel(title="payload's error", unit="m", signals=(error,)))
-    panels.append(_Panel(title="drum haul", unit="m", signals=(("drum.haul", "", DRUM),)))
-    for name, title, unit, limit, rest in (
-        ("motor.torque", "motor torque", "N m", drive.torque_peak, run.case.static_torque),
-        ("motor.speed", "motor speed", "rpm", winch.speed_limit, None),
-    ):
-        panels.append(
-            _Panel(
-                title=title,
-                unit=unit,
-                signals=((name, "", DRUM),),
-                limits=(-limit, limit),
-                rest=rest,
-            )
-        )
-    most = run.case.limits.rope_tension_peak
-    panels.append(
-        _Panel(
-            title="rope tension",
-            unit="N",
-            signals=(("rope.tension", "", REFERENCE),),
-            limits=(-math.inf, math.inf if most is None else most),
-            slack=True,
-        )
-    )
+        panels.append(_Panel("payload's error", "m", ((ERROR, "", AFTER),)))
+    panels.append(_Panel("drum haul", "m", (("drum.haul", "", DRUM),)))
+    torque, speed, most = drive.torque_peak, winch.speed_limit, run.case.limits.rope_tension_peak
+    turning, turns = (("motor.torque", "", DRUM),), (("motor.speed", "", DRUM),)
+    limits, rest = (-torque, torque), run.case.static_torque
+    panels.append(_Panel("motor torque", "N m", turning, limits=limits, rest=rest))
+    panels.append(_Panel("motor speed", "rpm", turns, limits=(-speed, speed)))
+    pull, limits = (("rope.tension", "", REFERENCE),), (-math.inf, most or math.inf)
+    panels.append(_Panel("rope tension", "N", pull, limits=limits, slack=True))
     if "contact.gap" in run:
-        gap = _Panel(title="clearance below", unit="m", signals=(("contact.gap", "", AFTER),))
-        panels.append(gap)
+        panels.append(_Panel("clearance below", "m", (("contact.gap", "", AFTER),)))
     return [panel for panel in panels if panel.signals[0][0] in (*run.signals, ERROR)]
 
 
@@ -222,11 +203,8 @@ def _states(axes: Axes, run: Run, window: Window | None) -> None:
     rows = slice(None) if window is None else window.rows(run.time)
     time = run.time[rows]
 
-    def flag(name: str, limit: float, *, below: bool = False) -> npt.NDArray[np.bool_]:
-        if name not in run:
-            return np.zeros(time.size, dtype=np.bool_)
-        values = run[name][rows]
-        return values < limit if below else values > limit
+    def flag(name: str, limit: float) -> BoolArray:
+        return run[name][rows] > limit if name in run else np.zeros(time.size, dtype=np.bool_)
 
     late = run.case.sensors.telemetry.delay + 1.0
     states = (
@@ -284,10 +262,6 @@ def _finding(run: Run) -> str:
         rms = quantity(found["hook rms"] * residual / 100.0, "m")
         text += f", {rms} rms: {percent(residual / 100.0)} of the hook's motion"
     return text
-
-
-def _close_up(window: Window) -> str:
-    return f"{window.why}: {window.start:.4g} to {window.end:.4g} s"
 
 
 def _span(run: Run, name: str) -> float:

@@ -49,8 +49,7 @@ _LINES: dict[str, tuple[str, Any]] = {
     "stability": ("#000000", (0, (1, 1))),
 }
 _STEEP = "#9a9a9a"
-SHADE = "#cfe3f1"
-DEGREES = 180.0 / math.pi
+_SHADE = "#cfe3f1"
 _FAR = 3.0  # times what can be reached: beyond, a limit is not shown
 
 
@@ -120,7 +119,7 @@ def shade(axes: Axes, periods: FloatArray, limit: FloatArray) -> None:
         T = np.linspace(periods[0], periods[-1], 400)
         # Lines that leave for infinity do so between two periods.
         below = np.interp(T, periods, np.minimum(limit, 1e3))
-        axes.fill_between(T, 0.0, np.minimum(below, steepest(T)), color=SHADE, linewidth=0.0)
+        axes.fill_between(T, 0.0, np.minimum(below, steepest(T)), color=_SHADE, linewidth=0.0)
 
 
 def limit_line(
@@ -130,15 +129,13 @@ def limit_line(
     axes.plot(periods, np.minimum(heights, 2.0 * top), color=colour, **style)
 
 
-def draw_steepest(axes: Axes, periods: FloatArray, top: float) -> None:
-    """Draw the steepest seas of each period."""
+def _frame(axes: Axes, periods: FloatArray, top: float, label: str) -> None:
+    """Draw the steepest seas of each period; make the axes those of peak period and H_s."""
     T = np.linspace(periods[0], periods[-1], 100)
     if steepest(T).min() < top:
         axes.plot(T, steepest(T), color=_STEEP, linestyle=":", linewidth=1.2, label="steepest seas")
-
-
-def periods_axis(axes: Axes, periods: FloatArray) -> None:
-    """Make the x axis that of peak periods."""
+    axes.set_ylim(0.0, top)
+    axes.set_ylabel(label)
     axes.set_xlabel(r"peak period $T_p$ [s]")
     if periods.size > 1:
         axes.set_xlim(periods[0], periods[-1])
@@ -155,7 +152,7 @@ def titled(figure: Figure, study: Operability, at: AtDepth | None, finding: str)
         about += f", {at.rope.length:g} m of rope"
     if study.headings is not None:
         h = own_heading(study, study.depths[0].main)
-        about += f", heading {float(study.headings[h]) * DEGREES:.0f} deg"
+        about += f", heading {math.degrees(study.headings[h]):.0f} deg"
     return headline(figure, finding, about)
 
 
@@ -196,10 +193,7 @@ def contour_figure(study: Operability, at: AtDepth | None = None) -> Figure:
         anew = at.contours["reoptimised"].limit[h]
         style = {"linestyle": (0, (6, 1.5, 1, 1.5)), "label": "gains anew for each sea"}
         limit_line(axes, periods, anew, top, AFTER, **style)
-    draw_steepest(axes, periods, top)
-    axes.set_ylim(0.0, top)
-    periods_axis(axes, periods)
-    axes.set_ylabel(r"limiting $H_s$ [m]")
+    _frame(axes, periods, top, r"limiting $H_s$ [m]")
     figure.legend(loc="outside right center", fontsize=8.5)
     return titled(figure, study, at, _finding(study, at, h))
 
@@ -230,7 +224,7 @@ def capability_figure(study: Operability, at: AtDepth | None = None) -> Figure:
     lowest = lines.limit
     largest = max((a[1] for a in asked), default=float(np.quantile(lowest, 0.5)))
     top = 2.0 * largest
-    axes.fill_between(lines.periods, 0.0, np.minimum(lowest, 2 * top), color=SHADE, lw=0.0)
+    axes.fill_between(lines.periods, 0.0, np.minimum(lowest, 2 * top), color=_SHADE, lw=0.0)
     for criterion, heights in zip(lines.criteria, lines.heights, strict=True):
         if heights.min() > top:
             continue
@@ -277,10 +271,7 @@ def depth_figure(study: Operability) -> Figure:
             limit_line(axes, study.periods, held, top, colour, linestyle=_HELD, linewidth=1.2)
     if "loop" in study.depths[0].contours:
         axes.plot([], [], color=REFERENCE, linestyle=_HELD, label="drum held")
-    draw_steepest(axes, study.periods, top)
-    axes.set_ylim(0.0, top)
-    periods_axis(axes, study.periods)
-    axes.set_ylabel(r"limiting $H_s$ [m]")
+    _frame(axes, study.periods, top, r"limiting $H_s$ [m]")
     figure.legend(loc="outside right center", fontsize=8.5)
     lengths = [at.rope.length for at in study.depths]
     finding = f"Rope from {min(lengths):g} to {max(lengths):g} m"
@@ -408,10 +399,7 @@ def scatter_figure(study: Operability, at: AtDepth | None = None) -> Figure:
             label = f"... best heading: {100.0 * best:.0f} %"
             vaning = contour.weathervaning
             limit_line(axes, contour.periods, vaning, top, colour, label=label, **style)
-    draw_steepest(axes, at.main.periods, top)
-    axes.set_ylim(0.0, top)
-    periods_axis(axes, at.main.periods)
-    axes.set_ylabel(r"$H_s$ [m]")
+    _frame(axes, at.main.periods, top, r"$H_s$ [m]")
     figure.legend(loc="outside lower center", ncols=3, fontsize=8.5)
     if months:
         _months(figure.add_subplot(grid[0, 1]), at)

@@ -49,16 +49,12 @@ class OutputFolder:
         folder = Path(path)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-        except FileExistsError:
-            raise InputError(
-                f"{folder}: the output folder cannot be made: a file is there"
-            ) from None
-        except NotADirectoryError:
-            raise InputError(
-                f"{folder}: the output folder cannot be made: part of the path is a file"
-            ) from None
         except OSError as error:
-            reason = error.strerror or error
+            known: dict[type[OSError], str] = {
+                FileExistsError: "a file is there",
+                NotADirectoryError: "part of the path is a file",
+            }
+            reason = known.get(type(error), error.strerror or error)
             raise InputError(f"{folder}: the output folder cannot be made: {reason}") from error
         ready = cls(folder, kinds)
         ready.write(f".{os.getpid()}.probe", b"")

@@ -257,7 +257,10 @@ def markdown(item: Report | Table, drawn: Sequence[str] | None = None) -> str:
         mark = {"ok": "Ok", "NOT OK": "Not ok"}.get(item.verdict_mark, item.verdict_mark)
         parts.append(f"**{mark}**: {item.status}." if mark else f"{item.status}.")
     for section in item.sections:
-        there = [i for i in section.items if not isinstance(i, Drawing) or _is_in(i, drawn)]
+        there = [
+            item for item in section.items
+            if drawn is None or not isinstance(item, Drawing) or item.name in drawn
+        ]  # fmt: skip
         parts += [f"## {section.title}"] * bool(section.title and there)
         for one in there:
             if isinstance(one, Drawing):
@@ -317,10 +320,6 @@ def json_data(item: Any) -> Any:
 def json_text(item: Any) -> str:
     """Return anything as JSON, see `json_data`."""
     return json.dumps(json_data(item), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-
-
-def _is_in(drawing: Drawing, drawn: Sequence[str] | None) -> bool:
-    return drawn is None or drawing.name in drawn
 
 
 def _grid(table: Table) -> str:
