@@ -29,7 +29,7 @@ from models.case import Case
 
 from ..design import StructureDesign, optimise_structure
 from ..search import Progress
-from .follow import Answer, Posed, designed, follow, least_between, slope
+from .follow import Answer, Posed, begin_from, designed, follow, least_between, slope
 
 _GRID = 7  # gears that are tried before the Brent's method
 _FINE = 2e-3  # of the logarithm of the gear
@@ -121,7 +121,7 @@ class _Gears:
             done = len(self.answers)
             self.tell("gears", done, done + 1)
             known = [k for k, answer in self.answers.items() if answer is not None]
-            known.sort(key=lambda k: _apart(k, key))
+            known.sort(key=lambda k: abs(math.log(k[0] / gear)) + abs(math.log(k[1] / radius)))
             near = self.answers[known[0]] if known else self.begin
             problem = self.problem(gear, radius)
             found = None
@@ -213,9 +213,8 @@ def gear_changes(case: Case, gear: float, radius: float | None = None) -> dict[s
 def _begin(first: StructureDesign) -> Answer | None:
     posed = Posed.of(first.case, first.structure, first.masses)
     problem = posed.asked_by(first.case) if first.drive_kept else posed.problem(posed.loop)
-    values = [first.parameters[p.name] for p in problem.law.parameters]
     coefficient = first.drag if problem.drag is not None else None
-    return follow(problem, [np.array(values)], coefficient=coefficient)
+    return follow(problem, [begin_from(problem, first)], coefficient=coefficient)
 
 
 def _best_gear(
@@ -313,10 +312,6 @@ def _binding(answer: Answer) -> tuple[str, ...]:
     return tuple(
         sorted((n for n, p in prices.items() if abs(p) > 1e-4), key=lambda n: -abs(prices[n]))
     )
-
-
-def _apart(one: tuple[float, float], other: tuple[float, float]) -> float:
-    return sum(abs(math.log(a / b)) for a, b in zip(one, other, strict=True))
 
 
 def _range(

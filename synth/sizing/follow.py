@@ -35,7 +35,6 @@ from ..search import (
     Solution,
     SolverPace,
     assess,
-    assessment_of,
     begin_points,
     cost_nodes,
     margin_nodes,
@@ -44,7 +43,7 @@ from ..search import (
 )
 
 EXCESS = 1e-4  # relative excess over a limit that an answer on the way may have
-_ROUNDS = 5  # of the exchange of nodes
+ROUNDS = 5  # of the exchange of nodes
 _FRESH = 3  # starts where no neighbour's answer is stable
 _MOST_HELD = 200  # frequencies that are inherited
 _RTOL = 1e-6  # of the integrals on the way
@@ -134,15 +133,13 @@ class Answer:
         """Return the parameters for another problem, each as large for it as here."""
         old, new = self.problem.law.parameters, problem.law.parameters
         ratio = np.array([b.scale / a.scale for a, b in zip(old, new, strict=True)])
-        return _inside(problem, self.solved.values * ratio)
+        return problem.law.clipped(self.solved.values * ratio)
 
 
-def begin_from(problem: Problem, design: StructureDesign | Sequence[float]) -> FloatArray:
-    """Return a design's parameters, or given ones, as a start for a problem."""
-    if isinstance(design, StructureDesign):
-        names = [p.name for p in problem.law.parameters]
-        return _inside(problem, np.array([design.parameters[name] for name in names]))
-    return _inside(problem, np.array(design, dtype=np.float64))
+def begin_from(problem: Problem, design: StructureDesign) -> FloatArray:
+    """Return a design's parameters as a start for a problem."""
+    values = [design.parameters[p.name] for p in problem.law.parameters]
+    return problem.law.clipped(np.array(values))
 
 
 def follow(
@@ -155,7 +152,7 @@ def follow(
     coefficient: float | None = None,
     extra: float = 0.0,
     fine: bool = False,
-    rounds: int = _ROUNDS,
+    rounds: int = ROUNDS,
 ) -> Answer | None:
     """Return the optimum of a problem from starts close to it, or None if none arrives.
 
@@ -277,7 +274,7 @@ def _arrived(
     extra: float,
     rounds: int,
 ) -> Answer | None:
-    assessment = _assessed(problem, begin, coefficient)
+    assessment = problem.assess(begin, coefficient)
     held = near.held if near is not None else np.zeros(0)
     solved: Solution | None = None
     best: Answer | None = None
@@ -313,7 +310,7 @@ def _arrived(
         if excess <= 0.5 * EXCESS:
             return answer
         held = _fewer(assessment, problem, held)
-    rough = rounds < _ROUNDS
+    rough = rounds < ROUNDS
     return best if best is not None and (rough or best.excess <= 10.0 * EXCESS) else None
 
 
@@ -330,23 +327,3 @@ def _solved(programme: Programme, start: FloatArray, *, first: bool) -> Solution
         if solved.converged and programme.problem.stable(solved.values, solved.coefficient):
             return solved
     return None
-
-
-def _assessed(problem: Problem, values: FloatArray, coefficient: float | None) -> Assessment:
-    solved = Solution(
-        values=values,
-        coefficient=coefficient,
-        objective=0.0,
-        extra=0.0,
-        converged=True,
-        message="",
-        iterations=0,
-        prices={},
-    )
-    return assessment_of(problem, solved)
-
-
-def _inside(problem: Problem, values: FloatArray) -> FloatArray:
-    low = np.array([p.low for p in problem.law.parameters])
-    high = np.array([p.high for p in problem.law.parameters])
-    return np.asarray(np.clip(values, low, high))

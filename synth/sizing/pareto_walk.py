@@ -115,7 +115,7 @@ class FrontWalk:
                 )
                 if other is None or worse:
                     x = self.programme.pack(one.values, one.coefficient)
-                    self._along(_from(order, j), x)
+                    self._along(order[order.index(j) :], x)
 
     def _state_again(self) -> None:
         self.programme = local_programme(
@@ -267,12 +267,6 @@ def _led(before: Place, here: Place, step: float) -> FloatArray:
         return here[1]
     share = np.clip((step - here[0]) / gap, 0.0, 2.0)
     return np.asarray(here[1] + share * (here[1] - before[1]), dtype=np.float64)
-
-
-def _from(order: Sequence[int], first: int) -> list[int]:
-    """Return the part of an order from one of its entries on."""
-    listed = list(order)
-    return listed[listed.index(first) :]
 
 
 def exchanged(walk: FrontWalk, tell: Progress) -> list[tuple[float, ParetoPoint | None]]:

@@ -15,14 +15,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from models.basics import FloatArray, InputError, check_range, parse_quantity
+from models.basics import InputError, check_range, parse_quantity
 from models.case import Case
 from models.hook import HookMotion
 
 from ..limits import Limit, Rms
 from ..question import Goal, Problem
 from ..search import Progress
-from .follow import Answer, Posed, follow
+from .follow import ROUNDS, Answer, Posed, follow
 from .motor import MotorData, with_motor
 
 TARGET = "payload.displacement.rms"
@@ -124,7 +124,8 @@ def least_motor(
     rest = math.log(_at_rest(case, gear))
     size, answer, extra = max(math.log(scale), rest), near, 0.0
     while len(known) < _STEPS:
-        problem = _problem(case, structure, gear, target, math.exp(size), masses)
+        posed = Posed.of(with_motor(case, math.exp(size), gear), structure, masses)
+        problem = posed.problem(with_target(posed, target))
         found = _rated(problem, answer, extra)
         if found is None:
             return SmallestMotor(point=_stopped(problem, answer, gear), answer=None)
@@ -142,26 +143,6 @@ def least_motor(
     return SmallestMotor(point=_none(gear, ("motor.inertia",)), answer=answer)
 
 
-def sea_factor(
-    case: Case, structure: str, height: float, target: float, *, masses: int, near: Answer
-) -> Answer | None:
-    """Return the answer with the least factor on target and drive in a sea of height H_s [m].
-
-    At a factor of one or less (its `extra` at most 0) the winch meets the target there.
-    """
-    posed = Posed.of(case.variant({"sea.significant_height": height}), structure, masses)
-    problem = posed.problem(with_target(posed, target))
-    relaxed = [m.name for m in problem.limits if m.drive and not m.at_least]
-    return follow(
-        problem,
-        _starts(near, problem),
-        near=near,
-        goal=Goal.RELAX,
-        relaxed=relaxed,
-        extra=near.solved.extra,
-    )
-
-
 def _at_rest(case: Case, gear: float) -> float:
     """Return the scale of the motor that just holds the load at rest, through the losses."""
     drive, box = case.winch.drive, case.winch.gearbox
@@ -175,32 +156,23 @@ def _at_rest(case: Case, gear: float) -> float:
 def _rated(problem: Problem, near: Answer, extra: float) -> Answer | None:
     """Return the answer with the least factor on the motor's ratings."""
     ratings = [m.name for m in problem.limits if m.name in RATINGS]
-    for guess in (extra, _FAR):
-        found = follow(
-            problem,
-            _starts(near, problem),
-            near=near,
-            goal=Goal.RELAX,
-            relaxed=ratings,
-            extra=guess,
-        )
-        if found is not None:
-            return found
-    return None
+    guesses = (_least_factor(problem, near, ratings, guess) for guess in (extra, _FAR))
+    return next((found for found in guesses if found is not None), None)
 
 
-def _problem(
-    case: Case, structure: str, gear: float, target: float, scale: float, masses: int
-) -> Problem:
-    posed = Posed.of(with_motor(case, scale, gear), structure, masses)
-    return posed.problem(with_target(posed, target))
+def _least_factor(
+    problem: Problem, near: Answer, relaxed: Sequence[str], extra: float, rounds: int = ROUNDS
+) -> Answer | None:
+    """Return the answer with the least factor on some limits, from that of a neighbour.
 
-
-def _starts(near: Answer, problem: Problem) -> list[FloatArray]:
-    """Return starts from a neighbour: as large for the new plant as for its own, or as it is."""
-    carried, plain = near.carried(problem), near.solved.values
-    starts = [carried] if problem.stable(carried, near.solved.coefficient) else []
-    return starts or [plain]
+    It begins with parameters as large for the new plant as for its own, or as they are.
+    """
+    begin = near.carried(problem)
+    if not problem.stable(begin, near.solved.coefficient):
+        begin = near.solved.values
+    return follow(
+        problem, [begin], near=near, goal=Goal.RELAX, relaxed=relaxed, extra=extra, rounds=rounds
+    )
 
 
 def _next(known: Sequence[tuple[float, float]], rest: float) -> float | None:
@@ -264,15 +236,7 @@ def _stopped(problem: Problem, near: Answer, gear: float) -> SizePoint:
     though they do not grow with the motor are what stops it.
     """
     relaxed = [m.name for m in problem.limits if m.drive and not m.at_least]
-    wide = follow(
-        problem,
-        _starts(near, problem),
-        near=near,
-        goal=Goal.RELAX,
-        relaxed=relaxed,
-        extra=0.5,
-        rounds=1,
-    )
+    wide = _least_factor(problem, near, relaxed, 0.5, rounds=1)
     if wide is None:
         return _none(gear, ("stability",))
     uses, prices = wide.uses(), wide.solved.prices
@@ -358,7 +322,11 @@ def highest_sea(
         height = asked * math.exp(size)
         sea = case.variant({"sea.significant_height": height})
         aim = target_of(target, float(HookMotion.from_case(sea).displacement.rms))
-        found = sea_factor(case, structure, height, aim, masses=masses, near=answer)
+        posed = Posed.of(sea, structure, masses)
+        problem = posed.problem(with_target(posed, aim))
+        relaxed = [m.name for m in problem.limits if m.drive and not m.at_least]
+        # At a factor of one or less (`extra` at most 0) the winch meets the target there.
+        found = _least_factor(problem, answer, relaxed, answer.solved.extra)
         if found is None:
             if size <= math.log(_LOWEST):
                 break
@@ -369,10 +337,8 @@ def highest_sea(
             if abs(found.solved.extra) < _SEA_FINE:
                 break
         kept = [s for s, f in known if f <= 0.0]
-        below, above = (
-            max(kept, default=-math.inf),
-            min((s for s, f in known if f > 0.0), default=math.inf),
-        )
+        below = max(kept, default=-math.inf)
+        above = min((s for s, f in known if f > 0.0), default=math.inf)
         over = known[-1][1]
         guess = size - max(-1.0, min(1.0, 1.2 * over))
         if len(known) > 1 and known[-1][1] != known[-2][1]:

@@ -26,6 +26,7 @@ from ..question import Problem
 from ..search import Progress
 from .follow import Answer, Posed, begin_from, follow, slope
 from .motor import motor_changes
+from .pareto_walk import with_bound
 
 _RPM = 0.10471975511965977
 _NOISE = ("acceleration", "velocity", "displacement")
@@ -116,17 +117,7 @@ def part_items(case: Case, heard: Sequence[str], posed: Posed) -> list[Item]:
         The case posed for it.
     """
     ratio = case.winch.gearbox.ratio
-    items = [
-        Item(
-            name="gear ratio",
-            kind="gear",
-            value=ratio,
-            unit="",
-            better=0,
-            step=0.1 * ratio,
-            changes=lambda f: {"winch.gearbox.ratio": ratio * f},
-        )
-    ]
+    items = [_scaled("gear ratio", "gear", "winch.gearbox.ratio", ratio, "", 0, 0.1 * ratio)]
     if case.limits.drive == "enforce":
         torque = case.winch.drive.torque_continuous
         items.append(
@@ -405,21 +396,13 @@ def _again(
     problem = _changed(design, here, item, factor)
     if problem is None:
         return None
-    begins = (
-        [near.carried(problem), here.carried(problem)]
-        if near is not here
-        else [here.carried(problem)]
-    )
+    begins = [answer.carried(problem) for answer in dict.fromkeys((near, here))]
     return follow(problem, begins, near=here)
 
 
 def _changed(design: StructureDesign, here: Answer, item: Item, factor: float) -> Problem | None:
     if item.limit is not None:
-        limits = [
-            replace(m, bound=m.bound * factor) if m.name == item.limit else m
-            for m in here.problem.limits
-        ]
-        return replace(here.problem, limits=tuple(limits))
+        return with_bound(here.problem, item.limit, item.value * factor)
     case = item.case(design.case, factor)
     if case is None:
         return None

@@ -300,18 +300,13 @@ def _walked(walk: _Search, grid: FloatArray) -> None:
     known = sorted(walk.found)
     at = known.index(min(gears, key=lambda g: walk.found[g].point.scale))
     ends = known[max(at - 1, 0)], known[min(at + 1, len(known) - 1)]
-    _home_in(walk, *ends, total)
-
-
-def _home_in(walk: _Search, low: float, high: float, total: int) -> None:
-    """Home in on the gear with the smallest motor."""
 
     def size(gear: float) -> float:
         walk.tell("the best gear", min(len(walk.found), total), total)
         # Three digits: a gear is ordered by a number.
         return walk.at(float(f"{gear:.3g}")).point.scale
 
-    least_between(size, low, high, _FINE)
+    least_between(size, *ends, _FINE)
 
 
 def _given(walk: _Search, posed: Posed) -> Answer | None:
@@ -319,15 +314,11 @@ def _given(walk: _Search, posed: Posed) -> Answer | None:
     walk.tell("the winch as it is", 0, 1)
     problem = posed.problem((*posed.loop, *posed.drive))
     own = walk.case.winch.gearbox.ratio
-    known = [a for g, least in walk.found.items() if (a := least.answer) is not None and g > 0.0]
-    nearest = sorted(known, key=lambda a: abs(_gear_of(walk, a) / own - 1.0))[:1]
-    begins = [a.carried(problem) for a in [*nearest, walk.free]]
+    gears = sorted(walk.found, key=lambda g: abs(g / own - 1.0))
+    known = [a for g in gears if (a := walk.found[g].answer) is not None]
+    begins = [a.carried(problem) for a in [*known[:1], walk.free]]
     answer = follow(problem, begins, coefficient=walk.free.solved.coefficient)
     return answer if answer is not None and answer.excess <= 10.0 * EXCESS else None
-
-
-def _gear_of(walk: _Search, answer: Answer) -> float:
-    return next(g for g, least in walk.found.items() if least.answer is answer)
 
 
 def _chosen(sizing: Sizing, walk: _Search, best: SmallestMotor) -> Sizing:
