@@ -24,7 +24,7 @@ import numpy as np
 from models.basics import ComplexArray, FloatArray, IndexArray
 from models.plant import RopeLumps
 
-from .numbers import PlantNumbers
+from .numbers import PlantNumbers, at_rows
 
 BLOCK = 12_000  # numbers of an array at once: the half dozen in use stay in the cache
 
@@ -60,7 +60,7 @@ class ChainLoops:
         self, plants: PlantNumbers, gains: FloatArray, drag: FloatArray, *, lumps: RopeLumps
     ) -> None:
         self._count = max(len(plants), len(gains), drag.size)
-        n, like = plants, plants.like
+        n = plants
         self._lumps = lumps
         self._drag = drag
         self._gains = gains
@@ -71,15 +71,7 @@ class ChainLoops:
         self._h = n["drum_radius"] / n["gear_ratio"]
         self._load = n.gear_factor * self._h
         self._inertia, self._friction = n["inertia"], n["viscous_friction"]
-        if like.motor == "dc":
-            self._phi = n["torque_constant"] / n["resistance"]
-            self._beta = self._phi * n["back_emf_constant"]
-            self._lag = n["inductance"] / n["resistance"]
-        else:
-            speed_mode = like.speed_gain > 0.0
-            self._phi = n["speed_gain"] if speed_mode else np.ones(1)
-            self._beta = n["speed_gain"] if speed_mode else np.zeros(1)
-            self._lag = 1.0 / n["torque_bandwidth"]
+        self._phi, self._beta, self._lag = n.drive
         self._torque_constant = n["torque_constant"]
         self._filters = [
             n[name]
@@ -143,11 +135,11 @@ class ChainLoops:
         for at in range(0, len(self), step):
             rows = np.arange(at, min(at + step, len(self)))
             parts = self._parts(rows, s)
-            inverse = 1.0 / _size(parts.closed)
+            inverse = 1.0 / abs2(parts.closed)
             if density is not None:
                 inverse *= density[rows]
             for name in outputs:
-                found[name][rows] = (_size(self._numerator(name, rows, s, parts)) * inverse) @ right
+                found[name][rows] = (abs2(self._numerator(name, rows, s, parts)) * inverse) @ right
         return found
 
     def velocity_of_drag(
@@ -159,7 +151,7 @@ class ChainLoops:
         unit = np.array([self.scale])
         some = self.with_drag(unit)._parts(rows, s)
         slope = (some.closed - none.closed) / unit
-        driven = np.broadcast_to(_size(none.W) * omega**2, (rows.size, omega.size))
+        driven = np.broadcast_to(abs2(none.W) * omega**2, (rows.size, omega.size))
         return none.closed, slope, driven
 
     def _numerator(
@@ -173,26 +165,26 @@ class ChainLoops:
             return np.asarray(parts.G * parts.W)
         if name == "rope.tension":
             return np.asarray(parts.f * parts.W)
-        phi, load = _at(self._phi, rows), _at(self._load, rows)
+        phi, load = at_rows(self._phi, rows), at_rows(self._load, rows)
         if name in ("motor.speed", "drum.haul"):
             drum = load * parts.f * parts.e + phi * parts.G
-            return np.asarray(s * drum if name == "motor.speed" else _at(self._h, rows) * drum)
-        shaft = _at(self._inertia, rows) * s**2 + _at(self._friction, rows) * s
-        torque = _at(self._beta, rows) * load * s * parts.f - phi * shaft * parts.G
+            return np.asarray(s * drum if name == "motor.speed" else at_rows(self._h, rows) * drum)
+        shaft = at_rows(self._inertia, rows) * s**2 + at_rows(self._friction, rows) * s
+        torque = at_rows(self._beta, rows) * load * s * parts.f - phi * shaft * parts.G
         if name == "motor.torque":
             return np.asarray(torque)
         assert name == "motor.current", name
-        return np.asarray(torque / _at(self._torque_constant, rows))
+        return np.asarray(torque / at_rows(self._torque_constant, rows))
 
     def _parts(self, rows: IndexArray, s: ComplexArray) -> _Parts:
-        stretch = 1.0 + s * _at(self._tau, rows)
+        stretch = 1.0 + s * at_rows(self._tau, rows)
         square = s * s
         springs, masses = self._lumps.springs, self._lumps.masses
-        spring = _at(self._stiffness, rows) * stretch  # EA (1 + tau s) / L
-        rope = _at(self._rope, rows)
-        end = _at(self._mass, rows) + rope * masses[-1]
+        spring = at_rows(self._stiffness, rows) * stretch  # EA (1 + tau s) / L
+        rope = at_rows(self._rope, rows)
+        end = at_rows(self._mass, rows) + rope * masses[-1]
         # Force over the stiffness of the whole rope, from the payload up.
-        force = (end * square + s * _at(self._drag, rows)) / spring
+        force = (end * square + s * at_rows(self._drag, rows)) / spring
         x = np.ones_like(force)
         z = rope * square / spring
         if self.masses > 1:
@@ -209,25 +201,22 @@ class ChainLoops:
             force = delta / piece + masses[0] * z * x
         y = x + springs[0] * force
         f = force * spring
-        e = 1.0 + s * _at(self._lag, rows)
-        shaft = _at(self._inertia, rows) * square + _at(self._friction, rows) * s
-        W = shaft * e + _at(self._beta, rows) * s
-        h = _at(self._h, rows)
+        e = 1.0 + s * at_rows(self._lag, rows)
+        shaft = at_rows(self._inertia, rows) * square + at_rows(self._friction, rows) * s
+        W = shaft * e + at_rows(self._beta, rows) * s
+        h = at_rows(self._h, rows)
         g = self._gains
-        G = _at(g[:, 0], rows) * square + _at(g[:, 1], rows) * s + _at(g[:, 2], rows)
+        G = at_rows(g[:, 0], rows) * square + at_rows(g[:, 1], rows) * s + at_rows(g[:, 2], rows)
         for bandwidth in self._filters:
-            b = s / _at(bandwidth, rows)
+            b = s / at_rows(bandwidth, rows)
             G = G / (1.0 + np.sqrt(2.0) * b + b * b)
         if np.any(self._delay):
-            G = G * np.exp(-s * _at(self._delay, rows))
-        open_loop = W * y + (_at(self._load, rows) * h) * (e * f)
-        closed = open_loop + (h * _at(self._phi, rows)) * G
+            G = G * np.exp(-s * at_rows(self._delay, rows))
+        open_loop = W * y + (at_rows(self._load, rows) * h) * (e * f)
+        closed = open_loop + (h * at_rows(self._phi, rows)) * G
         return _Parts(closed=closed, open=open_loop, W=W + 0.0 * x, f=f, G=G + 0.0 * x, e=e)
 
 
-def _at(column: FloatArray, rows: IndexArray) -> FloatArray:
-    return column[rows][:, None] if column.size > 1 else column[:, None]
-
-
-def _size(values: ComplexArray) -> FloatArray:
+def abs2(values: ComplexArray) -> FloatArray:
+    """Return |values|^2."""
     return np.asarray(values.real**2 + values.imag**2)

@@ -88,6 +88,8 @@ class FrequencyEngine:
         late = [path for path in spread.paths if path.startswith(FAULTS)]
         if late:
             raise InputError(f"sweep: {late[0]} happens in time; use mode 'time'")
+        if "rope.masses" in spread.paths:
+            raise InputError("sweep: rope.masses cannot vary; a design has one number of masses")
         self.case: Case = case
         self.spread = spread.on(case, gains, design.drag)
         self.metrics = chosen_metrics(metrics, dc=case.winch.motor.type == "dc")

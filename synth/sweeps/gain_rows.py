@@ -10,19 +10,18 @@ again on finer nodes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from models.basics import BoolArray, ComplexArray, FloatArray, IndexArray, InputError, Quadrature
+from models.basics import BoolArray, ComplexArray, FloatArray, IndexArray, Quadrature
 from models.plant import lump_rope
 from models.spread import GAINS, Spread
 
 from ..design import GainDesign
-from .chain import ChainLoops
-from .drag_rows import Velocity, agreeing_drag
+from .chain import ChainLoops, abs2
 from .kernel import SpringLoops, spring_peaks
 from .metrics import FrequencyMetric, finished
 from .numbers import PlantNumbers, numbers_of
@@ -31,6 +30,7 @@ from .sweep_nodes import SweepNodes, sweep_nodes
 from .winding_count import calming_drag, count_unstable, light_poles, peak_sensitivity
 
 Loops = SpringLoops | ChainLoops
+Velocity = Callable[[IndexArray, FloatArray], FloatArray]
 
 _REFERENCE = 3.0  # frequency by which polynomials are scaled [rad/s]
 _LEVELS = 6  # of nodes, each with panels half as long
@@ -38,6 +38,10 @@ _VELOCITY = "payload.velocity"
 _AT_ONCE = 2000  # rows of one pass where each has a density of its own, or finer nodes
 _EDGE = 1.0 + 1e-6  # drag over the least that is stable, up to which a loop counts as unstable
 _LAST = 1e-3  # difference of two rules that is told where no finer nodes are left
+_DRAG_ROUNDS = 60
+_AGREES = 3e-13  # of the logarithm of C
+_CLOSE = 1e-10  # ... and what will do
+_STEP = 1.5  # of it, at most
 _CHAINS = 64  # chains whose responses are kept while their drag is found
 
 
@@ -99,8 +103,6 @@ class GainRows:
         self._second = tuple(
             dict.fromkeys(m.output for m in metrics if m.kind in ("peak", "least", "period"))
         )
-        if "rope.masses" in spread.paths:
-            raise InputError("sweep: rope.masses cannot vary; a design has one number of masses")
 
     @property
     def block(self) -> int:
@@ -303,7 +305,7 @@ class GainRows:
                 seen = self._variances(loops, [_VELOCITY], nodes, own.rows[some])
                 return np.where(_stable(loops), np.sqrt(seen[_VELOCITY][:, 0]), np.inf)
 
-            found = agreeing_drag(quadratic[at], start, spring)
+            found = _agreeing_drag(quadratic[at], start, spring)
             below = np.where(np.isfinite(found), found, 0.0) / _EDGE
             drag[at] = np.where(_stable(self._loops(own, below)), found, np.inf)
             return drag
@@ -318,7 +320,7 @@ class GainRows:
                     assert isinstance(bare, ChainLoops)
                     edge = calming_drag(bare)
                 velocity = self._chain_velocity(part, nodes, edge)
-                found = agreeing_drag(quadratic[some], start, velocity)
+                found = _agreeing_drag(quadratic[some], start, velocity)
                 # At the very edge the motion that calms a loop is that of its own instability.
                 drag[some] = np.where(found <= _EDGE * edge, np.inf, found)
             if not careful:
@@ -338,8 +340,7 @@ class GainRows:
 
         def velocity(some: IndexArray, C: FloatArray) -> FloatArray:
             closed = c0[some] + C[:, None] * c1[some]
-            size = closed.real**2 + closed.imag**2
-            sigma = np.sqrt((driven[some] / size).sum(axis=1))
+            sigma = np.sqrt((driven[some] / abs2(closed)).sum(axis=1))
             return np.where(edge[some] < C, sigma, np.inf)
 
         return velocity
@@ -349,3 +350,56 @@ def _stable(loops: Loops) -> BoolArray:
     if isinstance(loops, SpringLoops):
         return loops.stable
     return np.asarray(count_unstable(loops) == 0)
+
+
+def _agreeing_drag(quadratic: FloatArray, start: float, velocity: Velocity) -> FloatArray:
+    """Return the drag that agrees with each loop's response, (n,) [N s/m]; infinite for none.
+
+    C = q sqrt(8/pi) sigma_v(C), by the secant rule on logarithms, as `synth.robust.plant_stack`
+    does.  More drag means less motion, so that the right side falls; where a loop is unstable it
+    is given more.
+
+    Parameters
+    ----------
+    quadratic
+        q of the drag force q |v| v of each, (n,) [N s2/m2].
+    start
+        About where to begin [N s/m].
+    velocity
+        rms of the payload's velocity of loops `rows` with drag C, (m,); infinite if unstable.
+    """
+    slope = quadratic * np.sqrt(8.0 / np.pi)
+    x = np.full(quadratic.size, np.log(max(start, 1.0)))
+    found = np.where(quadratic > 0.0, np.inf, 0.0)
+    left, right = np.full_like(x, -np.inf), np.full_like(x, np.inf)
+    before, gap_before = np.full_like(x, np.nan), np.full_like(x, np.nan)
+    rows = np.flatnonzero(quadratic > 0.0)
+    for _ in range(_DRAG_ROUNDS):
+        if not rows.size:
+            break
+        sigma = velocity(rows, np.exp(x[rows]))
+        sound = np.isfinite(sigma)
+        with np.errstate(divide="ignore"):
+            gap = np.where(sound, np.log(np.maximum(slope[rows] * sigma, 1e-300)) - x[rows], _STEP)
+        done = np.abs(gap) < _AGREES
+        found[rows[done]] = np.exp(x[rows[done]])
+        # The gap falls with x: its sign says on which side the answer lies.
+        left[rows] = np.where(gap > 0.0, x[rows], left[rows])
+        right[rows] = np.where(gap > 0.0, right[rows], x[rows])
+        with np.errstate(all="ignore"):
+            rise = (gap - gap_before[rows]) / (x[rows] - before[rows])
+        rise = np.where(np.isfinite(rise) & sound, np.clip(rise, -3.0, -0.3), -1.5)
+        before[rows], gap_before[rows] = x[rows], np.where(sound, gap, np.nan)
+        step = np.clip(-gap / rise, -_STEP, _STEP)
+        ahead = x[rows] + step
+        outside = (ahead <= left[rows]) | (ahead >= right[rows])
+        middle = 0.5 * (left[rows] + right[rows])
+        ahead = np.where(outside & np.isfinite(middle), middle, ahead)
+        x[rows] = ahead
+        narrow = right[rows] - left[rows] < _AGREES
+        found[rows[narrow & ~done]] = np.exp(right[rows[narrow & ~done]])
+        # Rounding may keep the last digits from agreeing.
+        close = np.abs(gap) < _CLOSE
+        found[rows[close & ~done]] = np.exp(before[rows[close & ~done]])
+        rows = rows[~(done | narrow)]
+    return found

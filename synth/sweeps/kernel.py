@@ -27,7 +27,7 @@ import numpy as np
 
 from models.basics import BoolArray, ComplexArray, FloatArray, IndexArray
 
-from .numbers import PlantNumbers
+from .numbers import PlantNumbers, at_rows
 
 Columns = list[FloatArray]  # coefficients of s^0, s^1, .., each (n,), or (1,) if all have the same
 
@@ -68,19 +68,12 @@ class SpringLoops:
         reference: float,
     ) -> None:
         self.reference = reference
-        n, like = plants, plants.like
+        n = plants
         self._count = max(len(plants), len(gains), drag.size)
         zero, one = np.zeros(1), np.ones(1)
         h = n["drum_radius"] / n["gear_ratio"]
         load = n.gear_factor * h
-        if like.motor == "dc":
-            phi = n["torque_constant"] / n["resistance"]
-            beta, lag = phi * n["back_emf_constant"], n["inductance"] / n["resistance"]
-        else:
-            lag = 1.0 / n["torque_bandwidth"]
-            speed_mode = like.speed_gain > 0.0
-            phi = n["speed_gain"] if speed_mode else one
-            beta = n["speed_gain"] if speed_mode else zero
+        phi, beta, lag = n.drive
         K, mass = n.stiffness, n["payload_mass"] + mass_share * n.rope_mass
         kappa = _trimmed([K, K * n.damping_time])
         D, e = [zero, drag, mass], _trimmed([one, lag])
@@ -233,10 +226,10 @@ class SpringLoops:
         parts = []
         for start in (0, 1):
             half = columns[start::2]
-            value = np.broadcast_to(_at(half[-1], rows), y.shape).copy()
+            value = np.broadcast_to(at_rows(half[-1], rows), y.shape).copy()
             for c in half[-2::-1]:
                 value *= x
-                value += _at(c, rows)
+                value += at_rows(c, rows)
             parts.append(value)
         return np.asarray(parts[0] ** 2 + (parts[1] * y) ** 2)
 
@@ -311,10 +304,6 @@ def _trimmed(columns: Columns) -> Columns:
 
 def _there(column: FloatArray) -> bool:
     return column.size > 1 or bool(column[0] != 0.0)
-
-
-def _at(column: FloatArray, rows: IndexArray) -> FloatArray:
-    return column[rows][:, None] if column.size > 1 else column[:, None]
 
 
 def _chunks(count: int) -> list[slice]:

@@ -126,6 +126,17 @@ class PlantNumbers:
         return 0.5 * (1.0 / eta + eta)
 
     @property
+    def drive(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Torque per command, torque per speed, and the lag of the motor with its drive [s]."""
+        if self.like.motor == "dc":
+            phi = self["torque_constant"] / self["resistance"]
+            return phi, phi * self["back_emf_constant"], self["inductance"] / self["resistance"]
+        lag = 1.0 / self["torque_bandwidth"]
+        if self.like.speed_gain > 0.0:
+            return self["speed_gain"], self["speed_gain"], lag
+        return np.ones(1), np.zeros(1), lag
+
+    @property
     def damping_time(self) -> FloatArray:
         """Kelvin-Voigt time of the rope, 2 zeta over the first exact mode [s]."""
         zeta = self["damping_ratio"]
@@ -300,3 +311,8 @@ def _first_root(eps: FloatArray) -> FloatArray:
         if np.all(np.abs(step) <= 1e-15 * nu):
             break
     return nu
+
+
+def at_rows(column: FloatArray, rows: IndexArray) -> FloatArray:
+    """Return a column's values of some rows, (m, 1); (1, 1) where all rows have the same."""
+    return column[rows][:, None] if column.size > 1 else column[:, None]

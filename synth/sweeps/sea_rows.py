@@ -8,7 +8,6 @@ through its own case.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -135,12 +134,7 @@ class SeaRows:
         if key not in self._known:
             if len(self._known) > 20_000:
                 self._known.clear()
-            named = dict(zip(self.spread.paths, row, strict=True))
-            self._known[key] = HookMotion.from_case(_with(self.spread, named, self._columns))
+            assert self.spread.case is not None
+            changes = {self.spread.paths[j]: float(row[j]) for j in self._columns}
+            self._known[key] = HookMotion.from_case(self.spread.case.variant(changes))
         return self._known[key]
-
-
-def _with(spread: Spread, named: Mapping[str, float], columns: list[int]) -> Case:
-    assert spread.case is not None
-    changes = {spread.paths[j]: float(named[spread.paths[j]]) for j in columns}
-    return spread.case.variant(changes)

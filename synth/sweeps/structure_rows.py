@@ -41,15 +41,12 @@ class StructureRows:
     refined = 0
     unresolved = 0
     columns = False
-    spring = False
 
     def __init__(
         self, design: StructureDesign, spread: Spread, metrics: Sequence[FrequencyMetric]
     ) -> None:
         if not design.parameters:
             raise InputError(f"sweep: the design has no controller: {design.status}")
-        if "rope.masses" in spread.paths:
-            raise InputError("sweep: rope.masses cannot vary; a design has one number of masses")
         self.design, self.spread, self.metrics = design, spread, tuple(metrics)
 
     @property

@@ -8,7 +8,6 @@ are put side by side, on the design's own plant and drag.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,9 +19,6 @@ from ..loop import with_drag
 from ..question import pose
 from ..robust import GainRadius, gain_radius
 from .frequency import FrequencyEngine
-
-if TYPE_CHECKING:
-    pass
 
 _OUTSIDE = 1.001  # times the radius, where the nearest unstable gains have to be unstable
 _FACES = 0.5  # share of the draws that are put on the faces of the box

@@ -28,7 +28,7 @@ import numpy as np
 
 from models.basics import BoolArray, ComplexArray, FloatArray, IndexArray
 
-from .chain import ChainLoops
+from .chain import ChainLoops, abs2
 
 Follow = Callable[[IndexArray, ComplexArray], ComplexArray]
 
@@ -101,7 +101,7 @@ def light_poles(loops: Loops, row: int) -> ComplexArray:
     rows = np.array([row])
     omega = _grid(loops, rows, _radius(loops, rows))[0, 1:]
     closed, free = loops.responses(rows, _imaginary(omega))
-    size = (_abs2(closed) / _abs2(free))[0]
+    size = (abs2(closed) / abs2(free))[0]
     inner = np.flatnonzero((size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])) + 1
     start = inner[np.argsort(size[inner])[:_SOUGHT]]
     s = _imaginary(omega[start])
@@ -226,7 +226,7 @@ def _peaks(loops: Loops, rows: IndexArray) -> FloatArray:
     omega = _grid(loops, rows, _radius(loops, rows))[:, 1:]
     closed, free = loops.responses(rows, _imaginary(omega))
     m, k = omega.shape
-    every = [(np.repeat(np.arange(m), k), omega.ravel(), (_abs2(closed) / _abs2(free)).ravel())]
+    every = [(np.repeat(np.arange(m), k), omega.ravel(), (abs2(closed) / abs2(free)).ravel())]
     smooth = _steps(closed[:, :-1], closed[:, 1:])[1] & _steps(free[:, :-1], free[:, 1:])[1]
     loop, at = np.nonzero(~smooth)
     a, b = omega[loop, at], omega[loop, at + 1]
@@ -237,7 +237,7 @@ def _peaks(loops: Loops, rows: IndexArray) -> FloatArray:
         middle = 0.5 * (a + b)
         here = [v[:, 0] for v in loops.responses(rows[loop], _imaginary(middle[:, None]))]
         with np.errstate(all="ignore"):
-            every.append((loop, middle, _abs2(here[0]) / _abs2(here[1])))
+            every.append((loop, middle, abs2(here[0]) / abs2(here[1])))
         loop = np.concatenate([loop, loop])
         a, b = np.concatenate([a, middle]), np.concatenate([middle, b])
         ends = [
@@ -274,7 +274,7 @@ def _least(
     def value(w: FloatArray) -> FloatArray:
         closed, free = loops.responses(rows[owner], _imaginary(w[:, None]))
         with np.errstate(all="ignore"):
-            found = (_abs2(closed) / _abs2(free))[:, 0]
+            found = (abs2(closed) / abs2(free))[:, 0]
         return np.where(np.isfinite(found), found, np.inf)
 
     # Golden section on arrays, a bracket for each minimum: SciPy's would do them one by one.
@@ -289,10 +289,6 @@ def _least(
         f1, f2 = np.where(down, seen, f2), np.where(down, f1, seen)
     np.minimum.at(best, owner, np.minimum(f1, f2))
     return np.asarray(1.0 / np.sqrt(best))
-
-
-def _abs2(values: ComplexArray) -> FloatArray:
-    return np.asarray(values.real**2 + values.imag**2)
 
 
 def calming_drag(loops: ChainLoops) -> FloatArray:
@@ -311,8 +307,7 @@ def calming_drag(loops: ChainLoops) -> FloatArray:
         c1 = (more.responses(rows, s)[0] - c0) / unit
         both = c0 * c1.conj()
         with np.errstate(all="ignore"):
-            size = c1.real**2 + c1.imag**2
-            return np.asarray(both.imag), np.asarray(-both.real / size)
+            return np.asarray(both.imag), np.asarray(-both.real / abs2(c1))
 
     for at in range(0, len(loops), _STEP):
         rows = np.arange(at, min(at + _STEP, len(loops)))
