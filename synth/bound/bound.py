@@ -24,7 +24,7 @@ from models.plant import LinearPlant, ShapingFilter
 
 from ..loop import Disturbance, LinearController, disturbances
 from ..structures import reduced
-from .dual import Dual, DualPoint, shaped, with_input_outputs
+from .dual import Dual, DualPoint, shaped_plant, with_input_outputs
 from .spectral_factor import SpectralFactor, spectral_factor
 from .truth import TrueCost, refitted, truth_of
 
@@ -219,7 +219,7 @@ def lqg_bound(
     # a further round only has to make the model better where the loop feels it.
     for attempt in range(max(0, refits) + 1):
         filters = {n: f.filter if isinstance(f, SpectralFactor) else f for n, f in fitted.items()}
-        dual = Dual(shaped(model, filters), minimise, limits)
+        dual = Dual(shaped_plant(model, filters), minimise, limits)
         dual.squares = squares * asked
         point = dual.maximise(start)
         start = point.multipliers
@@ -266,11 +266,14 @@ def _bound(
         ", ".join(names) + (f" {delay} late" if delay != "0 ms" else "")
         for delay, names in late.items()
     )
-    fits = {n: f.shape_error for n, f in filters.items() if isinstance(f, ShapingFilter)}
+    fitted = {n: f for n, f in filters.items() if isinstance(f, ShapingFilter)}
     said = [
         f"sensors: {heard}",
         "shaken by " + ", ".join(s.name for s in sources),
-        *(f"{n}: factor of order {_order(filters[n])}, fit error {e:.2g}" for n, e in fits.items()),
+        *(
+            f"{n}: factor of order {f.order}, fit error {f.shape_error:.2g}"
+            for n, f in fitted.items()
+        ),
     ]
     return Bound(
         plant=plant,
@@ -284,7 +287,7 @@ def _bound(
         rms=rms,
         gap=dual.gap(point),
         missed=loop.missed / max(attained, 1e-300),
-        fits=fits,
+        fits={n: f.shape_error for n, f in fitted.items()},
         controller=reduced(dual.plant, point.regulator, dual.estimator, len(dual.plant.states)),
         pade=pade,
         assumptions=(*said, *assumptions),
@@ -292,10 +295,6 @@ def _bound(
         dual=dual,
         filters=filters,
     )
-
-
-def _order(source: ShapingFilter | float) -> int:
-    return source.order if isinstance(source, ShapingFilter) else 0
 
 
 def _check(plant: LinearPlant, minimise: Mapping[str, float], limits: Mapping[str, float]) -> None:

@@ -35,9 +35,9 @@ from ..loop import LinearController, closed_loop_poles, disturbances
 from ..question import PAYLOAD, pose
 from ..verify import LawMatrices, Loop, moments
 from .bound import Bound, lqg_bound
-from .check import banded
 from .dual import with_input_outputs
 from .spectral_factor import SpectralFactor, spectral_factor
+from .truth import banded
 
 _FAINT = 1e-3  # noise of an exact sensor, see `bound_for`
 _LONGER = 2.0  # T_z of any signal over that of the hook, at most

@@ -13,21 +13,21 @@ import numpy as np
 
 from models.basics import FloatArray, SynthesisError, one_thread
 
-from ..loop import Disturbance, LinearController, closed_loop_poles
+from ..loop import LinearController
 from ..verify import (
     LawMatrices,
     Loop,
-    Source,
     Verification,
     agreement,
     bounded,
+    closed_matrices,
     lyapunov_variances,
     moments,
     panels,
 )
 from .bound import Bound
 from .dual import DualPoint
-from .truth import lqg_poles, optimal_response
+from .truth import banded, densities, lqg_poles, optimal_response
 
 _PADE = 5  # of the delays, where another controller's stability is looked at
 _TIME = 1e-3  # cost by a Lyapunov equation, in which much cancels
@@ -102,17 +102,7 @@ def weighted_rms(bound: Bound, controller: LinearController) -> float:
     """
     model = bound.plant.without_delays(_PADE, at="measurements")
     law = LawMatrices.of(controller, bound.plant)
-    poles = closed_loop_poles(
-        model,
-        LinearController(
-            A=law.A,
-            B=law.B,
-            C=law.C,
-            D=law.D,
-            measurements=bound.plant.measurements,
-            inputs=bound.plant.inputs,
-        ),
-    )
+    poles = np.linalg.eigvals(closed_matrices(model, law)[0])
     if poles.real.max(initial=-1.0) >= 0.0:
         raise SynthesisError(
             f"bound: the controller's loop is unstable (growth rate {poles.real.max():.3g} 1/s)"
@@ -130,36 +120,20 @@ def weighted_rms(bound: Bound, controller: LinearController) -> float:
     return math.sqrt(sum(w * found[name][0] for name, w in bound.minimise.items()))
 
 
-def banded(source: Disturbance) -> Source:
-    """Return a disturbance that is zero outside its band."""
-    if source.band is None:
-        return Source(name=source.name, density=source.density, band=None, splits=source.splits)
-    low, high = source.band
-
-    def density(omega: FloatArray) -> FloatArray:
-        return np.where((omega >= low) & (omega <= high), source.density(omega), 0.0)
-
-    return Source(
-        name=source.name, density=density, band=source.band, splits=(low, *source.splits, high)
-    )
-
-
 def _variances(bound: Bound, names: list[str], point: DualPoint) -> dict[str, float]:
     """Return variances of the true loop whose response from noise to command is the model's."""
     model, kalman = bound.dual.plant, bound.dual.estimator
-    sources = [banded(source) for source in bound.sources]
-    shaking = [source.name for source in sources]
+    shaking = [source.name for source in bound.sources]
 
     def density(omega: FloatArray) -> FloatArray:
         X = optimal_response(model, point.regulator, kalman, omega)
         blocks = bound.plant.response(omega).select(outputs=names, disturbances=shaking)
         gains = np.abs(blocks.zw + blocks.zu @ X @ blocks.yw) ** 2
-        shaken = np.stack([source.density(omega) for source in sources])
-        return np.asarray(np.einsum("kzw,wk->zk", gains, shaken))
+        return np.asarray(np.einsum("kzw,wk->zk", gains, densities(bound.sources, omega)))
 
     marks = np.concatenate([lqg_poles(model, point.regulator, kalman), bound.plant.poles()])
     sizes = np.abs(marks)
-    splits = [w for source in sources for w in source.splits]
+    splits = [w for source in bound.sources for w in banded(source).splits]
     low = min([_NEAR * float(sizes[sizes > 1e-6].min(initial=1.0)), *splits])
     high = max([_FAR * float(sizes.max(initial=1.0)), *splits])
     # Simpson's rule on ever finer panels in log-frequency, with Richardson's extrapolation:

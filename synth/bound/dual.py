@@ -12,9 +12,9 @@ and the inner minimum is plain LQG (Boyd and Barratt, *Linear Controller Design*
 Zhu, Rotea and Skelton 1997).  d is concave, with the gradient J_i - b_i^2; the filter's Riccati
 equation does not depend on the multipliers and is solved once.
 
-Both Riccati equations need a plant whose disturbances are white and of intensity one: `shaped`
-takes the sea's filter into the plant, `with_input_outputs` makes a command that is charged or
-limited an output as any other.
+Both Riccati equations need a plant whose disturbances are white and of intensity one:
+`shaped_plant` takes the sea's filter into the plant, `with_input_outputs` makes a command that is
+charged or limited an output as any other.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from scipy.optimize import minimize
 from models.basics import FloatArray, InputError, SolverError, solve_lyapunov, solve_riccati
 from models.plant import LinearPlant, ShapingFilter
 
-from ..structures import LqgEstimator, LqgRegulator, weighing
+from ..structures import LqgEstimator, LqgRegulator, shaped, weighing
 
 _LEAST = 1e-6  # of a multiplier, as a price: lambda b^2 over the cost
 _MOST = 1e6
@@ -38,6 +38,25 @@ _STEPS = 12
 _NEAR = 0.3  # gap from which Newton's method is tried first ...
 _ARRIVED = 1e-6  # ... and at which its answer is taken
 _HAIR = 0.5  # in the logarithm of a multiplier that is at most a millionth of the cost
+
+
+def shaped_plant(plant: LinearPlant, sources: Mapping[str, ShapingFilter | float]) -> LinearPlant:
+    """Return `synth.structures.shaped`, its white noises checked.
+
+    Raises
+    ------
+    InputError
+        If a white noise has a rate that acts on the plant too.
+    """
+    for name, source in sources.items():
+        rates = [plant.disturbances.index(r) for r, of in plant.rates.items() if of == name]
+        through_rate = any(np.any(m[:, rates]) for m in (plant.E, plant.F, plant.Fz))
+        if through_rate and not isinstance(source, ShapingFilter):
+            raise InputError(
+                f"bound: {name} acts through its rate too, so its spectrum must fall off; "
+                "got white noise"
+            )
+    return shaped(plant, sources)
 
 
 def with_input_outputs(plant: LinearPlant, names: Sequence[str]) -> LinearPlant:
@@ -53,68 +72,6 @@ def with_input_outputs(plant: LinearPlant, names: Sequence[str]) -> LinearPlant:
         Dz=np.vstack([plant.Dz, rows]),
         Fz=np.vstack([plant.Fz, np.zeros((more, len(plant.disturbances)))]),
         outputs=(*plant.outputs, *wanted),
-    )
-
-
-def shaped(plant: LinearPlant, sources: Mapping[str, ShapingFilter | float]) -> LinearPlant:
-    """Return a plant that white noises of intensity 1 shake as the sources do.
-
-    Parameters
-    ----------
-    plant
-        Without delays.
-    sources
-        By name of a disturbance: a filter, or the intensity of white noise.  Disturbances that
-        are not named rest.
-
-    Raises
-    ------
-    InputError
-        If a white noise has a rate that acts on the plant too.
-    """
-    n, count = len(plant.states), len(sources)
-    extra = sum(s.order for s in sources.values() if isinstance(s, ShapingFilter))
-    A = np.zeros((n + extra, n + extra))
-    A[:n, :n] = plant.A
-    E, F = np.zeros((n + extra, count)), np.zeros((len(plant.measurements), count))
-    Fz = np.zeros((len(plant.outputs), count))
-    C, Cz = (np.hstack([m, np.zeros((len(m), extra))]) for m in (plant.C, plant.Cz))
-    at = n
-    for k, (name, source) in enumerate(sources.items()):
-        base = plant.disturbances.index(name)
-        rates = [plant.disturbances.index(r) for r, of in plant.rates.items() if of == name]
-        if not isinstance(source, ShapingFilter):
-            if any(np.any(m[:, rates]) for m in (plant.E, plant.F, plant.Fz)):
-                raise InputError(
-                    f"bound: {name} acts through its rate too, so its spectrum must fall off; "
-                    "got white noise"
-                )
-            root = np.sqrt(source)
-            E[:n, k], F[:, k] = root * plant.E[:, base], root * plant.F[:, base]
-            Fz[:, k] = root * plant.Fz[:, base]
-            continue
-        states = slice(at, at + source.order)
-        A[states, states], E[states, k] = source.A, source.B[:, 0]
-        row, rate = source.C[0], (source.C @ source.A)[0]
-        for target, columns in ((A[:n], plant.E), (C, plant.F), (Cz, plant.Fz)):
-            target[:, states] += np.outer(columns[:, base], row)
-            for r in rates:
-                target[:, states] += np.outer(columns[:, r], rate)
-        at += source.order
-    return LinearPlant(
-        A=A,
-        B=np.vstack([plant.B, np.zeros((extra, len(plant.inputs)))]),
-        E=E,
-        C=C,
-        D=plant.D,
-        F=F,
-        Cz=Cz,
-        Dz=plant.Dz,
-        Fz=Fz,
-        inputs=plant.inputs,
-        disturbances=tuple(sources),
-        measurements=plant.measurements,
-        outputs=plant.outputs,
     )
 
 

@@ -34,7 +34,7 @@ from models.plant import LinearPlant, PlantResponse, ShapingFilter
 
 from ..loop import Disturbance
 from ..structures import LqgEstimator, LqgRegulator
-from ..verify import panels
+from ..verify import Source, panels
 from .dual import Dual, DualPoint
 from .spectral_factor import SpectralFactor
 
@@ -191,15 +191,23 @@ def filter_plant(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray) -> 
     return LinearPlant(A=A, B=B, E=np.zeros((len(A), 0)), C=C, D=D)
 
 
+def banded(source: Disturbance) -> Source:
+    """Return a disturbance that is zero outside its band."""
+    if source.band is None:
+        return Source(name=source.name, density=source.density, band=None, splits=source.splits)
+    low, high = source.band
+
+    def density(omega: FloatArray) -> FloatArray:
+        return np.where((omega >= low) & (omega <= high), source.density(omega), 0.0)
+
+    return Source(
+        name=source.name, density=density, band=source.band, splits=(low, *source.splits, high)
+    )
+
+
 def densities(sources: tuple[Disturbance, ...], omega: FloatArray) -> FloatArray:
-    """Return the one-sided densities, (nw, k), zero outside their bands."""
-    rows = []
-    for source in sources:
-        density = np.asarray(source.density(omega), dtype=np.float64)
-        if source.band is not None:
-            density = np.where((omega >= source.band[0]) & (omega <= source.band[1]), density, 0.0)
-        rows.append(density)
-    return np.stack(rows)
+    """Return the densities of all sources, zero outside their bands, (nw, k)."""
+    return np.stack([banded(source).density(omega) for source in sources])
 
 
 def truth_of(

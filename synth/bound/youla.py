@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -53,7 +53,7 @@ from ..verify import (
 )
 from .bound import Bound
 from .check import weighted_rms
-from .truth import densities, filter_plant, frequencies
+from .truth import densities, filter_plant, frequencies, lqg_poles
 
 cp: Any = cvxpy  # its functions come through a star import that mypy does not follow
 _POINTS, _DENSE = 200, 2000  # at which M_s holds at first, and is looked at
@@ -82,9 +82,8 @@ class AffineLoop:
         K, L = bound.point.regulator.gain, bound.dual.estimator.gain
         AK, AL = plant.A + plant.B @ K, plant.A - L @ plant.C
         ny, nu = len(plant.measurements), len(plant.inputs)
-        self.marks = np.concatenate(
-            [np.linalg.eigvals(AK), np.linalg.eigvals(AL), bound.plant.poles()]
-        )
+        own = lqg_poles(plant, bound.point.regulator, bound.dual.estimator)
+        self.marks = np.concatenate([own, bound.plant.poles()])
         self.plant = bound.plant
         self.shaking = [source.name for source in bound.sources]
 
@@ -196,24 +195,14 @@ class YoulaDesign:
         heard, reached = self._gramians
         left, right = balanced_truncation(heard, reached, order)
         given = self.controller
-        return LinearController(
-            A=left @ given.A @ right,
-            B=left @ given.B,
-            C=given.C @ right,
-            D=given.D,
-            measurements=given.measurements,
-            inputs=given.inputs,
-        )
+        return replace(given, A=left @ given.A @ right, B=left @ given.B, C=given.C @ right)
 
     @cached_property
     def _gramians(self) -> tuple[FloatArray, FloatArray]:
         """Observability and controllability of the controller's states in the closed loop."""
         plant, point = self.bound.dual.plant, self.bound.point
         given = self.controller
-        law = LawMatrices(
-            A=np.array(given.A), B=np.array(given.B), C=np.array(given.C), D=np.array(given.D)
-        )
-        A, E, Cz, _ = closed_matrices(plant, law)
+        A, E, Cz, _ = closed_matrices(plant, LawMatrices.of(given, plant))
         n = len(plant.states)
         reached = solve_lyapunov(A, E @ E.T)
         moved = np.hstack([np.zeros((len(plant.inputs), n)), given.C])

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         Structure,
         pace,
     )
+    from .whitened import shaped
     from .winch_diagram import TRANSPARENT, WinchLaw, WinchStructure
     from .winch_structures import structure_named, structure_names
 else:

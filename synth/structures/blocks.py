@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -134,12 +134,7 @@ class LeadLag(FilterSection):
         """Return one state, the low-passed input."""
         zero, pole = values
         high = pole / zero
-        return (
-            np.array([[-pole]]),
-            np.array([[pole]]),
-            np.array([[1.0 - high]]),
-            np.array([[high]]),
-        )
+        return np.array([[-pole]]), np.array([[pole]]), np.array([[1.0 - high]]), np.array([[high]])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,7 +214,7 @@ class LeadTime(FilterSection):
     """
 
     time: Range = (0.0, 2.0)
-    bandwidth: Range = field(default=(2.0, 60.0))
+    bandwidth: Range = (2.0, 60.0)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -15,7 +15,7 @@ search wants of any structure: response, characteristic polynomial, state space.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -217,13 +217,7 @@ class DiagramLaw(ParametrisedController):
 def _bounded(parameter: Parameter, limits: tuple[float, float] | None) -> Parameter:
     if limits is None:
         return parameter
-    return Parameter(
-        name=parameter.name,
-        scale=parameter.scale,
-        low=limits[0],
-        high=limits[1],
-        unit=parameter.unit,
-    )
+    return replace(parameter, low=limits[0], high=limits[1])
 
 
 def _parallel(parts: Sequence[Matrices]) -> Matrices:

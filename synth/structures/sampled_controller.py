@@ -122,17 +122,12 @@ def tracking_gain(matrices: Matrices, sample_time: float) -> FloatArray:
         noise = B / np.where(size > 0.0, size, 1.0)
         P = scipy.linalg.solve_discrete_are(A.T, C.T, noise @ noise.T, np.eye(1))
         gain = A @ P @ C.T / (1.0 + C @ P @ C.T)
-        radius = float(np.abs(np.linalg.eigvals(A - gain @ C)).max())
+        if not float(np.abs(np.linalg.eigvals(A - gain @ C)).max()) < 1.0:
+            raise np.linalg.LinAlgError("the gain does not stabilise")
     except (np.linalg.LinAlgError, ValueError) as error:
-        raise _not_held() from error
-    if not radius < 1.0:
-        raise _not_held()
+        raise SynthesisError(
+            f"{_OWNER}: no anti-windup holds this controller: a state that does not decay is not "
+            "seen at its output or not reached by what it hears; leave such states out, or set "
+            "anti_windup to False"
+        ) from error
     return np.asarray(gain, dtype=np.float64)
-
-
-def _not_held() -> SynthesisError:
-    return SynthesisError(
-        f"{_OWNER}: no anti-windup holds this controller: a state that does not decay is not "
-        "seen at its output or not reached by what it hears; leave such states out, or set "
-        "anti_windup to False"
-    )

@@ -14,7 +14,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
@@ -201,15 +200,10 @@ class _GainLaw(ParametrisedController):
         self._entries = tuple(entries)
         self._factors = factors
         scales = gain_scales(plant, entries) / np.abs(factors)
-        limits = MappingProxyType(dict(bounds))
+        limits = [bounds.get(name, (-np.inf, np.inf)) for name in names]
         self.parameters = tuple(
-            Parameter(
-                name=name,
-                scale=float(scale),
-                low=float(limits.get(name, (-np.inf, np.inf))[0]),
-                high=float(limits.get(name, (-np.inf, np.inf))[1]),
-            )
-            for name, scale in zip(names, scales, strict=True)
+            Parameter(name=name, scale=float(scale), low=float(low), high=float(high))
+            for name, scale, (low, high) in zip(names, scales, limits, strict=True)
         )
         self.dimensions = len(entries) + 1
 

@@ -6,11 +6,11 @@ from, and nothing that is reported rests on it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from models.plant import LinearPlant
+from models.plant import LinearPlant, ShapingFilter
 
 from ..loop import Disturbance
 
@@ -23,34 +23,49 @@ def whitened(plant: LinearPlant, disturbances: Sequence[Disturbance]) -> LinearP
     disturbance and its rate.  A white noise whose rate acts too has no finite variance and
     keeps the rate out.
     """
-    n = len(plant.states)
-    known = {name: k for k, name in enumerate(plant.disturbances)}
-    rate_of = {base: rate for rate, base in plant.rates.items()}
-    extra = 2 * sum(not _is_white(d) for d in disturbances)
-    count = len(disturbances)
+    sources = {
+        d.name: np.pi * float(d.density(np.ones(1))[0]) if _is_white(d) else _oscillator(d)
+        for d in disturbances
+    }
+    return shaped(plant, sources)
+
+
+def shaped(plant: LinearPlant, sources: Mapping[str, ShapingFilter | float]) -> LinearPlant:
+    """Return a plant that white noises of intensity 1 shake as the sources do.
+
+    Parameters
+    ----------
+    plant
+        Without delays.
+    sources
+        By name of a disturbance: a filter, or the intensity of white noise.  Disturbances that
+        are not named rest.  A white noise whose rate acts too has no finite variance and keeps
+        the rate out.
+    """
+    n, count = len(plant.states), len(sources)
+    extra = sum(s.order for s in sources.values() if isinstance(s, ShapingFilter))
     A = np.zeros((n + extra, n + extra))
+    A[:n, :n] = plant.A
     E, F = np.zeros((n + extra, count)), np.zeros((len(plant.measurements), count))
     Fz = np.zeros((len(plant.outputs), count))
     C, Cz = (np.hstack([m, np.zeros((len(m), extra))]) for m in (plant.C, plant.Cz))
-    A[:n, :n] = plant.A
     at = n
-    for k, disturbance in enumerate(disturbances):
-        column = known[disturbance.name]
-        if _is_white(disturbance):
-            size = np.sqrt(np.pi * float(disturbance.density(np.ones(1))[0]))
-            E[:n, k], F[:, k] = size * plant.E[:, column], size * plant.F[:, column]
-            Fz[:, k] = size * plant.Fz[:, column]
+    for k, (name, source) in enumerate(sources.items()):
+        base = plant.disturbances.index(name)
+        rates = [plant.disturbances.index(r) for r, of in plant.rates.items() if of == name]
+        if not isinstance(source, ShapingFilter):
+            root = np.sqrt(source)
+            E[:n, k], F[:, k] = root * plant.E[:, base], root * plant.F[:, base]
+            Fz[:, k] = root * plant.Fz[:, base]
             continue
-        peak, damping, sigma = _oscillator(disturbance)
-        A[at, at + 1] = 1.0
-        A[at + 1, at : at + 2] = -(peak**2), -2.0 * damping * peak
-        E[at + 1, k] = np.sqrt(4.0 * damping * peak**3) * sigma
-        for state, name in ((at, disturbance.name), (at + 1, rate_of.get(disturbance.name))):
-            if name is not None:
-                A[:n, state] += plant.E[:, known[name]]
-                C[:, state] += plant.F[:, known[name]]
-                Cz[:, state] += plant.Fz[:, known[name]]
-        at += 2
+        states = slice(at, at + source.order)
+        A[states, states], E[states, k] = source.A, source.B[:, 0]
+        row, rate = source.C[0], (source.C @ source.A)[0]
+        for target, columns in ((A[:n], plant.E), (C, plant.F), (Cz, plant.Fz)):
+            target[:, states] += np.outer(columns[:, base], row)
+            for r in rates:
+                target[:, states] += np.outer(columns[:, r], rate)
+        at += source.order
     return LinearPlant(
         A=A,
         B=np.vstack([plant.B, np.zeros((extra, len(plant.inputs)))]),
@@ -62,7 +77,7 @@ def whitened(plant: LinearPlant, disturbances: Sequence[Disturbance]) -> LinearP
         Dz=plant.Dz,
         Fz=Fz,
         inputs=plant.inputs,
-        disturbances=tuple(d.name for d in disturbances),
+        disturbances=tuple(sources),
         measurements=plant.measurements,
         outputs=plant.outputs,
     )
@@ -75,13 +90,20 @@ def _is_white(disturbance: Disturbance) -> bool:
     return bool(np.all(density == density[0]))
 
 
-def _oscillator(disturbance: Disturbance) -> tuple[float, float, float]:
-    """Return peak frequency [rad/s], damping ratio and standard deviation of a spectrum."""
+def _oscillator(disturbance: Disturbance) -> ShapingFilter:
+    """Return an oscillator with the peak frequency, peak density and variance of a spectrum."""
     low, high = disturbance.band or (1e-3, 1e3)
     omega = np.geomspace(max(low, 1e-4 * high), high, 400)
     density = disturbance.density(omega)
     k = int(np.argmax(density))
-    variance = float(np.trapezoid(density, omega))
+    variance, peak = float(np.trapezoid(density, omega)), float(omega[k])
     # An oscillator's density at resonance is m0 / (pi damping peak).
     damping = variance / (np.pi * omega[k] * max(float(density[k]), 1e-300))
-    return float(omega[k]), float(np.clip(damping, 0.01, 2.0)), float(np.sqrt(variance))
+    damping = float(np.clip(damping, 0.01, 2.0))
+    return ShapingFilter(
+        A=np.array([[0.0, 1.0], [-(peak**2), -2.0 * damping * peak]]),
+        B=np.array([[0.0], [np.sqrt(4.0 * damping * peak**3) * np.sqrt(variance)]]),
+        C=np.array([[1.0, 0.0]]),
+        variance_error=0.0,
+        shape_error=np.nan,
+    )

@@ -59,6 +59,7 @@ _HAUL, _SPEED, _HEAVE, _HEAVE_RATE = "drum.haul", "motor.speed", "mru.heave", "m
 _GAINS = ("a", "a1", "a2")
 #: What the payload asks of the drum: speed per acceleration [s], velocity [-], position [1/s].
 ASKED = ("payload.acceleration_gain", "payload.velocity_gain", "payload.position_gain")
+_NODES = np.geomspace(0.05, 20.0, 240)  # at which a feed-forward is fitted [rad/s]
 _TOP = 3.0  # candidates' loop gains reach this at their crossover
 
 
@@ -309,29 +310,20 @@ class WinchLaw(DiagramLaw):
             drawn[::4, columns] *= 0.02
         if not self._structure.heave:
             return drawn
-        nodes = np.geomspace(0.05, 20.0, 240)
-        response = problem.plant.response(nodes)
-        weights = np.gradient(nodes)
+        response = problem.plant.response(_NODES)
         for row in drawn:
-            self._feed(row, problem, response, weights)
+            self._feed(row, problem, response)
         return self.clipped(drawn)
 
     def fed(self, values: Sequence[float], problem: GeneralisedPlant) -> list[list[float]]:
         """Return parameters with the feed-forward that suits the rest best, if there is one."""
         if not self._structure.heave:
             return []
-        nodes = np.geomspace(0.05, 20.0, 240)
         row = np.array(values, dtype=np.float64)
-        self._feed(row, problem, problem.plant.response(nodes), np.gradient(nodes))
+        self._feed(row, problem, problem.plant.response(_NODES))
         return [[float(v) for v in self.clipped(row[None])[0]]]
 
-    def _feed(
-        self,
-        row: FloatArray,
-        problem: GeneralisedPlant,
-        response: PlantResponse,
-        weights: FloatArray,
-    ) -> None:
+    def _feed(self, row: FloatArray, problem: GeneralisedPlant, response: PlantResponse) -> None:
         """Set gain and lead of the feed-forward to the best for the rest of a candidate."""
         gain, lead = self.index("heave.gain"), self.index("heave.lead")
 
@@ -352,7 +344,7 @@ class WinchLaw(DiagramLaw):
                 if disturbance.band is not None:
                     low, high = disturbance.band
                     density = density * ((response.omega >= low) & (response.omega <= high))
-                size = np.sqrt(weight * density * weights)
+                size = np.sqrt(weight * density * np.gradient(response.omega))
 
                 def caused(law: Any, w: int = w, through: Any = through) -> Any:
                     return through * sum(c * response.yw[:, j, w] for j, c in enumerate(law))

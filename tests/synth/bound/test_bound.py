@@ -19,11 +19,11 @@ from stillhook import load_case
 from synth.bound import Bound, bound_for, verify_bound, weighted_rms
 from synth.bound.bound import lqg_bound
 from synth.bound.case import rms_limits
-from synth.bound.dual import Dual, shaped
+from synth.bound.dual import Dual
 from synth.design import evaluate_gains, tune
 from synth.limits import Continuous, Minimum, Peak, Power, Rms
 from synth.loop import LinearController
-from synth.structures import StaticGain, reduced
+from synth.structures import StaticGain, reduced, shaped
 
 FloatArray = npt.NDArray[np.float64]
 cp: Any = cvxpy  # its signatures are not typed
