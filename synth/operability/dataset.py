@@ -18,6 +18,15 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _SUFFIX = {"loop": "", "held": "_held", "perfect": "_perfect", "reoptimised": "_reoptimised"}
+# Of a rope: variable, attribute of `RopeState`, unit, words.
+_ROPE = (
+    ("rope_length", "length", "m", "rope paid out"),
+    ("drum_layer", "layer", "1", "layer of the drum, 1 the bare drum; 0 not known"),
+    ("drum_radius", "radius", "m", "pitch radius of the drum"),
+    ("static_torque", "torque", "N m", "motor torque at rest, with losses"),
+    ("static_tension", "tension", "N", "rope tension at the winch at rest"),
+    ("stiffness", "stiffness", "N/m", "stiffness of the rope"),
+)
 
 
 def dataset_of(case: Case, depths: Sequence[AtDepth], status: str) -> xr.Dataset:
@@ -46,24 +55,15 @@ def dataset_of(case: Case, depths: Sequence[AtDepth], status: str) -> xr.Dataset
         drag = np.array([contour.drag for contour in contours])
         end = _SUFFIX[system]
         text = f"limiting significant wave height {words}"
-        for name, values, dims, about in (
-            (
-                f"height_limit{end}",
-                every,
-                ("limit", *tail),
-                {"units": "m", "long_name": f"{text}, by limit"},
-            ),
-            (f"height{end}", lowest, tail, {"units": "m", "long_name": text}),
-            (f"binding{end}", binding, tail, {"long_name": f"limit that binds {words}"}),
-            (
-                f"drag{end}",
-                drag,
-                tail,
-                {"units": "N s/m", "long_name": f"drag coefficient at the limit {words}"},
-            ),
+        for name, values, dims, unit, long_name in (
+            ("height_limit", every, ("limit", *tail), "m", f"{text}, by limit"),
+            ("height", lowest, tail, "m", text),
+            ("binding", binding, tail, "", f"limit that binds {words}"),
+            ("drag", drag, tail, "N s/m", f"drag coefficient at the limit {words}"),
         ):
             shown = values if turns else values.squeeze(axis=-2)
-            variables[name] = ((*lead, *dims), shown if many else shown[0], about)
+            notes = ({"units": unit} if unit else {}) | {"long_name": long_name}
+            variables[f"{name}{end}"] = ((*lead, *dims), shown if many else shown[0], notes)
     if "loop" in depths[0].contours:
         peaks = np.array([at.max_sensitivity for at in depths])
         about = {"units": "1", "long_name": "sensitivity peak M_s of the design's loop"}
@@ -74,12 +74,9 @@ def dataset_of(case: Case, depths: Sequence[AtDepth], status: str) -> xr.Dataset
         "limit": ("limit", names, {"long_name": "limit"}),
         "bound": ("limit", [first[n].bound for n in names], {"long_name": "bound, in `unit`"}),
         "unit": ("limit", [first[n].unit for n in names], {"long_name": "unit of the bound"}),
-        "peak_period": (
-            "peak_period",
-            main.periods,
-            {"units": "s", "long_name": "peak period T_p"},
-        ),
     }
+    about = {"units": "s", "long_name": "peak period T_p"}
+    coordinates["peak_period"] = ("peak_period", main.periods, about)
     if main.headings is not None:
         about = {
             "units": "degree",
@@ -105,23 +102,14 @@ def table_text(depths: Sequence[AtDepth]) -> str:
     names = _names(depths)
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    head = [
-        "rope_length_m",
-        "drum_layer",
-        "system",
-        "heading_deg",
-        "peak_period_s",
-        "height_m",
-        "binding",
-    ]
-    writer.writerow([*head, *(f"{name}_height_m" for name in names)])
+    head = "rope_length_m drum_layer system heading_deg peak_period_s height_m binding"
+    writer.writerow([*head.split(), *(f"{name}_height_m" for name in names)])
     for at in depths:
         for system, contour in at.contours.items():
             every = _by_limit(contour, names)
+            headings = np.degrees([] if contour.headings is None else contour.headings)
             for h in range(contour.limit.shape[0]):
-                heading = (
-                    "" if contour.headings is None else f"{np.degrees(contour.headings[h]):.6g}"
-                )
+                heading = f"{headings[h]:.6g}" if headings.size else ""
                 for p, period in enumerate(contour.periods):
                     row = [f"{at.rope.length:g}", at.rope.layer or "", system, heading]
                     row += [f"{period:.6g}", _figure(contour.limit[h, p])]
@@ -142,33 +130,13 @@ def _by_limit(contour: Contour, names: list[str]) -> Any:
 
 
 def _ropes(depths: Sequence[AtDepth], many: bool) -> dict[str, Any]:
-    figures: dict[str, tuple[list[float], str, str]] = {
-        "rope_length": ([at.rope.length for at in depths], "m", "rope paid out"),
-        "drum_layer": (
-            [at.rope.layer for at in depths],
-            "1",
-            "layer of the drum, 1 the bare drum; 0 not known",
-        ),
-        "drum_radius": ([at.rope.radius for at in depths], "m", "pitch radius of the drum"),
-        "static_torque": (
-            [at.rope.torque for at in depths],
-            "N m",
-            "motor torque at rest, with losses",
-        ),
-        "static_tension": (
-            [at.rope.tension for at in depths],
-            "N",
-            "rope tension at the winch at rest",
-        ),
-        "stiffness": ([at.rope.stiffness for at in depths], "N/m", "stiffness of the rope"),
-    }
     return {
         name: (
             ("rope_length",) if many else (),
-            values if many else values[0],
+            [getattr(at.rope, field) for at in depths] if many else getattr(depths[0].rope, field),
             {"units": unit, "long_name": text},
         )
-        for name, (values, unit, text) in figures.items()
+        for name, field, unit, text in _ROPE
     }
 
 

@@ -141,7 +141,12 @@ def operability(
     angles = _headings(case, headings)
     times = _periods(case, periods, diagram)
     columns = [sea_column(case, period, angles) for period in times]
-    lengths = [None] if depths is None else [_length(case, d) for d in depths]
+    lengths: list[float | None] = [None]
+    if depths is not None:
+        lengths = [
+            check_range(case.label, "depths", depth, low=1.0, high=12000.0, unit="m")
+            for depth in depths
+        ]
     stages = [pose_operability(design, criteria, length=length) for length in lengths]
     count = sum(len(stage.systems) for stage in stages) * len(columns)
     count += len(stages) * len(columns) * len(columns[0].hooks) if reoptimise else 0
@@ -187,11 +192,6 @@ def default_periods(scatter: Scatter | None = None) -> FloatArray:
     return np.linspace(max(low, 1.0), high, int(min(high - max(low, 1.0), 40.0)) + 1)
 
 
-def default_headings() -> FloatArray:
-    """Return the headings of a contour where none are asked for [rad]."""
-    return np.asarray(np.radians(np.arange(0.0, 360.0, _STEP)))
-
-
 def _diagram(given: Scatter | str | Path | None) -> Scatter | None:
     if given is None or isinstance(given, Scatter):
         return given
@@ -200,7 +200,7 @@ def _diagram(given: Scatter | str | Path | None) -> Scatter | None:
 
 def _headings(case: Case, given: Sequence[float] | None) -> Sequence[float] | None:
     if given is None:
-        return [float(b) for b in default_headings()] if has_headings(case) else None
+        return np.radians(np.arange(0.0, 360.0, _STEP)).tolist() if has_headings(case) else None
     owner = "operability"
     axis = check_ascending(owner, "headings", given)
     if axis.size == 0 or axis.size > _MOST_HEADINGS:
@@ -223,11 +223,6 @@ def _periods(
     check_range("operability", "periods", float(axis[0]), low=0.0, unit="s", open_low=True)
     check_range("operability", "periods", float(axis[-1]), high=60.0, unit="s")
     return [float(t) for t in axis]
-
-
-def _length(case: Case, depth: float) -> float:
-    source = case.label
-    return check_range(source, "depths", depth, low=1.0, high=12000.0, unit="m")
 
 
 def _on_rope(column: SeaColumn, question: OperabilityQuestion) -> SeaColumn:
@@ -253,12 +248,13 @@ def _at_depth(
         if scatter is None
         else {name: workable(contour, scatter, turned) for name, contour in contours.items()}
     )
-    periods = contours["perfect"].periods
+    low, high = contours["perfect"].periods[[0, -1]]
+    lines = np.linspace(0.75 * low, 1.1 * high, 60)
     return AtDepth(
         rope=rope_state(question.case),
         contours=contours,
         columns=tuple(columns),
-        capability=capability(question.perfect, question.criteria["perfect"], _lines(periods)),
+        capability=capability(question.perfect, question.criteria["perfect"], lines),
         workable=shares,
         max_sensitivity=_sensitivity(question, contours.get("loop")),
     )
@@ -276,11 +272,6 @@ def _sensitivity(question: OperabilityQuestion, contour: Contour | None) -> floa
     drag = float(known[0]) if known and loop.drag is not None else loop.reference
     assessment = Assessment(loop.plant, loop.controller, (), drag=loop.drag, coefficient=drag)
     return assessment.max_sensitivity if assessment.stable else math.inf
-
-
-def _lines(periods: FloatArray) -> FloatArray:
-    low, high = float(periods[0]), float(periods[-1])
-    return np.linspace(0.75 * low, 1.1 * high, 60)
 
 
 def example_scatter() -> Scatter:

@@ -184,7 +184,7 @@ class Family:
         """Return the case's own point, moved into the ranges, in every sea state."""
         point = []
         for axis in self.axes:
-            own = _value(self.case, axis.path)
+            own = value_at(self.case, axis.path)
             if axis.continuous:
                 middle = 0.5 * (axis.low + axis.high)
                 point.append(min(max(middle if own is None else own, axis.low), axis.high))
@@ -213,7 +213,8 @@ class Family:
         InputError
             If the values are not valid together.
         """
-        return self.case.replace({**self.changes(member), **self._sea_changes(member)})
+        sea = self.seas[member.sea].changes(self.case)
+        return self.case.replace({**self.changes(member), **sea})
 
     def changes(self, member: Member) -> dict[str, Any]:
         """Return a member's parameters by path, without its sea."""
@@ -236,9 +237,6 @@ class Family:
             parts.append(str(self.seas[member.sea]))
         return ", ".join(parts)
 
-    def _sea_changes(self, member: Member) -> dict[str, float]:
-        return self.seas[member.sea].changes(self.case)
-
     def _product(self, values: Sequence[Sequence[Any]]) -> Iterator[Member]:
         distinct = [tuple(dict.fromkeys(v)) for v in values]
         total = math.prod(len(v) for v in distinct) * len(self.seas)
@@ -260,12 +258,7 @@ def _axis(case: Case, path: str, values: Sequence[Any] | DiscreteValues) -> Axis
     raw = values.values if isinstance(values, DiscreteValues) else tuple(values)
     if not raw:
         raise InputError(f"family: {path} must have at least one value, got none")
-    read = []
-    for value in raw:
-        if isinstance(value, bool | int | float) or choice:
-            read.append(value)
-            continue
-        read.append(_read(case, path, value))
+    read = [v if isinstance(v, bool | int | float) or choice else _read(case, path, v) for v in raw]
     numbers = all(isinstance(v, int | float) and not isinstance(v, bool) for v in read)
     axis = Axis(path=path, values=tuple(read), continuous=numbers and not choice)
     probe = Family(case=case, axes=(axis,), seas=(_own_sea(case),))
@@ -279,10 +272,10 @@ def _read(case: Case, path: str, text: Any) -> Any:
     from pydantic import TypeAdapter, ValidationError
 
     *sections, key = path.split(".")
-    section = _value(case, ".".join(sections)) if sections else case
+    section = value_at(case, ".".join(sections)) if sections else case
     field = type(section).model_fields.get(key) if section is not None else None
     if field is None:
-        return _value(case.replace({path: text}), path)  # tells what is wrong with the path
+        return value_at(case.replace({path: text}), path)  # tells what is wrong with the path
     kind: Any = field.annotation
     if field.metadata:
         kind = Annotated[(field.annotation, *field.metadata)]
@@ -293,7 +286,7 @@ def _read(case: Case, path: str, text: Any) -> Any:
         raise InputError(f"family: {path}: {reason}") from None
 
 
-def _value(case: Case, path: str) -> Any:
+def value_at(case: Case, path: str) -> Any:
     """Return the value at a dotted path, None where there is none."""
     found: Any = case
     for part in path.split("."):

@@ -16,6 +16,7 @@ import numpy as np
 
 from models.basics import FloatArray, Quadrature, spectral_nodes
 from models.plant import LinearPlant
+from models.sensing import sensed_plant, sensed_spectra
 
 from ..loop import Disturbance, disturbances
 from ..question import HOOK, PAYLOAD, DesignQuestion, FamilyLoop, Problem, pose
@@ -64,10 +65,8 @@ class FamilyPlants:
             return self.nominal.structure.bind(self.nominal.plant)
         structure = self.structure
         if isinstance(structure, str):
-            bound: Structure = structure_named(structure, self.nominal.case)
-        else:
-            bound = structure
-        return bound.bind(self._plant(self.family.nominal()[0]))
+            structure = structure_named(structure, self.nominal.case)
+        return structure.bind(self._plant(self.family.nominal()[0]))
 
     @cached_property
     def guesses(self) -> list[list[float]]:
@@ -115,8 +114,6 @@ class FamilyPlants:
         masses = self.masses or self.most_masses
         if not self._sensed:
             return stacked_members(self.family, members, masses)
-        from models.sensing import sensed_plant
-
         case = self.family.case
         fixed = case.payload.fixed_drag
         numbers = numbers_of(self.family, members)
@@ -161,8 +158,6 @@ class FamilyPlants:
         if key not in self._plants:
             self._plants[key] = question.plant
             if self._sensed:
-                from models.sensing import sensed_plant
-
                 self._plants[key] = sensed_plant(
                     question.case, masses=question.masses, drag=question.drag_before
                 )
@@ -172,6 +167,4 @@ class FamilyPlants:
         question = self.question(member)
         if not self._sensed:
             return {HOOK: question.hook}
-        from models.sensing import sensed_spectra
-
         return dict(sensed_spectra(question.case, question.hook))

@@ -35,7 +35,7 @@ from models.spread import ALIASES
 
 from ..loop import LinearController
 from ..verify import LawMatrices
-from .family import Axis, Family, Member
+from .family import Axis, Family, Member, value_at
 from .mu_structured_value import UncertaintyBlock
 
 #: Paths of delays, and the measurements that they make late.
@@ -144,11 +144,7 @@ def plant_of(
 
 def _number(case: Case, path: str) -> float:
     """Return the number at a path of the case."""
-    found: Any = case
-    for part in path.split("."):
-        found = getattr(found, part, None)
-    if path == "payload.added_mass" and found is None:
-        found = case.payload.hydrodynamic_mass
+    found = value_at(case, path)
     if isinstance(found, bool) or not isinstance(found, int | float):
         raise InputError(f"robustness: there is no number at {path!r} in this case, got {found!r}")
     return float(found)
@@ -241,11 +237,7 @@ class UncertainLoop:
         if spread.size:
             inner = np.eye(spread.size) - blocks.zw * spread[None, None, :]
             yu = yu + (blocks.yw * spread[None, None, :]) @ np.linalg.solve(inner, blocks.zu)
-        late = np.zeros(C.shape[2])
-        for doubt, d in zip(self.doubts, delta, strict=True):
-            if doubt.delay:
-                late += doubt.half * d * self._hears(doubt)
-        turned = C[:, 0] * np.exp(-s[:, None] * late)
+        turned = C[:, 0] * np.exp(-s[:, None] * self._later(delta))
         return np.asarray(1.0 - np.einsum("ky,ky->k", turned, yu[:, :, 0]))
 
     def plant_at(self, delta: Sequence[float]) -> LinearPlant:
@@ -263,10 +255,7 @@ class UncertainLoop:
         """Return the plant at some deltas from the M-Delta form, delays exact."""
         plant, spread = self.plant, self.spread(delta)
         closed = spread[:, None] * np.linalg.inv(np.eye(spread.size) - plant.Fz * spread)
-        late = np.array(plant.delays)
-        for doubt, d in zip(self.doubts, delta, strict=True):
-            if doubt.delay:
-                late = late + doubt.half * float(d) * self._hears(doubt)
+        late = np.array(plant.delays) + self._later(delta)
         return LinearPlant(
             A=plant.A + plant.E @ closed @ plant.Cz,
             B=plant.B + plant.E @ closed @ plant.Dz,
@@ -277,6 +266,14 @@ class UncertainLoop:
             measurements=plant.measurements,
             delays=tuple(float(v) for v in np.maximum(late, 0.0)),
         )
+
+    def _later(self, delta: npt.ArrayLike) -> FloatArray:
+        """Return by how much later each measurement comes, (ny,) [s]."""
+        late = np.zeros(len(self.plant.measurements))
+        for doubt, d in zip(self.doubts, np.asarray(delta, dtype=np.float64), strict=True):
+            if doubt.delay:
+                late += doubt.half * d * self._hears(doubt)
+        return late
 
     def _hears(self, doubt: UncertainNumber) -> FloatArray:
         start = DELAYS[doubt.path]

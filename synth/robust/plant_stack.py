@@ -18,7 +18,7 @@ searches close loops node by node (`synth.loop.loop`), so this is a second opini
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -97,12 +97,11 @@ class PlantStack:
 
     def part(self, index: slice | IndexArray) -> PlantStack:
         """Return some of the plants."""
-        return PlantStack(
-            like=self.like,
-            **{name: getattr(self, name)[index] for name in (*_BLOCKS, "delays")},
+        rows = (*_BLOCKS, "delays", "quadratic_drag", "linear_drag")
+        return replace(
+            self,
             static={name: values[index] for name, values in self.static.items()},
-            quadratic_drag=self.quadratic_drag[index],
-            linear_drag=self.linear_drag[index],
+            **{name: getattr(self, name)[index] for name in rows},
         )
 
     def with_drag(self, coefficient: FloatArray) -> PlantStack:
@@ -111,17 +110,12 @@ class PlantStack:
         f = self.like.disturbances.index("payload.force")
         more = (self.linear_drag - coefficient)[:, None, None]
         row = self.Cz[:, v : v + 1]
-        changed: dict[str, Any] = {name: getattr(self, name) for name in _BLOCKS}
-        changed["A"] = self.A + more * self.E[:, :, f : f + 1] @ row
-        changed["C"] = self.C + more * self.F[:, :, f : f + 1] @ row
-        changed["Cz"] = self.Cz + more * self.Fz[:, :, f : f + 1] @ row
-        return PlantStack(
-            like=self.like,
-            delays=self.delays,
-            static=self.static,
-            quadratic_drag=self.quadratic_drag,
+        return replace(
+            self,
+            A=self.A + more * self.E[:, :, f : f + 1] @ row,
+            C=self.C + more * self.F[:, :, f : f + 1] @ row,
+            Cz=self.Cz + more * self.Fz[:, :, f : f + 1] @ row,
             linear_drag=coefficient,
-            **changed,
         )
 
     def without_delays(self) -> PlantStack:
@@ -132,14 +126,12 @@ class PlantStack:
         if not self.delays.any():
             return self
         late = np.maximum(self.delays, _SHORTEST)
-        changed: dict[str, Any] = {name: getattr(self, name) for name in _BLOCKS}
+        changed: dict[str, Any] = {}
         m, n = self.A.shape[:2]
         equal = bool((late == late[:, :1]).all()) and self.B.shape[2] == 1
-        banks: dict[tuple[float, ...], Any] = {}
-        for row in late:
-            key = (float(row[0]),) if equal else tuple(float(v) for v in row)
-            banks.setdefault(key, pade_bank(key, _PADE))
-        chosen = [banks[(float(r[0]),) if equal else tuple(float(v) for v in r)] for r in late]
+        keys = [tuple(row[:1].tolist() if equal else row.tolist()) for row in late]
+        banks = {key: pade_bank(key, _PADE) for key in dict.fromkeys(keys)}
+        chosen = [banks[key] for key in keys]
         A2, B2, C2, D2 = (np.stack([bank[k] for bank in chosen]) for k in range(4))
         k = A2.shape[1]
         if equal:
@@ -157,14 +149,7 @@ class PlantStack:
             changed["C"] = np.concatenate([D2 @ self.C, C2], axis=2)
             changed["D"], changed["F"] = D2 @ self.D, D2 @ self.F
             changed["Cz"] = np.concatenate([self.Cz, np.zeros((m, self.Cz.shape[1], k))], axis=2)
-        return PlantStack(
-            like=self.like,
-            delays=np.zeros_like(self.delays),
-            static=self.static,
-            quadratic_drag=self.quadratic_drag,
-            linear_drag=self.linear_drag,
-            **changed,
-        )
+        return replace(self, delays=np.zeros_like(self.delays), **changed)
 
 
 def stacked_members(family: Family, members: Sequence[Member], masses: int) -> PlantStack:

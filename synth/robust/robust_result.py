@@ -171,6 +171,7 @@ def answer_of(
     """
     structure = plants.structure if isinstance(plants.structure, str) else "structure"
     solved = found.solved
+    values = [] if solved is None else [float(v) for v in solved.values]
     results = [] if solved is None else _results(plants, problem, members, found)
     kept = solved is not None and solved.converged and found.excess <= KEPT
     notes: list[str] = []
@@ -178,7 +179,7 @@ def answer_of(
         results = _verified(problem, found, results, notes, progress)
     check = None
     if solved is not None and draws and problem.stable(solved.values, solved.coefficients):
-        check = draw_check(plants, [float(v) for v in solved.values], draws, seed + 1, progress)
+        check = draw_check(plants, values, draws, seed + 1, progress)
     all_stable = check is None or check.stable == check.count
     ok = bool(kept and quiet and all_stable and not notes)
     results.sort(key=lambda r: -r.payload_rms)
@@ -189,10 +190,8 @@ def answer_of(
         structure=structure,
         ok=ok,
         status=_status(objective, results, found, kept, quiet, check, notes),
-        parameters={} if solved is None else plants.law.named([float(v) for v in solved.values]),
-        controller=None
-        if solved is None
-        else plants.law.controller([float(v) for v in solved.values]),
+        parameters={} if solved is None else plants.law.named(values),
+        controller=None if solved is None else plants.law.controller(values),
         scenarios=tuple(results),
         added=len(members) - given,
         check=check,

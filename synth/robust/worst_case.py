@@ -259,14 +259,8 @@ def draw_check(
 
 
 def _unstable(member: Member, growth: float) -> Figures:
-    return Figures(
-        member=member,
-        growth=growth,
-        payload_rms=np.inf,
-        max_sensitivity=np.inf,
-        use=np.inf,
-        limit="stability",
-    )
+    figures = dict.fromkeys(("payload_rms", "max_sensitivity", "use"), np.inf)
+    return Figures(member=member, growth=growth, limit="stability", **figures)
 
 
 def _at_rest(limit: Limit, stack: PlantStack, index: int) -> Limit:

@@ -21,7 +21,7 @@ from models.plant import PlantData, build_plant
 from models.sensing import sensed_plant, sensed_spectra
 
 from ..design import GainDesign, StructureDesign
-from ..loop import Assessment, Disturbance, DragElement, LinearController, disturbances
+from ..loop import Assessment, Disturbance, DragElement, disturbances
 from ..question import HOOK, SampledNoise, pose
 from ..structures import ParametrisedController
 from .differences import derivative
@@ -59,7 +59,8 @@ class FixedDesign:
     @property
     def stochastic(self) -> bool:
         """Whether the drag is linearised with the response."""
-        return self.case.payload.fixed_drag is None and self._quadratic(self.case) > 0.0
+        quadratic = PlantData.from_case(self.case).quadratic_drag
+        return self.case.payload.fixed_drag is None and quadratic > 0.0
 
     @property
     def fixed_drag(self) -> float:
@@ -103,7 +104,7 @@ class FixedDesign:
         ]
         if gain is not None and gain != "A" and gain not in self.names:
             raise InputError(f"sensitivity: there is no gain {gain!r}; there are: {self.names}")
-        quadratic = self._quadratic(here)
+        quadratic = PlantData.from_case(here).quadratic_drag
         stochastic = here.payload.fixed_drag is None and quadratic > 0.0
         start = self.reference if stochastic else here.payload.fixed_drag or 0.0
         plant = (
@@ -116,7 +117,7 @@ class FixedDesign:
         drag = DragElement(quadratic=quadratic, reference=start) if stochastic else None
         assessment = Assessment(
             plant,
-            self.controller(values),
+            self.law.controller(values),
             self.disturbances if case is None else self.disturbances_of(here),
             drag=drag,
             coefficient=self.drag if case is None and gain is None else None,
@@ -125,10 +126,6 @@ class FixedDesign:
             return assessment if assessment.stable else None
         except SolverError:
             return None  # no drag agrees: unstable with any
-
-    def controller(self, values: list[float]) -> LinearController:
-        """Return the controller of some values."""
-        return self.law.controller(values)
 
     def with_number(self, path: str, factor: float) -> FixedDesign | None:
         """Return the same design with a number of its case, or a gain, times a factor."""
@@ -159,13 +156,9 @@ class FixedDesign:
         def response(value: float) -> ComplexArray:
             values = list(self.values)
             values[at] = value
-            return self.controller(values).response_at(s)
+            return self.law.controller(values).response_at(s)
 
         return np.asarray(derivative(response, self.values[at], common=True), np.complex128)
-
-    @staticmethod
-    def _quadratic(case: Case) -> float:
-        return PlantData.from_case(case).quadratic_drag
 
 
 def fixed_design(design: GainDesign | StructureDesign) -> FixedDesign:

@@ -12,7 +12,7 @@ those of the stable part.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,7 +31,7 @@ _FEWEST = 32  # base points without which an index means nothing
 
 def evaluate_rows(
     design: GainDesign | StructureDesign, spread: Spread, figure: str, progress: Progress | None
-) -> tuple[Spread, Callable[[FloatArray], FloatArray]]:
+) -> tuple[Spread, Evaluate]:
     """Return the spread in plain numbers, and a function from rows to a figure.
 
     Parameters
@@ -267,11 +267,8 @@ def _pair(spread: Spread, samples: int, seed: int) -> tuple[FloatArray, FloatArr
 
 def on_ranges(spread: Spread, points: FloatArray) -> FloatArray:
     """Return rows of values from points of the unit cube, (n, d)."""
-    columns: Sequence[FloatArray] = [
-        distribution.quantile(points[:, j])
-        for j, distribution in enumerate(spread.distributions.values())
-    ]
-    return np.stack(columns, axis=1)
+    pairs = zip(spread.distributions.values(), points.T, strict=True)
+    return np.stack([distribution.quantile(share) for distribution, share in pairs], axis=1)
 
 
 def _indices(values: FloatArray) -> tuple[FloatArray, FloatArray]:

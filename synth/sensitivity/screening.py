@@ -11,7 +11,6 @@ An effect with an unstable end is left out and counted.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,9 +20,7 @@ from models.spread import Spread
 
 from ..design import GainDesign, StructureDesign
 from ..search import Progress
-from .global_indices import evaluate_rows, on_ranges
-
-Evaluate = Callable[[FloatArray], FloatArray]
+from .global_indices import Evaluate, evaluate_rows, on_ranges
 
 _LEVELS = 4
 _ENDS = 0.01  # a normal distribution has no ends: the cube is cut there
