@@ -45,7 +45,8 @@ def verify_bound(bound: Bound) -> Verification:
     model = bound.plant.without_delays(bound.pade, at="measurements")
     law = LawMatrices.of(bound.controller, model)
     by_time = lyapunov_variances(model, law, bound.filters)
-    time = sum(c * by_time[n] for n, c in zip(model.outputs, charge, strict=True) if c > 0.0)
+    charged = {n: c for n, c in zip(model.outputs, charge, strict=True) if c > 0.0}
+    time = sum(c * by_time[n] for n, c in charged.items())
     checks = [
         agreement("model.cost", point.cost, time, _TIME, "closed loop by a Lyapunov equation"),
         agreement(
@@ -69,7 +70,7 @@ def verify_bound(bound: Bound) -> Verification:
     ]
     if bound.feasible:
         # Any controller's Lagrangian lies above the bound, so a rival's has to.
-        lagrangian = sum(c * found[n] for n, c in zip(model.outputs, charge, strict=True) if c)
+        lagrangian = sum(c * found[n] for n, c in charged.items())
         squares = np.array(list(bound.limits.values())) ** 2
         price = float(point.multipliers @ squares)
         checks.append(
@@ -78,7 +79,7 @@ def verify_bound(bound: Bound) -> Verification:
         for factor in (_RIVAL, 1.0 / _RIVAL):
             rival = dual.at(point.multipliers * factor) if bound.limits else point
             there = _variances(bound, names, rival)
-            value = sum(c * there[n] for n, c in zip(model.outputs, charge, strict=True) if c)
+            value = sum(c * there[n] for n, c in charged.items())
             checks.append(
                 bounded(
                     f"rival x {factor:.3g}",

@@ -301,11 +301,8 @@ def _sea(given: SeaState | Sequence[float]) -> SeaState:
         return given
     if not 2 <= len(given) <= 3:
         raise InputError(f"family: a sea must be (H_s, T_p[, occurrence]), got {tuple(given)}")
-    return SeaState(
-        significant_height=float(given[0]),
-        peak_period=float(given[1]),
-        occurrence=float(given[2]) if len(given) == 3 else 1.0,
-    )
+    names = ("significant_height", "peak_period", "occurrence")
+    return SeaState(**dict(zip(names, map(float, given), strict=False)))
 
 
 def _own_sea(case: Case) -> SeaState:

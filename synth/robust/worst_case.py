@@ -309,12 +309,7 @@ def _around(plants: FamilyPlants, member: Member, width: float, seed: int) -> li
 
 def _apart(plants: FamilyPlants, a: Member, b: Member) -> bool:
     """Return whether two members differ by more than a hundredth of some range."""
-    if a.sea != b.sea:
-        return True
-    for i, axis in enumerate(plants.family.axes):
-        if axis.continuous and axis.high > axis.low:
-            if abs(a.point[i] - b.point[i]) > 0.01 * (axis.high - axis.low):
-                return True
-        elif a.point[i] != b.point[i]:
-            return True
-    return False
+    return a.sea != b.sea or any(
+        abs(x - y) > 0.01 * (axis.high - axis.low) if axis.continuous else x != y
+        for axis, x, y in zip(plants.family.axes, a.point, b.point, strict=True)
+    )

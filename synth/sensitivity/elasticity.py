@@ -114,8 +114,6 @@ def _first(
             continue
         own = {
             name: gradient.along(matrices) + gradient.along_densities(densities)
-            if gradient.densities
-            else gradient.along(matrices)
             for name, gradient in gradients.items()
         }
         moved = drag.along(number, own["velocity"]) if drag is not None else 0.0

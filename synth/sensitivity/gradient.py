@@ -72,7 +72,8 @@ class Gradient:
 
     def along_densities(self, slopes: dict[str, FloatArray]) -> float:
         """Return the slope of the logarithm along a motion of the densities at `omega`."""
-        return sum(float(self.densities[name] @ slope) for name, slope in slopes.items())
+        known = {name: slope for name, slope in slopes.items() if name in self.densities}
+        return sum(float(self.densities[name] @ slope) for name, slope in known.items())
 
 
 class _Loop:

@@ -149,16 +149,10 @@ class Sensitivity:
                 assessment = self._fixed.assessment(case)
             else:
                 raise InputError(f"sensitivity: there is no number {path!r} in the case")
-            found.append(
-                Moved(
-                    path=path,
-                    share=share,
-                    payload_rms=assessment.sigma(PAYLOAD) if assessment is not None else np.inf,
-                    max_sensitivity=assessment.max_sensitivity
-                    if assessment is not None
-                    else np.inf,
-                )
-            )
+            rms, peak = np.inf, np.inf
+            if assessment is not None:
+                rms, peak = assessment.sigma(PAYLOAD), assessment.max_sensitivity
+            found.append(Moved(path=path, share=share, payload_rms=rms, max_sensitivity=peak))
         return tuple(found)
 
     def to_csv(self) -> str:

@@ -251,7 +251,7 @@ def _finished(
         CoPoint(
             gear=g,
             radius=r,
-            payload_rms=a.payload_rms if a is not None else math.inf,
+            payload_rms=search.cost(g, r),
             binding=_binding(a) if a is not None else (),
         )
         for (g, r), a in sorted(search.answers.items())

@@ -155,11 +155,12 @@ def pareto_front(
     check_range("pareto", "points", points, low=2, high=1000)
     if between is not None and not 0.0 <= between[0] < between[1]:
         raise InputError(f"pareto: between must be two ascending numbers, got {between}")
+    tell = progress or (lambda stage, done, total: None)
     if against == "delay":
-        found = delay_points(case, points, between or (0.0, _LONGEST), seed, progress)
+        found = delay_points(case, points, between or (0.0, _LONGEST), seed, tell)
     else:
-        found = _bound_points(case, against, points, between, seed, progress)
-    return _checked(case, against, found, checks, progress)
+        found = _bound_points(case, against, points, between, seed, tell)
+    return _checked(case, against, found, checks, tell)
 
 
 def _bound_points(
@@ -168,13 +169,12 @@ def _bound_points(
     count: int,
     between: tuple[float, float] | None,
     seed: int,
-    progress: Progress | None,
+    tell: Progress,
 ) -> list[tuple[float, ParetoPoint | None]]:
     question = pose(case)
     name = AGAINST[against][0]
     others = tuple(limit for limit in question.limits if limit.name != name)
     guesses = [[case.gains.a, case.gains.a1, case.gains.a2]] if case.gains is not None else []
-    tell = progress or (lambda stage, done, total: None)
     tell("ends of the front", 0, 4)
     known: dict[int, Found] = {}
     if between is None:
@@ -257,14 +257,13 @@ def _checked(
     against: str,
     found: Sequence[tuple[float, ParetoPoint | None]],
     checks: int,
-    progress: Progress | None,
+    tell: Progress,
 ) -> ParetoFront:
     points = [p for _, p in found if p is not None]
     chosen = np.unique(np.linspace(0, len(points) - 1, min(checks, len(points))).astype(int))
     passed = 0
     for n, k in enumerate(chosen if points else []):
-        if progress is not None:
-            progress("verify", n, len(chosen))
+        tell("verify", n, len(chosen))
         passed += points[int(k)].verify().ok
     return ParetoFront(
         case=case,
@@ -278,13 +277,12 @@ def _checked(
 
 
 def delay_points(
-    case: Case, count: int, between: tuple[float, float], seed: int, progress: Progress | None
+    case: Case, count: int, between: tuple[float, float], seed: int, tell: Progress
 ) -> list[tuple[float, ParetoPoint | None]]:
     """Return the best answer at each delay [s], None where there is none."""
     delays = np.linspace(*between, count)
     problems = [pose(case.replace({"sensors.telemetry.delay": float(d)})).problem for d in delays]
     guesses = [[case.gains.a, case.gains.a1, case.gains.a2]] if case.gains is not None else []
-    tell = progress or (lambda stage, done, total: None)
     best: list[tuple[Solution, float] | None] = [None] * count
     begins: list[tuple[int, Solution, FloatArray]] = []
     for n, k in enumerate((0, count // 2, count - 1)):

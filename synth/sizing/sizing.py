@@ -224,10 +224,9 @@ def _sized(
     rope = [lim for lim in posed.drive if lim.name.startswith("rope.")]
     problem = posed.problem((*posed.loop, *rope))
     found = search(problem, starts, seed, [], tell)
-    ok = found.solved is not None and found.solved.converged and found.excess <= KEPT
-    free = None
-    if ok and found.solved is not None:
-        free = follow(problem, [found.solved.values], coefficient=found.solved.coefficient)
+    solved, free = found.solved, None
+    if solved is not None and solved.converged and found.excess <= KEPT:
+        free = follow(problem, [solved.values], coefficient=solved.coefficient)
     empty = Sizing(
         case=base,
         structure=structure,
@@ -398,9 +397,7 @@ def _why_not(sizing: Sizing, free: Answer) -> str:
             f"no motor holds the payload to {_mm(sizing.target)} rms: without any limit of the "
             f"motor it moves {_mm(sizing.unlimited_rms)}; {stops} stops it"
         )
-    names: dict[str, None] = {}
-    for point in sizing.points:
-        names |= dict.fromkeys(point.binding[:1])
+    names = dict.fromkeys(name for point in sizing.points for name in point.binding[:1])
     return (
         f"no motor of this kind holds the payload to {_mm(sizing.target)} rms behind any of these "
         f"gears: {', '.join(names) or 'stability'} stops it"

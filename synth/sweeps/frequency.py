@@ -151,7 +151,6 @@ class FrequencyEngine:
     ) -> xr.Dataset:
         """Return the dataset of rows, the first of them being case number `first`."""
         columns = self.evaluate(rows, progress)
-        nodes = self.rows.level_nodes()
         return dataset_of(
             self.design,
             self.spread,
@@ -161,8 +160,8 @@ class FrequencyEngine:
             first=first,
             notes={
                 **(notes or {}),
-                "engine": "one by one" if isinstance(self.rows, StructureRows) else "columns",
-                "nodes": 0 if nodes is None else len(nodes),
+                "engine": "columns" if isinstance(self.rows, GainRows) else "one by one",
+                "nodes": len(self.rows.level_nodes()) if isinstance(self.rows, GainRows) else 0,
                 "refined": self.rows.refined,
                 "unresolved": self.rows.unresolved,
             },

@@ -96,6 +96,7 @@ class GainRows:
         self.sea = SeaRows(case, spread)
         delayed = case.sensors.telemetry.delay > 0.0 or "sensors.telemetry.delay" in spread.paths
         self.spring = design.masses == 1 and not delayed
+        self._nodes: dict[int, SweepNodes] = {}  # by level
         self.columns = True  # whether column arithmetic has sufficed so far
         self.refined = 0  # rows that needed finer nodes
         self.unresolved = 0  # ... and those that none of them resolved
@@ -167,10 +168,8 @@ class GainRows:
             exposure=self.case.limits.exposure_time,
             count=len(rows),
         )
-        result: dict[str, FloatArray | BoolArray] = {"stable": stable}
-        for name, column in values.items():
-            result[name] = np.where(stable, column, np.nan)
-        return result
+        kept = {name: np.where(stable, column, np.nan) for name, column in values.items()}
+        return {"stable": stable, **kept}
 
     def loop_gain(self, rows: FloatArray, omega: FloatArray) -> ComplexArray:
         """Return L(i omega) of rows, (n, k), at frequencies above zero [rad/s]."""
@@ -192,10 +191,6 @@ class GainRows:
             low, high, splits = self._frame
             self._nodes[level] = sweep_nodes(low, high, splits, level=level, marks=self._marks)
         return self._nodes[level]
-
-    @cached_property
-    def _nodes(self) -> dict[int, SweepNodes]:
-        return {}
 
     @cached_property
     def _frame(self) -> tuple[float, float, list[float]]:

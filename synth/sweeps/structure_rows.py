@@ -17,7 +17,6 @@ from models.basics import (
     ComplexArray,
     FloatArray,
     InputError,
-    Quadrature,
     SolverError,
     peak_factor,
 )
@@ -38,6 +37,7 @@ class StructureRows:
         The design, the spread on its case, and what is wanted.
     """
 
+    block = 16  # rows between two words of progress
     refined = 0
     unresolved = 0
     columns = False
@@ -48,16 +48,6 @@ class StructureRows:
         if not design.parameters:
             raise InputError(f"sweep: the design has no controller: {design.status}")
         self.design, self.spread, self.metrics = design, spread, tuple(metrics)
-
-    @property
-    def block(self) -> int:
-        """Rows between two words of progress."""
-        return 16
-
-    def level_nodes(self, level: int = 0) -> Quadrature | None:
-        """Return None: every case has nodes of its own."""
-        del level
-        return None
 
     def evaluate(self, rows: FloatArray) -> dict[str, FloatArray | BoolArray]:
         """Return ``stable`` and the metrics of rows, (n,) each.
