@@ -244,27 +244,6 @@ class Motion:
 
 
 @dataclass(frozen=True, kw_only=True)
-class StillMotion:
-    """No motion at all."""
-
-    @property
-    def description(self) -> str:
-        """What it is."""
-        return "still"
-
-    def motion(self, duration: float, step: float, seed: int) -> Motion:
-        """Return zeros; the seed plays no part."""
-        del seed
-        _check("still motion", duration, step)
-
-        def evaluate(start: int, count: int) -> MotionBlock:
-            del start
-            return np.zeros(count), np.zeros(count), np.zeros(count)
-
-        return Motion(source=self.description, duration=duration, step=step, evaluate=evaluate)
-
-
-@dataclass(frozen=True, kw_only=True)
 class SineMotion:
     """A sine, z = amplitude sin(2 pi t/period + phase).
 

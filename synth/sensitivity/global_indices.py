@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -105,11 +104,6 @@ class SobolIndices(ReadOnlyArrays):
     evaluations: int
     unstable: int
 
-    @property
-    def share_unstable(self) -> float:
-        """Share of the cases that are unstable [-]."""
-        return self.unstable / self.evaluations
-
     def __str__(self) -> str:
         """Return a small tree, the largest total first."""
         order = np.argsort(-self.total)
@@ -194,7 +188,6 @@ def indices_of(
         As in `sobol_indices`.
     """
     from scipy.stats import bootstrap
-    from scipy.stats import sobol_indices as estimate
 
     check_range("sensitivity", "confidence", confidence, low=0.5, high=0.9999)
     check_range("sensitivity", "samples", samples, low=_FEWEST, high=2**22)
@@ -224,13 +217,9 @@ def indices_of(
     spreads = np.ptp(kept)
     if spreads <= 1e-12 * np.abs(kept).max():
         raise InputError(f"sensitivity: {figure} does not move over these ranges")
-    # SciPy squeezes its answers, and cannot do with those of one number: it is given twice then.
-    crossings = np.repeat(kept[2:], 2, axis=0) if d == 1 else kept[2:]
-    answer: Any = estimate(
-        func={"f_A": kept[:1], "f_B": kept[1:2], "f_AB": crossings[:, None, :]}, n=kept.shape[1]
-    )
-    # SciPy's own bootstrap of the indices takes no seed.
     centred = kept - kept[:2].mean()
+    first, total = _indices(centred)
+    # SciPy's own bootstrap of the indices takes no seed.
     ends = bootstrap(
         [np.arange(kept.shape[1])],
         lambda columns: np.stack(_indices(centred[:, columns])),
@@ -243,8 +232,8 @@ def indices_of(
     return SobolIndices(
         figure=figure,
         paths=spread.paths,
-        first=np.ravel(answer.first_order)[:d],
-        total=np.ravel(answer.total_order)[:d],
+        first=first,
+        total=total,
         first_interval=intervals[0],
         total_interval=intervals[1],
         confidence=confidence,

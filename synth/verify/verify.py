@@ -13,12 +13,13 @@ the question, the search or the design is used.  `verify_tuning` does the same f
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from models.basics import one_thread
+from models.basics import ComplexArray, FloatArray, SolverError, one_thread
 from models.hook import HookMotion
 from models.plant import (
     MAX_MASSES,
@@ -26,12 +27,14 @@ from models.plant import (
     PlantData,
     build_plant,
     fit_shaping_filter,
+    fixed_top_modes,
     line_response_at,
 )
 from models.sensing import sensed_plant
 
 from .claims import DesignClaims, GainClaims, StructureClaims, TuningClaims
 from .demands import HOOK, PAYLOAD, VELOCITY, Demand, case_demands, limit_demand
+from .integrals import integrate, panels
 from .nyquist import CurveMargins
 from .recheck import (
     PADE,
@@ -45,9 +48,8 @@ from .recheck import (
     winding_check,
     winding_of_plant,
 )
-from .recompute import LawMatrices, Loop, Source, lyapunov_variances, moments
+from .recompute import LawMatrices, Loop, Source, imaginary, lyapunov_variances, moments
 from .tuning_check import verify_tuning
-from .uncompensated import HeldDrum
 from .verification import Check, Verification, agreement, bounded, failure
 from .winding import count_unstable, open_loop_poles
 
@@ -57,6 +59,8 @@ _RMS = 1e-6  # rms by another quadrature
 _TIME = 1e-3  # rms by a Lyapunov equation, with a Pade model for the delay
 _ROPE = 0.02  # what the distributed rope may differ by from the lumped one
 _MODAL_MASSES = 20  # of the rope on which a one-spring design is looked at for information
+_HELD_RMS = 1e-8  # of the integrals with the drum held
+_HELD_MODES = 40  # of the rope with the drum held
 _ROPE_PER_DECADE = 200  # first points of the contour on a rope with modes that no mark tells of
 
 
@@ -404,3 +408,77 @@ def _on_more_rope(design: StructureClaims, tuning: TuningClaims, masses: int) ->
         "rope.payload_rms", design.payload_rms, math.sqrt(variance), _ROPE, f"[m] on {on}"
     )
     return [*checks, rms]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HeldDrum:
+    """Rope and payload with the drum held.
+
+    Attributes
+    ----------
+    data
+        The plant's numbers.
+    source
+        The hook's motion.
+    """
+
+    data: PlantData
+    source: Source
+
+    def hook_variance(self) -> float:
+        """Return the variance of the hook's motion [m^2]."""
+        return float(self._integral(np.ones_like, np.zeros(0, dtype=np.complex128))[0])
+
+    def moments(self, drag: float) -> tuple[float, float]:
+        """Return m0 [m^2] and m2 [m^2/s^2] of the payload's motion for a drag C [N s/m]."""
+
+        def gain(omega: FloatArray) -> FloatArray:
+            return np.asarray(np.abs(self.transfer(imaginary(omega), drag)) ** 2)
+
+        m0, m2 = self._integral(gain, self._poles(drag))
+        return float(m0), float(m2)
+
+    def transfer(self, s: ComplexArray, drag: float) -> ComplexArray:
+        """Return P/Z, (k,): 1/(cosh gamma + D l sinh(gamma)/gamma), or that of one spring."""
+        data = self.data
+        stretch = 1.0 + s * data.damping_time
+        if data.lumping == "thesis" or data.mass_per_length == 0.0:
+            spring = data.stiffness * stretch
+            return np.asarray(spring / (self._mass * s**2 + drag * s + spring))
+        load = (data.payload_mass * s**2 + drag * s) / (data.stiffness * stretch)
+        speed = math.sqrt(data.axial_stiffness / data.mass_per_length)
+        gamma = s * data.rope_length / (speed * np.sqrt(stretch))
+        return np.asarray(1.0 / (np.cosh(gamma) + load * np.sinh(gamma) / gamma))
+
+    @property
+    def _mass(self) -> float:
+        """Moving mass of the one-spring model [kg]."""
+        rope = self.data.rope_mass if self.data.lumping == "thesis" else 0.0
+        return self.data.payload_mass + rope
+
+    def _poles(self, drag: float) -> ComplexArray:
+        """Return about where the poles are [1/s], the upper half."""
+        data = self.data
+        if data.lumping == "thesis" or data.mass_per_length == 0.0:
+            modes = np.array([math.sqrt(data.stiffness / self._mass)])
+        else:
+            rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
+            modes = fixed_top_modes(*rope, data.payload_mass, _HELD_MODES)
+        # The payload hardly moves in the higher modes, so drag only damps the first.
+        decay = 0.5 * data.damping_time * modes**2
+        decay[0] += 0.5 * drag / self._mass
+        return np.asarray(-decay + 1j * modes, dtype=np.complex128)
+
+    def _integral(
+        self, gain: Callable[[FloatArray], FloatArray], poles: ComplexArray
+    ) -> FloatArray:
+        """Return the integrals of gain (k,) times the hook's density, and times omega^2."""
+        if self.source.band is None:
+            raise SolverError("verification: the hook's motion has no band")
+        low, high = self.source.band
+
+        def density(omega: FloatArray) -> FloatArray:
+            spectrum = gain(omega) * self.source.density(omega)
+            return np.stack([spectrum, omega**2 * spectrum])
+
+        return integrate(density, panels(low, high, self.source.splits, poles), rtol=_HELD_RMS)

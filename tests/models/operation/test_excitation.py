@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly
 from scipy.spatial.transform import Rotation
+from still_motion import StillMotion
 
 from models import InputError, PhysicsWarning, load_case
 from models.operation import RecordMotion, SineMotion, SixDofMotion, SpectrumMotion
@@ -21,7 +22,6 @@ from models.operation.excitation import (
     SECOND_BODY,
     SURFACE,
     LongRecord,
-    StillMotion,
     seed_for,
 )
 from models.operation.hermite import interpolated

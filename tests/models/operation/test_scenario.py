@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from still_motion import StillMotion
 
 from models import InputError, build_plant, load_case
 from models.operation import (
@@ -20,7 +21,6 @@ from models.operation import (
     scenario_names,
     scenario_options,
 )
-from models.operation.excitation import StillMotion
 from models.operation.profile import Move, Profile
 from models.plant import Deck, Seabed, Surroundings
 from models.sensing.telemetry import during

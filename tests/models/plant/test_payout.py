@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from one_run import simulate
+from still_motion import StillMotion
 
 from models import InputError, load_case
 from models.operation import Scenario, scenario_named
-from models.operation.excitation import StillMotion
 from models.operation.profile import Move, Profile
 from models.plant import DrumTravel
 from synth.controllers import LinearFeedback

@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from one_run import simulate
+from still_motion import StillMotion
 
 from models import Case, InputError, PhysicsWarning, build_plant, load_case
 from models.operation import Scenario, SineMotion
-from models.operation.excitation import StillMotion
 from models.operation.profile import Move, Profile
 from models.plant import DriveLimits, fixed_top_modes
 from models.run import Run
