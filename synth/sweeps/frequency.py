@@ -1,9 +1,10 @@
 """Sweeps in the frequency domain: thousands to millions of cases around one design.
 
-frequency_sweep(design, spread, samples=..) -> xarray.Dataset along "case"
-FrequencyEngine(design, spread).evaluate(rows) -> columns, for whoever brings rows
-FrequencyEngine(design, spread).chunks(samples=..) -> dataset after dataset, where there are
-    more cases than memory holds
+    frequency_sweep(design, spread, samples=..) -> xarray.Dataset along "case"
+    FrequencyEngine(design, spread).evaluate(rows) -> columns, for whoever brings rows
+    FrequencyEngine(design, spread).chunks(samples=..) -> dataset after dataset
+
+The last is for more cases than memory holds.
 """
 
 from __future__ import annotations
