@@ -458,7 +458,7 @@ def _levels(high: float) -> FloatArray:
     """Return round bounds of bands of H_s from zero to above a value, five to ten."""
     steps = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
     step = next((s for s in steps if high / s <= 10.0), steps[-1])
-    return np.asarray(step * np.arange(math.ceil(high / step - 1e-9) + 1.0))
+    return np.asarray(step * np.arange(max(math.ceil(high / step - 1e-9), 1) + 1.0))
 
 
 def _rose(axes: Any, periods: FloatArray) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -251,6 +252,18 @@ def test_every_figure_can_be_drawn(kind: str) -> None:
     both = [turning()] if kind in ("headings", "depths") else [study(), turning()]
     for found in both:
         assert picture(draw(found), "png").startswith(b"\x89PNG")
+
+
+def test_roses_can_be_drawn_where_no_sea_can_be_worked_in() -> None:
+    from stillhook.text import picture
+
+    (at,) = turning().depths[:1]
+    flat = {
+        name: replace(found, heights=np.zeros_like(found.heights))
+        for name, found in at.contours.items()
+    }
+    nowhere = replace(turning(), depths=(replace(at, contours=flat),))
+    assert picture(heading_figure(nowhere), "png").startswith(b"\x89PNG")
 
 
 def test_axes_are_read_as_ranges_and_lists() -> None:
