@@ -14,7 +14,7 @@ from pathlib import Path
 from models.basics import InputError, check_range
 
 from ...comparison import Comparison, comparison_report, write_comparison
-from ...text import OutputFolder, console, count, pairs, show
+from ...text import OutputFolder, Report, ReportSection, console, count, pairs, show
 from ..declare import CASE, choice, switch, text, whole
 from ..given import case_words, given_case
 from ..working import conclude, counting, figure_kinds, place_for, tidy
@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ...comparison import compare
 
     if arguments.list:
-        return _list()
+        return conclude(_contenders(), arguments)
     check_range("compare", "--seeds", arguments.seeds, low=1, high=_MANY)
     wanted = _controllers(arguments.controllers)
     heights = _heights(arguments.hs)
@@ -121,15 +121,15 @@ def _next(found: Comparison, place: Path, arguments: argparse.Namespace) -> list
     return rows
 
 
-def _list() -> int:
+def _contenders() -> Report:
     from ...controllers import CONTENDERS, DEFAULTS
 
-    out = console()
-    for name, each in CONTENDERS.items():
-        mark = "" if name in DEFAULTS else "  (if asked for)"
-        out.print(f"{name}{mark}", style="bold")
-        show(pairs([("is", each.what), ("knows", each.knows)]), out)
-    return 0
+    marks = {name: "" if name in DEFAULTS else "  (if asked for)" for name in CONTENDERS}
+    sections = [
+        ReportSection(name + marks[name], [pairs([("is", each.what), ("knows", each.knows)])])
+        for name, each in CONTENDERS.items()
+    ]
+    return Report(name="contenders", sections=sections)
 
 
 def _controllers(text: str | None) -> list[object] | None:

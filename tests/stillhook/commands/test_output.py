@@ -42,6 +42,7 @@ def told(capsys, *words: str) -> dict:
         ("evaluate", *CALM, "--gains", GAINS, "--no-bound"),
         ("bound", "thesis-1975"),
         ("margins", "thesis-1975", "--draws", "10"),
+        ("compare", "thesis-1975", "--list"),
     ],
     ids=" ".join,
 )
