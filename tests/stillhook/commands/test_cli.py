@@ -11,11 +11,12 @@ import subprocess
 import sys
 import threading
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from designs import infeasible_design, loopless_design, thesis_design, unstable_design
+from endings import Ending
 
 import stillhook as sh
 from models import SolverError, load_case, template_text
@@ -26,29 +27,6 @@ from stillhook.text import console, progress, show, told_once
 
 THESIS = "A=200,a=50,a1=100,a2=100"
 CASE = load_case("thesis-1975").to_yaml()
-
-
-@dataclass(frozen=True, kw_only=True)
-class Ending:
-    status: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def run(capsys, tmp_path, monkeypatch):
-    """Run the command line in a scratch folder, in this process."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*words: str) -> Ending:
-        try:
-            status = cli.main(words)
-        except SystemExit as stop:
-            status = int(stop.code or 0)
-        seen = capsys.readouterr()
-        return Ending(status=status, out=seen.out, err=seen.err)
-
-    return call
 
 
 @pytest.fixture

@@ -8,14 +8,12 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from designs import thesis_design
 
 import stillhook as sh
-from stillhook import cli
 from stillhook.comparison.bench import CellBench
 from stillhook.comparison.store import STORE
 from stillhook.controllers import CONTENDERS
@@ -24,29 +22,6 @@ from stillhook.designs import save_design
 CALM = ("compare", "thesis-1975", "--set", "sea.significant_height=0.5")
 SHORT = ("--seeds", "2", "--duration", "30 s", "--jobs", "1")
 WHO = ("--controllers", "none,feed-forward")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Ending:
-    status: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def run(capsys, tmp_path, monkeypatch):
-    """Run the command line in a scratch folder, in this process."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*words: str) -> Ending:
-        try:
-            status = cli.main(words)
-        except SystemExit as stop:
-            status = int(stop.code or 0)
-        seen = capsys.readouterr()
-        return Ending(status=status, out=seen.out, err=seen.err)
-
-    return call
 
 
 def test_a_comparison_ends_well_and_fills_its_folder(run):

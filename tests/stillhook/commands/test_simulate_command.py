@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -34,29 +34,6 @@ from synth.controllers import CONTROLLERS
 
 CALM = ("thesis-1975", "--set", "sea.significant_height=0.3")
 SHORT = ("--duration", "40 s", "--no-figures")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Ending:
-    status: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def run(capsys, tmp_path, monkeypatch):
-    """Run the command line in a scratch folder, in this process."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*words: str) -> Ending:
-        try:
-            status = cli.main(words)
-        except SystemExit as stop:
-            status = int(stop.code or 0)
-        seen = capsys.readouterr()
-        return Ending(status=status, out=seen.out, err=seen.err)
-
-    return call
 
 
 def summary(folder: str = "here") -> dict:
