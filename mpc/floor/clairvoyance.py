@@ -12,8 +12,8 @@ The drag of the linear plant is the linear equivalent of the quadratic drag in t
 *answer*, found by substitution: a payload that is held still has next to none, and the drag of the
 open-loop motion would damp it for nothing.  ``drag=0`` tells how little hangs on it.
 
-`Clairvoyant.verify` simulates the answer by another route, `mpc.floor.certificate` proves it, and
-`mpc.floor.nlp` refines it on the nonlinear plant.
+`Clairvoyant.verify` simulates the answer by another route, and `mpc.floor.certificate` proves it;
+the tests refine it on the nonlinear plant (`nonlinear_floor`).
 """
 
 from __future__ import annotations

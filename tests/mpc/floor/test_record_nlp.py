@@ -2,12 +2,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from nonlinear_floor import Refinement, refine
 from one_run import simulate
 
 import stillhook as sh
 from models.operation import Motion, SpectrumMotion
 from mpc.floor import Clairvoyant, clairvoyant
-from mpc.floor.nlp import Refinement, refine
 
 SETTLE = 30.0
 

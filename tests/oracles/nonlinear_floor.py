@@ -1,4 +1,4 @@
-r"""The floor on the nonlinear plant: one record refined by a nonlinear programme.
+r"""The clairvoyant floor once more, on the nonlinear plant: one record by a nonlinear programme.
 
     Clairvoyant (hold="command") --> `refine` (IPOPT) --> Refinement --> `Replay` in a simulation
 
@@ -28,10 +28,9 @@ import numpy as np
 from models.basics import FloatArray, InputError, ReadOnlyArrays, SolverError, check_range
 from models.plant import MEAN_LOSSES, Plant, PlantData, build_plant
 from models.sensing import Measurement
-
-from .certificate import rollout
-from .floor import Clairvoyant
-from .problem import RHO, RHO_START
+from mpc.floor.certificate import rollout
+from mpc.floor.floor import Clairvoyant
+from mpc.floor.problem import RHO, RHO_START
 
 _OWNER = "record refinement"
 _REACH = 0.25  # of the fastest pole times a Runge-Kutta step
