@@ -24,17 +24,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from ..basics import GRAVITY, FloatArray, InputError, check_finite, read_only, wave_number
+from ..case import Case
 from ..vessel import HeaveRao, hook_operators, rao_of_hook, vessel_raos
-
-if TYPE_CHECKING:
-    from ..case import Case
-
 
 # Spacing of the waves whose energy is mapped, and of the curve through E, relative to frequency.
 _FINE, _COARSE = 0.0015, 0.006

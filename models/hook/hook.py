@@ -19,7 +19,6 @@ import math
 import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -35,13 +34,10 @@ from ..basics import (
     check_range,
     spectrum_statistics,
 )
+from ..case import Case
 from ..sea import SeaSpectrum
 from ..vessel import HeaveRao, OutsideShare, hook_rao, speed_remark
 from .encounter import Encounter, MetSpectrum
-
-if TYPE_CHECKING:
-    from ..case import Case
-
 
 _MOTIONS = ("displacement", "velocity", "acceleration")
 

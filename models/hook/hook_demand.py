@@ -20,16 +20,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..basics import THREE_HOURS, FloatArray, check_range, peak_factor, zero_crossing_period
+from ..case import Case
 from .hook import HookMotion
-
-if TYPE_CHECKING:
-    from ..case import Case
-
 
 ORDERS = np.arange(7.0)[:, np.newaxis]
 """Orders of the displacement's moments that the figures of all three motions are made of (7, 1)."""

@@ -13,7 +13,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from ..basics import (
     check_range,
     spectral_nodes,
 )
+from ..case import Case
 from ..sea import SeaSpectrum
 from ..vessel import (
     Point,
@@ -39,10 +39,6 @@ from ..vessel import (
 )
 from .encounter import Encounter, speed_along
 from .hook_demand import ORDERS, HookDemand, MotionFigures, fractile_factor
-
-if TYPE_CHECKING:
-    from ..case import Case
-
 
 HEADINGS = tuple(float(b) for b in range(0, 360, 15))
 PEAK_PERIODS = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0)

@@ -24,18 +24,15 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from ..basics import FloatArray, InputError, check_range, check_seed
+from ..case import Case
 from ..hook import HookMotion
 from .hermite import MotionBlock, interpolated
-
-if TYPE_CHECKING:
-    from ..case import Case
-
 
 HOOK = None
 """Purpose of a random motion that is drawn with the run's own seed."""

@@ -14,19 +14,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from ..basics import FloatArray, InputError, check_range
+from ..case import Case
 from ..plant import Surroundings
 from ..sensing import Bias, Late, check_biases, check_late
+from .excitation import MotionSource
 from .profile import Period, Profile, check_periods
-
-if TYPE_CHECKING:
-    from ..case import Case
-    from .excitation import MotionSource
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,16 +10,14 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..basics import InputError
+from ..case import Case
 from .contact_scenarios import CONTACT_SCENARIOS
 from .options import Option, ScenarioRecipe, WordOption
 from .scenario import Scenario
 from .station_scenarios import STATION_SCENARIOS
-
-if TYPE_CHECKING:
-    from ..case import Case
 
 _RECIPES: Mapping[str, ScenarioRecipe] = {**STATION_SCENARIOS, **CONTACT_SCENARIOS}
 

@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,10 +23,8 @@ from .library_files import FORMATS, read_with_library
 from .ndbc import is_ndbc, read_ndbc
 from .quality import QualityControl, RawRecords, TimeArray, sift
 from .scatter import Scatter
+from .sea import SeaSpectrum
 from .table import MOST_ROWS
-
-if TYPE_CHECKING:
-    from .sea import SeaSpectrum
 
 _EXTENSIONS = {".spt": "datawell", ".oct": "octopus", ".mat": "xwaves"}
 

@@ -25,11 +25,9 @@ from pydantic import (
 
 from ..basics import GRAVITY, InputError, file_stamp, range_text
 from ..casefile import DataFile, Quantity, Section, custom_error, problems
+from .sea import SeaSpectrum
 from .shapes import fully_arisen, gaussian_widths, jonswap_gamma
 from .table import SpectrumTable, row_faults
-
-if TYPE_CHECKING:
-    from .sea import SeaSpectrum
 
 # T_p of the 1975 form over its T_S: it peaks at f T_mean = 0.54^(1/4) with T_mean = 0.9 T_S.
 _PEAK_OF_SIGNIFICANT = 0.9 / math.sqrt(math.sqrt(0.54))

@@ -16,7 +16,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
@@ -30,15 +29,12 @@ from ..basics import (
     check_seed,
     pick,
 )
+from ..case import Case
 from ..rig import Encoder, LoadCell, PayloadSensor
 from .control import HEARD
 from .draws import SENSOR_NOISE, draw
 from .mru import MruBlock
 from .telemetry import Late, TelemetryBlock, TelemetrySchedule
-
-if TYPE_CHECKING:
-    from ..case import Case
-
 
 #: What the sensors take from the plant, by name; the payload's signals behind its filters.
 RAW = (

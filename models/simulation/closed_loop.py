@@ -19,20 +19,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import casadi as ca
 import numpy as np
 
 from ..basics import FloatArray
+from ..case import Case
 from ..plant import MOTION, Plant
 from ..sensing import Recursion, SensorModel
 from .integrate import StepChoice, braked_step, disturbances
 from .rows import FLAGS
-
-if TYPE_CHECKING:
-    from ..case import Case
-
 
 HOOK = "hook"
 _SATURATED = 1e-9  # relative difference of asked and applied command that is no rounding [-]

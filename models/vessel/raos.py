@@ -17,10 +17,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from waveresponse import RAO
 
 from ..basics import (
     ComplexArray,
@@ -32,10 +32,6 @@ from ..basics import (
     read_only,
     wave_number,
 )
-
-if TYPE_CHECKING:
-    from waveresponse import RAO
-
 
 MODES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 """The six motions, in the order of the last axis of every table."""

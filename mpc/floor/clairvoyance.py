@@ -22,11 +22,12 @@ import math
 import time as clock
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.basics import FloatArray, InputError, check_range
+from models.case import Case
+from models.operation import Motion
 from models.plant import DriveLimits, PlantData, stochastic_equivalent
 
 from .cache import distrust, fingerprint, store_solution, stored_solution
@@ -36,10 +37,6 @@ from .plant import HOLDS, Hold, RecordPlant, record_plant
 from .problem import RecordProblem, RecordSolution
 from .qp import solve_record
 from .solvers import SOLVERS
-
-if TYPE_CHECKING:
-    from models.case import Case
-    from models.operation import Motion
 
 _Pose = Callable[[float], RecordProblem]
 

@@ -12,20 +12,18 @@ import time as clock
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from models.basics import FloatArray, ReadOnlyArrays
+from models.case import Case
+from models.plant import DriveLimits
 
 from .certificate import Certificate, certify, rollout
 from .plant import Hold
 from .problem import RecordProblem, RecordSolution
 from .verification import RecordVerification, verify_record
-
-if TYPE_CHECKING:
-    from models.case import Case
-    from models.plant import DriveLimits
 
 Start = Literal["free", "hook"]
 

@@ -27,19 +27,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import scipy.linalg
 
 from models.basics import FloatArray, InputError, ReadOnlyArrays
-from models.plant import MEAN_LOSSES, SPEED_BAND, DriveLimits, Plant, build_plant
+from models.case import Case
+from models.plant import MEAN_LOSSES, SPEED_BAND, DriveLimits, LinearPlant, Plant, build_plant
 
 from ..winch import command_law
-
-if TYPE_CHECKING:
-    from models.case import Case
-    from models.plant import LinearPlant
 
 Hold = Literal["line", "command"]
 HOLDS: tuple[Hold, ...] = ("line", "command")

@@ -10,19 +10,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from models.basics import FloatArray
+from models.case import Case
 from models.plant import build_plant
 
 from .problem import RecordProblem, RecordSolution
-
-if TYPE_CHECKING:
-    from models.case import Case
-
 
 _REACH = 0.1  # of the plant's fastest pole times the step
 _PAYLOAD, _LIMITS = 1e-5, 1e-5  # allowed [m], and share of a limit [-]

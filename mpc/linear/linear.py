@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from typing_extensions import override
@@ -21,12 +21,9 @@ from models.case import Case
 from models.plant import DriveLimits
 from models.sensing import HEARD, Measurement
 
+from ..forecast import Predictor
 from ..winch import Weights
 from .winch_mpc import WinchMPC
-
-if TYPE_CHECKING:
-    from ..forecast import Predictor
-
 
 _SAME = 1e-3  # of the peak torque
 _TORQUE = HEARD.index("motor.torque")

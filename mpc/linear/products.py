@@ -10,19 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.basics import FloatArray, read_only
 
+from ..forecast import Forecast
 from ..programme import Condensed
 from ..winch import PredictionModel
 from .winch_programme import WATCHED, path_of_sea, sea_at_end
-
-if TYPE_CHECKING:
-    from ..forecast import Forecast
-
 
 _NONE = np.zeros(0)
 _WIDE = 1e20  # no limit, for the solver

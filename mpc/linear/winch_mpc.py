@@ -18,16 +18,17 @@ import time as clock
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from models.basics import FloatArray, InputError, check_range
 from models.case import Case
+from models.operation import Motion
 from models.plant import SPEED_BAND, DriveLimits
 from models.sensing import HEARD, Measurement
 
-from ..forecast import AdaptiveAR, PerfectPreview
+from ..forecast import AdaptiveAR, Forecast, PerfectPreview, Predictor
 from ..programme import Condensed, QPSolution, SoftQP, default_blocking, kkt_residual
 from ..winch import (
     PredictionModel,
@@ -42,12 +43,6 @@ from ..winch import (
 from .drive_window import DriveWindow, TorqueBudget
 from .products import Products
 from .winch_programme import winch_programme
-
-if TYPE_CHECKING:
-    from models.operation import Motion
-
-    from ..forecast import Forecast, Predictor
-
 
 _OWNER = "predictive control"
 _QUADRATIC, _LINEAR = 1e4, 1e2  # price of a soft row, over its scale, in units of the cost

@@ -13,28 +13,23 @@ import math
 import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from typing_extensions import override
 
 from models.basics import FloatArray, SolverError, check_range
 from models.case import Case
-from models.plant import DriveLimits
+from models.plant import DriveLimits, DrumTravel
 from models.sensing import HEARD, Measurement
 
+from ..forecast import Predictor
 from ..linear import WinchMPC, path_of_sea
 from ..winch import Weights
 from .mean_torque import start_torque
 from .responses import with_drift
 from .shooting import Known, Linearisation, Shooting
 from .stage import make_stage
-
-if TYPE_CHECKING:
-    from models.plant import DrumTravel
-
-    from ..forecast import Predictor
-
 
 _OWNER = "nonlinear predictive control"
 _APPLIED = HEARD.index("drive.applied")

@@ -9,19 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
 from models.basics import FloatArray
-from models.plant import build_plant, displacement_names
+from models.plant import DrumTravel, build_plant, displacement_names
 
 from ..winch import SampledWinch
-
-if TYPE_CHECKING:
-    from models.plant import DrumTravel
-
 
 _SMOOTH = 0.002  # eps of a tension, over that at rest
 _TURN = 2.0  # motor speed over which gear's losses and friction change sides [rad/s]

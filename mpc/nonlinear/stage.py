@@ -23,24 +23,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 import scipy.linalg
 
 from models.basics import FloatArray, InputError, ReadOnlyArrays, SolverError, check_range
-from models.plant import zero_order_hold
+from models.plant import DrumTravel, zero_order_hold
 from models.simulation import Kernel
 
 from ..programme import hermite_within
 from ..winch import SampledWinch
 from .mean_torque import Drift, mean_torque
 from .nonlinear_forces import ForceLaw, force_law
-
-if TYPE_CHECKING:
-    from models.plant import DrumTravel
-
 
 _OWNER = "nonlinear predictive control"
 _NEWTON = 50  # iterations for the forces of one sample

@@ -9,17 +9,15 @@ long as there is any.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..controllers import Contender, StoredDesign
 from ..keeper import POLL, Died, Processes
+from ..text import Progress
 from .bench import CellBench, CellSetup, CellTask, Refused
 from .cell import Cell, ComparisonQuestion, Trace
 from .comparison import Comparison
 from .store import Store
-
-if TYPE_CHECKING:
-    from ..text import Progress
 
 
 @dataclass(kw_only=True)

@@ -7,12 +7,13 @@ is a shaded edge, because nothing can lie below it on the linear plant.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from models.basics import InputError
 
+from ..controllers import Contender
 from ..text import (
     AFTER,
     BEFORE,
@@ -20,6 +21,8 @@ from ..text import (
     DRUM,
     HOOK,
     REFERENCE,
+    Axes,
+    Figure,
     count,
     drawn,
     duration,
@@ -32,14 +35,8 @@ from ..text import (
     scale,
     typeset,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from ..controllers import Contender
-    from .cell import Trace
-    from .comparison import Comparison
+from .cell import Trace
+from .comparison import Comparison
 
 _COLOURS = {
     "none": HOOK,

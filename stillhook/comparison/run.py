@@ -14,7 +14,6 @@ import sys
 import time as clock
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from models.basics import InputError, check_range
 from models.case import Case
@@ -23,15 +22,13 @@ from models.simulation import EASE
 from ..controllers import contenders_of
 from ..keeper import Processes, usable_cores
 from ..runs import seconds_of, seeds_of
+from ..text import Progress
 from .bench import CellSetup
 from .campaign import Campaign
 from .cell import ComparisonQuestion
 from .comparison import Comparison
 from .mismatch import Mismatch
 from .store import STORE, Store
-
-if TYPE_CHECKING:
-    from ..text import Progress
 
 _LONGEST = 1e6  # run [s]
 

@@ -11,14 +11,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from models.basics import mean_interval
 
 from ..text import Column, Table, Written, columns, count, duration, listed, number, quantity, scale
-
-if TYPE_CHECKING:
-    from .comparison import Comparison
+from .comparison import Comparison
 
 LEGEND = (
     "sat.: of the time at the drive's limits; lost: runs in which the payload left its place by "

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +19,8 @@ from ..text import (
     DRUM,
     HOOK,
     REFERENCE,
+    Axes,
+    Figure,
     decibels,
     drawn,
     duration,
@@ -30,11 +31,6 @@ from ..text import (
     scale,
 )
 from .runs import MAIN, Runs, main_quantity
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 _COLOURS = {"none": BEFORE, "feedback": AFTER, "constant-tension": "#cc79a7"}
 _OTHERS = (DRUM, "#56b4e9", "#e69f00", HOOK)

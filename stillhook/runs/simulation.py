@@ -11,14 +11,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, overload
+from typing import Literal, overload
 
 import numpy as np
 
 from models.basics import InputError, check_range, check_seed, one_thread
 from models.case import Case
 from models.casefile import Quantity
-from models.operation import Scenario, SpectrumMotion, scenario_named
+from models.operation import MotionSource, Scenario, SpectrumMotion, scenario_named
+from models.plant import DriveLimits
 from models.run import NamedQuantity, Run
 from models.sensing import Controller, holds_brake
 from models.simulation import (
@@ -33,10 +34,6 @@ from synth.design import GainDesign, Tuning
 from ..controllers import controller_of
 from .runs import Runs, keep_worst, stays
 from .window import error_of
-
-if TYPE_CHECKING:
-    from models.operation import MotionSource
-    from models.plant import DriveLimits
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
@@ -27,6 +28,8 @@ from ..text import (
     DRUM,
     HOOK,
     REFERENCE,
+    Axes,
+    Figure,
     drawn,
     headline,
     number,
@@ -37,11 +40,7 @@ from ..text import (
 from .window import Window, moves, whole_of, window_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from matplotlib.transforms import Affine2DBase, Transform
 
 _SHOTS = 8

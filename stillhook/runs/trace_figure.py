@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +22,8 @@ from ..text import (
     DRUM,
     HOOK,
     REFERENCE,
+    Axes,
+    Figure,
     drawn,
     duration,
     headline,
@@ -32,11 +33,6 @@ from ..text import (
     scale,
 )
 from .window import Window, envelope, error_of, moves, runs_of_true, window_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 _BINS = 500  # over the width of the whole run
 _SMALL = 0.25  # of the hook's motion: a payload that moves less has a scale of its own

@@ -17,8 +17,10 @@ from ..text import (
     DRUM,
     HOOK,
     REFERENCE,
+    Axes,
     Column,
     Drawing,
+    Figure,
     Report,
     ReportSection,
     Table,
@@ -38,9 +40,7 @@ from ..text import (
 )
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.contour import QuadContourSet
-    from matplotlib.figure import Figure
     from matplotlib.projections.polar import PolarAxes
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from synth.operability import AtDepth, Operability
+from synth.operability import AtDepth, Contour, ContourCheck, Operability
 
 from ..text import (
     Column,
@@ -34,8 +34,6 @@ from .operability_figures import (
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from synth.operability import Contour, ContourCheck
 
 _MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
 _WHO = {"held": "drum held", "loop": "design", "reoptimised": "anew", "perfect": "perfect"}

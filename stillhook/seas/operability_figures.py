@@ -7,13 +7,13 @@ shaded; the maker's lines of heave over period; roses and scatter diagrams.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from models.basics import GRAVITY, FloatArray
-from synth.operability import AtDepth, Criterion, Operability
+from synth.operability import AtDepth, Contour, Criterion, Operability
 
 from ..text import (
     AFTER,
@@ -21,18 +21,14 @@ from ..text import (
     DRUM,
     HOOK,
     REFERENCE,
+    Axes,
+    Figure,
     drawn,
     headline,
     new_figure,
     panel,
     quantity,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from synth.operability import Contour
 
 # Colour and dashes of each limit: the same in every figure.
 _LINES: dict[str, tuple[str, Any]] = {

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+
+from models.sea import Scatter, SeaRecords, SeaSpectrum
 
 from ..text import (
     AFTER,
     BEFORE,
     HOOK,
     Drawing,
+    Figure,
     Item,
     Report,
     ReportSection,
@@ -29,11 +31,6 @@ from ..text import (
     quantity,
     typeset,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from models.sea import Scatter, SeaRecords, SeaSpectrum
 
 _MOST_CELLS = 350  # beyond, the numbers in the cells would not be legible
 

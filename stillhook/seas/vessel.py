@@ -6,11 +6,14 @@ RAOs are shown as amplitudes and phases, a hull by its panels from three sides.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from models.basics import FloatArray
 from models.vessel import MODES, VesselRaos
+from models.vessel.hull import HullVessel
+from models.vessel.readers import LongWaveCheck
 
 from ..text import (
     AFTER,
@@ -18,7 +21,9 @@ from ..text import (
     DRUM,
     HOOK,
     REFERENCE,
+    Axes,
     Drawing,
+    Figure,
     Report,
     ReportSection,
     Table,
@@ -33,14 +38,6 @@ from ..text import (
     quantity,
     remarks,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from models.basics import FloatArray
-    from models.vessel.hull import HullVessel
-    from models.vessel.readers import LongWaveCheck
 
 _HEADINGS = (0.0, 45.0, 90.0, 135.0, 180.0)
 _COLOURS = (AFTER, "#56b4e9", DRUM, BEFORE, REFERENCE)

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
+from models.case import Case
+
 from .export import table_of, write_result
 from .words import SweepSummary, case_at, worst_cases
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped]
-
-    from models.case import Case
 
 
 @xr.register_dataset_accessor("sweep")  # type: ignore[no-untyped-call]

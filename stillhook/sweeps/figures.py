@@ -20,6 +20,8 @@ from ..text import (
     BROKEN,
     HOOK,
     REFERENCE,
+    Axes,
+    Figure,
     drawn,
     headline,
     logarithmic,
@@ -33,8 +35,6 @@ from ..text import (
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from synth.design import GainDesign, StructureDesign
 

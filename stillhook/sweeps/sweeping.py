@@ -19,11 +19,11 @@ from models.case import Case
 from models.spread import METHODS, Spread
 from synth.design import GainDesign, StructureDesign
 
+from ..keeper import Pool
+from ..text import Progress
+
 if TYPE_CHECKING:
     import xarray as xr
-
-    from ..keeper import Pool
-    from ..text import Progress
 
 SAMPLES = {"frequency": 10_000, "time": 256}
 """Cases of a sweep unless told otherwise, by its mode."""

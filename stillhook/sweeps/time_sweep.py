@@ -23,7 +23,7 @@ from models.operation import FAULTS, PREFIX, scenario_named
 from models.spread import Spread
 
 from ..keeper import Alone, Cluster, Died, Pool, Processes
-from ..text import OutputFolder
+from ..text import OutputFolder, Progress
 from .export import write_result
 from .store import ATTRIBUTE, Draw, Results, header_of, places_of, text_of
 from .time_cases import CaseResult, CaseTask, TimeQuestion, seed_of
@@ -31,8 +31,6 @@ from .time_metrics import METRICS, STATUS
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from ..text import Progress
 
 _TOLD = 20  # reasons of failed cases that a result tells
 

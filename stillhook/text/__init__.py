@@ -20,6 +20,8 @@ if TYPE_CHECKING:
         DRUM,
         HOOK,
         REFERENCE,
+        Axes,
+        Figure,
         annotate,
         drawn,
         headline,

@@ -16,8 +16,10 @@ from functools import wraps
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes as Axes
+    from matplotlib.figure import Figure as Figure
+else:
+    Axes = Figure = Any  # matplotlib is loaded when something is drawn
 
 P = ParamSpec("P")
 
@@ -67,7 +69,7 @@ def styled() -> Iterator[None]:
 
 def new_figure(width: float = 7.2, height: float = 4.4) -> Figure:
     """Return an empty figure [inch] that belongs to nobody: no pyplot, no global state."""
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Figure
 
     return Figure(figsize=(width, height), layout="constrained")
 

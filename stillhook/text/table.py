@@ -14,12 +14,10 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .quantities import percent, quantity
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .style import Figure
 
 
 @dataclass(frozen=True)

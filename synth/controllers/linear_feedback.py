@@ -33,7 +33,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
@@ -42,7 +41,7 @@ from models.basics import InputError, check_range, pick
 from models.case import Case
 from models.plant import MEAN_LOSSES, build_plant
 
-from ..design import GainDesign
+from ..design import GainDesign, Tuning
 from ..loop import LinearController
 from ..structures import (
     Matrices,
@@ -54,10 +53,6 @@ from ..structures import (
     sampled,
     tracking_gain,
 )
-
-if TYPE_CHECKING:
-    from ..design import Tuning
-
 
 _OWNER = "linear feedback"
 PAYLOAD = ("payload.acceleration", "payload.velocity", "payload.displacement")

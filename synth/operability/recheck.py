@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,11 +20,9 @@ from models.plant import PlantData
 from ..design import GainDesign
 from ..loop import Assessment
 from ..question import pose, pose_structure
-
-if TYPE_CHECKING:
-    from .columns import SeaColumn
-    from .contour import Contour
-    from .pose import Design
+from .columns import SeaColumn
+from .contour import Contour
+from .pose import Design
 
 _TOLERANCE = 1e-6
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from models.basics import StillhookError, SynthesisError
+from models.run import Run
 
 from ...controllers import controller_of
 from ...runs import RunFolder, Runs, Series, headline_of, keep_worst, runs_data, runs_report, tree
@@ -45,8 +46,6 @@ from .simulate_given import SimulationRequest, again, asked_of
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-    from models.run import Run
 
 _MEGABYTE = 1e6
 _Ticker = Callable[[str, float], None]  # takes what is being done, and how much is done [s]

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from models import Case
 from models.basics import InputError, check_range
 from models.casefile import Quantity, read_yaml
 
@@ -15,7 +16,6 @@ from ...text import told_once
 from ..given import given_case, parse_gains, parse_options
 
 if TYPE_CHECKING:
-    from models import Case
     from models.operation import MotionSource, Scenario
     from models.simulation import SimulationOptions
     from synth.design import GainDesign

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from models.basics import InputError, check_range, read_quantity
 
-from ...text import csv_text
+from ...text import Progress, csv_text
 from ..declare import CASE, DESIGN, group, repeated, results_folder, switch, text, whole
 from ..given import case_words, given_case
 from ..given_design import design_words, given_design
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from synth.design import GainDesign, StructureDesign
 
     from ...designs import Wide
-    from ...text import Progress
 
 ARGUMENTS = (
     CASE,

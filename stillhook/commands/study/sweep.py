@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from models import Case
 from models.basics import InputError, check_range
 from models.spread import Spread
 
@@ -34,8 +35,6 @@ from ..working import conclude, counting, place_for, tidy
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from models import Case
 
 _MOST = 100  # of the worst cases that are told
 

@@ -10,19 +10,16 @@ import argparse
 import math
 import shlex
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from models import Case
 from models.basics import InputError
+from models.hook import HookSurvey
 
 from ...seas import motion_report, own_place
 from ...text import OutputFolder, console, show
 from ..declare import CASE, real, results_folder, text
 from ..given import case_words, given_case
 from ..working import conclude, prepared
-
-if TYPE_CHECKING:
-    from models import Case
-    from models.hook import HookSurvey
 
 ARGUMENTS = (
     CASE,

@@ -6,11 +6,11 @@ import argparse
 import math
 import os
 import shlex
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.basics import InputError, check_range
+from models.vessel.hull import Hull
 from models.vessel.readers import check_long_waves, write_raos
 
 from ...seas import hull_report
@@ -18,9 +18,6 @@ from ...text import progress
 from ..declare import choice, declared, group, real, switch, text, whole
 from ..vary import parse_range
 from ..working import conclude, prepared_table
-
-if TYPE_CHECKING:
-    from models.vessel.hull import Hull
 
 _STAGE = "computing waves on the hull"
 
