@@ -36,13 +36,13 @@ from ..basics import (
 )
 from .discrete import DiscretePlant, StateSpace, zero_order_hold
 from .pade import pade_bank
+from .resolvent import Resolvent, Transfer
 from .response import PlantResponse
 
 if TYPE_CHECKING:
     import control
 
 _OWNER = "linear plant"
-_CHUNK = 512  # points solved at a time: keeps the stacked (n, k, columns) states in the cache
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, init=False)
@@ -165,36 +165,26 @@ class LinearPlant(StateSpace):
         """
         points = np.array(s, dtype=np.complex128).reshape(-1)
         check_finite(_OWNER, "s", points.view(np.float64))
-        n, nu = self.A.shape[0], self.B.shape[1]
-        if n and np.any(points == 0.0) and _integrates(self.A):
+        if len(self.A) and np.any(points == 0.0) and _integrates(self.A):
             raise InputError(
                 f"{_OWNER}: the response is asked for at s = 0, where the plant has a pole "
                 "(an integrator); ask above zero"
             )
-        keep = pick(_OWNER, "disturbance", self.disturbances, self.independent_disturbances)
-        forced = np.hstack([self.B, self.E[:, keep], np.zeros_like(self.E[:, keep])])
-        direct_y = np.hstack([self.D, self.F[:, keep], np.zeros_like(self.F[:, keep])])
-        direct_z = np.hstack([self.Dz, self.Fz[:, keep], np.zeros_like(self.Fz[:, keep])])
-        nw = len(keep)
-        for rate, base in self.rates.items():  # the last nw columns are the ones times s
-            i, j = self.disturbances.index(rate), keep.index(self.disturbances.index(base))
-            forced[:, nu + nw + j] += self.E[:, i]
-            direct_y[:, nu + nw + j] += self.F[:, i]
-            direct_z[:, nu + nw + j] += self.Fz[:, i]
-        y = np.empty((points.size, self.C.shape[0], nu + nw), dtype=np.complex128)
-        z = np.empty((points.size, self.Cz.shape[0], nu + nw), dtype=np.complex128)
-        T, into, out_of = self.triangular
-        for start in range(0, points.size, _CHUNK):
-            part = points[start : start + _CHUNK, None, None]
-            x = _back_substituted(T, _fold(into @ forced, nu, nw, part), part[:, 0, 0])
-            if x is None:
-                raise InputError(
-                    f"{_OWNER}: the response is asked for at a pole of the plant, s = "
-                    f"{_nearest(self.poles(), part.ravel()):.6g} 1/s"
-                )
-            y[start : start + _CHUNK] = (self.C @ out_of) @ x + _fold(direct_y, nu, nw, part)
-            z[start : start + _CHUNK] = (self.Cz @ out_of) @ x + _fold(direct_z, nu, nw, part)
-        y *= np.exp(-points[:, None] * np.array(self.delays))[:, :, None]
+        transfer, direct, keep = self._transfer
+        rows = transfer(points)
+        if rows is None:
+            raise InputError(
+                f"{_OWNER}: the response is asked for at a pole of the plant, s = "
+                f"{_nearest(self.poles(), points):.6g} 1/s"
+            )
+        rows += direct
+        nu, ny = len(self.inputs), len(self.measurements)
+        width = nu + len(keep)
+        for k, base in enumerate(self.rates.values()):  # the last columns are the ones times s
+            column = nu + self.independent_disturbances.index(base)
+            rows[:, :, column] += points[:, None] * rows[:, :, width + k]
+        rows[:, :ny] *= np.exp(-points[:, None] * np.array(self.delays))[:, :, None]
+        y, z = rows[:, :ny, :width], rows[:, ny:, :width]
         return PlantResponse(
             omega=points.imag,
             s=points,
@@ -209,18 +199,18 @@ class LinearPlant(StateSpace):
         )
 
     @cached_property
-    def triangular(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """T, U, V with A = V T U, T upper triangular and U = V^-1, (n, n) each.
+    def resolvent(self) -> Resolvent:
+        """(s I - A)^-1, the same for all plants that are made of this one by `select`."""
+        return Resolvent(self.A)
 
-        The balanced Schur form: with it a response costs one back-substitution per
-        frequency.  Unlike the eigenvectors it does no harm near a defective A (a drum in
-        torque mode is a chain of two integrators).
-        """
-        if not len(self.A):
-            return (np.zeros((0, 0), dtype=np.complex128),) * 3
-        balanced, (scale, _) = scipy.linalg.matrix_balance(self.A, permute=False, separate=True)
-        T, Q = scipy.linalg.schur(balanced, output="complex")
-        return np.asarray(T), Q.conj().T / scale, scale[:, None] * Q
+    @cached_property
+    def _transfer(self) -> tuple[Transfer, FloatArray, list[int]]:
+        """C (s I - A)^-1 B and D of all signals, (ny + nz, nu + nw + rates), and nw's indices."""
+        keep = pick(_OWNER, "disturbance", self.disturbances, self.independent_disturbances)
+        columns = [*keep, *pick(_OWNER, "disturbance", self.disturbances, list(self.rates))]
+        C, B = np.vstack([self.C, self.Cz]), np.hstack([self.B, self.E[:, columns]])
+        direct = np.block([[self.D, self.F[:, columns]], [self.Dz, self.Fz[:, columns]]])
+        return self.resolvent.between(C, B), direct, keep
 
     def _with(self, **changes: Any) -> LinearPlant:
         """Return it with changes that need no check: they follow from what has been checked."""
@@ -229,7 +219,30 @@ class LinearPlant(StateSpace):
             value = changes.get(field.name, getattr(self, field.name))
             object.__setattr__(plant, field.name, value)
         StateSpace.__post_init__(plant)
+        if "A" not in changes:
+            object.__setattr__(plant, "resolvent", self.resolvent)
         return plant
+
+    def with_element(self, output: str, disturbance: str, gain: float) -> LinearPlant:
+        """Return the plant with `disturbance` += `gain` times `output` closed around it.
+
+        Linear drag is such an element: a force of -C times the payload's velocity.
+
+        Raises
+        ------
+        InputError
+            If a name is unknown, or the output has a direct term.
+        """
+        v = pick(_OWNER, "output", self.outputs, [output])[0]
+        f = pick(_OWNER, "disturbance", self.disturbances, [disturbance])[0]
+        if np.any(self.Dz[v]) or np.any(self.Fz[v]):
+            raise InputError(f"{_OWNER}: {output} must have no direct term to be fed back")
+        row = gain * self.Cz[v]
+        return self._with(
+            A=self.A + np.outer(self.E[:, f], row),
+            C=self.C + np.outer(self.F[:, f], row),
+            Cz=self.Cz + np.outer(self.Fz[:, f], row),
+        )
 
     def select(
         self,
@@ -392,28 +405,6 @@ def _matrix(name: str, value: npt.ArrayLike) -> FloatArray:
 def _delay_states(names: Sequence[str], delays: Sequence[float], order: int) -> list[str]:
     late = [name for name, delay in zip(names, delays, strict=True) if delay > 0.0]
     return [f"{name}.delay{i + 1}" for name in late for i in range(order)]
-
-
-def _back_substituted(T: ComplexArray, right: ComplexArray, s: ComplexArray) -> ComplexArray | None:
-    """Solve (s I - T) x = right for every point s, (k, n, columns); None at an eigenvalue."""
-    n = len(T)
-    x = np.empty((n, right.shape[0], right.shape[2]), dtype=np.complex128)
-    for i in range(n - 1, -1, -1):
-        pivot = s - T[i, i]
-        if not np.all(pivot):
-            return None
-        above = np.tensordot(T[i, i + 1 :], x[i + 1 :], axes=1)
-        x[i] = (right[:, i] + above) / pivot[:, None]
-    return x.transpose(1, 0, 2)
-
-
-def _fold(columns: FloatArray | ComplexArray, nu: int, nw: int, s: ComplexArray) -> ComplexArray:
-    """Return [inputs, disturbances + s rates] for every point s, (k, rows, nu + nw)."""
-    folded: ComplexArray = np.repeat(
-        columns[None, :, : nu + nw].astype(np.complex128), len(s), axis=0
-    )
-    folded[:, :, nu:] += s * columns[None, :, nu + nw :]
-    return folded
 
 
 def _integrates(A: FloatArray) -> bool:

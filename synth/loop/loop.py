@@ -28,14 +28,14 @@ fixed point elsewhere.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import InputError, check_range, pick
+from models.basics import check_range
 from models.plant import LinearPlant, PlantResponse
 
 # What both kinds of number share; NumPy and CasADi have no common static type.
@@ -285,17 +285,7 @@ def with_drag(plant: LinearPlant, element: DragElement, coefficient: float) -> L
     Raises
     ------
     InputError
-        If the velocity is not a pure state of the plant (it has a direct term).
+        If a name is unknown or the velocity is no pure state of the plant (has a direct term).
     """
-    v = pick("drag element", "output", plant.outputs, [element.velocity])[0]
-    f = pick("drag element", "disturbance", plant.disturbances, [element.force])[0]
-    if np.any(plant.Dz[v]) or np.any(plant.Fz[v]):
-        raise InputError(f"drag element: {element.velocity} must have no direct term")
-    gain = -(coefficient - element.reference)
-    row = plant.Cz[v][None, :]
-    return replace(
-        plant,
-        A=plant.A + gain * plant.E[:, f : f + 1] @ row,
-        C=plant.C + gain * plant.F[:, f : f + 1] @ row,
-        Cz=plant.Cz + gain * plant.Fz[:, f : f + 1] @ row,
-    )
+    gain = element.reference - coefficient
+    return plant.with_element(element.velocity, element.force, gain)

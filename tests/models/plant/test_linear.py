@@ -374,3 +374,29 @@ def test_prints_as_a_small_tree() -> None:
         "└ outputs: x"
     )
     assert "sampled every 0.1 s" in str(oscillator().discretise(0.1))
+
+
+def test_an_element_closed_around_a_plant_is_a_rank_one_update() -> None:
+    """P_ab + P_af g P_vb / (1 - g P_vf), Woodbury's formula for the feedback w_f += g z_v."""
+    plant = dataclasses.replace(random_plant(), Dz=None, Fz=None, outputs=("position", "effort"))
+    gain = -0.7
+    closed = plant.with_element("effort", "force", gain).response(OMEGA)
+    r = plant.response(OMEGA)
+    factor = gain / (1.0 - gain * r.zw[:, 1, 2])[:, None, None]
+    for block, out, into in (
+        ("zw", r.zw, r.zw),
+        ("zu", r.zw, r.zu),
+        ("yw", r.yw, r.zw),
+        ("yu", r.yw, r.zu),
+    ):
+        update = factor * out[:, :, 2:] * into[:, 1:2]
+        want = getattr(r, block) + update
+        np.testing.assert_allclose(getattr(closed, block), want, rtol=1e-10, atol=1e-13)
+
+
+def test_an_element_closed_around_a_plant_needs_a_pure_state() -> None:
+    plant = random_plant()
+    with pytest.raises(InputError, match="effort must have no direct term"):
+        plant.with_element("effort", "force", 1.0)
+    with pytest.raises(InputError, match="there is no output 'speed'"):
+        plant.with_element("speed", "force", 1.0)
