@@ -16,10 +16,12 @@ from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 import scipy.linalg
 
 from ..basics import ComplexArray, FloatArray
 
+BoolArray = npt.NDArray[np.bool_]
 Transfer = Callable[[ComplexArray], ComplexArray | None]
 
 _CHUNK = 512  # points solved at a time: keeps the stacked (n, k, columns) states in the cache
@@ -53,7 +55,8 @@ class Resolvent:
         self, modes: tuple[ComplexArray, ComplexArray, ComplexArray], C: FloatArray, B: FloatArray
     ) -> Transfer:
         poles, V, W = modes
-        residues = ((C @ V).T[:, :, None] * (W @ B)[:, None, :]).reshape(len(poles), -1)
+        residues = (C @ V).T[:, :, None] * (W @ B)[:, None, :] * self._paths(C, B)
+        residues = residues.reshape(len(poles), -1)
         real, upper = np.flatnonzero(poles.imag == 0.0), np.flatnonzero(poles.imag > 0.0)
         lower, above, pairs = upper + 1, poles[upper], residues[upper]  # LAPACK's order of pairs
         nothing = _ROUNDING * np.abs(poles)
@@ -70,13 +73,13 @@ class Resolvent:
             kernel = np.concatenate([inverse[:, real], s[:, None] * both, both], axis=1)
             found = np.empty((s.size, weights.shape[1]), dtype=np.complex128)
             found.real, found.imag = kernel.real @ weights, kernel.imag @ weights
-            return found.reshape(s.size, len(C), -1)
+            return found.reshape(s.size, len(C), B.shape[1])
 
         return transfer
 
     def _by_back_substitution(self, C: FloatArray, B: FloatArray) -> Transfer:
         T, into, out_of = self._triangular
-        right, left = into @ B, C @ out_of
+        right, left, paths = into @ B, C @ out_of, self._paths(C, B)
 
         def transfer(s: ComplexArray) -> ComplexArray | None:
             found = np.empty((s.size, len(C), B.shape[1]), dtype=np.complex128)
@@ -85,9 +88,24 @@ class Resolvent:
                 if x is None:
                     return None
                 found[start : start + _CHUNK] = left @ x
-            return found
+            return found * paths
 
         return transfer
+
+    def _paths(self, C: FloatArray, B: FloatArray) -> BoolArray:
+        """Tell which inputs reach which outputs at all, (rows, columns).
+
+        A winch does not move the ship: such a response is zero, and no sum that rounds to it.
+        """
+        return np.asarray((C != 0.0) @ self._reach @ (B != 0.0))
+
+    @cached_property
+    def _reach(self) -> BoolArray:
+        """Whether a state, (row), hears another one, (column), through however many others."""
+        reach: BoolArray = (self.A != 0.0) | np.eye(len(self.A), dtype=np.bool_)
+        for _ in range(len(self.A).bit_length()):
+            reach = reach @ reach
+        return reach
 
     @cached_property
     def modes(self) -> tuple[ComplexArray, ComplexArray, ComplexArray] | None:

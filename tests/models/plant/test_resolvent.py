@@ -91,3 +91,19 @@ def test_plants_with_the_same_poles_share_one_decomposition() -> None:
     both = plant.response(omega)
     np.testing.assert_allclose(some.response(omega).zw, both.zw[:, 2:], rtol=1e-13)
     np.testing.assert_allclose(some.response(omega).yu, both.yu[:, 1:], rtol=1e-13)
+
+
+def test_what_is_not_connected_is_not_heard_at_all() -> None:
+    """A filter on one side of the plant: its states are not moved by the plant's input."""
+    A = np.block(
+        [[chain(4), np.ones((8, 2))], [np.zeros((2, 8)), np.array([[-1.0, 2.0], [-2.0, -1.5]])]]
+    )
+    C, B = np.eye(10), np.eye(10)[:, [0, 9]]
+    resolvent = Resolvent(A)
+    for _ in range(2):
+        found = resolvent.between(C, B)(POINTS.astype(complex))
+        assert found is not None
+        assert not found[:, 8:, 0].any()
+        assert found[:, 8:, 1].all()
+        assert found[:, :8].all()
+        resolvent.__dict__["modes"] = None  # the same by back-substitution
