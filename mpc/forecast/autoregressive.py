@@ -97,8 +97,8 @@ class AdaptiveAR:
         error: float = 0.0,
     ) -> None:
         owner = "adaptive AR"
-        self._leads = leads_of(owner, sample_time, horizon)
-        self._sample_time = Ts = float(sample_time)
+        self.leads = leads_of(owner, sample_time, horizon)
+        self.sample_time = Ts = float(sample_time)
         lags = int(check_range(owner, "order", order, low=4, high=200))
         spacing = check_range(owner, "spacing", spacing, low=4.0 * Ts, high=100.0, unit="s")
         late = check_range(owner, "delay", delay, low=0.0, high=60.0, unit="s")
@@ -111,30 +111,20 @@ class AdaptiveAR:
             sample_time=Ts,
             spacing=self._q,
             order=lags,
-            steps=max(2, math.ceil((self._leads[-1] + late) / D - 1e-9)),
+            steps=max(2, math.ceil((self.leads[-1] + late) / D - 1e-9)),
             every=self._every,
             memory=memory,
         )
         self._lags, self._span = self._regression.lags, self._regression.span
         self._share = Ts / memory
-        self._at = read_only(self._leads + late)
-        n, knots = self._leads.size, self._regression.knots
+        self._at = read_only(self.leads + late)
+        n, knots = self.leads.size, self._regression.knots
         weights = hermite_weights(owner, knots, np.append(self._at, Ts))
         weights[:, 1::2] /= D  # rates are kept times the spacing
         self._weights = read_only(np.delete(weights, (n, 2 * n + 1), axis=0))
         self._next_sample = read_only(weights[[n, 2 * n + 1]] * np.array(((1.0,), (D,))))
         self._fade = read_only(np.exp(-self._at / _FADING))
         self.reset()
-
-    @property
-    def sample_time(self) -> float:
-        """Time between samples and between leads [s]."""
-        return self._sample_time
-
-    @property
-    def leads(self) -> FloatArray:
-        """Leads from 0 to the horizon [s], (n,)."""
-        return self._leads
 
     @property
     def ready(self) -> bool:
@@ -149,7 +139,7 @@ class AdaptiveAR:
         self._row = self._span - 1  # of the newest sample
         self._age = self._missing = self._stale = 0
         self._power = np.zeros(2)
-        self._std = np.zeros((2, self._leads.size))
+        self._std = np.zeros((2, self.leads.size))
         self._known: FloatArray | None = None  # the variances that `_std` is made of
         self._work: Iterator[None] = iter(())
         self._working = False
@@ -165,7 +155,7 @@ class AdaptiveAR:
             self._power += max(1.0 / (self._age + 1), self._share) * (newest**2 - self._power)
         else:
             self._missing, self._stale = self._missing + 1, self._stale + 1
-            gap = self._missing * self._sample_time > _BRIDGED
+            gap = self._missing * self.sample_time > _BRIDGED
             self._append(self._bridge(), gap=gap)
         self._age += 1
         if self._age < self._span:
@@ -183,7 +173,7 @@ class AdaptiveAR:
 
     def forecast(self) -> Forecast:
         """Return the motion now and at the leads: two products of a matrix and a vector."""
-        n, D, model = self._leads.size, self._D, self._regression.model
+        n, D, model = self.leads.size, self._D, self._regression.model
         if model is None:
             heave, rate = self._record[self._row]
             rms = np.sqrt(self._power)[:, None] * np.ones(n)
@@ -228,6 +218,6 @@ class AdaptiveAR:
         """Return what stands for a missing sample."""
         model = self._regression.model
         if model is None:
-            return np.asarray(self._record[self._row] * math.exp(-self._sample_time / _FADING))
+            return np.asarray(self._record[self._row] * math.exp(-self.sample_time / _FADING))
         knots = model @ self._record[self._row - self._lags].ravel()
         return np.asarray(self._next_sample @ knots)

@@ -43,22 +43,12 @@ class PerfectPreview:
     """
 
     def __init__(self, *, sample_time: float, horizon: float) -> None:
-        self._leads = leads_of("perfect preview", sample_time, horizon)
-        self._sample_time = float(sample_time)
-        self._certain = np.zeros(self._leads.size)
+        self.leads = leads_of("perfect preview", sample_time, horizon)
+        self.sample_time = float(sample_time)
+        self._certain = np.zeros(self.leads.size)
         self._certain.setflags(write=False)
         self._record: FloatArray | None = None
         self._time = math.nan
-
-    @property
-    def sample_time(self) -> float:
-        """Time between samples and between leads [s]."""
-        return self._sample_time
-
-    @property
-    def leads(self) -> FloatArray:
-        """Leads from 0 to the horizon [s], (n,)."""
-        return self._leads
 
     def foresee(self, motion: Motion) -> None:
         """Take the hook's record of the run that follows.
@@ -68,12 +58,12 @@ class PerfectPreview:
         motion
             The motion, with row 0 at time 0; it is sampled here once.
         """
-        last = math.floor((motion.rows - 1) * motion.step / self._sample_time + 1e-9)
-        record = np.zeros((2, last + 1 + self._leads.size))
+        last = math.floor((motion.rows - 1) * motion.step / self.sample_time + 1e-9)
+        record = np.zeros((2, last + 1 + self.leads.size))
         for start in range(0, last + 1, _CHUNK):
             samples = np.arange(start, min(start + _CHUNK, last + 1))
             record[:, samples] = _sampled(
-                motion, samples * np.float64(self._sample_time / motion.step)
+                motion, samples * np.float64(self.sample_time / motion.step)
             )
         record[0, last + 1 :] = record[0, last]
         record.setflags(write=False)
@@ -96,16 +86,16 @@ class PerfectPreview:
         InputError
             If there is no record, or no sample has come, or the time is no sample of the grid.
         """
-        record, n = self._record, self._leads.size
+        record, n = self._record, self.leads.size
         if record is None:
             raise InputError(
                 "perfect preview: record must be given with foresee(motion) before a forecast, "
                 "got none"
             )
-        at = self._time / self._sample_time
+        at = self._time / self.sample_time
         if not math.isfinite(at) or abs(at - round(at)) > 1e-6 * max(1.0, abs(at)):
             raise InputError(
-                f"perfect preview: time must be a multiple of {self._sample_time:g} s, "
+                f"perfect preview: time must be a multiple of {self.sample_time:g} s, "
                 f"got {self._time:g} s"
             )
         first = min(max(round(at), 0), record.shape[1] - n)

@@ -12,7 +12,7 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .linear import LinearMPC
     from .products import Products
-    from .winch_mpc import WinchMPC
+    from .winch_mpc import WinchMPC, WinchOptions
     from .winch_programme import WATCHED, path_of_sea, sea_at_end
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

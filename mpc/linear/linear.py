@@ -10,20 +10,15 @@ from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
-from typing_extensions import override
+from typing_extensions import Unpack, override
 
 from models.basics import check_range
 from models.case import Case
-from models.plant import DriveLimits
 from models.sensing import HEARD, Measurement
 
-from ..forecast import Predictor
-from ..winch import Weights
-from .winch_mpc import WinchMPC
+from .winch_mpc import WinchMPC, WinchOptions
 
 _SAME = 1e-3  # of the peak torque
 _TORQUE = HEARD.index("motor.torque")
@@ -116,7 +111,7 @@ class LinearMPC(WinchMPC):
     Examples
     --------
     >>> from models import load_case
-    >>> from mpc.winch import ProcessNoise
+    >>> from mpc.winch import ProcessNoise, Weights
     >>> weights = Weights(torque=0.02, noise=ProcessNoise(force=0.1, torque=0.05, rope=0.1))
     >>> controller = LinearMPC(load_case("thesis-1975"), weights=weights)
     >>> controller.name, controller.horizon, len(controller.programme.blocks)
@@ -127,20 +122,8 @@ class LinearMPC(WinchMPC):
         self,
         case: Case,
         *,
-        horizon: float | None = None,
-        sample_time: float = 0.05,
-        blocking: Sequence[int] | None = None,
-        weights: Weights | None = None,
-        predictor: Literal["kalman", "ar", "preview"] | Predictor = "kalman",
-        masses: int | None = None,
-        minimum_tension: float | None = None,
-        excursion: float | None = None,
         torque_rate: float | None = None,
-        thermal: bool = False,
-        deadline: float | None = None,
-        prove: bool = False,
-        limits: DriveLimits | None = None,
-        name: str | None = None,
+        **options: Unpack[WinchOptions],
     ) -> None:
         if torque_rate is not None:
             check_range(
@@ -151,22 +134,7 @@ class LinearMPC(WinchMPC):
                 unit="N m/s",
                 open_low=True,
             )
-        super().__init__(
-            case,
-            horizon=horizon,
-            sample_time=sample_time,
-            blocking=blocking,
-            weights=weights,
-            predictor=predictor,
-            masses=masses,
-            minimum_tension=minimum_tension,
-            excursion=excursion,
-            thermal=thermal,
-            deadline=deadline,
-            limits=limits,
-            name=name,
-            prove=prove,
-        )
+        super().__init__(case, **options)
         self.programme = p = self._condense(self.model)
         self.products = self._products(self.model, p)
         free = np.eye(len(p.blocks))

@@ -18,7 +18,7 @@ import time as clock
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, TypedDict
 
 import numpy as np
 
@@ -53,6 +53,24 @@ _IN_BAND = 3.0  # [rad/s]
 _LEAST = 0.1  # of the static tension, that is to stay in the rope
 _UNIT, _TORQUE = HEARD.index("mru.valid"), HEARD.index("motor.torque")
 _HEAVE, _RATE = HEARD.index("mru.heave"), HEARD.index("mru.heave_rate")
+
+
+class WinchOptions(TypedDict, total=False):
+    """What linear and nonlinear predictive control are both asked; `LinearMPC` explains it."""
+
+    horizon: float | None
+    sample_time: float
+    blocking: Sequence[int] | None
+    weights: Weights | None
+    predictor: Literal["kalman", "ar", "preview"] | Predictor
+    masses: int | None
+    minimum_tension: float | None
+    excursion: float | None
+    thermal: bool
+    deadline: float | None
+    limits: DriveLimits | None
+    name: str | None
+    prove: bool
 
 
 class WinchMPC(ABC):
@@ -95,18 +113,18 @@ class WinchMPC(ABC):
         self,
         case: Case,
         *,
-        horizon: float | None,
-        sample_time: float,
-        blocking: Sequence[int] | None,
-        weights: Weights | None,
-        predictor: Literal["kalman", "ar", "preview"] | Predictor,
-        masses: int | None,
-        minimum_tension: float | None,
-        excursion: float | None,
-        thermal: bool,
-        deadline: float | None,
-        limits: DriveLimits | None,
-        name: str | None,
+        horizon: float | None = None,
+        sample_time: float = 0.05,
+        blocking: Sequence[int] | None = None,
+        weights: Weights | None = None,
+        predictor: Literal["kalman", "ar", "preview"] | Predictor = "kalman",
+        masses: int | None = None,
+        minimum_tension: float | None = None,
+        excursion: float | None = None,
+        thermal: bool = False,
+        deadline: float | None = None,
+        limits: DriveLimits | None = None,
+        name: str | None = None,
         prove: bool = False,
     ) -> None:
         T = check_range(_OWNER, "sample_time", sample_time, low=0.0, unit="s", open_low=True)

@@ -13,19 +13,16 @@ import math
 import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
-from typing_extensions import override
+from typing_extensions import Unpack, override
 
 from models.basics import FloatArray, SolverError, check_range
 from models.case import Case
-from models.plant import DriveLimits, DrumTravel
+from models.plant import DrumTravel
 from models.sensing import HEARD, Measurement
 
-from ..forecast import Predictor
-from ..linear import WinchMPC, path_of_sea
-from ..winch import Weights
+from ..linear import WinchMPC, WinchOptions, path_of_sea
 from .mean_torque import start_torque
 from .responses import with_drift
 from .shooting import Known, Linearisation, Shooting
@@ -68,7 +65,7 @@ class NonlinearMPC(WinchMPC):
         Vessel, sea, rope, payload, winch and sensors.
     horizon, sample_time, blocking, weights, predictor, masses
         As for `LinearMPC`.
-    minimum_tension, excursion, thermal, deadline, limits
+    minimum_tension, excursion, thermal, deadline, prove, limits
         As for `LinearMPC`; the deadline is that of the feedback.
     iterations
         Gauss-Newton steps in a sample.
@@ -102,7 +99,7 @@ class NonlinearMPC(WinchMPC):
     Examples
     --------
     >>> from models import load_case
-    >>> from mpc.winch import ProcessNoise
+    >>> from mpc.winch import ProcessNoise, Weights
     >>> weights = Weights(torque=0.02, noise=ProcessNoise(force=0.1, torque=0.05, rope=0.1))
     >>> controller = NonlinearMPC(load_case("thesis-1975"), weights=weights)
     >>> controller.name, controller.stage.channels
@@ -116,17 +113,6 @@ class NonlinearMPC(WinchMPC):
         self,
         case: Case,
         *,
-        horizon: float | None = None,
-        sample_time: float = 0.05,
-        blocking: Sequence[int] | None = None,
-        weights: Weights | None = None,
-        predictor: Literal["kalman", "ar", "preview"] | Predictor = "kalman",
-        masses: int | None = None,
-        minimum_tension: float | None = None,
-        excursion: float | None = None,
-        thermal: bool = False,
-        deadline: float | None = None,
-        limits: DriveLimits | None = None,
         iterations: int = 1,
         substeps: int = 1,
         drag: bool = True,
@@ -135,25 +121,11 @@ class NonlinearMPC(WinchMPC):
         travel: DrumTravel | None = None,
         mean_torque: bool = True,
         compiled: bool | None = None,
-        name: str | None = None,
+        **options: Unpack[WinchOptions],
     ) -> None:
         check_range(_OWNER, "iterations", iterations, low=1, high=1000)
-        super().__init__(
-            case,
-            horizon=horizon,
-            sample_time=sample_time,
-            blocking=blocking,
-            weights=weights,
-            predictor=predictor,
-            masses=masses,
-            minimum_tension=minimum_tension,
-            excursion=excursion,
-            thermal=thermal,
-            deadline=deadline,
-            limits=limits,
-            name=name,
-        )
-        if name is None:
+        super().__init__(case, **options)
+        if options.get("name") is None:
             self.name = f"nonlinear-{self.name}"
         self.iterations = int(iterations)
         self.stage = make_stage(

@@ -158,7 +158,7 @@ def tune_weights(
             sample_time=sample_time,
             masses=masses,
             limit=limit,
-            progress=progress or _silent,
+            progress=progress or (lambda share: None),
         )
     )
 
@@ -292,10 +292,6 @@ def _search(
         )
     progress(1.0)
     return best[1]
-
-
-def _silent(_: float) -> None:
-    """Tell nobody."""
 
 
 def saturates(model: PredictionModel) -> bool:
