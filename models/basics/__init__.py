@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         SynthesisError,
         ascending_fault,
         check_ascending,
+        check_choice,
         check_finite,
         check_range,
         check_seed,

@@ -10,7 +10,7 @@ every other module may use it.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import fields
 
 import numpy as np
@@ -135,6 +135,18 @@ def ascending_fault(values: Sequence[float] | FloatArray) -> str:
         f"must be strictly ascending, got {array[i]:g} followed by {array[i + 1]:g} "
         f"({kind}, index {i + 1})"
     )
+
+
+def check_choice(owner: str, name: str, value: object, choices: Collection[str]) -> None:
+    """Refuse a value that is none of a few words.
+
+    Raises
+    ------
+    InputError
+        If it is none of them; they are told.
+    """
+    if value not in choices:
+        raise InputError(f"{owner}: {name} must be one of {', '.join(choices)}; got {value!r}")
 
 
 def check_seed(owner: str, seed: int) -> int:

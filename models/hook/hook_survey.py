@@ -21,6 +21,7 @@ from ..basics import (
     FloatArray,
     InputError,
     ReadOnlyArrays,
+    check_choice,
     check_finite,
     check_range,
     spectral_nodes,
@@ -93,8 +94,7 @@ class HookSurvey(ReadOnlyArrays):
         motion
             `displacement`, `velocity` or `acceleration`.
         """
-        if motion not in _MOTIONS:
-            raise InputError(f"hook: motion must be one of {', '.join(_MOTIONS)}; got {motion!r}")
+        check_choice("hook", "motion", motion, _MOTIONS)
         return np.sqrt(np.maximum(self.moments[..., 2 * _MOTIONS.index(motion)], 0.0))
 
     def figures(self, side: int, heading: int, period: int) -> HookDemand:

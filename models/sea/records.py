@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, InputError, check_range, file_stamp, read_bytes
+from ..basics import FloatArray, InputError, check_choice, check_range, file_stamp, read_bytes
 from .library_files import FORMATS, read_with_library
 from .ndbc import is_ndbc, read_ndbc
 from .quality import QualityControl, RawRecords, TimeArray, sift
@@ -279,10 +279,8 @@ def _read_raw(path: str, file_format: str | None) -> RawRecords:
     InputError
         If the format is unknown, or its reader refuses the file.
     """
-    if file_format is not None and file_format not in FORMATS:
-        raise InputError(
-            f"{path}: the format must be one of {', '.join(FORMATS)}; got {file_format!r}"
-        )
+    if file_format is not None:
+        check_choice(str(path), "the format", file_format, FORMATS)
     name = file_format or _guess_format(path)
     if name == "ndbc":
         return read_ndbc(path)

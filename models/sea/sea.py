@@ -35,6 +35,7 @@ from ..basics import (
     Quadrature,
     SpectrumStatistics,
     adaptive_nodes,
+    check_choice,
     check_range,
     spectrum_statistics,
 )
@@ -131,10 +132,7 @@ class SeaSpectrum:
 
     def __post_init__(self) -> None:
         """Check the values, and give a measured sea or a sum its height."""
-        if self.kind not in SPECTRA:
-            raise InputError(
-                f"sea: spectrum must be one of {', '.join(SPECTRA)}; got {self.kind!r}"
-            )
+        check_choice("sea", "spectrum", self.kind, SPECTRA)
         _check_fields(self.kind, lambda name: getattr(self, name))
         if self.parts is not None:
             object.__setattr__(self, "parts", tuple(self.parts))

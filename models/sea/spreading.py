@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, InputError, check_range
+from ..basics import FloatArray, InputError, check_choice, check_range
 
 SPREADINGS = ("cos-2s", "cos-n")
 """The spreading laws by their names in a case file."""
@@ -70,10 +70,7 @@ class Spreading:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        if self.kind not in SPREADINGS:
-            raise InputError(
-                f"spreading: kind must be one of {', '.join(SPREADINGS)}; got {self.kind!r}"
-            )
+        check_choice("spreading", "kind", self.kind, SPREADINGS)
         check_range("spreading", "exponent", self.exponent, low=0.0, high=500.0)
 
     def density(self, angle: npt.ArrayLike) -> FloatArray:

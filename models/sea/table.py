@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..basics import FloatArray, InputError, ascending_fault, check_finite
+from ..basics import FloatArray, InputError, ascending_fault, check_choice, check_finite
 
 BEYOND = ("decay", "zero")
 """What a measured spectrum may be above its last row: falling with omega^-5, or zero."""
@@ -72,10 +72,7 @@ class SpectrumTable:
             raise InputError(
                 f"{owner}: density must be at least 0 m^2 s/rad, got {density[i]:g} at index {i}"
             )
-        if self.beyond not in BEYOND:
-            raise InputError(
-                f"{owner}: beyond must be one of {', '.join(BEYOND)}; got {self.beyond!r}"
-            )
+        check_choice(owner, "beyond", self.beyond, BEYOND)
         object.__setattr__(self, "omega", tuple(omega.tolist()))
         object.__setattr__(self, "density", tuple(density.tolist()))
 

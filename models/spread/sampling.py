@@ -14,7 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from ..basics import FloatArray, InputError, check_range
+from ..basics import FloatArray, InputError, check_choice, check_range
 
 METHODS = ("sobol", "lhs", "random", "grid", "corners", "given")
 """Ways to choose samples, by their names."""
@@ -32,8 +32,7 @@ def counted(method: str, samples: int, columns: int) -> int:
     InputError
         If the method is unknown or there are too many corners.
     """
-    if method not in METHODS:
-        raise InputError(f"spread: method must be one of {', '.join(METHODS)}; got {method!r}")
+    check_choice("spread", "method", method, METHODS)
     check_range("spread", "samples", samples, low=1)
     if method == "corners":
         if 1 << columns > _MOST_CORNERS:

@@ -24,7 +24,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import ComplexArray, FloatArray, InputError
+from ..basics import ComplexArray, FloatArray, InputError, check_choice
 
 CHOICES: dict[str, tuple[str, ...]] = {
     "waves": ("frequency (rad/s)", "frequency (Hz)", "period (s)"),
@@ -101,11 +101,7 @@ class Convention:
     def __post_init__(self) -> None:
         """Check the choices."""
         for name, choices in CHOICES.items():
-            value = getattr(self, name)
-            if value not in choices:
-                raise InputError(
-                    f"convention: {name} must be one of {', '.join(choices)}; got {value!r}"
-                )
+            check_choice("convention", name, getattr(self, name), choices)
 
     def words(self) -> str:
         """Return what differs from the project's convention, or say that nothing does."""

@@ -29,6 +29,7 @@ from ..basics import (
     SpectralDensity,
     adaptive_nodes,
     check_ascending,
+    check_choice,
     check_finite,
     read_only,
 )
@@ -123,14 +124,8 @@ class HeaveRao:
             raise InputError(
                 f"{owner}: amplitude must be at least 0 m/m, got {amplitude[i]:g} at index {i}"
             )
-        for name, choice, choices in (
-            ("below", self.below, BELOW),
-            ("beyond", self.beyond, BEYOND),
-        ):
-            if choice not in choices:
-                raise InputError(
-                    f"vessel: {name} must be one of {', '.join(choices)}; got {choice!r}"
-                )
+        check_choice("vessel", "below", self.below, BELOW)
+        check_choice("vessel", "beyond", self.beyond, BEYOND)
         object.__setattr__(self, "omega", read_only(omega))
         object.__setattr__(self, "amplitude", read_only(amplitude))
         object.__setattr__(self, "phase", read_only(phase))

@@ -15,7 +15,7 @@ import time as clock
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from models.basics import InputError, check_range
+from models.basics import InputError, check_choice, check_range
 from models.case import Case
 from models.simulation import EASE
 
@@ -115,8 +115,7 @@ def compare(
     contenders = contenders_of(controllers)
     numbers = seeds_of("compare", seeds)
     lasting = seconds_of("compare: duration", duration, high=_LONGEST)
-    if design_at not in ("each", "case"):
-        raise InputError(f"compare: design_at must be one of each, case; got {design_at!r}")
+    check_choice("compare", "design_at", design_at, ("each", "case"))
     check_range("compare", "starts", starts, low=1, high=4096)
     if jobs is not None:
         check_range("compare", "jobs", jobs, low=1, high=512)

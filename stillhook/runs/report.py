@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Literal
 
-from models.basics import InputError
+from models.basics import InputError, check_choice
 from models.case import Case
 from models.run import ERROR, FEWEST_MAXIMA, Run, write_csv, write_netcdf, write_parquet
 
@@ -258,10 +258,7 @@ def write_runs(
     """
     if not compared:
         raise InputError("write_runs: at least one set of runs is wanted, got none")
-    if format not in (*FORMATS, "none"):
-        raise InputError(
-            f"write_runs: format must be one of {', '.join(FORMATS)}, none; got {format!r}"
-        )
+    check_choice("write_runs", "format", format, (*FORMATS, "none"))
     names = [runs.controller for runs in compared]
     if len(set(names)) != len(names):
         raise InputError(

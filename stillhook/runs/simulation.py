@@ -15,7 +15,7 @@ from typing import Literal, overload
 
 import numpy as np
 
-from models.basics import InputError, check_range, check_seed, one_thread
+from models.basics import InputError, check_choice, check_range, check_seed, one_thread
 from models.case import Case
 from models.casefile import Quantity
 from models.operation import MotionSource, Scenario, SpectrumMotion, scenario_named
@@ -196,8 +196,7 @@ def simulate(
     (3, True, 3)
     """
     numbers = seeds_of("simulate", seeds)
-    if traces not in ("all", "worst"):
-        raise InputError(f"simulate: traces must be one of all, worst; got {traces!r}")
+    check_choice("simulate", "traces", traces, ("all", "worst"))
     if isinstance(scenario, str):
         scenario = scenario_named(scenario, case, **(options or {}))
     elif options:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from models.basics import InputError
+from models.basics import InputError, replace_atomically
 
 from .table import Drawing
 
@@ -70,18 +70,8 @@ class OutputFolder:
             If it cannot be written.
         """
         target = self.path / name
-        temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
         data = content.encode("utf-8") if isinstance(content, str) else content
-        try:
-            temporary.write_bytes(data)
-            os.replace(temporary, target)
-        except OSError as error:
-            reason = error.strerror or error
-            raise InputError(f"{target}: cannot be written: {reason}") from error
-        finally:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
-        return target
+        return replace_atomically(target, lambda place: place.write_bytes(data))
 
     def draw(
         self,
