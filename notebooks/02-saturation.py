@@ -34,7 +34,10 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from describing import bias_for, gaussian_response, sine_response
 from IPython.display import Markdown
+from limit_cycles import limit_cycles
+from torque_loop import TorqueLoop
 
 import stillhook as sh
 from models import HookMotion, build_plant
@@ -44,9 +47,6 @@ from models.simulation import SimulationOptions, prepare, run_simulation
 from stillhook.text import AFTER, BEFORE, DRUM, HOOK, REFERENCE
 from synth.loop import closed_loop_poles
 from synth.question import pose
-from synth.saturation.describing import bias_for, gaussian_response, sine_response
-from synth.saturation.limit_cycles import limit_cycles
-from synth.saturation.torque_loop import TorqueLoop
 from synth.structures import sampled_loop
 
 sys.path.insert(0, str(Path.cwd().parent / "docs" / "make"))

@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
+import doctest
 import math
 import sys
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+import describing
 import numpy as np
 import pytest
 import scipy.integrate
+from describing import bias_for, gaussian_response, sine_response
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from limit_cycles import clipped_harmonics, limit_cycles
+from torque_loop import TorqueLoop
 
 import stillhook as sh
 from models import build_plant
 from models.plant import DriveLimits
 from models.simulation import SimulationOptions, prepare, run_simulation
 from synth.loop import LinearController, closed_loop_poles
-from synth.saturation.describing import bias_for, gaussian_response, sine_response
-from synth.saturation.limit_cycles import clipped_harmonics, limit_cycles
-from synth.saturation.torque_loop import TorqueLoop
 from synth.structures import sampled_loop
 
-sys.path.insert(0, str(Path(__file__).parents[3] / "docs" / "make"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "docs" / "make"))
 try:
     import saturation
 finally:
@@ -46,6 +48,10 @@ def law(case):
 
 
 # --- describing functions --------------------------------------------------------------------
+
+
+def test_examples():
+    assert doctest.testmod(describing) == (0, 4)
 
 
 @given(limit=st.floats(0.5, 3.0), bias=BIASES, amplitude=SIZES)

@@ -4,7 +4,7 @@ A saturated loop oscillates at omega with a demand of amplitude A about a bias b
 
     1 + N(A, b) L_tau(i omega) = 0,    mean(A, b) = static torque,
 
-with N and the mean of `synth.saturation.describing`.  A conditionally stable loop has two such
+with N and the mean of `describing`.  A conditionally stable loop has two such
 cycles: a small one which is a threshold, as a loop pushed beyond it keeps losing gain, and a large
 one in which it ends, bounded by nothing but the payload's quadratic drag.  That takes part as the
 linear drag that takes as much energy from the payload's first harmonic.
@@ -21,14 +21,13 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from describing import bias_for, sine_response
 from scipy.optimize import brentq, root
+from torque_loop import TorqueLoop
 
 from models.basics import ComplexArray, FloatArray, check_range
 from models.plant import energy_equivalent
-
-from ..loop import loop_margins
-from .describing import bias_for, sine_response
-from .torque_loop import TorqueLoop
+from synth.loop import loop_margins
 
 _POINTS = 512  # of a cycle
 _RESIDUAL = 1e-8

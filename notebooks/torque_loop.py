@@ -13,7 +13,7 @@ whole response,
 
     1 + L_tau = (1 + L_u) d / P_tu.
 
-`synth.saturation.limit_cycles` asks where this loop oscillates once the torque is clipped.
+`limit_cycles` asks where this loop oscillates once the torque is clipped.
 """
 
 from __future__ import annotations
@@ -27,8 +27,7 @@ import numpy.typing as npt
 from models.basics import ComplexArray, FloatArray, InputError, check_range
 from models.case import Case
 from models.plant import LinearPlant, build_plant
-
-from ..loop import LinearController, Margins, closed_loop_poles, frequency_grid, loop_margins
+from synth.loop import LinearController, Margins, closed_loop_poles, frequency_grid, loop_margins
 
 _OWNER = "torque loop"
 

@@ -10,7 +10,7 @@ by which e goes through:
 * for a Gaussian e, the least-mean-square gain (Booton 1954), which is the probability of being
   within the limits (Price's theorem).
 
-`synth.saturation` closes a loop around them.
+`limit_cycles` closes a loop around them.
 """
 
 from __future__ import annotations
