@@ -1,7 +1,7 @@
 """`Limit`: a bound on a design, as rows of a nonlinear programme and as a figure in reports.
 
-Each limit says the same thing twice: `rows` for the optimiser (CasADi, at most zero when it
-is kept, with the bound as a symbol so that its price comes out of the same solve), and
+Each limit says the same thing twice: `rows` for the optimiser (at most zero when it is kept,
+of dual numbers so that their slopes come along), and
 `measure` for the report (numbers on refined frequencies, `synth.loop.assess`).  `critical` gives
 the frequencies at which a design presses against it, for the exchange of nodes.
 
@@ -21,36 +21,47 @@ import numpy as np
 from models.basics import FloatArray
 
 if TYPE_CHECKING:
-    from ..loop import Assessment, Phasor
+    from ..loop import Assessment
 
 
 class Symbols(Protocol):
-    """The symbols of a programme that a limit's rows are made of."""
+    """What a limit's rows are made of: arrays, or `synth.loop.Dual` arrays with their slopes.
+
+    Without a batch the arrays are vectors; of many parameter vectors they have leading axes.
+    """
 
     @property
-    def differences(self) -> Sequence[Phasor]:
-        """1 + L of every loop at the margin frequencies."""
+    def differences(self) -> Sequence[Any]:
+        """1 + L of every loop at the margin frequencies, (k,) each."""
 
     @property
-    def omega(self) -> Any:
-        """The margin frequencies [rad/s] as a CasADi constant."""
+    def nearest(self) -> Sequence[Any]:
+        """1 + L of every loop where it comes nearest to zero between those; none on a grid."""
 
     @property
-    def omega_values(self) -> FloatArray:
-        """The same in numbers, (k,)."""
+    def on_axis(self) -> Any | None:
+        """L of all loops where it crosses the negative real axis, (c,); None on a grid."""
+
+    @property
+    def turning_delays(self) -> Any | None:
+        """Delay at each crossover that turns L to -1 [s], (c,); None on a grid."""
+
+    @property
+    def omega(self) -> FloatArray:
+        """The margin frequencies [rad/s], (k,)."""
 
     @property
     def module_margin(self) -> float:
         """Radius of the disc about -1 that a limit on the sensitivity keeps clear; 0 without."""
 
-    def response(self, output: str, disturbance: str) -> Phasor:
-        """Return the closed-loop response at the margin frequencies."""
+    def response(self, output: str, disturbance: str) -> Any:
+        """Return the closed-loop response at the margin frequencies, (k,)."""
 
     def moment(self, output: str, order: int) -> Any:
-        """Return the spectral moment m_order of `output`."""
+        """Return the spectral moment m_order of `output`, (1,)."""
 
     def peak(self, output: str, duration: float) -> Any:
-        """Return the most probable maximum of `output` in `duration` [s]."""
+        """Return the most probable maximum of `output` in `duration` [s], (1,)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,9 +88,14 @@ class Limit(ABC):
         """The outputs whose variances the limit needs."""
         return (getattr(self, "output"),) if self.drive else ()  # noqa: B009
 
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """The outputs that the limit speaks of."""
+        return self.outputs
+
     @abstractmethod
     def rows(self, symbols: Symbols, bound: Any) -> Any:
-        """Return a CasADi vector that is at most 0 where the limit is kept."""
+        """Return a vector that is at most 0 where the limit is kept."""
 
     @abstractmethod
     def measure(self, loop: Assessment) -> float:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import casadi as ca
 import numpy as np
 from typing_extensions import override
 
 from models.basics import FloatArray, check_range
 
-from ..loop import Phasor
+from ..loop import imag, joined, log, real, sqrt, squared, value_of, where
 from .limits import Limit, Symbols
 
 if TYPE_CHECKING:
@@ -38,7 +37,8 @@ class MaxSensitivity(Limit):
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
         # The logarithm keeps |L| of 1e6 at low frequency from dwarfing what matters.
-        return ca.vertcat(*[-ca.log(bound**2 * d.squared()) for d in symbols.differences])
+        places = [*symbols.differences, *symbols.nearest]
+        return joined([-log(squared(d) * bound**2) for d in places])
 
     @override
     def measure(self, loop: Assessment) -> float:
@@ -65,6 +65,10 @@ class GainMargin(Limit):
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
+        if symbols.on_axis is not None:
+            # Where L crosses the axis short of -1: what the gain may grow by there.
+            within = value_of(symbols.on_axis) > -1.0
+            return log(-symbols.on_axis[within] * bound)
         # The curve keeps off the segment [-1, -1/bound] of the real axis.
         reach = symbols.module_margin
         ratio = self.bound * (1.0 - reach)
@@ -94,8 +98,12 @@ class GainMarginDown(Limit):
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
+        least = max(bound, 1.0 / _FAR)
+        if symbols.on_axis is not None:
+            beyond = value_of(symbols.on_axis) < -1.0
+            return log(-1.0 / (symbols.on_axis[beyond] * least))
         # The curve keeps off the segment [-1/bound, -1] of the real axis.
-        far = 1.0 / ca.fmax(bound, 1.0 / _FAR)
+        far = 1.0 / least
         reach = symbols.module_margin
         ratio = 1.0 / (max(self.bound, 1.0 / _FAR) * (1.0 + reach))
         return _off_segment(symbols, 1.0 + reach, far, ratio)
@@ -122,28 +130,30 @@ class DelayMargin(Limit):
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
+        if symbols.turning_delays is not None:
+            return log(bound / symbols.turning_delays)
         # A delay tau turns L by omega tau: L keeps off the arc of the unit circle that such a
         # turn carries to -1.  The disc of a limit on the sensitivity covers the arc's first part.
         covered = 2.0 * np.arcsin(0.5 * symbols.module_margin)
-        at = np.flatnonzero(symbols.omega_values * self.bound > covered).tolist()
-        turn = ca.fmin(symbols.omega[at] * bound, 2.0 * np.pi)
+        at = np.flatnonzero(symbols.omega * self.bound > covered)
+        turn = np.minimum(symbols.omega[at] * bound, 2.0 * np.pi)
         # Half as thick as wide where it is short, and its round end where the arc ends.
-        width = ca.fmax(turn - covered, 0.0)
-        thick = ca.fmin(_THICK, 0.25 * width)
+        width = np.maximum(turn - covered, 0.0)
+        thick = np.minimum(_THICK, 0.25 * width)
         half = 0.5 * width - thick
         middle = np.pi + covered + 0.5 * width
         rows = []
         for d in symbols.differences:
-            loop = d - 1.0
-            re, im = loop.re[at], loop.im[at]
-            along = re * ca.cos(middle) + im * ca.sin(middle)
-            across = ca.fabs(im * ca.cos(middle) - re * ca.sin(middle))
-            beside = ca.atan2(across, along) < half
-            radial = (ca.sqrt(along**2 + across**2 + _TINY) - 1.0) ** 2
-            to_end = (along - ca.cos(half)) ** 2 + (across - ca.sin(half)) ** 2
-            squared = ca.if_else(beside, radial, to_end)
-            rows.append(ca.log((thick**2 + _TINY) / (squared + _TINY)))
-        return ca.vertcat(*rows)
+            re, im = real(d[..., at] - 1.0), imag(d[..., at])
+            along = re * np.cos(middle) + im * np.sin(middle)
+            across = im * np.cos(middle) - re * np.sin(middle)
+            beside = np.arctan2(np.abs(value_of(across)), value_of(along)) < half
+            radial = squared(sqrt(along * along + across * across + _TINY) - 1.0)
+            # Across counts by its size: the round end is the same on both sides of the arc.
+            outside = where(value_of(across) < 0.0, -across, across) - np.sin(half)
+            to_end = squared(along - np.cos(half)) + squared(outside)
+            rows.append(log((thick**2 + _TINY) / (where(beside, radial, to_end) + _TINY)))
+        return joined(rows)
 
     @override
     def measure(self, loop: Assessment) -> float:
@@ -168,9 +178,9 @@ class RollOff(Limit):
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
-        at = np.flatnonzero(symbols.omega_values >= self.above).tolist()
-        return ca.vertcat(
-            *[ca.log((d - 1.0).squared()[at] / bound**2 + 1e-6) for d in symbols.differences]
+        at = np.flatnonzero(symbols.omega >= self.above)
+        return joined(
+            [log(squared(d[..., at] - 1.0) / bound**2 + 1e-6) for d in symbols.differences]
         )
 
     @override
@@ -196,14 +206,19 @@ class LowFrequency(Limit):
 
     @property
     @override
+    def signals(self) -> tuple[str, ...]:
+        return (self.output,)
+
+    @property
+    @override
     def edges(self) -> tuple[float, ...]:
         return (self.below,)
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
-        at = np.flatnonzero(symbols.omega_values <= self.below).tolist()
+        at = np.flatnonzero(symbols.omega <= self.below)
         response = symbols.response(self.output, self.disturbance)
-        return ca.log(response.squared()[at] / bound**2)
+        return log(squared(response[..., at]) / bound**2)
 
     @override
     def measure(self, loop: Assessment) -> float:
@@ -228,18 +243,18 @@ def _off_segment(symbols: Symbols, start: Any, end: Any, ratio: float) -> Any:
     two ends in numbers; where it is not, the disc of a limit on the sensitivity covers all.
     """
     if ratio <= 1.0:
-        return ca.MX(0, 1)
+        return real(symbols.differences[0][..., :0])
     count = min(_MOST_DISCS, max(1, int(np.ceil(np.log(ratio) / np.log(_RATIO)))))
     rows = []
     for k in range(count):
         first = start * (end / start) ** (k / count)
         last = start * (end / start) ** ((k + 1) / count)
         first = first - _OVERLAP * (last - first)  # into the disc before
-        centre, radius = Phasor(-0.5 * (first + last), 0.0), 0.5 * (last - first)
+        centre, radius = -0.5 * (first + last), 0.5 * (last - first)
         rows += [_off_disc(d - 1.0, centre, radius) for d in symbols.differences]
-    return ca.vertcat(*rows)
+    return joined(rows)
 
 
-def _off_disc(point: Phasor, centre: Phasor, radius: Any) -> Any:
+def _off_disc(point: Any, centre: float, radius: float) -> Any:
     """Return a row that keeps `point` out of a disc; the logarithm bounds its slope far away."""
-    return ca.log((radius**2 + _TINY) / ((point - centre).squared() + _TINY))
+    return log((radius**2 + _TINY) / (squared(point - centre) + _TINY))

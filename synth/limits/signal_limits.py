@@ -46,7 +46,7 @@ class Rms(_OfOneSignal):
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
-        return symbols.moment(self.output, 0) / bound**2 - 1.0
+        return symbols.moment(self.output, 0) / (bound * bound) - 1.0
 
     @override
     def measure(self, loop: Assessment) -> float:
@@ -62,7 +62,7 @@ class Continuous(_OfOneSignal):
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
-        return (self.static**2 + symbols.moment(self.output, 0)) / bound**2 - 1.0
+        return (self.static**2 + symbols.moment(self.output, 0)) / (bound * bound) - 1.0
 
     @override
     def measure(self, loop: Assessment) -> float:

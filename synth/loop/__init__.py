@@ -13,6 +13,20 @@ if TYPE_CHECKING:
     from .assess import Assessment, frequency_grid, integration_band
     from .controller import LinearController, closed_loop_matrix, closed_loop_poles
     from .disturbance import Disturbance, disturbances
+    from .dual import (
+        Dual,
+        at_least,
+        constant,
+        exp,
+        imag,
+        joined,
+        log,
+        real,
+        sqrt,
+        squared,
+        value_of,
+        where,
+    )
     from .loop import (
         DragElement,
         Phasor,
@@ -24,6 +38,6 @@ if TYPE_CHECKING:
         return_differences,
         with_drag,
     )
-    from .margins import Margins, loop_margins, refine_minima
+    from .margins import Margins, crossings, loop_margins, refine_minima
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

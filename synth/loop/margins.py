@@ -70,10 +70,10 @@ def loop_margins(loop: LoopGain, grid: FloatArray, gain: ComplexArray) -> Margin
     peak_at, distance = refine_minima(lambda w: np.abs(1.0 + loop(w)), grid, np.abs(1.0 + gain))
     # |S - 1/2| = |1 - L| / (2 |1 + L|)
     _, disk = refine_minima(lambda w: _disk_distance(loop(w)), grid, _disk_distance(gain))
-    crossovers = _crossings(lambda w: np.abs(loop(w)) - 1.0, grid, np.abs(gain) - 1.0)
+    crossovers = crossings(lambda w: np.abs(loop(w)) - 1.0, grid, np.abs(gain) - 1.0)
     at_unity = loop(crossovers) if crossovers.size else np.zeros(0, complex)
     turn = np.angle(-at_unity)  # angle beyond -180 deg
-    axis = _crossings(lambda w: loop(w).imag, grid, gain.imag)
+    axis = crossings(lambda w: loop(w).imag, grid, gain.imag)
     on_axis = loop(axis).real if axis.size else np.zeros(0)
     axis, on_axis = _with_ends(grid, gain, axis, on_axis)
     negative = on_axis < 0.0
@@ -110,14 +110,20 @@ def worst_margins(margins: list[Margins]) -> Margins:
 
 
 def refine_minima(
-    function: Callable[[FloatArray], FloatArray], grid: FloatArray, values: FloatArray
+    function: Callable[[FloatArray], FloatArray],
+    grid: FloatArray,
+    values: FloatArray,
+    *,
+    below: float = np.inf,
 ) -> tuple[FloatArray, FloatArray]:
     """Return places and values of all local minima of `function`, refined from a grid.
 
-    The ends of the grid count as minima.  All brackets are zoomed into at once, so the
-    function is called a handful of times with long vectors.
+    Minima above `below` on the grid are left out; the ends of the grid count as minima.  All
+    brackets are zoomed into at once, so the function is called a handful of times with long
+    vectors.
     """
     inner = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])) + 1
+    inner = inner[values[inner] < below]
     ends = np.array([0, grid.size - 1])
     if not inner.size:
         return grid[ends], values[ends]
@@ -146,7 +152,7 @@ def refine_minima(
     return np.concatenate([at, grid[ends]]), np.concatenate([best, values[ends]])
 
 
-def _crossings(
+def crossings(
     function: Callable[[FloatArray], FloatArray], grid: FloatArray, values: FloatArray
 ) -> FloatArray:
     """Return where `function` changes its sign between grid points, all of them zoomed into."""

@@ -21,6 +21,14 @@ if TYPE_CHECKING:
         with_masses,
     )
     from .structure_question import SampledNoise, StructureQuestion, pose_structure
-    from .symbols import LoopSymbols
+    from .loop_numbers import (
+        Closing,
+        LoopBlocks,
+        LoopNumbers,
+        LoopResponses,
+        Moments,
+        Point,
+        moment_weights,
+    )
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

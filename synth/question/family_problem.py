@@ -11,7 +11,7 @@ robust design and gain scheduling are one problem.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 
@@ -19,6 +19,7 @@ import numpy as np
 
 from models.basics import FloatArray, InputError, check_range
 
+from ..loop import Disturbance
 from ..structures import Parameter
 from .problem import Problem, Values
 
@@ -121,6 +122,13 @@ class FamilyProblem:
                     f"{len(self.parameters)} searched ones, got a blend of shape {found}"
                 )
 
+    @classmethod
+    def of(cls, asked: FamilyProblem | Problem) -> FamilyProblem:
+        """Return a family, that of one problem where it is asked about one."""
+        if isinstance(asked, FamilyProblem):
+            return asked
+        return cls(scenarios=(FamilyLoop(name="", problem=asked),))
+
     @cached_property
     def scales(self) -> FloatArray:
         """Typical sizes of the searched parameters."""
@@ -140,6 +148,16 @@ class FamilyProblem:
             key += (None if blend is None else blend.tobytes(),)
             found.setdefault(key if problem.drag is None else (i,), []).append(i)
         return tuple(tuple(members) for members in found.values())
+
+    def shaken_by_all(self, group: Sequence[int]) -> Problem:
+        """Return a group's first problem, shaken by what shakes any of the group."""
+        problems = [self.scenarios[i].problem for i in group]
+        if len(problems) == 1:
+            return problems[0]
+        every = [d for problem in problems for d in problem.disturbances]
+        names = dict.fromkeys(d.name for d in every)
+        summed = tuple(_summed([d for d in every if d.name == name]) for name in names)
+        return replace(problems[0], disturbances=summed)
 
     def stable(self, values: Values, coefficients: Sequence[float | None] | None = None) -> bool:
         """Return whether every loop is stable."""
@@ -174,3 +192,19 @@ class FamilyProblem:
             return float((values / [s.best for s in self.scenarios]).max())
         weights = np.array([s.weight for s in self.scenarios])
         return float(np.sqrt(weights @ values**2 / weights.sum()))
+
+
+def _summed(parts: Sequence[Disturbance]) -> Disturbance:
+    """Return the disturbance whose density is the sum of several."""
+    bands = [d.band for d in parts if d.band is not None]
+
+    def density(omega: FloatArray) -> FloatArray:
+        return np.asarray(np.sum([d.density(omega) for d in parts], axis=0), dtype=np.float64)
+
+    whole = (min(b[0] for b in bands), max(b[1] for b in bands)) if bands else None
+    return Disturbance(
+        name=parts[0].name,
+        density=density,
+        band=whole if len(bands) == len(parts) else None,
+        splits=tuple(sorted({w for d in parts for w in d.splits})),
+    )

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from models.basics import FloatArray
+from models.basics import ComplexArray, FloatArray
 from models.plant import LinearPlant
 
 from ..limits import Limit
@@ -54,18 +54,29 @@ class Problem:
         sizes = np.abs(self.plant.poles())
         return -_SLOW * float(sizes[sizes > 1e-6 * sizes.max(initial=1.0)].min(initial=1.0))
 
-    def growth(self, values: Values) -> float:
-        """Return the largest real part of a closed-loop pole [1/s], drag as the plant holds it."""
-        matrix = self.law.closed_loop_matrix(self.rational, [float(v) for v in values])
-        return float(np.linalg.eigvals(matrix).real.max(initial=-np.inf))
+    @cached_property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs that cost, limits and drag speak of."""
+        wanted = {*self.minimise, *(output for limit in self.limits for output in limit.signals)}
+        if self.drag is not None:
+            wanted.add(self.drag.velocity)
+        return tuple(sorted(wanted))
 
-    def abscissa(self, values: Values, coefficient: float | None = None) -> float:
-        """Return the largest real part of a closed-loop pole over the size of the largest."""
+    def loop_poles(self, values: Values, coefficient: float | None = None) -> ComplexArray:
+        """Return the closed loop's poles [1/s], delays as Pade models."""
         plant = self.rational
         if self.drag is not None and coefficient is not None:
             plant = with_drag(plant, self.drag, coefficient)
         matrix = self.law.closed_loop_matrix(plant, [float(v) for v in values])
-        poles = np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
+        return np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
+
+    def growth(self, values: Values) -> float:
+        """Return the largest real part of a closed-loop pole [1/s], drag as the plant holds it."""
+        return float(self.loop_poles(values).real.max(initial=-np.inf))
+
+    def abscissa(self, values: Values, coefficient: float | None = None) -> float:
+        """Return the largest real part of a closed-loop pole over the size of the largest."""
+        poles = self.loop_poles(values, coefficient)
         return float(poles.real.max(initial=-1.0) / max(1.0, float(np.abs(poles).max(initial=1.0))))
 
     def stable(self, values: Values, coefficient: float | None = None) -> bool:

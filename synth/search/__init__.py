@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .family_search import FamilyFound, search_family
-    from .multistart import Found, Progress, Start, least_violation, resume, search
+    from .multistart import Found, Progress, Start, least_violation, search
     from .nodes import cost_nodes, margin_nodes
-    from .polishing import KEPT, assess, assessment_of, polish, thinned
-    from .programme import Programme, Solution, SolverPace
-    from .starts import begin_points, briskest, coarse_programme
+    from .polishing import KEPT, assess, polish, settle, stated
+    from .programme import Programme, Solution
+    from .starts import begin_points, briskest, start_coefficients
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -1,169 +1,208 @@
-"""Polishing of a solution by the exchange of nodes, until no limit is broken between them.
+"""Descent to an optimum on nodes that follow the loop, and the assessment of where it ended.
 
-The exchange method of semi-infinite programming: solve, look where a limit is pressed
-hardest, make those places nodes, solve again.  What leaves here has been looked at on
-refined frequencies and adaptive quadrature, not on the nodes it was solved on.
+    start -> nodes for its poles -> descent -> nodes for the new poles -> ... -> Solution
+          -> margins where they are measured -> assessment -> excess over the limits
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from models.basics import FloatArray
 
+from ..limits import Limit
 from ..loop import Assessment
-from ..question import Goal, Problem
+from ..question import FamilyProblem, Goal, Problem, Values
 from .nodes import cost_nodes, margin_nodes
-from .programme import Programme, Solution, SolverPace
+from .programme import Programme, Solution
 
-KEPT = 1e-5  # a limit counts as kept up to this relative excess
-_MOST_CRITICAL = 300  # frequencies that one assessment adds
-_ROUNDS = 12  # of the exchange of nodes
-_LATE = 4  # rounds after which it settles for less
-_LATE_HAIR = 2e-4  # relative excess that is then mended by tightening
-_REACH = 0.3  # how far, relatively, a round of the exchange may move a parameter
-_FAR_REACH = 3.0  # ... where it must leave the neighbourhood to keep the limits
-_CLOSE = 3e-2  # relative excess below which a start counts as the answer itself
+KEPT = 1e-5  # relative excess over a limit that counts as none
+_PER_DECADE, _FINE_PER_DECADE = 40, 60  # margin nodes
+_ROUNDS, _FINE_ROUNDS = 3, 4  # of a descent with new nodes
+_SETTLED, _FINE_SETTLED = 1e-4, 1e-6  # change of the log objective below which nodes are right
 _HAIR = 2e-2  # relative excess that tightening may still mend
-_SETTLED = 2e-5  # change of the log cost below which the exchange has settled
+_HAIRS = 3  # rounds of it
+
+
+def stated(
+    asked: FamilyProblem | Problem,
+    values: Values,
+    coefficients: Sequence[float | None] | None = None,
+    goal: Goal = Goal.COST,
+    *,
+    reference: FloatArray,
+    relaxed: Sequence[str] = (),
+    fine: bool = False,
+) -> Programme:
+    """Return a programme on nodes that suit the loops at a point.
+
+    Parameters
+    ----------
+    asked, values, coefficients
+        The family, and where it stands: searched parameters, and drag coefficients [N s/m].
+    goal, reference, relaxed
+        As `Programme` takes them.
+    fine
+        On nodes for eight digits, and with margins held where they are measured.
+    """
+    family = FamilyProblem.of(asked)
+    nodes, omega = [], []
+    for group in family.groups:
+        scenario = family.scenarios[group[0]]
+        drag = None if coefficients is None else coefficients[group[0]]
+        poles = scenario.problem.loop_poles(scenario.values(values), drag)
+        shaken = family.shaken_by_all(group)
+        nodes.append(cost_nodes(shaken, poles, fine=fine))
+        per_decade = _FINE_PER_DECADE if fine else _PER_DECADE
+        omega.append(margin_nodes(scenario.problem, poles, per_decade))
+    tolerance = 1e-10 if fine else 1e-6
+    return Programme(
+        family,
+        nodes,
+        omega,
+        goal,
+        reference=reference,
+        relaxed=relaxed,
+        tolerance=tolerance,
+        exact=fine,
+    )
+
+
+def settle(
+    asked: FamilyProblem | Problem,
+    values: Values,
+    coefficients: Sequence[float | None] | None,
+    goal: Goal = Goal.COST,
+    *,
+    reference: FloatArray,
+    relaxed: Sequence[str] = (),
+    extra: float | None = None,
+    fine: bool = False,
+    reach: float | None = None,
+    tighten: dict[tuple[int, str], float] | None = None,
+) -> Solution:
+    """Return the answer that is reached from a point, on nodes that suit the loop there.
+
+    Parameters
+    ----------
+    asked, values, coefficients, goal, reference, relaxed, fine
+        See `stated`.
+    extra
+        Where the variable of the goal begins.
+    reach, tighten
+        See `Programme.solve`.
+    """
+    last: Solution | None = None
+    iterations = 0
+    for _ in range(_FINE_ROUNDS if fine else _ROUNDS):
+        programme = stated(
+            asked, values, coefficients, goal, reference=reference, relaxed=relaxed, fine=fine
+        )
+        found = programme.solve(programme.pack(values, coefficients, extra), reach, tighten)
+        iterations += found.iterations
+        found = replace(found, iterations=iterations)
+        if not np.isfinite(found.objective):
+            return last or found
+        moved = np.inf if last is None else abs(found.objective - last.objective)
+        values, coefficients, extra, last = found.values, found.coefficients, found.extra, found
+        if moved < (_FINE_SETTLED if fine else _SETTLED):
+            break
+    assert last is not None
+    return last
 
 
 def polish(
-    problem: Problem,
+    asked: FamilyProblem | Problem,
     solved: Solution,
     reference: FloatArray,
     goal: Goal = Goal.COST,
     relaxed: Sequence[str] = (),
-) -> tuple[Solution, Assessment, float]:
-    """Return a solution on refined nodes: exchange until no limit is broken between them.
+) -> tuple[Solution, tuple[Assessment, ...], float]:
+    """Return a solution on fine nodes and with its true margins.
 
-    Also returned: its assessment, and the largest relative excess over a limit.
+    Also returned: the assessment of each member's loop, and the largest relative excess over a
+    limit.
     """
-    before, broken = np.zeros(0), np.zeros(0)
-    assessment, excess = assess(problem, solved, goal, relaxed)
-    best = (excess > KEPT, solved.objective, solved, assessment, excess)
-    hairs: dict[str, float] = {}
-    for k in range(_ROUNDS):
-        late = k >= _LATE
-        if late:
-            # In a flat valley the peaks wander for ever: what a hair mends need not be waited for.
-            for name, over in _overs(problem, assessment, relaxed).items():
-                if 0.5 * KEPT < over < _LATE_HAIR:
-                    hairs[name] = hairs.get(name, 0.0) + 1.1 * over
-        # Where a limit was broken stays a node; what was merely close stays for one more round.
-        critical = thinned([limit.critical(assessment) for limit in problem.limits])
-        broken = np.concatenate([broken, *(limit.worst(assessment) for limit in problem.limits)])
-        held, before = np.concatenate([before, critical, broken]), critical
-        programme = Programme(
-            problem,
-            cost_nodes(problem, [assessment]),
-            np.unique(np.concatenate([margin_nodes(problem, [assessment.poles], 60), held])),
+    family = FamilyProblem.of(asked)
+    tighten: dict[tuple[int, str], float] = {}
+    best: tuple[Solution, tuple[Assessment, ...], float] | None = None
+    for _ in range(1 + _HAIRS):
+        found = settle(
+            family,
+            solved.values,
+            solved.coefficients,
             goal,
             reference=reference,
             relaxed=relaxed,
-            tolerance=1e-9,
+            extra=solved.extra,
+            fine=True,
+            tighten=tighten,
         )
-        start = programme.pack(solved.values, solved.coefficient, solved.extra)
-        again = _any_pace(programme, start, excess, hairs, follow=goal is Goal.COST)
-        if again is None:
+        sound = np.isfinite(found.objective) and family.stable(found.values, found.coefficients)
+        if sound:
+            assessments, overs = _measured(family, found, goal, relaxed)
+            excess = max([0.0, *overs.values()])
+            if best is None or (excess > KEPT, found.objective) < (best[2] > KEPT, best[0].objective):
+                best = found, assessments, excess
+            if excess <= KEPT or excess > _HAIR:
+                break
+            for key, over in overs.items():
+                if over > 0.5 * KEPT:
+                    tighten[key] = tighten.get(key, 0.0) + 1.1 * over
+            solved = found
+        else:
             break
-        moved = abs(again.objective - solved.objective)
-        solved = again
-        assessment, excess = assess(problem, solved, goal, relaxed)
-        # The exchange need not descend: a round may leak anew, so the best so far is kept.
-        if (excess > KEPT, solved.objective) < best[:2] or best[0]:
-            best = (excess > KEPT, solved.objective, solved, assessment, excess)
-        if excess <= (KEPT if late else 0.5 * KEPT) and moved < (5.0 if late else 1.0) * _SETTLED:
-            break
-    return best[2:] if not best[0] else _tightened(problem, best[2:], programme, goal, relaxed)
-
-
-def thinned(critical: Sequence[FloatArray], most: int = _MOST_CRITICAL) -> FloatArray:
-    """Return all critical frequencies, or an even choice where there are more than `most`."""
-    every = np.unique(np.concatenate([np.zeros(0), *critical]))
-    return np.asarray(every[:: 1 + every.size // most])
-
-
-def _any_pace(
-    programme: Programme,
-    start: FloatArray,
-    excess: float,
-    tighten: Mapping[str, float],
-    *,
-    follow: bool,
-) -> Solution | None:
-    """Return an answer near the start, by whichever pace of the solver gets there."""
-    # From the answer itself a few quadratic programmes do; an interior point must first leave
-    # the limits that bind, and so comes after.
-    if follow and excess < _CLOSE:
-        near = programme.follow(start, None, tighten)
-        if near is not None and programme.problem.stable(near.values, near.coefficient):
-            return near
-    if excess < _CLOSE:
-        tries = [(SolverPace.THERE, _REACH), (SolverPace.NEAR, _REACH)]
-    else:
-        tries = [(SolverPace.NEAR, _REACH), (SolverPace.FAR, _REACH), (SolverPace.NEAR, _FAR_REACH)]
-    for pace, reach in tries:
-        solved = programme.solve(start, reach, tighten, pace)
-        if solved.converged and programme.problem.stable(solved.values, solved.coefficient):
-            return solved
-    return None
-
-
-def _tightened(
-    problem: Problem,
-    answer: tuple[Solution, Assessment, float],
-    programme: Programme,
-    goal: Goal,
-    relaxed: Sequence[str],
-) -> tuple[Solution, Assessment, float]:
-    """Return an answer that keeps the limits, from one that breaks them by a hair.
-
-    Where the exchange does not settle, the bounds are tightened by what they were broken by;
-    the cost of that is of the same order, and stands in no report as a price.
-    """
-    solved, assessment, excess = answer
-    if not solved.converged or excess > _HAIR:
-        return answer
-    tighten: dict[str, float] = {}
-    for _ in range(3):
-        for name, over in _overs(problem, assessment, relaxed).items():
-            if over > 0.5 * KEPT:
-                tighten[name] = tighten.get(name, 0.0) + 1.1 * over
-        start = programme.pack(solved.values, solved.coefficient, solved.extra)
-        again = programme.solve(start, _REACH, tighten, SolverPace.NEAR)
-        if not (again.converged and problem.stable(again.values, again.coefficient)):
-            return answer
-        solved = again
-        assessment, excess = assess(problem, solved, goal, relaxed)
-        if excess <= KEPT:
-            return solved, assessment, excess
-    return answer
+    if best is None:
+        assessments, overs = _measured(family, solved, goal, relaxed)
+        best = replace(solved, converged=False), assessments, max([1.0, *overs.values()])
+    return best
 
 
 def assessment_of(problem: Problem, solved: Solution, amplitude: float = 1.0) -> Assessment:
-    """Return a solution in numbers, the disturbances' amplitudes times `amplitude`."""
+    """Return a solution of one problem in numbers, the disturbances' amplitudes times `amplitude`."""
     scaled = tuple(d.scaled(amplitude) for d in problem.disturbances)
     return replace(problem, disturbances=scaled).assess(solved.values, solved.coefficient)
 
 
 def assess(
-    problem: Problem, solved: Solution, goal: Goal = Goal.COST, relaxed: Sequence[str] = ()
-) -> tuple[Assessment, float]:
-    """Return a solution in numbers, and its largest relative excess over a limit."""
-    assessment = assessment_of(
-        problem, solved, float(np.exp(solved.extra)) if goal is Goal.SEA else 1.0
-    )
-    return assessment, max(_overs(problem, assessment, relaxed).values(), default=0.0)
+    asked: FamilyProblem | Problem,
+    solved: Solution,
+    goal: Goal = Goal.COST,
+    relaxed: Sequence[str] = (),
+) -> tuple[tuple[Assessment, ...], float]:
+    """Return each member's loop in numbers, and the largest relative excess over a limit."""
+    assessments, overs = _measured(FamilyProblem.of(asked), solved, goal, relaxed)
+    return assessments, max(overs.values(), default=0.0)
 
 
-def _overs(problem: Problem, assessment: Assessment, relaxed: Sequence[str]) -> dict[str, float]:
-    """Return the relative excess over each limit that counts, by name."""
-    return {
-        limit.name: limit.use(limit.measure(assessment)) - 1.0
-        for limit in problem.limits
+def _measured(
+    family: FamilyProblem, solved: Solution, goal: Goal, relaxed: Sequence[str]
+) -> tuple[tuple[Assessment, ...], dict[tuple[int, str], float]]:
+    """Return each member's assessment and the relative excess over its limits."""
+    amplitude = float(np.exp(solved.extra)) if goal is Goal.SEA else 1.0
+    assessments = []
+    for scenario, coefficient in zip(family.scenarios, solved.coefficients, strict=True):
+        problem = scenario.problem
+        scaled = tuple(d.scaled(amplitude) for d in problem.disturbances)
+        own = scenario.values(solved.values)
+        assessments.append(replace(problem, disturbances=scaled).assess(own, coefficient))
+    overs = {
+        (i, limit.name): limit.use(limit.measure(assessments[i])) - 1.0
+        for i, limit in own_limits(family)
         if limit.name not in relaxed
     }
+    return tuple(assessments), overs
+
+
+def own_limits(family: FamilyProblem) -> list[tuple[int, Limit]]:
+    """Return each member's limits, those on a loop that a group shares only once."""
+    return [
+        (i, limit)
+        for group in family.groups
+        for i in group
+        for limit in family.scenarios[i].problem.limits
+        if limit.drive or i == group[0]
+    ]

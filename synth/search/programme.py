@@ -1,270 +1,223 @@
-r"""The nonlinear programme of gain synthesis, stated in CasADi and solved by IPOPT.
+r"""The programme of gain synthesis: one set of parameters, one loop or a family of them.
 
 .. math::
 
-    \min_{p,\,C} \tfrac12 \log \sum_z \lambda_z \sum_w \int |F_{zw}|^2 S_w \, d\omega
-    \quad\text{s.t. limits} \le 0,\; C = q \sqrt{8/\pi}\,\sigma_v
+    \min_{p, C_i, t} t \quad\text{s.t. } \log J_i - \log r_i \le t, \;
+    \text{limits of every member } i \le 0, \; C_i = q_i \sqrt{8/\pi}\,\sigma_{v,i},
+    \qquad J_i^2 = \sum_z \lambda_z \sum_w \int |F_{zw}|^2 S_w \, d\omega
 
-The integrals are sums over quadrature nodes, so the spectrum may be a table and delays are
-exact; derivatives of both orders are CasADi's.
+with r_i = 1 for the worst case and the best cost of its own for the worst regret; a mean is
+minimised as it is, and of a family of one the cost.  The integrals are sums over quadrature nodes,
+so that a spectrum may be a table and delays are exact; slopes are exact too
+(`synth.question.loop_numbers`).  Members on the same loop share its margins and responses.
 
-A spectral integral is finite for an unstable loop too, and a margin on a grid can be jumped
-over.  So the objective carries a *guard*: it is not a number wherever a closed-loop pole lies
-in the right half plane (Pade models for the delays), and IPOPT's line search treats such a
-trial point as it treats a division by zero, by a shorter step.  Every iterate from a stable
-start is thus stable, for any order of the loop; inequalities on the characteristic
-polynomial (Lienard-Chipart), the usual way, lose their digits beyond order eight or so, and a
-rope brings twenty.
+A spectral integral is finite for an unstable loop, and a margin on a grid can be jumped over.  So
+no point is evaluated at which a closed-loop pole of any member lies in the right half plane (Pade
+models for the delays): a descent that would go there takes a shorter step.  Every iterate from a
+stable start is thus stable, for any order of the loop; inequalities on the characteristic
+polynomial (Lienard-Chipart), the usual way, lose their digits beyond order eight or so, and a rope
+brings twenty.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import Enum
-from functools import cached_property
 from typing import Any
 
-import casadi as ca
 import numpy as np
-from typing_extensions import override
 
 from models.basics import FloatArray, Quadrature
+from models.plant import LinearPlant
 
-from ..question import Goal, LoopSymbols, Problem, Values
-from .follow import Follower
+from ..limits import Limit
+from ..loop import Dual, exp, value_of
+from ..question import (
+    Closing,
+    FamilyLoop,
+    FamilyProblem,
+    Goal,
+    LoopBlocks,
+    LoopNumbers,
+    LoopResponses,
+    Objective,
+    Point,
+    Problem,
+    Values,
+    moment_weights,
+)
+from .sqp import Descent, Evaluation, descend
 
 _ROOM = 12.0  # how far the logarithms of drag, sea and factors may move: e^12
-_ITERATIONS, _MOST_ITERATIONS = 150, 400  # of a solve with few and with many parameters
+_STEPS, _MOST_STEPS = 60, 120  # of a solve with few and with many parameters
 _MANY = 6
-_PATIENCE = 60  # rejected trial points before a solve is given up
-
-
-class Guard(ca.Callback):
-    """Zero where the loop is stable, not a number elsewhere; its derivative is zero.
-
-    Parameters
-    ----------
-    stable
-        Says of the programme's vector, (size,), whether the loop (or every loop) is stable.
-    size
-        Length of that vector.
-    """
-
-    def __init__(self, stable: Callable[[FloatArray], bool], size: int) -> None:
-        ca.Callback.__init__(self)
-        self._stable = stable
-        self._size = size
-        self._jacobian: ca.Function | None = None
-        self.rejected = 0
-        self.construct("guard", {})
-
-    @override
-    def get_n_in(self) -> int:
-        return 1
-
-    @override
-    def get_n_out(self) -> int:
-        return 1
-
-    @override
-    def get_sparsity_in(self, i: int) -> ca.Sparsity:
-        del i
-        return ca.Sparsity.dense(self._size, 1)
-
-    @override
-    def eval(self, arg: Sequence[Any]) -> list[float]:
-        if self.rejected > _PATIENCE:
-            return [np.nan]  # ends the solve: its line search finds nothing stable any more
-        x = np.array(arg[0], dtype=np.float64).ravel()
-        if not np.all(np.isfinite(x)):
-            return [np.nan]
-        stable = self._stable(x)
-        self.rejected += not stable
-        return [0.0 if stable else np.nan]
-
-    @override
-    def has_jacobian(self) -> bool:
-        return True
-
-    @override
-    def get_jacobian(
-        self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Mapping[str, Any]
-    ) -> ca.Function:
-        x, out = ca.MX.sym("x", self._size), ca.MX.sym("out", 1)
-        zero = ca.MX(ca.Sparsity(1, self._size))
-        self._jacobian = ca.Function(name, [x, out], [zero], inames, onames, opts)
-        return self._jacobian
-
-
-def solver_options(tolerance: float, max_iterations: int) -> dict[str, Any]:
-    """Return the options of IPOPT that every programme here shares."""
-    return {
-        "print_time": False,
-        "show_eval_warnings": False,
-        "ipopt.print_level": 0,
-        "ipopt.sb": "yes",
-        "ipopt.tol": tolerance,
-        "ipopt.acceptable_tol": 10.0 * tolerance,
-        "ipopt.max_iter": max_iterations,
-    }
-
-
-class SolverPace(Enum):
-    """How IPOPT goes about a start, by its barrier.
-
-    From afar the adaptive barrier finds the way.  From the answer itself a large barrier would
-    carry it off, and from a point that breaks a limit a tiny one gets stuck on the wrong side.
-    """
-
-    FAR = {"ipopt.mu_strategy": "adaptive"}  # noqa: RUF012
-    NEAR = {"ipopt.mu_strategy": "monotone", "ipopt.mu_init": 1e-3}  # noqa: RUF012
-    THERE = {  # noqa: RUF012
-        "ipopt.mu_strategy": "monotone",
-        "ipopt.mu_init": 1e-5,
-        "ipopt.bound_push": 1e-6,
-        "ipopt.bound_frac": 1e-6,
-        "ipopt.slack_bound_push": 1e-6,
-        "ipopt.slack_bound_frac": 1e-6,
-    }
+_SHIFT = 1e-6  # relative, of a bound or a frequency, of differences
+_SLOW = "slow pole"
+_HANGING = 30.0  # how sharply the worst member stands for its family in a model of the curvature
+Tighten = Mapping[tuple[int, str], float]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solution:
     """What a solve returned; nothing in it is verified yet.
 
-    `prices` is d log(cost) / d log(bound) by limit (the envelope theorem), for the goal COST.
-    `multipliers` are those of the programme's rows, (m,), which `Programme.follow` begins with.
+    Attributes
+    ----------
+    values
+        The searched parameters.
+    coefficients
+        Drag coefficient of each member [N s/m], None without drag.
+    objective
+        Logarithm of what the family's objective makes of the costs.
+    extra
+        The variable of a goal other than the cost.
+    prices
+        d log(cost) / d log(bound) by member and limit, with the sign of the bound: what loosening
+        takes off counts as negative.
+    costs, pressure
+        Cost of each member on the nodes, and how much of the objective hangs on it (adds up to 1).
+    multipliers
+        Those of the programme's rows and equations.
     """
 
     values: FloatArray
-    coefficient: float | None
+    coefficients: tuple[float | None, ...]
     objective: float
-    extra: float
     converged: bool
     message: str
     iterations: int
-    prices: dict[str, float]
+    prices: tuple[Mapping[str, float], ...]
+    costs: FloatArray
+    pressure: FloatArray
+    extra: float = 0.0
     multipliers: FloatArray | None = None
+
+    @property
+    def coefficient(self) -> float | None:
+        """Drag coefficient of the first member [N s/m]."""
+        return self.coefficients[0]
 
 
 class Programme:
-    """A stated programme: built once for a set of nodes, solved from many starts."""
+    """A programme on a set of nodes, solved from any number of starts.
+
+    Parameters
+    ----------
+    asked
+        The family, or one problem.
+    nodes, omega
+        Quadrature nodes and margin frequencies [rad/s] of each group of members.
+    goal, relaxed
+        What is looked for, and the limits whose bounds share a factor (`Goal.RELAX`).
+    reference
+        Searched parameters at which every loop is briskly stable.
+    tolerance
+        Of the log objective.
+    exact
+        Whether margins are held where they are measured, at refined peaks and crossings of the
+        curve, and not only on the margin frequencies and by discs that are a little too large.
+    """
 
     def __init__(
         self,
-        problem: Problem,
-        nodes: Quadrature,
-        omega: FloatArray,
+        asked: FamilyProblem | Problem,
+        nodes: Sequence[Quadrature],
+        omega: Sequence[FloatArray],
         goal: Goal = Goal.COST,
         *,
         reference: FloatArray,
         relaxed: Sequence[str] = (),
-        tolerance: float = 1e-7,
+        tolerance: float = 1e-8,
         max_iterations: int | None = None,
+        exact: bool = False,
     ) -> None:
-        self.problem = problem
-        if max_iterations is None:
-            many = len(problem.law.parameters) > _MANY
-            max_iterations = _MOST_ITERATIONS if many else _ITERATIONS
-        self._goal = goal
-        symbols = LoopSymbols(problem, nodes, omega, goal)
-        self._bounds = np.array([limit.bound for limit in problem.limits], dtype=np.float64)
-        bounds = ca.MX.sym("bounds", self._bounds.size)
-        rows, self._slices, at = [], [], 0
-        for k, limit in enumerate(problem.limits):
-            bound = bounds[k]
-            # Relaxed limits share one factor, and rows one slack: the most that any needs.
-            if goal is Goal.RELAX and limit.name in relaxed:
-                bound = bound * ca.exp(symbols.extra)
-            row = limit.rows(symbols, bound)
-            if goal is Goal.FEASIBLE:
-                row = row - symbols.extra
-            rows.append(row)
-            self._slices.append(slice(at, at + row.shape[0]))
-            at += row.shape[0]
-        self._inequalities = at
-        # No limit of the case: it stops a real pole from creeping to zero, below every node.
-        rows.append(symbols.no_slow_pole(reference))
-        self._inequalities += 1
-        if problem.drag is not None:
-            rows.append(symbols.drag_balance())
-        constraints = ca.vertcat(*rows) if rows else ca.MX(0, 1)
-        cost = symbols.cost()
-        objective = cost
+        self.family = family = FamilyProblem.of(asked)
+        scenarios, count = family.scenarios, len(family.parameters)
+        self._goal, self._relaxed, self._exact = goal, frozenset(relaxed), exact
+        self._tolerance = tolerance
+        many = _MOST_STEPS if count > _MANY else _STEPS
+        self._most = many if max_iterations is None else max_iterations
+        drags = [i for i, s in enumerate(scenarios) if s.problem.drag is not None]
+        self._drag_at = {i: count + k for k, i in enumerate(drags)}
+        at = count + len(drags)
+        self._mean = family.objective is Objective.MEAN and len(scenarios) > 1
+        # A family of one needs no variable above its costs.
+        self._bound_at = None
+        if goal is Goal.COST and len(scenarios) > 1 and not self._mean:
+            self._bound_at, at = at, at + 1
+        self._extra_at = None
         if goal is not Goal.COST:
-            objective = -symbols.extra if goal is Goal.SEA else symbols.extra
-        self._guard = Guard(self._stable, symbols.x.shape[0])
-        self.evaluate = ca.Function("evaluate", [symbols.x, bounds], [cost, constraints])
-        self._statement: dict[str, Any] = {
-            "x": symbols.x,
-            "p": bounds,
-            # Zero or not a number, and flat: it turns points down and changes no derivative.
-            "f": objective + self._guard(symbols.x),
-            "g": constraints,
-        }
-        self._cost = objective
-        self._options = solver_options(tolerance, max_iterations)
-        self._solvers: dict[SolverPace, Any] = {}
+            self._extra_at, at = at, at + 1
+        self.size = at
+        self._best = np.zeros(len(scenarios))
+        if family.objective is Objective.REGRET:
+            self._best = np.log([s.best for s in scenarios])
+        # Parameters that are positive stand as logarithms: their products are what acts.
+        self._logarithmic = np.array([p.low > 0.0 for p in family.parameters], dtype=np.bool_)
+        self._unit = np.where(self._logarithmic, 1.0, family.scales)
+        self._loops = [
+            _Loop([scenarios[i] for i in group], where, margins, reference)
+            for group, where, margins in zip(family.groups, nodes, omega, strict=True)
+        ]
 
-    def _stable(self, x: FloatArray) -> bool:
-        """Return whether the loop of the programme's vector is stable."""
-        parameters = self.problem.law.parameters
-        count = len(parameters)
-        coefficient = float(np.exp(x[count])) if self.problem.drag is not None else None
-        scales = np.array([p.scale for p in parameters])
-        return self.problem.stable(x[:count] * scales, coefficient)
+    def stable(self, x: FloatArray) -> bool:
+        """Return whether every loop of a vector is stable."""
+        return self.family.stable(self._values(x), self._coefficients(x))
 
-    def _solver(self, pace: SolverPace) -> Any:
-        if pace not in self._solvers:
-            options = {**self._options, **pace.value}
-            self._solvers[pace] = ca.nlpsol("synthesis", "ipopt", self._statement, options)
-        return self._solvers[pace]
+    def _values(self, x: FloatArray) -> FloatArray:
+        own = x[: self._unit.size]
+        return np.where(self._logarithmic, np.exp(np.where(self._logarithmic, own, 0.0)), own * self._unit)
 
-    @cached_property
-    def _follower(self) -> Follower:
-        # Without the guard: the follower asks for stability itself, before it evaluates.
-        return Follower({**self._statement, "f": self._cost})
+    def _placed(self, values: Values) -> FloatArray:
+        """Return parameters as the programme's vector has them."""
+        given = np.asarray(values, dtype=np.float64)
+        return np.where(self._logarithmic, np.log(np.where(self._logarithmic, given, 1.0)), given / self._unit)
+
+    def _coefficients(self, x: FloatArray) -> tuple[float | None, ...]:
+        every, drags = range(len(self.family.scenarios)), self._drag_at
+        return tuple(float(np.exp(x[drags[i]])) if i in drags else None for i in every)
 
     def pack(
-        self, values: Values, coefficient: float | None = None, extra: float | None = None
+        self,
+        values: Values,
+        coefficients: Sequence[float | None] | None = None,
+        extra: float | None = None,
     ) -> FloatArray:
-        """Return the programme's vector for given parameters."""
-        x = [v / p.scale for v, p in zip(values, self.problem.law.parameters, strict=True)]
-        # Drag, sea and factors as logarithms: they stay positive, and a step is a share.
-        if self.problem.drag is not None:
-            x.append(float(np.log(coefficient or self.problem.drag.reference)))
-        if self._goal is not Goal.COST:
-            x.append(0.0 if extra is None else extra)
-        return np.array(x)
+        """Return the programme's vector for given parameters.
 
-    def _tightened(self, tighten: Mapping[str, float]) -> FloatArray:
-        bounds = self._bounds.copy()
-        for k, limit in enumerate(self.problem.limits):
-            step = tighten.get(limit.name, 0.0)
-            bounds[k] *= 1.0 + step if limit.at_least else 1.0 - step
-        return bounds
+        Drag, sea and factors stand in it as logarithms: they stay positive, and a step is a share.
+        """
+        scenarios = self.family.scenarios
+        x = np.zeros(self.size)
+        x[: self._unit.size] = self._placed(values)
+        for i, at in self._drag_at.items():
+            drag, given = scenarios[i].problem.drag, None
+            if coefficients is not None:
+                given = coefficients[i]
+            assert drag is not None
+            x[at] = np.log(given or drag.reference)
+        if self._extra_at is not None:
+            x[self._extra_at] = 0.0 if extra is None else extra
+        if self._bound_at is not None:
+            costs = np.array([c.item() for c in self._numbers(x, slopes=False)[0]])
+            excess = (costs - self._best)[np.isfinite(costs)]
+            x[self._bound_at] = float(excess.max(initial=-20.0)) + 1e-6
+        return x
 
     def violations(
-        self, x: FloatArray, tighten: Mapping[str, float] | None = None
-    ) -> tuple[float, dict[str, float]]:
-        """Return the log cost and the largest row of each limit at a vector; see `solve`."""
-        cost, rows = self.evaluate(x, self._tightened(tighten or {}))
-        flat = np.array(rows, dtype=np.float64).ravel()
+        self, x: FloatArray, tighten: Tighten | None = None
+    ) -> tuple[FloatArray, dict[tuple[int, str], float]]:
+        """Return the log costs and the largest row of each limit at a vector; see `solve`."""
+        costs, rows, _ = self._numbers(x, tighten, slopes=False)
         worst = {
-            limit.name: float(flat[part].max(initial=-np.inf))
-            for limit, part in zip(self.problem.limits, self._slices, strict=True)
+            key: float(np.max(row, initial=-np.inf)) for key, row in rows if key[1] != _SLOW
         }
-        return float(cost), worst
+        return np.array([cost.item() for cost in costs]), worst
 
     def solve(
-        self,
-        start: FloatArray,
-        reach: float | None = None,
-        tighten: Mapping[str, float] | None = None,
-        pace: SolverPace = SolverPace.FAR,
+        self, start: FloatArray, reach: float | None = None, tighten: Tighten | None = None
     ) -> Solution:
-        """Return IPOPT's answer from a start.
+        """Return the answer that is reached from a start.
 
         Parameters
         ----------
@@ -273,107 +226,306 @@ class Programme:
         reach
             How far, relatively, a parameter may move.
         tighten
-            Relative tightening of bounds by name of the limit.
-        pace
-            How near the start is to the answer.
+            Relative tightening of bounds by member and name of the limit.
         """
-        self._guard.rejected = 0
         low, high = self._box(start, reach)
-        bottom, solver = self._bottom(), self._solver(pace)
-        answer = solver(
-            x0=start,
-            p=self._tightened(tighten or {}),
-            lbx=low,
-            ubx=high,
-            lbg=bottom,
-            ubg=np.zeros(bottom.size),
+        found = descend(
+            lambda x: self._evaluation(x, tighten),
+            self.stable,
+            start,
+            low,
+            high,
+            logarithmic=np.append(self._logarithmic, np.ones(self.size - self._unit.size, np.bool_)),
+            tolerance=self._tolerance,
+            most=self._most,
         )
-        stats = solver.stats()
-        found = {k: np.array(answer[k], dtype=np.float64).ravel() for k in ("x", "lam_p", "lam_g")}
-        return self._answer(
-            found["x"],
-            float(answer["f"]),
-            found["lam_p"],
-            found["lam_g"],
-            converged=bool(stats["success"]),
-            message=str(stats["return_status"]).replace("_", " ").lower(),
-            iterations=int(stats["iter_count"]),
-        )
+        return self._solution(found, tighten)
 
-    def follow(
-        self,
-        start: FloatArray,
-        near: Solution | None = None,
-        tighten: Mapping[str, float] | None = None,
-    ) -> Solution | None:
-        """Return the answer near a start in a few steps, None if there is none so near.
+    def lagrangian(self, x: FloatArray, multipliers: FloatArray) -> float:
+        """Return log cost plus multipliers times rows and equations at a vector.
 
-        Parameters
-        ----------
-        start, tighten
-            As `solve` takes them.
-        near
-            An answer of this very programme close by, for its multipliers.
+        The row that keeps slow poles off is normalised by the reference: it has no price.
         """
-        bottom = self._bottom()
-        lam = np.zeros(bottom.size)
-        if near is not None and near.multipliers is not None and near.multipliers.size == lam.size:
-            lam = near.multipliers
-        bounds = self._tightened(tighten or {})
-        box = self._box(start, None)
-        found = self._follower.answer(start, bounds, lam, box, bottom, self._stable)
-        if found is None:
-            return None
-        x, lam, objective, steps = found
-        prices = self._follower.prices(x, bounds, lam)
-        return self._answer(
-            x, objective, prices, lam, converged=True, message="followed", iterations=steps
-        )
+        costs, rows, balances = self._numbers(x, slopes=False)
+        priced = [row if key[1] != _SLOW else 0.0 * row for key, row in rows]
+        flat = np.concatenate([*priced, *balances])
+        return float(costs[0].item() + multipliers @ flat)
 
     def _box(self, start: FloatArray, reach: float | None) -> tuple[FloatArray, FloatArray]:
         """Return the least and greatest values that variables may take from a start."""
-        parameters = self.problem.law.parameters
-        count = len(parameters)
+        family, count = self.family, self._unit.size
         low, high = start - _ROOM, start + _ROOM
-        low[:count] = [p.low / p.scale for p in parameters]
-        high[:count] = [p.high / p.scale for p in parameters]
+        low[:count] = self._placed([p.low for p in family.parameters])
+        high[:count] = self._placed([p.high for p in family.parameters])
         if reach is not None:
             near = start[:count]
-            # A parameter that is nearly zero still gets a thousandth of the largest one's room.
-            room = reach * np.maximum(np.abs(near), 1e-3 * np.abs(near).max(initial=1e-3))
+            room = reach * np.where(self._logarithmic, 1.0, np.abs(near))
             low[:count] = np.maximum(low[:count], near - room)
             high[:count] = np.minimum(high[:count], near + room)
         return low, high
 
-    def _bottom(self) -> FloatArray:
-        """Return the lower bounds of the rows: only equalities have one."""
-        equalities = int(self.problem.drag is not None)
-        return np.append(np.full(self._inequalities, -np.inf), np.zeros(equalities))
+    def _bound(self, i: int, limit: Limit, tighten: Tighten | None) -> float:
+        step = (tighten or {}).get((i, limit.name), 0.0)
+        return limit.bound * (1.0 + step if limit.at_least else 1.0 - step)
 
-    def _answer(
-        self,
-        x: FloatArray,
-        objective: float,
-        prices: FloatArray,
-        multipliers: FloatArray,
-        *,
-        converged: bool,
-        message: str,
-        iterations: int,
-    ) -> Solution:
-        count = len(self.problem.law.parameters)
-        drag = self.problem.drag is not None
-        return Solution(
-            values=x[:count] * np.array([p.scale for p in self.problem.law.parameters]),
-            coefficient=float(np.exp(x[count])) if drag else None,
-            objective=objective,
-            extra=float(x[-1]) if self._goal is not Goal.COST else 0.0,
-            converged=converged,
-            message=message,
-            iterations=iterations,
-            prices={
-                limit.name: float(prices[k] * limit.bound)
-                for k, limit in enumerate(self.problem.limits)
-            },
-            multipliers=multipliers,
+    def _numbers(
+        self, x: FloatArray, tighten: Tighten | None = None, *, slopes: bool, shift: float = 0.0
+    ) -> tuple[list[FloatArray], list[tuple[tuple[int, str], FloatArray]], list[FloatArray]]:
+        """Return log costs, rows by member and limit, and drag balances, without slopes."""
+        costs, rows, balances, _ = self._parts(x, tighten, slopes=slopes, shift=shift)
+        plain = [(key, np.asarray(value_of(row))) for key, row, _ in rows]
+        return (
+            [np.asarray(value_of(c)) for c, _ in costs],
+            plain,
+            [np.asarray(value_of(b)) for b, _ in balances],
         )
+
+    def _parts(
+        self, x: FloatArray, tighten: Tighten | None, *, slopes: bool, shift: float = 0.0
+    ) -> tuple[
+        list[tuple[Any, int]],
+        list[tuple[tuple[int, str], Any, int]],
+        list[tuple[Any, int]],
+        list[FloatArray],
+    ]:
+        family = self.family
+        values = self._values(x)
+        costs: dict[int, Any] = {}
+        curvatures: dict[int, FloatArray] = {}
+        rows: list[tuple[tuple[int, str], Any, int]] = []
+        balances: list[tuple[Any, int]] = []
+        for group, loop in zip(family.groups, self._loops, strict=True):
+            first = group[0]
+            at = self._drag_at.get(first)
+            log_drag = None if at is None else float(x[at])
+            extra = None if self._extra_at is None else float(x[self._extra_at])
+            own = family.scenarios[first].values(values)
+            numbers = loop.at(own, log_drag, extra, self._goal, slopes=slopes, exact=self._exact)
+            for k, i in enumerate(group):
+                problem = family.scenarios[i].problem
+                seen = numbers if i == first else numbers.under(problem, loop.weights[k])
+                for limit in problem.limits:
+                    if not (limit.drive or i == first):
+                        continue
+                    bound: Any = self._bound(i, limit, tighten) * (1.0 + shift)
+                    if self._goal is Goal.RELAX and limit.name in self._relaxed:
+                        bound = exp(seen.extra) * bound
+                    row = limit.rows(seen, bound)
+                    if self._goal is Goal.FEASIBLE:
+                        row = row - seen.extra
+                    rows.append(((i, limit.name), row, first))
+                costs[i] = seen.cost()
+                if slopes:
+                    curvatures[i] = seen.cost_curvature()
+            # No limit of the case: it stops a real pole from creeping to zero, below every node.
+            rows.append(((first, _SLOW), loop.no_slow_pole(own, log_drag, extra, slopes), first))
+            if log_drag is not None:
+                balances.append((numbers.drag_balance(), first))
+        every = range(len(family.scenarios))
+        bends = [curvatures[i] for i in every] if slopes else []
+        return [(costs[i], i) for i in every], rows, balances, bends
+
+    def _evaluation(self, x: FloatArray, tighten: Tighten | None) -> Evaluation:
+        at = self._values(x)
+        with np.errstate(all="ignore"):
+            costs, rows, balances, curvatures = self._parts(x, tighten, slopes=True)
+        values, slopes = [], []
+        for _, row, i in rows:
+            values.append(np.ravel(row.value))
+            slopes.append(self._spread(row, i, at))
+        spread = [(float(c.value.item()), self._spread(c, i, at)[0]) for c, i in costs]
+        slope = np.zeros(self.size)
+        if self._extra_at is not None:
+            sign = -1.0 if self._goal is Goal.SEA else 1.0
+            objective, slope[self._extra_at] = sign * float(x[self._extra_at]), sign
+        elif self._mean:
+            weights = np.array([s.weight for s in self.family.scenarios])
+            shares = weights * np.exp(2.0 * np.array([c for c, _ in spread]))
+            objective = 0.5 * float(np.log(shares.sum() / weights.sum()))
+            slope = (shares / shares.sum()) @ np.array([s for _, s in spread])
+        elif self._bound_at is not None:
+            objective, slope[self._bound_at] = float(x[self._bound_at]), 1.0
+            for (cost, own), best in zip(spread, self._best, strict=True):
+                own = own.copy()
+                own[self._bound_at] = -1.0
+                values.append(np.array([cost - best - objective]))
+                slopes.append(own[None])
+        else:
+            objective, slope = spread[0][0] - float(self._best[0]), spread[0][1]
+        empty = np.zeros((0, self.size))
+        # The members that the objective hangs on: all in a mean, the dearest otherwise.
+        excess = np.array([c for c, _ in spread]) - self._best
+        shares = np.exp((2.0 if self._mean else _HANGING) * (excess - excess.max()))
+        curvature = np.zeros((self.size, self.size))
+        for (_, i), bend, share in zip(costs, curvatures, shares / shares.sum(), strict=True):
+            turn = self._spread(Dual(np.zeros(len(bend)), np.eye(len(bend))), i, at)
+            curvature += share * turn.T @ bend @ turn
+        return Evaluation(
+            curvature=curvature,
+            objective=objective,
+            slope=slope,
+            rows=np.concatenate(values),
+            jacobian=np.concatenate(slopes),
+            equations=np.concatenate([np.zeros(0), *(b.value for b, _ in balances)]),
+            equation_slopes=np.concatenate([empty, *(self._spread(b, i, at) for b, i in balances)]),
+        )
+
+    def _spread(self, found: Dual, i: int, values: FloatArray) -> FloatArray:
+        """Return the slopes of a vector by the programme's variables, (k, size)."""
+        scenario, family = self.family.scenarios[i], self.family
+        own = len(scenario.problem.law.parameters)
+        slope = found.slope.reshape(len(found.slope), -1)
+        result = np.zeros((slope.shape[1], self.size))
+        by_own = slope[:own].T
+        if scenario.blend is not None:
+            by_own = by_own @ scenario.blend
+        result[:, : family.scales.size] = by_own * np.where(self._logarithmic, values, self._unit)
+        if i in self._drag_at:
+            result[:, self._drag_at[i]] = slope[own]
+        if self._extra_at is not None:
+            result[:, self._extra_at] = slope[-1]
+        return result
+
+    def _solution(self, found: Descent, tighten: Tighten | None) -> Solution:
+        family, x = self.family, found.x
+        with np.errstate(all="ignore"):
+            reached = np.isfinite(found.at.objective)
+            costs = np.full(len(family.scenarios), np.inf)
+            if reached:
+                costs = np.exp([c.item() for c in self._numbers(x, tighten, slopes=False)[0]])
+        pressure = np.ones(len(family.scenarios))
+        if self._bound_at is not None and reached:
+            pressure = found.prices[-len(family.scenarios) :]
+        elif self._mean:
+            pressure = np.array([s.weight for s in family.scenarios]) * costs**2
+        extra = 0.0 if self._extra_at is None else float(x[self._extra_at])
+        objective = float(np.log(family.total(costs))) if reached else np.inf
+        if self._extra_at is not None:
+            objective = found.at.objective
+        return Solution(
+            values=self._values(x),
+            coefficients=self._coefficients(x),
+            objective=objective,
+            extra=extra,
+            converged=found.converged,
+            message=found.message,
+            iterations=found.steps,
+            prices=self._prices(found, tighten) if reached else self._free(),
+            costs=np.asarray(costs),
+            pressure=np.asarray(pressure / max(float(np.sum(pressure)), 1e-300)),
+            multipliers=np.concatenate([found.prices, found.equation_prices]),
+        )
+
+    def _free(self) -> tuple[dict[str, float], ...]:
+        return tuple({lim.name: 0.0 for lim in s.problem.limits} for s in self.family.scenarios)
+
+    def _prices(self, found: Descent, tighten: Tighten | None) -> tuple[dict[str, float], ...]:
+        """Return the price of each limit: multipliers times the slope of its rows by its bound."""
+        result = self._free()
+        above = self._numbers(found.x, tighten, slopes=False, shift=_SHIFT)[1]
+        below = self._numbers(found.x, tighten, slopes=False, shift=-_SHIFT)[1]
+        at = 0
+        for (key, more), (_, less) in zip(above, below, strict=True):
+            own = found.prices[at : at + more.size]
+            at += more.size
+            if key[1] != _SLOW and more.shape == less.shape and own.size == more.size:
+                result[key[0]][key[1]] = float(own @ (more - less)) / (2.0 * _SHIFT)
+        return result
+
+
+class _Loop:
+    """One loop on its nodes and margin frequencies."""
+
+    def __init__(
+        self,
+        members: Sequence[FamilyLoop],
+        nodes: Quadrature,
+        omega: FloatArray,
+        reference: FloatArray,
+    ) -> None:
+        problem = self.problem = members[0].problem
+        self.outputs = problem.outputs
+        self.omega = omega
+        self.weights = [moment_weights(member.problem, nodes) for member in members]
+        every = self._blocks(problem.plant, np.concatenate([nodes.omega, omega]))
+        self._s = every.s
+        self._parts = slice(0, nodes.omega.size), slice(nodes.omega.size, None)
+        self._cost, self._margins = (every.part(part) for part in self._parts)
+        slow = problem.plant.response_at([problem.slow_point])
+        self._slow = LoopBlocks.of(problem, slow, self.outputs)
+        drag = None if problem.drag is None else problem.drag.reference
+        begin = Point(values=list(members[0].values(reference)), drag=drag)
+        there = LoopResponses(self._slow, Closing.of(problem, self._slow.s, begin)).determinant()
+        self._there = float(np.real(there[0]))
+
+    def _blocks(self, plant: LinearPlant, omega: FloatArray) -> LoopBlocks:
+        return LoopBlocks.of(self.problem, plant.response(omega), self.outputs)
+
+    def at(
+        self,
+        values: FloatArray,
+        log_drag: float | None,
+        extra: float | None,
+        goal: Goal,
+        *,
+        slopes: bool,
+        exact: bool,
+    ) -> LoopNumbers:
+        closing = Closing.of(self.problem, self._s, _point(values, log_drag, slopes))
+        numbers = LoopNumbers(
+            self.problem,
+            self.outputs,
+            LoopResponses(self._cost, closing.part(self._parts[0])),
+            LoopResponses(self._margins, closing.part(self._parts[1])),
+            self.weights[0],
+            self.omega,
+            log_drag=_variable(log_drag, values.size, values.size, extra, slopes),
+            extra=_variable(extra, -1, values.size + (log_drag is not None), extra, slopes),
+            goal=goal,
+        )
+        if exact:
+            numbers.measure(lambda w, d: self._fresh(w, _point(values, log_drag, d)))
+        return numbers
+
+    def _fresh(self, omega: FloatArray, point: Point) -> LoopResponses:
+        """Return the closed loop at other frequencies."""
+        blocks = self._blocks(self.problem.plant, omega)
+        return LoopResponses(blocks, Closing.of(self.problem, blocks.s, point))
+
+    def no_slow_pole(
+        self, values: FloatArray, log_drag: float | None, extra: float | None, slopes: bool
+    ) -> Any:
+        """Return a row that keeps real poles from crossing -decay.
+
+        det(I - C yu) at a real point s is the characteristic function over that of the open loop,
+        and cannot change its sign unless a real pole passes s.  Complex poles cannot reach the axis
+        through |1 + L| > 0, but a real one may creep up to zero, below every frequency node;
+        stability alone would let it crawl there.
+        """
+        closing = Closing.of(self.problem, self._slow.s, _point(values, log_drag, slopes))
+        found = LoopResponses(self._slow, closing).determinant()
+        if not isinstance(found, Dual):
+            return 1e-6 - np.real(found) / self._there
+        slope = found.slope.real
+        if extra is not None:
+            slope = np.concatenate([slope, np.zeros_like(slope[:1])])
+        return 1e-6 - Dual(found.value.real, slope) / self._there
+
+
+def _point(values: FloatArray, log_drag: float | None, slopes: bool) -> Point:
+    drag = None if log_drag is None else float(np.exp(log_drag))
+    return Point(values=[float(v) for v in values], drag=drag, slopes=slopes)
+
+
+def _variable(
+    value: float | None, at: int, count: int, extra: float | None, slopes: bool
+) -> Any:
+    """Return one of the variables that follow the parameters, with its own slope."""
+    if value is None:
+        return None
+    number = np.array([value])
+    if not slopes:
+        return number
+    slope = np.zeros((count + 1 + (at != -1 and extra is not None), 1))
+    slope[at] = 1.0
+    return Dual(number, slope)

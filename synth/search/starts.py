@@ -1,10 +1,10 @@
 """Starting points of a search: candidates screened for stability, found where screening fails.
 
-    Problem -> guesses, candidates drawn, candidates stabilised -> merit -> starting points
+    Family -> guesses, candidates drawn, candidates stabilised -> merit -> starting points
 
 Phase 0 draws a Sobol set over signs and orders of magnitude of the parameters and keeps the
-stable candidates, ranked by cost and broken limits and spread out.  Phase I, where too few
-are stable, moves the least unstable ones left by minimising their spectral abscissa.
+stable candidates, ranked by cost and broken limits, all of them at once, and spread out.  Phase I,
+where too few are stable, moves the least unstable ones left by minimising their spectral abscissa.
 """
 
 from __future__ import annotations
@@ -18,16 +18,68 @@ from scipy.stats import qmc
 
 from models.basics import FloatArray
 
-from ..question import Goal, Problem
+from ..question import (
+    Closing,
+    FamilyProblem,
+    LoopBlocks,
+    LoopNumbers,
+    LoopResponses,
+    Moments,
+    Point,
+    Problem,
+    Values,
+    moment_weights,
+)
 from ..structures import pace
-from .nodes import cost_nodes, margin_nodes
-from .programme import Programme
+from .nodes import around, cost_nodes, margin_nodes
 
+_CANDIDATES = 512
 _SPREAD = 0.5  # least distance of two starts, in decades over all parameters
 _LEASH = 1e-3  # price of moving a parameter by a factor of e, squared
 _PHASE_ONE_STEPS = 60  # Nelder-Mead iterations per parameter and start
+_STABLE = -1e-9  # relative abscissa below which a candidate counts
 _WEIGHTS = (5.0, 1.0)  # of broken limits against the log cost
 _WORST = 20.0  # what one broken limit may add to the merit of a candidate
+_AT_ONCE = 64  # candidates whose merits are computed together
+_DRAGS = 4  # rounds in which a candidate's drag is made to agree with its motion
+_PER_DECADE = 20  # margin nodes of the screening
+_SAMPLE = 4  # loops whose poles the screening's nodes know
+
+
+def begin_points(
+    asked: FamilyProblem | Problem, count: int, seed: int, guesses: Sequence[Values] = ()
+) -> list[FloatArray]:
+    """Return stable starting points: guesses, screened candidates, stabilised candidates.
+
+    Guesses that are stable come first, whatever their merit.
+    """
+    family = FamilyProblem.of(asked)
+    loops = [family.scenarios[group[0]] for group in family.groups]
+    given = [np.array(guess, dtype=np.float64) for guess in guesses]
+    first = [guess for guess in given if family.abscissa(guess, enough=0.0) < _STABLE][:count]
+    # Guesses that are not may be mended by phase I.
+    points = [np.vstack(given)] if len(given) > len(first) else []
+    if all(loop.blend is None for loop in loops):
+        chosen = loops[:: max(1, len(loops) // 4)]
+        drawn = [candidates(loop.problem, _CANDIDATES // len(chosen), seed) for loop in chosen]
+        points += drawn
+    if not points:
+        return first
+    every = np.vstack(points)
+    abscissas = np.array([family.abscissa(point, enough=0.0) for point in every])
+    stable = every[abscissas < _STABLE]
+    if len(stable) < count:
+        # Phase I moves the least unstable ones; those that are stable need no moving.
+        rest = np.where(abscissas < 0.0, np.inf, abscissas)
+        found = stabilise(family, every, rest, count)
+        stable = np.vstack([stable, *[f[None] for f in found]])
+    if not len(stable):
+        return first
+    wanted = count - len(first)
+    orders = [pick_spread(stable, m, family.scales, wanted) for m in _merits(family, stable)]
+    # In turns: the quickest to keep the limits, and the most still with limits to mend.
+    turns = dict.fromkeys(i for pair in zip(*orders, strict=True) for i in pair)
+    return [*first, *(stable[i] for i in list(turns)[:wanted])]
 
 
 def candidates(problem: Problem, count: int, seed: int) -> FloatArray:
@@ -75,14 +127,14 @@ def pick_spread(points: FloatArray, merit: FloatArray, scales: FloatArray, count
 
 
 def stabilise(
-    problem: Problem, points: FloatArray, abscissas: FloatArray, count: int
+    family: FamilyProblem, points: FloatArray, abscissas: FloatArray, count: int
 ) -> list[FloatArray]:
     """Return up to `count` stable parameter vectors found from the least unstable points."""
-    scales = np.array([p.scale for p in problem.law.parameters])
-    low = np.array([p.low for p in problem.law.parameters]) / scales
-    high = np.array([p.high for p in problem.law.parameters]) / scales
+    scales = family.scales
+    low = np.array([p.low for p in family.parameters]) / scales
+    high = np.array([p.high for p in family.parameters]) / scales
     found: list[FloatArray] = []
-    middle = pace(problem.plant)
+    middle = pace(family.scenarios[0].problem.plant)
     for i in pick_spread(points, abscissas, scales, 2 * count):
         begin = np.arcsinh(points[i] / scales)
 
@@ -93,7 +145,7 @@ def stabilise(
         def abscissa(y: FloatArray, begin: FloatArray = begin) -> float:
             # In the plant's own time: relative to the fastest pole it is 1, and flat, for a
             # pole that just grows.  The rest keeps the simplex from wandering off.
-            largest = problem.growth(values_at(y))
+            largest = family.growth(values_at(y))
             return largest / middle + _LEASH * float(np.sum((y - begin) ** 2))
 
         answer = minimize(
@@ -103,87 +155,83 @@ def stabilise(
             options={"maxiter": _PHASE_ONE_STEPS * scales.size, "xatol": 1e-6, "fatol": 1e-9},
         )
         values = values_at(answer.x)
-        if problem.stable(values):
+        if family.stable(values):
             found.append(values)
         if len(found) == count:
             break
     return found
 
 
-def briskest(problem: Problem, points: Sequence[FloatArray]) -> FloatArray:
-    """Return the point whose loop settles fastest, to tell the sides of the stability boundary."""
-    return min(points, key=problem.abscissa)
+def briskest(asked: FamilyProblem | Problem, points: Sequence[FloatArray]) -> FloatArray:
+    """Return the point whose loops settle fastest, to tell the sides of the stability boundary."""
+    return min(points, key=FamilyProblem.of(asked).abscissa)
 
 
-def start_coefficient(problem: Problem) -> float | None:
-    """Return the drag coefficient that a search begins with [N s/m]."""
-    return None if problem.drag is None else problem.drag.reference
+def start_coefficients(family: FamilyProblem) -> tuple[float | None, ...]:
+    """Return the drag coefficients that a search begins with [N s/m]."""
+    drags = [scenario.problem.drag for scenario in family.scenarios]
+    return tuple(None if drag is None else drag.reference for drag in drags)
 
 
-def begin_points(
-    problem: Problem, starts: int, seed: int, guesses: Sequence[Sequence[float]]
-) -> list[FloatArray]:
-    """Return stable starting points: guesses, screened candidates, stabilised candidates.
-
-    Guesses that are stable come first, whatever their merit.
-    """
-    order = len(problem.rational.states)
-    points = candidates(problem, 1024 if order <= 12 else 512, seed)
-    given = [np.array(guess, dtype=np.float64) for guess in guesses]
-    first = [guess for guess in given if problem.abscissa(guess) < -1e-9][:starts]
-    if len(given) > len(first):  # phase I may mend them
-        points = np.vstack([*given, points])
-    abscissas = np.array([problem.abscissa(p) for p in points])
-    stable = np.flatnonzero(abscissas < -1e-9)
-    scales = np.array([p.scale for p in problem.law.parameters])
-    if stable.size < starts:
-        # Phase I moves the least unstable ones; those that are stable need no moving.
-        found = stabilise(problem, points, np.where(abscissas < 0, np.inf, abscissas), starts)
-        points = np.vstack([points[stable], *[f[None] for f in found]])
-    else:
-        points = points[stable]
-    if not len(points):
-        return first
-    wanted = starts - len(first)
-    orders = [pick_spread(points, merit, scales, wanted) for merit in _merits(problem, points)]
-    # In turns: the quickest to keep the limits, and the most still with limits to mend.
-    turns = dict.fromkeys(i for pair in zip(*orders, strict=True) for i in pair)
-    return [*first, *(points[i] for i in list(turns)[:wanted])]
-
-
-def _merits(problem: Problem, points: FloatArray) -> list[FloatArray]:
-    """Return log cost plus a penalty on broken limits, on nodes that suit the plant alone.
+def _merits(family: FamilyProblem, points: FloatArray) -> list[FloatArray]:
+    """Return log cost plus a penalty on broken limits of stable points.
 
     Two of them, (k,) each: with the rows as they are, and with rows that weigh more.
     """
-    sample = points[:: max(1, len(points) // 4)][:4]
-    programme = coarse_programme(problem, list(sample), briskest(problem, list(sample)))
-    merits = []
-    for point in points:
-        x = programme.pack(point, start_coefficient(problem))
-        cost, broken = programme.violations(x)
-        # Rows are logarithms as the cost is: a margin broken tenfold outweighs a tenfold gain.
-        penalty = sum(min(_WORST, max(0.0, row)) for row in broken.values())
-        merits.append([cost + weight * penalty for weight in _WEIGHTS])
-    found = np.nan_to_num(np.array(merits, dtype=np.float64), nan=np.inf)
-    return [np.asarray(column) for column in found.T]
+    chosen = range(0, len(points), max(1, len(points) // _SAMPLE))
+    sample = [points[i] for i in chosen][:_SAMPLE]
+    costs = np.full((len(family.scenarios), len(points)), np.nan)
+    penalty = np.zeros(len(points))
+    for group in family.groups:
+        first = family.scenarios[group[0]]
+        problem = first.problem
+        poles = around([problem.loop_poles(first.values(p)) for p in sample])
+        nodes, omega = cost_nodes(problem, poles), margin_nodes(problem, poles, _PER_DECADE)
+        outputs = problem.outputs
+        blocks = LoopBlocks.of(
+            problem, problem.plant.response(np.concatenate([nodes.omega, omega])), outputs
+        )
+        parts = blocks.part(slice(0, nodes.omega.size)), blocks.part(slice(nodes.omega.size, None))
+        weights = [moment_weights(family.scenarios[i].problem, nodes) for i in group]
+        for begin in range(0, len(points), _AT_ONCE):
+            some = slice(begin, begin + _AT_ONCE)
+            own = [column[:, None] for column in np.array([first.values(p) for p in points[some]]).T]
+            drag = None
+            if problem.drag is not None:
+                drag = _consistent(problem, own, parts[0], weights[0])
+            closing = Closing.of(problem, blocks.s, Point(values=own, drag=drag))
+            cuts = slice(0, nodes.omega.size), slice(nodes.omega.size, None)
+            cost, margins = (
+                LoopResponses(part, closing.part(cut))
+                for part, cut in zip(parts, cuts, strict=True)
+            )
+            numbers = LoopNumbers(problem, outputs, cost, margins, weights[0], omega)
+            for k, i in enumerate(group):
+                member = family.scenarios[i].problem
+                seen = numbers if i == group[0] else numbers.under(member, weights[k])
+                costs[i, some] = seen.cost()[..., 0]
+                for limit in member.limits:
+                    if limit.drive or i == group[0]:
+                        row = np.max(limit.rows(seen, limit.bound), axis=-1, initial=-np.inf)
+                        # Rows are logarithms as the cost is: a margin broken tenfold outweighs a
+                        # tenfold gain.
+                        penalty[some] += np.clip(np.nan_to_num(row, nan=_WORST), 0.0, _WORST)
+    with np.errstate(all="ignore"):
+        total = np.log([family.total(np.exp(column)) for column in costs.T])
+    found = [np.nan_to_num(total + weight * penalty, nan=np.inf) for weight in _WEIGHTS]
+    return [np.asarray(column, dtype=np.float64) for column in found]
 
 
-def coarse_programme(
-    problem: Problem,
-    begins: Sequence[FloatArray],
-    reference: FloatArray,
-    goal: Goal = Goal.COST,
-    **options: Any,
-) -> Programme:
-    """Return a programme on nodes that suit all the starts."""
-    assessments = [problem.assess(begin, start_coefficient(problem)) for begin in begins]
-    return Programme(
-        problem,
-        cost_nodes(problem, assessments, rtol=1e-4),
-        margin_nodes(problem, [v.poles for v in assessments[:4]], 40),
-        goal,
-        reference=reference,
-        tolerance=1e-6,
-        **options,
-    )
+def _consistent(
+    problem: Problem, values: Sequence[FloatArray], blocks: LoopBlocks, weights: Moments
+) -> FloatArray:
+    """Return the drag coefficients that agree with the motion of many candidates, (b, 1)."""
+    element = problem.drag
+    assert element is not None
+    drag = np.full((len(values[0]), 1), element.reference)
+    row = problem.outputs.index(element.velocity)
+    for _ in range(_DRAGS):
+        closing = Closing.of(problem, blocks.s, Point(values=values, drag=drag))
+        variance = LoopResponses(blocks, closing).moments([row], [weights[0]])
+        drag = element.slope * np.sqrt(variance)
+    return drag

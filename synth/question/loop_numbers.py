@@ -1,0 +1,538 @@
+r"""The loop on its frequencies in numbers: moments, responses and return differences with slopes.
+
+With the plant's blocks at a frequency and u = C y,
+
+.. math::
+
+    G = (I - C P_{yu})^{-1}, \quad v = G C P_{yw}, \quad y = P_{yw} + P_{yu} v,
+    \quad F = P_{zw} + P_{zu} v
+
+and every slope follows from that of the controller alone,
+
+.. math::
+
+    dv = G \, dC \, y, \quad dF = P_{zu} \, dv, \quad dG = G \, dC \, P_{yu} G .
+
+Quadratic drag, linearised, is one more loop around the plant: a force -(c - c_0) v with the
+logarithm of c as its variable.  Given many parameter vectors at once and no slopes, the same lines
+screen candidates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from models.basics import ComplexArray, FloatArray, Quadrature
+from models.plant import PlantResponse
+
+from ..loop import (
+    Dual,
+    at_least,
+    crossings,
+    exp,
+    joined,
+    log,
+    real,
+    refine_minima,
+    sqrt,
+    value_of,
+)
+from ..structures import ParametrisedController
+from .problem import Goal, Problem
+
+_CLOSE = 1.5  # dips of |1 + L| below this many times the margin are followed between the nodes
+_LEAST_MARGIN = 0.1  # ... or times this one
+_SHIFT = 1e-6  # relative, of a frequency, of differences
+_LEAST_CYCLES = float(np.exp(0.5))  # of a peak: a factor of one, below which the log turns negative
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LoopBlocks:
+    """A plant's blocks, the drag's loop among them, at k points s.
+
+    `zw` (nz, nw, k), `zu` (nz, m, k), `yw` (l, nw, k), `yu` (l, m, k), with m inputs and l
+    measurements of which the last of each is the drag's, if there is drag.
+    """
+
+    s: ComplexArray
+    zw: ComplexArray
+    zu: ComplexArray
+    yw: ComplexArray
+    yu: ComplexArray
+
+    @classmethod
+    def of(
+        cls, problem: Problem, response: PlantResponse, outputs: Sequence[str]
+    ) -> LoopBlocks:
+        """Return the blocks of a response for some outputs and the problem's disturbances."""
+        z = [response.outputs.index(name) for name in outputs]
+        w = [response.disturbances.index(d.name) for d in problem.disturbances]
+        zw, yw = response.zw[:, z][:, :, w], response.yw[:, :, w]
+        zu, yu = response.zu[:, z], response.yu
+        if problem.drag is not None:
+            v = response.outputs.index(problem.drag.velocity)
+            f = response.disturbances.index(problem.drag.force)
+            zu = np.concatenate([zu, response.zw[:, z, f : f + 1]], axis=2)
+            yw = np.concatenate([yw, response.zw[:, v : v + 1][:, :, w]], axis=1)
+            own = np.concatenate([response.zu[:, v : v + 1], response.zw[:, v : v + 1, f, None]], 2)
+            yu = np.concatenate(
+                [np.concatenate([yu, response.yw[:, :, f, None]], axis=2), own], axis=1
+            )
+        moved = (np.ascontiguousarray(np.moveaxis(block, 0, -1)) for block in (zw, zu, yw, yu))
+        return cls(s=response.s, **dict(zip(("zw", "zu", "yw", "yu"), moved, strict=True)))
+
+    def part(self, which: slice) -> LoopBlocks:
+        """Return some of the points."""
+        return LoopBlocks(
+            s=self.s[which],
+            zw=self.zw[..., which],
+            zu=self.zu[..., which],
+            yw=self.yw[..., which],
+            yu=self.yu[..., which],
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Point:
+    """A parameter vector, or many: what a loop is closed with.
+
+    Attributes
+    ----------
+    values
+        The law's parameters, one array each, () or (b, 1).
+    drag
+        Coefficient of the drag [N s/m] or None, () or (b, 1).
+    slopes
+        Whether derivatives are asked for: by the parameters, then by the drag's logarithm.
+    """
+
+    values: Sequence[Any]
+    drag: Any = None
+    slopes: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Closing:
+    """C with the drag's loop at k points, (m, l, ..., k), and its slopes, if asked for.
+
+    The slopes are those of the entries that depend on a variable, (k,) each, by variable.
+    """
+
+    law: ComplexArray
+    slopes: list[dict[tuple[int, int], ComplexArray]] | None
+
+    @classmethod
+    def of(cls, problem: Problem, s: ComplexArray, point: Point) -> Closing:
+        """Return what closes the loop of a problem at points `s`, (k,) [1/s]."""
+        law: ParametrisedController = problem.law
+        count, drag = len(point.values), problem.drag
+        values: list[Any] = list(point.values)
+        slopes: list[dict[tuple[int, int], ComplexArray]] | None = None
+        if point.slopes:
+            unit = np.eye(count)
+            values = [Dual(np.array([v]), unit[:, i : i + 1]) for i, v in enumerate(values)]
+            slopes = [{} for _ in range(count + (drag is not None))]
+        entries = law.response(values, s)
+        m, length = len(entries) + (drag is not None), len(entries[0]) + (drag is not None)
+        many = np.shape(point.values[0])[:-1] if count else ()
+        C = np.zeros((m, length, *many, s.size), dtype=np.complex128)
+        for i, line in enumerate(entries):
+            for j, entry in enumerate(line):
+                if isinstance(entry, Dual):
+                    assert slopes is not None
+                    C[i, j] = entry.value
+                    for a in np.flatnonzero(np.any(entry.slope, axis=1)):
+                        slopes[a][i, j] = np.broadcast_to(entry.slope[a], s.shape)
+                else:
+                    C[i, j] = entry
+        if drag is not None:
+            C[-1, -1] = -(point.drag - drag.reference)
+            if slopes is not None:
+                slopes[count][m - 1, length - 1] = np.full(s.shape, -point.drag, np.complex128)
+        return cls(law=C, slopes=slopes)
+
+    def part(self, which: slice) -> Closing:
+        """Return some of the points."""
+        slopes = self.slopes
+        if slopes is not None:
+            slopes = [{key: slope[which] for key, slope in own.items()} for own in slopes]
+        return Closing(law=self.law[..., which], slopes=slopes)
+
+
+class LoopResponses:
+    """The closed loop at some points.
+
+    Parameters
+    ----------
+    blocks, closing
+        The plant's blocks, and what closes the loop at the same points.
+    """
+
+    def __init__(self, blocks: LoopBlocks, closing: Closing) -> None:
+        law, slope = closing.law, closing.slopes
+        self.count = 0 if slope is None else len(slope)
+        yu, yw = blocks.yu, blocks.yw
+        if law.ndim > 3:  # many parameter vectors: an axis for them before that of the points
+            yu, yw = yu[..., None, :], yw[..., None, :]
+            self._zw, self._zu = blocks.zw[..., None, :], blocks.zu[..., None, :]
+        else:
+            self._zw, self._zu = blocks.zw, blocks.zu
+        identity = np.eye(len(law)).reshape(len(law), len(law), *(1,) * (law.ndim - 2))
+        self.inverse = _inverse(identity - _times(law, yu))
+        self._commands = _times(self.inverse, _times(law, yw))
+        self._yu = yu
+        self._law_slope = slope
+        self._heard = yw + _times(yu, self._commands) if slope is not None else None
+
+    @cached_property
+    def _command_slope(self) -> ComplexArray:
+        """Slopes of the commands by each variable, (n, m, nw, k)."""
+        assert self._law_slope is not None and self._heard is not None
+        m, points = len(self.inverse), self._heard.shape[-1]
+        found = np.zeros((self.count, m, self._heard.shape[1], points), np.complex128)
+        for a, parts in enumerate(self._law_slope):
+            by_command: dict[int, ComplexArray] = {}
+            for (i, j), slope in parts.items():  # most entries depend on few parameters
+                term = slope * self._heard[j]
+                by_command[i] = by_command[i] + term if i in by_command else term
+            for i, through in by_command.items():
+                found[a] += self.inverse[:, i, None] * through
+        return found
+
+    def response(self, row: int, column: int) -> Any:
+        """Return the response of an output to a disturbance, (k,)."""
+        value = self._zw[row, column] + _times(self._zu[row : row + 1], self._commands)[0, column]
+        if self._law_slope is None:
+            return value
+        slope = np.einsum("rk,nrk->nk", self._zu[row], self._command_slope[:, :, column])
+        return Dual(value, slope)
+
+    def difference(self, index: int) -> Any:
+        """Return 1 + L of the loop broken at one command, all others closed, (k,)."""
+        own = self.inverse[index, index]
+        if self._law_slope is None:
+            return 1.0 / own
+        # dG_ii = G_i. dC (P_yu G)_.i
+        back = np.einsum("jmk,mk->jk", self._yu, self.inverse[:, index])
+        return Dual(1.0 / own, -self._turned(self.inverse[index], back) / own**2)
+
+    def determinant(self) -> Any:
+        """Return det(I - C P_yu), (k,)."""
+        whole = np.linalg.det(np.moveaxis(self.inverse, (0, 1), (-2, -1)))
+        if self._law_slope is None:
+            return 1.0 / whole
+        # d det M = det M tr(M^-1 dM), M = I - C P_yu
+        turned = np.einsum("jmk,mrk->jrk", self._yu, self.inverse)
+        slope = np.zeros((self.count, turned.shape[-1]), np.complex128)
+        for a, parts in enumerate(self._law_slope):
+            for (i, j), part in parts.items():
+                slope[a] -= part * turned[j, i]
+        return Dual(1.0 / whole, slope / whole)
+
+    def _turned(self, left: ComplexArray, right: ComplexArray) -> ComplexArray:
+        """Return left . dC right of vectors (m, k) and (l, k) by each variable, (n, k)."""
+        assert self._law_slope is not None
+        found = np.zeros((self.count, right.shape[-1]), np.complex128)
+        for a, parts in enumerate(self._law_slope):
+            for (i, j), slope in parts.items():
+                found[a] += left[i] * slope * right[j]
+        return found
+
+    def moments(self, rows: Sequence[int], powers: Sequence[FloatArray]) -> Any:
+        """Return integrals of |F|^2 over all disturbances.
+
+        Parameters
+        ----------
+        rows
+            Output of each integral.
+        powers
+            Its weights, (nw, k) each: quadrature weights times density times a power of omega.
+
+        Returns
+        -------
+        ndarray or Dual
+            (..., number of integrals).
+        """
+        found = {row: self._all(row) for row in dict.fromkeys(rows)}
+        values = []
+        for row, weights in zip(rows, powers, strict=True):
+            # (nw, ..., k) against (nw, k)
+            spread = weights.reshape(len(weights), *(1,) * (found[row].ndim - 2), -1)
+            values.append(np.sum(np.abs(found[row]) ** 2 * spread, axis=(0, -1)))
+        value = np.stack(values, axis=-1)
+        if self._law_slope is None:
+            return value
+        adjoint = np.stack(
+            [
+                (np.conj(found[row]) * weights)[None] * self._zu[row][:, None]
+                for row, weights in zip(rows, powers, strict=True)
+            ]
+        )
+        size = len(rows), -1
+        slope = 2.0 * (
+            self._command_slope.reshape(self.count, -1) @ adjoint.reshape(size).T
+        )
+        return Dual(value, slope.real)
+
+    def curvature(self, row: int, weights: FloatArray) -> FloatArray:
+        """Return half the Gauss-Newton Hessian of an integral of |F|^2, (n, n); see `moments`."""
+        slope = np.einsum("rk,nrwk->nwk", self._zu[row], self._command_slope) * np.sqrt(weights)
+        flat = slope.reshape(self.count, -1)
+        return np.asarray((flat @ flat.conj().T).real)
+
+    def _all(self, row: int) -> ComplexArray:
+        """Return the responses of an output to every disturbance, (nw, ..., k)."""
+        return np.asarray(self._zw[row] + _times(self._zu[row : row + 1], self._commands)[0])
+
+
+#: Weights of the moments m_0 and m_2 on quadrature nodes, (nw, k) each, by order.
+Moments = Mapping[int, FloatArray]
+
+
+def moment_weights(problem: Problem, nodes: Quadrature) -> Moments:
+    """Return quadrature weights times densities times powers of omega, (nw, k), by order."""
+    densities = [d.density(nodes.omega) * nodes.weights for d in problem.disturbances]
+    return {order: np.array(densities) * nodes.omega**order for order in (0, 2)}
+
+
+Fresh = Callable[[FloatArray, bool], LoopResponses]
+
+
+class LoopNumbers:
+    """The `synth.limits.Symbols` of a problem at one point, or at many.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    outputs
+        Names of the outputs that the blocks hold.
+    cost, margins
+        The closed loop on the quadrature nodes and on the margin frequencies.
+    weights, omega
+        The weights of the moments on those nodes, and those frequencies [rad/s].
+    log_drag
+        Logarithm of the drag coefficient, or None.
+    extra
+        The variable of a goal other than the cost, or None.
+    goal
+        What is looked for.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        outputs: Sequence[str],
+        cost: LoopResponses,
+        margins: LoopResponses,
+        weights: Moments,
+        omega: FloatArray,
+        *,
+        log_drag: Any = None,
+        extra: Any = None,
+        goal: Goal = Goal.COST,
+    ) -> None:
+        self._problem, self._outputs, self._weights = problem, tuple(outputs), weights
+        self._cost, self._margins = cost, margins
+        self.omega = omega
+        self.log_drag, self.extra = log_drag, extra
+        self._amplitude = exp(extra * 2.0) if goal is Goal.SEA else None
+        self._fresh: Fresh | None = None
+
+    def under(self, problem: Problem, weights: Moments) -> LoopNumbers:
+        """Return the same loop shaken by the disturbances of another problem."""
+        return LoopNumbers(
+            problem,
+            self._outputs,
+            self._cost,
+            self._margins,
+            weights,
+            self.omega,
+            log_drag=self.log_drag,
+            extra=self.extra,
+        )
+
+    @cached_property
+    def differences(self) -> list[Any]:
+        """1 + L of every loop at the margin frequencies, (k,) each."""
+        loops = range(len(self._problem.plant.inputs))
+        return [self._padded(self._margins.difference(i)) for i in loops]
+
+    @property
+    def module_margin(self) -> float:
+        """Radius of the disc about -1 that a limit on the sensitivity keeps clear; 0 without."""
+        bounds = [lim.bound for lim in self._problem.limits if lim.name == "max_sensitivity"]
+        return 1.0 / bounds[0] if bounds else 0.0
+
+    def measure(self, fresh: Fresh) -> None:
+        """Let margins be held where they are measured, between the margin frequencies too.
+
+        Parameters
+        ----------
+        fresh
+            From frequencies [rad/s] and whether slopes are wanted to the closed loop there.
+        """
+        self._fresh = fresh
+
+    @cached_property
+    def nearest(self) -> list[Any]:
+        """1 + L of every loop at the refined dips of its size, (p,) each; none on a grid.
+
+        The dips move with the parameters, but at a dip that changes its size in second order only.
+        """
+        fresh = self._fresh
+        if fresh is None:
+            return []
+        found = []
+        for i, d in enumerate(self.differences):
+            at, _ = refine_minima(
+                lambda w, i=i: np.abs(value_of(fresh(w, False).difference(i))),
+                self.omega,
+                np.abs(value_of(d)),
+                below=_CLOSE * max(self.module_margin, _LEAST_MARGIN),
+            )
+            found.append(self._padded(fresh(at, isinstance(d, Dual)).difference(i)))
+        return found
+
+    @cached_property
+    def on_axis(self) -> Any | None:
+        """L of all loops where it crosses the negative real axis, (c,); None on a grid.
+
+        The crossing moves with the parameters: Im L = 0 gives its frequency's slopes.
+        """
+        fresh = self._fresh
+        if fresh is None:
+            return None
+        found = []
+        for i, d in enumerate(self.differences):
+            gain = value_of(d) - 1.0
+            at = crossings(lambda w, i=i: _gain(fresh(w, False), i).imag, self.omega, gain.imag)
+            ends = self.omega[[0, -1]][_flat(gain[[0, -1]])]
+            for places, moves in ((at, True), (ends, False)):
+                loop = self._padded(fresh(places, isinstance(d, Dual)).difference(i) - 1.0)
+                if isinstance(loop, Dual):
+                    slope = loop.slope
+                    if moves:
+                        rate = _rate(fresh, places, i)
+                        slope = slope - rate * slope.imag / rate.imag
+                    loop = Dual(loop.value.real, slope.real)
+                found.append(real(loop)[..., value_of(real(loop)) < 0.0])
+        return joined(found)
+
+    @cached_property
+    def turning_delays(self) -> Any | None:
+        """Delay at each crossover of all loops that turns L to -1 [s], (c,); None on a grid."""
+        fresh = self._fresh
+        if fresh is None:
+            return None
+        found: list[Any] = []
+        for i, d in enumerate(self.differences):
+            size = np.abs(value_of(d) - 1.0) - 1.0
+            at = crossings(lambda w, i=i: np.abs(_gain(fresh(w, False), i)) - 1.0, self.omega, size)
+            loop = self._padded(fresh(at, isinstance(d, Dual)).difference(i) - 1.0)
+            gain = value_of(loop)
+            turn = np.mod(np.angle(-gain), 2.0 * np.pi)
+            if not isinstance(loop, Dual):
+                found.append(turn / at)
+                continue
+            rate = _rate(fresh, at, i)
+            grows = (np.conj(gain) * rate).real
+            shift = -(np.conj(gain) * loop.slope).real / grows  # of the crossover, [rad/s]
+            turns = ((loop.slope + rate * shift) / gain).imag
+            found.append(Dual(turn / at, turns / at - turn / at**2 * shift))
+        return joined(found)
+
+    def response(self, output: str, disturbance: str) -> Any:
+        """Return the closed-loop response at the margin frequencies, (k,)."""
+        names = [d.name for d in self._problem.disturbances]
+        row, column = self._outputs.index(output), names.index(disturbance)
+        return self._padded(self._margins.response(row, column))
+
+    @cached_property
+    def _moments(self) -> Mapping[tuple[str, int], Any]:
+        """Spectral moments m_0 and m_2 of every output."""
+        keys = [(name, order) for name in self._outputs for order in self._weights]
+        rows = [self._outputs.index(name) for name, _ in keys]
+        every = self._cost.moments(rows, [self._weights[order] for _, order in keys])
+        every = self._padded(every)
+        return {key: every[k : k + 1] if isinstance(every, Dual) else every[..., k : k + 1]
+                for k, key in enumerate(keys)}
+
+    def moment(self, output: str, order: int) -> Any:
+        """Return the spectral moment m_order of `output`, (1,)."""
+        found = self._moments[output, order]
+        return found if self._amplitude is None else found * self._amplitude
+
+    def peak(self, output: str, duration: float) -> Any:
+        """Return the most probable maximum of `output` in `duration` [s], (1,)."""
+        m0, m2 = self.moment(output, 0), self.moment(output, 2)
+        cycles = sqrt(m2 / m0) * (duration / (2.0 * np.pi))
+        return sqrt(log(at_least(cycles, _LEAST_CYCLES)) * 2.0) * sqrt(m0)
+
+    def cost(self) -> Any:
+        """Return the logarithm of the square root of the weighted variance, (1,)."""
+        terms = [self.moment(name, 0) * w for name, w in self._problem.minimise.items()]
+        return log(sum(terms[1:], terms[0])) * 0.5
+
+    def cost_curvature(self) -> FloatArray:
+        """Return the Gauss-Newton Hessian of `cost` by its variables, (n, n).
+
+        The responses are nearly linear in the parameters where the cost is small, and then it is
+        the sum of squares, not its logarithm, that a quadratic model is good for.
+        """
+        total, variance = np.zeros((self._cost.count, self._cost.count)), 0.0
+        for name, weight in self._problem.minimise.items():
+            row = self._outputs.index(name)
+            total += weight * self._cost.curvature(row, self._weights[0])
+            variance += weight * float(value_of(self._moments[name, 0]).item())
+        found = total / variance
+        if isinstance(self.extra, Dual):
+            found = np.pad(found, (0, 1))
+        return found
+
+    def drag_balance(self) -> Any:
+        """Return log C - log(slope sigma_v), zero where drag and motion agree, (1,)."""
+        drag = self._problem.drag
+        assert drag is not None
+        return self.log_drag - (log(self.moment(drag.velocity, 0)) * 0.5 + np.log(drag.slope))
+
+    def _padded(self, found: Any) -> Any:
+        """Return a number with a slope of zero by the variable of the goal, if there is one."""
+        if not isinstance(found, Dual) or not isinstance(self.extra, Dual):
+            return found
+        return Dual(found.value, np.concatenate([found.slope, np.zeros_like(found.slope[:1])]))
+
+
+def _gain(loop: LoopResponses, index: int) -> ComplexArray:
+    return np.asarray(value_of(loop.difference(index)) - 1.0)
+
+
+def _rate(fresh: Fresh, omega: FloatArray, index: int) -> ComplexArray:
+    """Return dL/d omega by central differences, (k,)."""
+    ends = [_gain(fresh(omega * (1.0 + step), False), index) for step in (_SHIFT, -_SHIFT)]
+    return np.asarray((ends[0] - ends[1]) / (2.0 * _SHIFT * omega))
+
+
+def _flat(gain: ComplexArray) -> Any:
+    """Return where L starts or ends on the real axis, as `synth.loop` counts it."""
+    return (np.abs(gain) > 1e-6) & (np.abs(gain.imag) < 1e-3 * np.abs(gain))
+
+
+def _times(a: ComplexArray, b: ComplexArray) -> ComplexArray:
+    """Return the product of matrices that stand on the first two axes."""
+    return np.asarray(sum(a[:, k, None] * b[None, k] for k in range(len(b))))
+
+
+def _inverse(a: ComplexArray) -> ComplexArray:
+    """Return the inverse of matrices on the first two axes."""
+    if len(a) == 1:
+        return 1.0 / a
+    if len(a) == 2:
+        determinant = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]
+        return np.array([[a[1, 1], -a[0, 1]], [-a[1, 0], a[0, 0]]]) / determinant
+    return np.moveaxis(np.linalg.inv(np.moveaxis(a, (0, 1), (-2, -1))), (-2, -1), (0, 1))

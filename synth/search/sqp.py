@@ -1,0 +1,361 @@
+r"""Sequential quadratic programming on few variables and many rows.
+
+.. math::
+
+    \min_{d, s} \tfrac12 d^T H d + \nabla f^T d + \rho s \quad\text{s.t. }
+    g + J d \le s, \; |h + A d| \le s, \; s \ge 0
+
+An exact penalty on the largest row (Nocedal and Wright, *Numerical Optimization*, 2nd ed., ch. 17
+and 18): the slack keeps every quadratic programme feasible, so that a start may break its limits.
+The Hessian of the Lagrangian begins as differences of its exact slopes and is kept up by damped
+BFGS; rows that cannot come into play within a step stay out of its quadratic programme, which
+DAQP solves by a dual active set.  Points at which the loop is unstable are never evaluated: a
+spectral integral is finite there too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import daqp
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import eigh
+
+from models.basics import FloatArray
+
+_SLACK = 1e-8  # curvature of the slack, which the quadratic programme wants positive
+_FLAT = 1e-8  # least curvature of the model
+_FLOOR = 1e-4  # of the model, relative to its mean curvature
+_SHARE = 1e-3  # of the model's curvature that every direction has at least
+_STEP = 1e-5  # relative, of differences
+_LEAST = 0.1  # a variable near zero is given this share of the size that moves something by one
+_ROOM, _LEAST_ROOM = 0.5, 1e-9  # how far, relatively, a variable may move at first and at last
+_MOST_ROOM = 4.0
+_HALVINGS = 8
+_SOUND = 1e-4  # share of the reduction promised that a step must keep
+_STIFF = 1.5  # weight of the rows over the sum of their multipliers
+_HEAVY = 1e7
+_KEPT = 1e-8  # row that counts as kept
+_RENEWED = 6  # steps after which differences replace what BFGS has gathered
+_DAMPED = 0.2  # of Powell's damping
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Evaluation:
+    """A programme at a point: objective, rows at most zero, equations, and their slopes.
+
+    Shapes: slope (n,), rows (m,), jacobian (m, n), equations (e,), their slopes (e, n).
+    `curvature` (n, n), positive semidefinite, is a model of the objective's Hessian from its
+    slopes alone (Gauss-Newton).
+    """
+
+    objective: float
+    slope: FloatArray
+    rows: FloatArray
+    jacobian: FloatArray
+    equations: FloatArray
+    equation_slopes: FloatArray
+    curvature: FloatArray
+
+    @property
+    def broken(self) -> float:
+        """The largest row or equation; 0 where all are kept."""
+        return max(
+            0.0, float(self.rows.max(initial=0.0)), float(np.abs(self.equations).max(initial=0.0))
+        )
+
+    @property
+    def finite(self) -> bool:
+        """Whether everything is a number."""
+        parts = (self.slope, self.rows, self.jacobian, self.equations)
+        return bool(np.isfinite(self.objective) and all(np.all(np.isfinite(p)) for p in parts))
+
+    def lagrangian_slope(self, prices: FloatArray, equation_prices: FloatArray) -> FloatArray:
+        """Return the slope of objective + prices . rows + prices . equations, (n,)."""
+        return np.asarray(
+            self.slope + prices @ self.jacobian + equation_prices @ self.equation_slopes
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Descent:
+    """Where a descent ended: the point, its evaluation, the multipliers, and how."""
+
+    x: FloatArray
+    at: Evaluation
+    prices: FloatArray
+    equation_prices: FloatArray
+    converged: bool
+    message: str
+    steps: int
+
+
+def descend(
+    evaluate: Callable[[FloatArray], Evaluation],
+    stable: Callable[[FloatArray], bool],
+    start: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    *,
+    logarithmic: npt.NDArray[np.bool_],
+    tolerance: float = 1e-8,
+    most: int = 60,
+) -> Descent:
+    """Return the point near a start where nothing gets better within the rows.
+
+    Parameters
+    ----------
+    evaluate
+        The programme at a vector (n,).
+    stable
+        Whether a vector may be evaluated.
+    start, low, high
+        Where to begin, and the ends of each variable, (n,).
+    logarithmic
+        Which variables are logarithms, of size one, (n,).
+    tolerance
+        Of the objective: what a step must promise to be taken.
+    most
+        Steps at most.
+    """
+    x = np.clip(start, low, high)
+    prices, equation_prices = np.zeros(0), np.zeros(0)
+    if not stable(x):
+        none = np.zeros(0)
+        empty = Evaluation(
+            objective=np.inf,
+            slope=np.zeros_like(x),
+            rows=none,
+            jacobian=np.zeros((0, x.size)),
+            equations=none,
+            equation_slopes=np.zeros((0, x.size)),
+            curvature=np.zeros((x.size, x.size)),
+        )
+        return _ended(x, empty, none, none, "the start is unstable", 0)
+    at = evaluate(x)
+    if not at.finite:
+        return _ended(x, at, np.zeros(at.rows.size), np.zeros(at.equations.size), "no number", 0)
+    hessian: FloatArray | None = None
+    room, weight = _ROOM, 10.0
+    stalled, age = 0, 0
+    prices, equation_prices = np.zeros(at.rows.size), np.zeros(at.equations.size)
+    for k in range(most):
+        size = np.where(logarithmic, 1.0, _sizes(x, at))
+        if hessian is None or age >= _RENEWED:
+            age = 0
+            hessian = _differences(
+                evaluate, x, size, at, prices, equation_prices, high
+            )
+        reach = room * size
+        box = np.maximum(low - x, -reach), np.minimum(high - x, reach)
+        found = _quadratic(at, at.rows, at.equations, hessian, box, weight)
+        if found is None:
+            return _ended(x, at, prices, equation_prices, "no quadratic programme", k)
+        step, slack, new_prices, new_equation_prices = found
+        total = float(np.abs(new_prices).sum() + np.abs(new_equation_prices).sum())
+        if slack > max(_KEPT, 0.9 * at.broken) and at.broken > _KEPT and weight < _HEAVY:
+            weight *= 10.0
+            continue
+        prices, equation_prices = new_prices, new_equation_prices
+        if slack <= _KEPT and weight < _STIFF * total:
+            weight = 2.0 * _STIFF * total
+        model = float(at.slope @ step + 0.5 * step @ hessian @ step)
+        promised = weight * (at.broken - slack) - model
+        if promised <= tolerance:
+            if at.broken <= _KEPT * 10.0:
+                return _ended(x, at, prices, equation_prices, "", k + 1)
+            if weight >= _HEAVY or slack > _KEPT:
+                return _ended(x, at, prices, equation_prices, "the limits exclude each other", k)
+        merit = at.objective + weight * at.broken
+        ahead, share = _ahead(
+            evaluate, stable, x, step, merit, weight, promised, at, hessian, box
+        )
+        if ahead is None:
+            room *= 0.2
+            stalled += 1
+            if stalled == 2:
+                hessian = None  # the differences anew: what BFGS has gathered may mislead
+            if room < _LEAST_ROOM or stalled > 4:
+                small = promised <= 1e2 * tolerance and at.broken <= 1e2 * _KEPT
+                done = "" if small else "no step helps"
+                return _ended(x, at, prices, equation_prices, done, k + 1)
+            continue
+        stalled, age = 0, age + 1
+        moved, new = ahead
+        limited = bool(np.any(np.abs(step) >= 0.99 * reach))
+        room = min(_MOST_ROOM, 2.0 * room) if share == 1.0 and limited else room * max(share, 0.25)
+        hessian = _updated(hessian, moved - x, at, new, prices, equation_prices)
+        x, at = moved, new
+        if prices.size != at.rows.size:
+            prices = np.zeros(at.rows.size)
+    return _ended(x, at, prices, equation_prices, "maximum of iterations", most)
+
+
+def _sizes(x: FloatArray, at: Evaluation) -> FloatArray:
+    """Return the size of each variable: its own, or, near zero, what moves something by one."""
+    slopes = np.vstack([at.slope[None], at.jacobian, at.equation_slopes])
+    steepest = np.abs(slopes).max(axis=0)
+    return np.asarray(np.maximum(np.abs(x), _LEAST / np.maximum(steepest, 1.0)))
+
+
+def _ended(
+    x: FloatArray,
+    at: Evaluation,
+    prices: FloatArray,
+    equation_prices: FloatArray,
+    message: str,
+    steps: int,
+) -> Descent:
+    return Descent(
+        x=x,
+        at=at,
+        prices=prices,
+        equation_prices=equation_prices,
+        converged=not message,
+        message=message or "solved",
+        steps=steps,
+    )
+
+
+def _quadratic(
+    at: Evaluation,
+    rows: FloatArray,
+    equations: FloatArray,
+    hessian: FloatArray,
+    box: tuple[FloatArray, FloatArray],
+    weight: float,
+) -> tuple[FloatArray, float, FloatArray, FloatArray] | None:
+    """Return the step, its slack, and the multipliers of rows and equations."""
+    n = at.slope.size
+    reach = np.maximum(np.maximum(np.abs(box[0]), np.abs(box[1])), 1e-300)
+    # A row that no step within the box can bring to zero stays out.
+    near = np.flatnonzero(rows + np.abs(at.jacobian) @ reach > 0.0)
+    e = equations.size
+    H = np.zeros((n + 1, n + 1))
+    # In shares of the reach, so that the sizes of the variables do not matter.
+    H[:n, :n], H[n, n] = _convex(hessian * np.outer(reach, reach), at.curvature * np.outer(reach, reach)), _SLACK
+    f = np.append(at.slope * reach, weight)
+    A = np.zeros((near.size + 2 * e, n + 1))
+    A[: near.size, :n] = at.jacobian[near] * reach
+    A[near.size : near.size + e, :n] = at.equation_slopes * reach
+    A[near.size + e :, :n] = -at.equation_slopes * reach
+    A[:, n] = -1.0
+    upper = np.concatenate([-rows[near], -equations, equations])
+    most = np.append(box[1] / reach, 1e6)
+    least = np.append(box[0] / reach, 0.0)
+    above = np.concatenate([most, upper])
+    below = np.concatenate([least, np.full(upper.size, -1e30)])
+    kinds = np.zeros(above.size, dtype=np.intc)
+    # Rows that nearly coincide can make the active set go round in circles; proximal steps do not.
+    for proximal in (0.0, 1e-6, 1e-3):
+        answer, _, flag, info = daqp.solve(
+            H, f, A, above, below, kinds, primal_tol=1e-10, eps_prox=proximal
+        )
+        if flag >= 1:
+            break
+    else:
+        return None
+    lam = np.asarray(info["lam"], dtype=np.float64)[n + 1 :]
+    prices = np.zeros(rows.size)
+    prices[near] = lam[: near.size]
+    equation_prices = lam[near.size : near.size + e] - lam[near.size + e :]
+    answer = np.asarray(answer, dtype=np.float64)
+    return answer[:n] * reach, max(0.0, float(answer[n])), prices, equation_prices
+
+
+def _ahead(
+    evaluate: Callable[[FloatArray], Evaluation],
+    stable: Callable[[FloatArray], bool],
+    x: FloatArray,
+    step: FloatArray,
+    merit: float,
+    weight: float,
+    promised: float,
+    at: Evaluation,
+    hessian: FloatArray,
+    box: tuple[FloatArray, FloatArray],
+) -> tuple[tuple[FloatArray, Evaluation] | None, float]:
+    """Return where a step, or a share of it, leads to, and the share; None if nowhere better."""
+    share = 1.0
+    for k in range(_HALVINGS):
+        there = x + share * step
+        if stable(there):
+            new = evaluate(there)
+            # A hair of slack: at the answer itself the merit only rounds.
+            wanted = merit - _SOUND * share * promised + 1e-12 * (1.0 + abs(merit))
+            if new.finite and new.objective + weight * new.broken <= wanted:
+                return (there, new), share
+            if k == 0 and new.finite and new.rows.size == at.rows.size:
+                # Rows curve: a second step takes up what the first one left broken.
+                rows = new.rows - at.jacobian @ step
+                equations = new.equations - at.equation_slopes @ step
+                again = _quadratic(at, rows, equations, hessian, box, weight)
+                if again is not None and stable(x + again[0]):
+                    bent = evaluate(x + again[0])
+                    if bent.finite and bent.objective + weight * bent.broken <= wanted:
+                        return (x + again[0], bent), 1.0
+        share *= 0.5 if k < 3 else 0.25
+    return None, share
+
+
+def _differences(
+    evaluate: Callable[[FloatArray], Evaluation],
+    x: FloatArray,
+    sizes: FloatArray,
+    at: Evaluation,
+    prices: FloatArray,
+    equation_prices: FloatArray,
+    high: FloatArray,
+) -> FloatArray:
+    """Return the Hessian of the Lagrangian by differences of its slope."""
+    here = at.lagrangian_slope(prices, equation_prices)
+    hessian = np.zeros((x.size, x.size))
+    for i in range(x.size):
+        size = _STEP * sizes[i]
+        there = x.copy()
+        there[i] += size if x[i] + size <= high[i] else -size
+        new = evaluate(there)
+        if not new.finite or new.rows.size != at.rows.size:
+            hessian[i, i] = 1.0 / sizes[i] ** 2
+            continue
+        hessian[i] = (new.lagrangian_slope(prices, equation_prices) - here) / (there[i] - x[i])
+    return 0.5 * (hessian + hessian.T)
+
+
+def _convex(curvature: FloatArray, model: FloatArray) -> FloatArray:
+    """Return a positive definite matrix: where a curvature is negative a share of the model's.
+
+    The shares are taken along the axes that make both matrices diagonal.
+    """
+    floor = max(_FLAT, _FLOOR * float(np.trace(model)) / len(model))
+    metric = model + floor * np.eye(len(model))
+    sizes, axes = eigh(0.5 * (curvature + curvature.T), metric)
+    back = metric @ axes
+    return np.asarray((back * np.maximum(sizes, _SHARE)) @ back.T, dtype=np.float64)
+
+
+def _updated(
+    hessian: FloatArray,
+    step: FloatArray,
+    old: Evaluation,
+    new: Evaluation,
+    prices: FloatArray,
+    equation_prices: FloatArray,
+) -> FloatArray:
+    """Return the Hessian after a step, by Powell's damped BFGS."""
+    if new.rows.size != old.rows.size:
+        return hessian
+    change = new.lagrangian_slope(prices, equation_prices) - old.lagrangian_slope(
+        prices, equation_prices
+    )
+    along = hessian @ step
+    curve, bend = float(step @ along), float(step @ change)
+    if curve <= 0.0 or not np.isfinite(bend):
+        return hessian
+    if bend < _DAMPED * curve:
+        theta = (1.0 - _DAMPED) * curve / (curve - bend)
+        change = theta * change + (1.0 - theta) * along
+        bend = float(step @ change)
+    return np.asarray(hessian - np.outer(along, along) / curve + np.outer(change, change) / bend)
