@@ -16,8 +16,8 @@ from models.basics import ComplexArray, FloatArray
 
 LoopGain = Callable[[FloatArray], ComplexArray]
 
-_INSIDE = np.arange(1.0, 9.0) / 9.0
-_SPLITS = 16  # of a bracket into nine: 50 bits
+_TRIES = 60  # at a crossing
+_WIDTH, _ZERO = 1e-14, 1e-15  # of a bracket, relative, and of what crosses
 _ZOOM = np.linspace(0.0, 1.0, 17)
 _ROUNDS = 7  # each zooms by a factor of eight: 8^7 is 2e6
 _FORETOLD = 1e-13  # relative error of a parabola that is as good as the function itself
@@ -161,15 +161,27 @@ def crossings(
     low, high, left = grid[at], grid[at + 1], values[at] >= 0.0
     if not at.size:
         return np.zeros(0)
-    rows = np.arange(at.size)
-    for _ in range(_SPLITS):
-        # Many points in one call cost little more than one: a ninth of the bracket is left.
-        nodes = low[:, None] + (high - low)[:, None] * _INSIDE
-        changed = (function(nodes.ravel()).reshape(nodes.shape) >= 0.0) != left[:, None]
-        first = np.where(changed.any(axis=1), changed.argmax(axis=1), _INSIDE.size)
-        ends = np.column_stack([low, nodes, high])
-        low, high = ends[rows, first], ends[rows, first + 1]
-    return 0.5 * (low + high)
+    f_low, f_high = values[at], values[at + 1]
+    for _ in range(_TRIES):
+        # False position with Anderson and Bjorck's weight on the end that stays.
+        middle = np.clip(
+            high - f_high * (high - low) / np.where(f_high == f_low, np.inf, f_high - f_low),
+            low,
+            high,
+        )
+        found = function(middle)
+        same = (found >= 0.0) == left
+        against = np.where(same, f_low, f_high)
+        weight = 1.0 - found / np.where(against == 0.0, np.inf, against)
+        weight = np.where(weight > 0.0, weight, 0.5)
+        f_low, f_high = (
+            np.where(same, found, f_low * weight),
+            np.where(same, f_high * weight, found),
+        )
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+        if np.all((high - low <= _WIDTH * high) | (np.abs(found) <= _ZERO)):
+            break
+    return middle
 
 
 def _with_ends(

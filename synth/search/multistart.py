@@ -23,7 +23,8 @@ from .starts import begin_points, briskest, start_coefficients
 Progress = Callable[[str, int, int], None]
 
 AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
-_ENOUGH = 3  # starts that agree on the best answer: no more are needed
+_ENOUGH, _MOST = 3, 0.7  # starts, and share of all, that agree on the best answer: no more needed
+_NEAR, _BESIDE = 3e-3, 0.03  # of log cost and parameters, relative: descents on their way to one end
 _POLISHED = 6  # distinct answers that are polished at most
 _RESERVE = 16  # further starts for a search of which none arrived
 _VIOLATION = 3  # starts of the least violation
@@ -173,16 +174,24 @@ def _descents(
     """Return the records of the starts, and the answers of those that arrived."""
     records: list[Start] = []
     first: list[Solution] = []
+    rough: list[tuple[Solution, Solution]] = []  # where a descent came by, and where it ended
+    drags = start_coefficients(family)
     count = min(starts, len(begins))
     for k, begin in enumerate(begins):
         if k >= count and first:
             break  # the reserve is for a search of which no start has arrived yet
         best = min((s.objective for s in first), default=np.inf)
         agreed = sum(1 for s in first if s.objective - best <= AGREE)
-        if agreed >= _ENOUGH and k >= guesses:
+        if agreed >= max(_ENOUGH, _MOST * len(first)) and k >= guesses:
             break
         tell("starts", min(k, count - 1), count)
-        solved = settle(family, begin, start_coefficients(family), reference=reference)
+        coarse = settle(family, begin, drags, reference=reference, rounds=1)
+        solved = next((end for came, end in rough if _same(family, came, coarse)), None)
+        if solved is None and np.isfinite(coarse.objective):
+            values, found = coarse.values, coarse.coefficients
+            solved = settle(family, values, found, reference=reference, exact=True)
+            rough.append((coarse, solved))
+        solved = solved or coarse
         stable = bool(
             np.isfinite(solved.objective) and family.stable(solved.values, solved.coefficients)
         )
@@ -191,6 +200,14 @@ def _descents(
             first.append(solved)
     tell("starts", count, count)
     return tuple(records), first
+
+
+def _same(family: FamilyProblem, one: Solution, other: Solution) -> bool:
+    """Return whether two descents are about to end in the same place."""
+    if not abs(one.objective - other.objective) <= _NEAR:
+        return False
+    size = np.maximum(np.maximum(np.abs(one.values), np.abs(other.values)), 1e-12 * family.scales)
+    return bool(np.max(np.abs(one.values - other.values) / size) <= _BESIDE)
 
 
 def least_violation(

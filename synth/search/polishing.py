@@ -36,6 +36,7 @@ def stated(
     reference: FloatArray,
     relaxed: Sequence[str] = (),
     fine: bool = False,
+    exact: bool = False,
 ) -> Programme:
     """Return a programme on nodes that suit the loops at a point.
 
@@ -46,7 +47,9 @@ def stated(
     goal, reference, relaxed
         As `Programme` takes them.
     fine
-        On nodes for eight digits, and with margins held where they are measured.
+        On nodes for eight digits.
+    exact
+        With margins held where they are measured.
     """
     family = FamilyProblem.of(asked)
     nodes, omega = [], []
@@ -67,7 +70,7 @@ def stated(
         reference=reference,
         relaxed=relaxed,
         tolerance=tolerance,
-        exact=fine,
+        exact=exact,
     )
 
 
@@ -81,6 +84,8 @@ def settle(
     relaxed: Sequence[str] = (),
     extra: float | None = None,
     fine: bool = False,
+    exact: bool = False,
+    rounds: int = _ROUNDS,
     reach: float | None = None,
     tighten: dict[tuple[int, str], float] | None = None,
 ) -> Solution:
@@ -92,14 +97,24 @@ def settle(
         See `stated`.
     extra
         Where the variable of the goal begins.
+    rounds
+        Most renewals of the nodes; the first of them, far from the answer, holds margins by discs,
+        which see a limit before it is broken.
     reach, tighten
         See `Programme.solve`.
     """
     last: Solution | None = None
     iterations = 0
-    for _ in range(_FINE_ROUNDS if fine else _ROUNDS):
+    for k in range(_FINE_ROUNDS if fine else rounds):
         programme = stated(
-            asked, values, coefficients, goal, reference=reference, relaxed=relaxed, fine=fine
+            asked,
+            values,
+            coefficients,
+            goal,
+            reference=reference,
+            relaxed=relaxed,
+            fine=fine,
+            exact=exact or fine or k > 0,
         )
         found = programme.solve(programme.pack(values, coefficients, extra), reach, tighten)
         iterations += found.iterations
