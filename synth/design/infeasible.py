@@ -15,15 +15,7 @@ import numpy as np
 from models.basics import FloatArray
 
 from ..question import DesignQuestion, Goal, Problem
-from ..search import (
-    Programme,
-    Progress,
-    Solution,
-    assessment_of,
-    briskest,
-    coarse_programme,
-    polish,
-)
+from ..search import Progress, Solution, assess, briskest, polish, settle
 from .tuning import Tuning
 
 _BINDING = 5e-3  # a limit that is used up to this share of itself binds
@@ -89,28 +81,39 @@ def shortfall(
 
 
 def _largest_sea(problem: Problem, free: Tuning) -> Solution | None:
-    begins = _begins(free)
-    programme = coarse_programme(problem, begins, briskest(problem, begins), Goal.SEA)
     seas = (0.0, -1.5, -4.0)  # from the sea asked for down to a fiftieth of it
     # Drag goes with the motion, so with the sea.
     drags = [None if free.coefficient is None else free.coefficient * np.exp(sea) for sea in seas]
-    found = _arrived(programme, begins, list(zip(drags, seas, strict=True)))
+    begins = _begins(free)
+    found = _arrived(problem, begins, list(zip(drags, seas, strict=True)), Goal.SEA)
     if not found:
         return None
-    best = max(found, key=lambda s: s.extra)
+    best = min(found, key=lambda s: s.objective)
     polished, _, excess = polish(problem, best, briskest(problem, begins), Goal.SEA)
     return polished if excess <= _KEPT else None
 
 
 def _arrived(
-    programme: Programme, begins: Sequence[FloatArray], tries: Sequence[tuple[float | None, float]]
+    problem: Problem,
+    begins: Sequence[FloatArray],
+    tries: Sequence[tuple[float | None, float]],
+    goal: Goal,
+    relaxed: Sequence[str] = (),
 ) -> list[Solution]:
     """Return from each point the answer of the first (drag, extra) that leads to a stable one."""
-    found = []
+    found, reference = [], briskest(problem, begins)
     for begin in begins:
         for coefficient, extra in tries:
-            solved = programme.solve(programme.pack(begin, coefficient, extra))
-            if solved.converged and programme.problem.stable(solved.values, solved.coefficient):
+            solved = settle(
+                problem,
+                begin,
+                (coefficient,),
+                goal,
+                reference=reference,
+                relaxed=relaxed,
+                extra=extra,
+            )
+            if solved.converged and problem.stable(solved.values, solved.coefficient):
                 found.append(solved)
                 break
     return found
@@ -121,19 +124,19 @@ def _required(
 ) -> dict[str, float]:
     """Return the least bounds of the binding limits for which the sea asked for is feasible."""
     begins = [*_begins(free), best.values]
-    reference = briskest(problem, begins)
-    programme = coarse_programme(problem, begins, reference, Goal.RELAX, relaxed=binding)
     # From the limits as they are to twenty times those.
-    found = _arrived(programme, begins, [(free.coefficient, room) for room in (0.0, 1.0, 3.0)])
+    tries = [(free.coefficient, room) for room in (0.0, 1.0, 3.0)]
+    found = _arrived(problem, begins, tries, Goal.RELAX, binding)
     if not found:
         return {}
     least = min(found, key=lambda s: s.extra)
-    _, assessment, excess = polish(problem, least, reference, Goal.RELAX, binding)
+    reference = briskest(problem, begins)
+    _, assessments, excess = polish(problem, least, reference, Goal.RELAX, binding)
     if excess > _KEPT:
         return {}
     # What each of them comes to there; one that the others spare is not asked for more.
     values = {
-        lim.name: (lim, lim.measure(assessment)) for lim in problem.limits if lim.name in binding
+        lim.name: (lim, lim.measure(assessments[0])) for lim in problem.limits if lim.name in binding
     }
     return {name: value for name, (lim, value) in values.items() if lim.use(value) > 1.0}
 
@@ -144,10 +147,10 @@ def _binding(problem: Problem, solved: Solution) -> list[str]:
     Not by their multipliers alone: of two limits that say nearly the same (torque and current
     of a DC motor) only one has a price, and relaxing that one would change nothing.
     """
-    assessment = assessment_of(problem, solved, amplitude=float(np.exp(solved.extra)))
+    (assessment,), _ = assess(problem, solved, Goal.SEA)
     uses = {lim.name: lim.use(lim.measure(assessment)) for lim in problem.limits if lim.drive}
     names = [name for name, use in uses.items() if use > 1.0 - _BINDING]
-    return sorted(names or [max(uses, key=lambda n: uses[n])], key=lambda n: -abs(solved.prices[n]))
+    return sorted(names or [max(uses, key=lambda n: uses[n])], key=lambda n: -abs(solved.prices[0][n]))
 
 
 def _begins(free: Tuning) -> list[FloatArray]:

@@ -20,13 +20,14 @@ from models.plant import masses_for_bandwidth
 
 from ..loop import Assessment
 from ..question import PAYLOAD, DesignQuestion, pose, with_masses
-from ..search import Progress, resume, search
+from ..search import Progress, search
 from .design import GainDesign
 from .infeasible import Shortfall, shortfall
 from .tuning import LimitUse, Tuning, limit_uses, tuning_of
 
 _MODES = 5.0  # every rope mode below this many crossovers belongs in the design plant
 _MOST_MASSES = 40
+_RESUMED = 5  # ends of a search that the next one, on more masses, begins from
 
 
 @one_thread()
@@ -66,7 +67,11 @@ def optimise_gains(
         question = with_masses(question, wanted)
         values = list(tuning.parameters.values())
         problem = question.problem
-        again = tuning_of(problem, resume(problem, values, tuning.found, progress))
+        ends = [s.end for s in sorted(tuning.starts, key=lambda s: s.cost) if s.converged]
+        guesses = [values, *ends[:_RESUMED]]
+        again = tuning_of(
+            problem, search(problem, 1, seed, guesses, progress, only_guesses=True)
+        )
         if not again.ok and tuning.ok:
             again = tuning_of(problem, search(problem, starts, seed, [values], progress))
         tuning = replace(again, starts=tuning.starts, agreed=tuning.agreed)

@@ -168,7 +168,7 @@ class StructureDesign:
             limits=self.limits,
             coefficient=self.drag if problem.drag is not None else None,
             assessment=None,
-            found=Found(solved=None, assessment=None, excess=0.0),
+            found=Found(solved=None, excess=0.0),
         )
 
     def verify(self) -> Verification:

@@ -124,9 +124,9 @@ def no_worse(problem: Problem, found: Found, starts: Sequence[Sequence[float]]) 
         solved = _as_it_is(problem, values)
         if solved is None or solved.objective > best - _BETTER:
             continue
-        again, assessment, excess = polish(problem, solved, np.array(values, dtype=np.float64))
+        again, assessments, excess = polish(problem, solved, np.array(values, dtype=np.float64))
         if again.converged and excess <= KEPT and again.objective < best:
-            found = replace(found, solved=again, assessment=assessment, excess=excess)
+            found = replace(found, solved=again, assessments=assessments, excess=excess)
     return found
 
 
@@ -145,12 +145,13 @@ def _as_it_is(problem: Problem, values: Sequence[float]) -> Solution | None:
     )
     return Solution(
         values=np.array(values, dtype=np.float64),
-        coefficient=coefficient,
+        coefficients=(coefficient,),
         # A hair dearer than it is, so that a solve which arrives at the same point counts.
         objective=0.5 * float(np.log(variance)) + _HAIR,
-        extra=0.0,
         converged=False,
         message="as it was",
         iterations=0,
-        prices={limit.name: 0.0 for limit in problem.limits},
+        prices=({limit.name: 0.0 for limit in problem.limits},),
+        costs=np.array([np.sqrt(variance)]),
+        pressure=np.ones(1),
     )

@@ -216,7 +216,7 @@ def tuning_of(problem: Problem, found: Found) -> Tuning:
         )
     cost = float(np.sqrt(sum(w * assessment.sigma(o) ** 2 for o, w in problem.minimise.items())))
     # The programme prices the logarithm of the cost per logarithm of the bound.
-    prices = {name: 0.01 * abs(price) * cost for name, price in solved.prices.items()}
+    prices = {name: 0.01 * abs(price) * cost for name, price in solved.prices[0].items()}
     uses = limit_uses(problem.limits, assessment, prices)
     ok = bool(assessment.stable and solved.converged and found.excess <= KEPT and np.isfinite(cost))
     return Tuning(

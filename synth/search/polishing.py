@@ -176,12 +176,6 @@ def polish(
     return best
 
 
-def assessment_of(problem: Problem, solved: Solution, amplitude: float = 1.0) -> Assessment:
-    """Return a solution of one problem in numbers, the disturbances' amplitudes times `amplitude`."""
-    scaled = tuple(d.scaled(amplitude) for d in problem.disturbances)
-    return replace(problem, disturbances=scaled).assess(solved.values, solved.coefficient)
-
-
 def assess(
     asked: FamilyProblem | Problem,
     solved: Solution,
