@@ -18,12 +18,13 @@ from ..loop import Assessment
 from ..question import FamilyProblem, Goal, Problem, Values
 from .polishing import KEPT, assess, polish, settle, stated
 from .programme import Solution
+from .sqp import INFEASIBLE
 from .starts import begin_points, briskest, start_coefficients
 
 Progress = Callable[[str, int, int], None]
 
 AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
-_ENOUGH, _MOST = 3, 0.7  # starts, and share of all, that agree on the best answer: no more needed
+_ENOUGH, _MOST = 4, 0.7  # starts, and share of all, that agree on the best answer: no more needed
 _NEAR, _BESIDE = 3e-3, 0.03  # of log cost and parameters, relative: descents on their way to one end
 _POLISHED = 6  # distinct answers that are polished at most
 _RESERVE = 16  # further starts for a search of which none arrived
@@ -187,7 +188,7 @@ def _descents(
         tell("starts", min(k, count - 1), count)
         coarse = settle(family, begin, drags, reference=reference, rounds=1)
         solved = next((end for came, end in rough if _same(family, came, coarse)), None)
-        if solved is None and np.isfinite(coarse.objective):
+        if solved is None and np.isfinite(coarse.objective) and coarse.message != INFEASIBLE:
             values, found = coarse.values, coarse.coefficients
             solved = settle(family, values, found, reference=reference, exact=True)
             rough.append((coarse, solved))

@@ -18,6 +18,7 @@ from ..loop import Assessment
 from ..question import FamilyProblem, Goal, Problem, Values
 from .nodes import cost_nodes, margin_nodes
 from .programme import Programme, Solution
+from .sqp import INFEASIBLE
 
 KEPT = 1e-5  # relative excess over a limit that counts as none
 _PER_DECADE, _FINE_PER_DECADE = 40, 60  # margin nodes
@@ -56,12 +57,12 @@ def stated(
     for group in family.groups:
         scenario = family.scenarios[group[0]]
         drag = None if coefficients is None else coefficients[group[0]]
-        poles = scenario.problem.loop_poles(scenario.values(values), drag)
+        poles = scenario.problem.loop_poles(scenario.values(values), drag, late=fine)
         shaken = family.shaken_by_all(group)
         nodes.append(cost_nodes(shaken, poles, fine=fine))
         per_decade = _FINE_PER_DECADE if fine else _PER_DECADE
         omega.append(margin_nodes(scenario.problem, poles, per_decade))
-    tolerance = 1e-10 if fine else 1e-6
+    tolerance = 1e-13 if fine else 1e-6
     return Programme(
         family,
         nodes,
@@ -121,6 +122,8 @@ def settle(
         found = replace(found, iterations=iterations)
         if not np.isfinite(found.objective):
             return last or found
+        if found.message == INFEASIBLE:
+            return found
         moved = np.inf if last is None else abs(found.objective - last.objective)
         values, coefficients, extra, last = found.values, found.coefficients, found.extra, found
         if moved < (_FINE_SETTLED if fine else _SETTLED):

@@ -230,7 +230,7 @@ class Programme:
         """
         low, high = self._box(start, reach)
         found = descend(
-            lambda x: self._evaluation(x, tighten),
+            lambda x: self.evaluate(x, tighten),
             self.stable,
             start,
             low,
@@ -325,7 +325,8 @@ class Programme:
         bends = [curvatures[i] for i in every] if slopes else []
         return [(costs[i], i) for i in every], rows, balances, bends
 
-    def _evaluation(self, x: FloatArray, tighten: Tighten | None) -> Evaluation:
+    def evaluate(self, x: FloatArray, tighten: Tighten | None = None) -> Evaluation:
+        """Return the programme at a vector, with slopes; see `solve`."""
         at = self._values(x)
         with np.errstate(all="ignore"):
             costs, rows, balances, curvatures = self._parts(x, tighten, slopes=True)

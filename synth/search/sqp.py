@@ -36,7 +36,8 @@ _MOST_ROOM = 4.0
 _HALVINGS = 8
 _SOUND = 1e-4  # share of the reduction promised that a step must keep
 _STIFF = 1.5  # weight of the rows over the sum of their multipliers
-_HEAVY = 1e7
+_HEAVY = 1e4  # of the penalty: if rows are broken still, nothing near mends them
+INFEASIBLE = "the limits exclude each other"
 _KEPT = 1e-8  # row that counts as kept
 _RENEWED = 6  # steps after which differences replace what BFGS has gathered
 _DAMPED = 0.2  # of Powell's damping
@@ -155,9 +156,12 @@ def descend(
             return _ended(x, at, prices, equation_prices, "no quadratic programme", k)
         step, slack, new_prices, new_equation_prices = found
         total = float(np.abs(new_prices).sum() + np.abs(new_equation_prices).sum())
-        if slack > max(_KEPT, 0.9 * at.broken) and at.broken > _KEPT and weight < _HEAVY:
-            weight *= 10.0
-            continue
+        if at.broken > _KEPT and slack > max(_KEPT, 0.9 * at.broken):
+            if weight < _HEAVY:
+                weight *= 10.0
+                continue
+            if np.all(np.abs(step) < 0.5 * reach):
+                return _ended(x, at, prices, equation_prices, INFEASIBLE, k)
         prices, equation_prices = new_prices, new_equation_prices
         if slack <= _KEPT and weight < _STIFF * total:
             weight = 2.0 * _STIFF * total
@@ -167,7 +171,7 @@ def descend(
             if at.broken <= _KEPT * 10.0:
                 return _ended(x, at, prices, equation_prices, "", k + 1)
             if weight >= _HEAVY or slack > _KEPT:
-                return _ended(x, at, prices, equation_prices, "the limits exclude each other", k)
+                return _ended(x, at, prices, equation_prices, INFEASIBLE, k)
         merit = at.objective + weight * at.broken
         ahead, share = _ahead(
             evaluate, stable, x, step, merit, weight, promised, at, hessian, box
