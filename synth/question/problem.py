@@ -18,7 +18,6 @@ from ..structures import ParametrisedController
 
 Values = Sequence[float] | FloatArray
 
-_HIGH_PADE = 12  # where the ripple that a delay leaves in a spectrum is to be seen
 PADE = 5  # order of the delay model that the stability guard sees
 _SLOW = 1e-4  # no real pole slower than this share of the plant's slowest one
 _DECAY = 1e-9  # a pole must lie this far left, relative to the size of the largest one
@@ -50,10 +49,6 @@ class Problem:
         return self.plant.without_delays(PADE)
 
     @cached_property
-    def _late(self) -> LinearPlant:
-        return self.plant.without_delays(_HIGH_PADE)
-
-    @cached_property
     def slow_point(self) -> float:
         """Point -decay on the real axis that no closed-loop pole may pass [1/s]."""
         sizes = np.abs(self.plant.poles())
@@ -67,11 +62,9 @@ class Problem:
             wanted.add(self.drag.velocity)
         return tuple(sorted(wanted))
 
-    def loop_poles(
-        self, values: Values, coefficient: float | None = None, *, late: bool = False
-    ) -> ComplexArray:
-        """Return the closed loop's poles [1/s], delays as Pade models (`late`: of high order)."""
-        plant = self._late if late else self.rational
+    def loop_poles(self, values: Values, coefficient: float | None = None) -> ComplexArray:
+        """Return the closed loop's poles [1/s], delays as Pade models."""
+        plant = self.rational
         if self.drag is not None and coefficient is not None:
             plant = with_drag(plant, self.drag, coefficient)
         matrix = self.law.closed_loop_matrix(plant, [float(v) for v in values])

@@ -15,7 +15,6 @@ _SLOW_SIDE = 8  # nodes per decade below everything that moves
 _FAST_SIDE = 24  # ... and above it, where a loop may cross over narrowly with the wrong gains
 _INSIDE = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)  # nodes about the edge of a limit's band
 _ON_AXIS = 1e-9  # relative distance of a pole from the axis below which no node can resolve it
-_RIPPLES = 16  # half periods of a delay's ripple that have panels of their own
 _COARSE, _FINE = (6, 3.0), (10, 4.0)  # nodes a panel and panels a decade: 1e-6, 1e-8 of an rms
 
 
@@ -28,13 +27,10 @@ def cost_nodes(problem: Problem, poles: ComplexArray, *, fine: bool = False) -> 
     every = np.concatenate([poles, problem.plant.poles()])
     low, high, half_line = integration_band(problem.disturbances, every)
     per_panel, per_decade = _FINE if fine else _COARSE
-    late = max(problem.plant.delays, default=0.0)
-    # A delay ripples the spectrum of white noise far above the poles, with its own period.
-    ripples = np.pi / late * np.arange(1, _RIPPLES + 1) if late > 0.0 and fine else np.zeros(0)
     return spectral_nodes(
         low,
-        max(high, float(ripples.max(initial=0.0))) if half_line else high,
-        splits=[*(omega for d in problem.disturbances for omega in d.splits), *ripples],
+        high,
+        splits=[omega for d in problem.disturbances for omega in d.splits],
         poles=every[np.abs(every.real) > _ON_AXIS * np.abs(every)],
         per_panel=per_panel,
         panels_per_decade=per_decade,

@@ -57,9 +57,13 @@ def stated(
     for group in family.groups:
         scenario = family.scenarios[group[0]]
         drag = None if coefficients is None else coefficients[group[0]]
-        poles = scenario.problem.loop_poles(scenario.values(values), drag, late=fine)
-        shaken = family.shaken_by_all(group)
-        nodes.append(cost_nodes(shaken, poles, fine=fine))
+        own, shaken = scenario.values(values), family.shaken_by_all(group)
+        poles = scenario.problem.loop_poles(own, drag)
+        if fine and any(shaken.plant.delays) and any(d.band is None for d in shaken.disturbances):
+            # A delay ripples the spectrum of white noise far above all poles.
+            nodes.append(shaken.assess(own, drag).quadrature(shaken.outputs))
+        else:
+            nodes.append(cost_nodes(shaken, poles, fine=fine))
         per_decade = _FINE_PER_DECADE if fine else _PER_DECADE
         omega.append(margin_nodes(scenario.problem, poles, per_decade))
     tolerance = 1e-13 if fine else 1e-6

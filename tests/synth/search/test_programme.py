@@ -33,7 +33,7 @@ from synth import (
 )
 from synth.loop import Assessment, disturbances
 from synth.question import Goal, Problem
-from synth.search import Programme, cost_nodes
+from synth.search import Programme
 from synth.structures import Structure
 
 OMEGA = np.geomspace(1e-3, 1e3, 60)
@@ -80,7 +80,8 @@ def view(question: Problem, values, coefficient: float | None = None) -> Assessm
 
 
 def programme(question: Problem, values, goal: Goal = Goal.COST, **options) -> Programme:
-    nodes = cost_nodes(question, question.loop_poles(values, late=True), fine=True)
+    coefficient = None if question.drag is None else question.drag.reference
+    nodes = view(question, values, coefficient).quadrature(question.outputs)
     return Programme(question, [nodes], [OMEGA], goal, reference=np.array(values), **options)
 
 
