@@ -124,7 +124,4 @@ def longest_panel(panels_per_decade: float) -> float:
     return math.log(10.0) / panels_per_decade
 
 
-@lru_cache(maxsize=64)
-def _gauss_legendre(count: int) -> tuple[FloatArray, FloatArray]:
-    x, w = np.polynomial.legendre.leggauss(count)
-    return x, w
+_gauss_legendre = lru_cache(maxsize=64)(np.polynomial.legendre.leggauss)
