@@ -7,7 +7,7 @@ through a Lyapunov equation, its true spectra through `quad_vec`, and a rival ha
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -93,8 +93,10 @@ def verify_bound(bound: Bound) -> Verification:
 
 
 @one_thread()
-def controller_rms(bound: Bound, controller: LinearController) -> dict[str, float]:
-    """Return what another controller makes of what a bound minimises and limits, rms by name.
+def controller_rms(
+    bound: Bound, controller: LinearController, names: Sequence[str]
+) -> dict[str, float]:
+    """Return what another controller makes of outputs on a bound's terms, rms by name.
 
     Raises
     ------
@@ -117,7 +119,6 @@ def controller_rms(bound: Bound, controller: LinearController) -> dict[str, floa
     # Only a controller with a direct path makes a delayed loop ring.
     late = max(bound.plant.delays) if np.any(law.D) else 0.0
     sources = [banded(source) for source in bound.sources]
-    names = list(dict.fromkeys([*bound.minimise, *bound.limits]))
     found = moments(loop, names, sources, orders=(0,), delay=late, rtol=_QUADRATURE)
     return {name: math.sqrt(found[name][0]) for name in names}
 
@@ -130,7 +131,7 @@ def weighted_rms(bound: Bound, controller: LinearController) -> float:
     SynthesisError
         If its loop is unstable.
     """
-    found = controller_rms(bound, controller)
+    found = controller_rms(bound, controller, list(bound.minimise))
     return math.sqrt(sum(w * found[name] ** 2 for name, w in bound.minimise.items()))
 
 

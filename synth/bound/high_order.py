@@ -102,7 +102,7 @@ def roots(design: YoulaDesign) -> tuple[FloatArray, FloatArray]:
         [bound.dual.plant.outputs.index(name) for name in plant.outputs]
     ]
     does = np.abs(plant.zu[:, :, 0]) ** 2 @ charge + (design.value / moved) ** 2
-    acted: ComplexArray = row * (np.sqrt(does) * weights)[:, None]
+    acted = row * (np.sqrt(does) * weights)[:, None]
     driven = np.moveaxis(reached, 1, 2).reshape(-1, row.shape[1])
     return upper_triangle(acted), upper_triangle(driven)
 
@@ -148,6 +148,7 @@ def high_order(
     plants = [plant.without_delays(_PADE, at="measurements") for plant in both]
     grid = margin_grid(np.concatenate([design.loop.marks, true.plant.poles()]))
     yu = true.yu(grid)
+    names = list(dict.fromkeys([*bound.minimise, *bound.limits]))
     found = roots(design)
     least = len(design.controller.A)
     for order in range(_LEAST, least + 1):
@@ -159,7 +160,7 @@ def high_order(
             continue
         if any(closed_loop_poles(p, controller).real.max() >= 0.0 for p in plants):
             continue
-        made = controller_rms(bound, controller)
+        made = controller_rms(bound, controller, names)
         rms = math.sqrt(sum(w * made[name] ** 2 for name, w in bound.minimise.items()))
         kept = all(made[name] <= _EXCESS * limit for name, limit in bound.limits.items())
         if rms > (1.0 + _LOST) * design.value or not kept:

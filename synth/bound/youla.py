@@ -365,7 +365,7 @@ def _variances(bound: Bound, loop: AffineLoop) -> dict[str, tuple[FloatArray, Fl
     return found
 
 
-def upper_triangle(rows: ComplexArray) -> FloatArray:
+def upper_triangle(rows: ComplexArray | FloatArray) -> FloatArray:
     """Return R with R'R = Re rows^H rows, (n, n)."""
     return np.asarray(np.linalg.qr(np.vstack([rows.real, rows.imag]), mode="r"), dtype=np.float64)
 

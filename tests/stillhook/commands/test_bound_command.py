@@ -11,6 +11,7 @@ from stillhook.cli import main
 from synth.bound import bound_for
 
 
+@pytest.mark.ci
 def test_the_bound_is_that_of_python(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bound", "thesis-1975", "--quiet"]) == 0
     told = capsys.readouterr().out
@@ -18,6 +19,7 @@ def test_the_bound_is_that_of_python(capsys: pytest.CaptureFixture[str]) -> None
     assert value == pytest.approx(1e3 * bound_for(load_case("thesis-1975")).free.value, rel=5e-3)
 
 
+@pytest.mark.ci
 def test_fewer_sensors_do_no_better(capsys: pytest.CaptureFixture[str]) -> None:
     values = []
     for sensors in ([], ["--sensors", "payload.displacement"]):

@@ -156,7 +156,7 @@ def holds(found: BestPossible) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[] if n in QUICK else pytest.mark.slow) for n in CRANE]
+    "name", [pytest.param(n, marks=pytest.mark.ci if n in QUICK else pytest.mark.slow) for n in CRANE]
 )
 def test_bound_is_below_every_structure_of_the_crane(name: str) -> None:
     design = crane_design(name)
@@ -223,6 +223,7 @@ def test_best_found_stands_on_the_exact_rope(name: str) -> None:
     assert "times the best found" in text
 
 
+@pytest.mark.ci
 def test_lqg_beside_the_bound_has_the_sensitivity_that_is_told() -> None:
     free = bound_for(crane_design("combined"))
     view = Assessment(free.free.plant, free.free.controller, free.free.sources)
@@ -230,6 +231,7 @@ def test_lqg_beside_the_bound_has_the_sensitivity_that_is_told() -> None:
     assert free.free_sensitivity > 4.0
 
 
+@pytest.mark.ci
 def test_the_design_itself_where_nothing_better_was_found(monkeypatch: pytest.MonkeyPatch) -> None:
     best = bound_for(crane_design("combined"))
     assert best.rms is not None
