@@ -156,7 +156,8 @@ def holds(found: BestPossible) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.ci if n in QUICK else pytest.mark.slow) for n in CRANE]
+    "name",
+    [pytest.param(n, marks=pytest.mark.ci if n in QUICK else pytest.mark.slow) for n in CRANE],
 )
 def test_bound_is_below_every_structure_of_the_crane(name: str) -> None:
     design = crane_design(name)
