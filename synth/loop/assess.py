@@ -28,6 +28,7 @@ from .controller import LinearController, closed_loop_plant, closed_loop_poles
 from .disturbance import Disturbance
 from .loop import DragElement, closed_loop, numeric_blocks, return_differences, with_drag
 from .margins import Margins, loop_margins, refine_minima, sensitivity_peaks, worst_margins
+from .pole_region import PoleRegion
 
 _RTOL = 1e-8  # of every variance
 _PADE = 6  # order of the delay models that the poles are those of
@@ -86,9 +87,20 @@ class Assessment:
     @cached_property
     def poles(self) -> ComplexArray:
         """Poles of the closed loop [1/s], delays as Pade models."""
+        return closed_loop_poles(self._modelled, self.controller)
+
+    @cached_property
+    def pole_region(self) -> PoleRegion:
+        """Decay, damping and frequency of the closed loop's poles, without the delay models'."""
+        own = len(self.plant.states)
+        models = np.linalg.eigvals(self._modelled.A[own:, own:])
+        return PoleRegion.of(self.poles, np.asarray(models, dtype=np.complex128))
+
+    @cached_property
+    def _modelled(self) -> LinearPlant:
+        """The plant with Pade models for its delays, their states after its own."""
         late = max(self.plant.delays, default=0.0) > _LATE
-        rational = self.plant.without_delays(_LATE_PADE if late else _PADE)
-        return closed_loop_poles(rational, self.controller)
+        return self.plant.without_delays(_LATE_PADE if late else _PADE)
 
     @property
     def stable(self) -> bool:
