@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from mpc.linear import LinearMPC
     from mpc.nonlinear import NonlinearMPC
     from mpc.winch import ProcessNoise, Weights, tune_weights
-    from synth.bound import Bound, bound_for, exact_sensors
+    from synth.bound import BestPossible, Bound, bound_for, exact_sensors
     from synth.controllers import BrakeOn, ConstantTension, LinearFeedback, VelocityFeedForward
     from synth.design import (
         GainDesign,

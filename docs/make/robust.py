@@ -26,7 +26,7 @@ from stored import docs_folder, study_parser, write_rows
 
 from models import load_case
 from models.basics import PhysicsWarning, one_thread
-from synth.bound import bound_beside
+from synth.bound import aboard, bound_for
 from synth.design import optimise_structure
 from synth.question import FamilyProblem
 from synth.robust import Family, optimise_robust
@@ -153,26 +153,17 @@ def bounds(starts: int) -> list[Row]:
         if design.margins is None:
             print(f"{name}: {design.status}")
             continue
-        posed = design.posed
-        enforced = [*posed.limits, *(posed.drive if design.drive_kept else ())]
-        beside = bound_beside(
-            case,
-            posed.question.hook,
-            design.controller,
-            masses=design.masses,
-            drag=design.drag,
-            limits=enforced,
-        )
-        print(f"{name}: {1e3 * design.payload_rms:.4g} mm; {beside.sentence}")
+        own, every = bound_for(design), bound_for(design, measurements=aboard(case))
+        print(f"{name}: {1e3 * design.payload_rms:.4g} mm, {own.factor:.3g} times the bound")
         rows.append(
             {
                 "structure": name,
                 "ok": "yes" if design.ok else "no",
                 "payload_rms": design.payload_rms,
-                "on_the_bound_s_terms": beside.rms,
-                "bound_same_sensors": beside.heard.value,
-                "bound_all_sensors": beside.every.value,
-                "exact_sensors": " ".join(beside.exact_heard),
+                "on_the_bound_s_terms": own.rms,
+                "bound_same_sensors": own.free.value,
+                "bound_all_sensors": every.free.value,
+                "exact_sensors": " ".join(own.exact),
             }
         )
     return rows

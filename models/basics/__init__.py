@@ -53,6 +53,7 @@ if TYPE_CHECKING:
         solve_discrete_riccati,
         solve_lyapunov,
         solve_riccati,
+        truncation_of_roots,
     )
     from .signals import White, pick, signal_delays, signal_names, signal_rates
     from .threads import one_thread

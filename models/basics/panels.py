@@ -13,8 +13,9 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 
-from .arrays import FloatArray
+from .arrays import ComplexArray, FloatArray
 from .checks import InputError, check_range
 
 
@@ -103,19 +104,26 @@ def cut_panels(
     for a, b in pairwise(inside):
         edges = np.linspace(a, b, math.ceil((b - a) / longest) + 1)
         stack += [(float(x), float(y)) for x, y in pairwise(edges)]
-    done = []
-    while stack:
-        a, b = stack.pop()
-        if any(0.5 * (b - a) > clearance * distance(a, b, p) * (1 + 1e-9) for p in marks):
-            stack += [(a, 0.5 * (a + b)), (0.5 * (a + b), b)]
-        else:
-            done.append((a, b))
+    done, panels = [], np.array(stack).reshape(-1, 2)
+    while len(panels):
+        half = 0.5 * (panels[:, 1] - panels[:, 0])
+        away = distance(panels[:, :1], panels[:, 1:], np.array(marks, dtype=np.complex128))
+        long = half > clearance * away.min(axis=1, initial=np.inf) * (1 + 1e-9)
+        done += [(float(a), float(b)) for a, b in panels[~long]]
+        middle = panels[long].mean(axis=1)
+        panels = np.concatenate(
+            [
+                np.column_stack([panels[long, 0], middle]),
+                np.column_stack([middle, panels[long, 1]]),
+            ]
+        )
     return sorted(done)
 
 
-def distance(a: float, b: float, mark: complex) -> float:
-    """Return how far a point of the complex t plane lies from the panel [a, b]."""
-    return math.hypot(max(a - mark.real, mark.real - b, 0.0), mark.imag)
+def distance(a: npt.ArrayLike, b: npt.ArrayLike, mark: ComplexArray) -> FloatArray:
+    """Return how far points of the complex t plane lie from the panels [a, b]."""
+    beside = np.maximum(np.maximum(np.asarray(a) - mark.real, mark.real - np.asarray(b)), 0.0)
+    return np.asarray(np.hypot(beside, mark.imag))
 
 
 def longest_panel(panels_per_decade: float) -> float:
@@ -124,7 +132,4 @@ def longest_panel(panels_per_decade: float) -> float:
     return math.log(10.0) / panels_per_decade
 
 
-@lru_cache(maxsize=64)
-def _gauss_legendre(count: int) -> tuple[FloatArray, FloatArray]:
-    x, w = np.polynomial.legendre.leggauss(count)
-    return x, w
+_gauss_legendre = lru_cache(maxsize=64)(np.polynomial.legendre.leggauss)

@@ -168,10 +168,11 @@ def spectral_nodes(
         raise InputError(f"quadrature: per_panel must be at least 2, got {per_panel!r}")
     marks = axis.poles(poles)
     longest = longest_panel(panels_per_decade)
+    places = np.array(marks, dtype=np.complex128)
     omega, weights = [], []
     for a, b in cut_panels(axis, splits, marks, longest, clearance=1.0):
         half = 0.5 * (b - a)
-        ratio = min([0.5 * longest, *(distance(a, b, p) for p in marks)]) / half
+        ratio = distance(a, b, places).min(initial=0.5 * longest) / half
         rho = ratio + math.hypot(ratio, 1.0)
         count = math.ceil(per_panel * math.log(_RHO_REFERENCE) / math.log(rho))
         nodes, weight = axis.rule(a, b, min(per_panel, max(3, count)))

@@ -183,11 +183,22 @@ def balanced_truncation(
     roots = []
     for gramian in (heard, reached):
         size, vectors = np.linalg.eigh(0.5 * (gramian + gramian.T))
-        roots.append(vectors * np.sqrt(np.maximum(size, 0.0)))
-    left, sizes, right = np.linalg.svd(roots[0].T @ roots[1])
-    keep = max(1, min(order, int(np.sum(sizes > 1e-10 * sizes[0]))))
+        roots.append((vectors * np.sqrt(np.maximum(size, 0.0))).T)
+    return truncation_of_roots(roots[0], roots[1], order, least=1e-10)
+
+
+def truncation_of_roots(
+    heard: FloatArray, reached: FloatArray, order: int, *, least: float = 1e-13
+) -> tuple[FloatArray, FloatArray]:
+    """Return `balanced_truncation` of Gramians R'R by their roots R, (., n).
+
+    Where the roots are known better than their squares; a state of less than `least` of the
+    first is of rounding size.
+    """
+    left, sizes, right = np.linalg.svd(heard @ reached.T)
+    keep = max(1, min(order, int(np.sum(sizes > least * sizes[0]))))
     scale = 1.0 / np.sqrt(sizes[:keep] + 1e-300)
-    return (left[:, :keep] * scale).T @ roots[0].T, roots[1] @ (right[:keep].T * scale)
+    return (left[:, :keep] * scale).T @ heard, reached.T @ (right[:keep].T * scale)
 
 
 def _whole(B: FloatArray, Q: FloatArray, given: FloatArray) -> float:

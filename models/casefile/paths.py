@@ -58,7 +58,7 @@ def replaced(
     wrong = []
     # Sections before their fields, and the key that selects among alternatives before the
     # others: the order in which the changes were written down does not matter.
-    for path in sorted(changes, key=_rank):
+    for path in sorted(changes, key=lambda p: (p.count("."), p.rpartition(".")[2] not in TAGS)):
         keys = [part for part in re.split(r"[.\[\]]+", path) if part]
         try:
             _set(_Place(tree, (model,), ()), keys, plain(changes[path]), given)
@@ -67,10 +67,6 @@ def replaced(
     if wrong:
         raise InputError("\n".join(wrong))
     return tree
-
-
-def _rank(path: str) -> tuple[int, bool]:
-    return path.count("."), path.rpartition(".")[2] not in TAGS
 
 
 class _Place:

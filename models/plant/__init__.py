@@ -12,7 +12,7 @@ from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .discrete import DiscretePlant, zero_order_hold
-    from .drag import consistent_drag, energy_equivalent, stochastic_equivalent
+    from .drag import consistent_drag, energy_equivalent, settled_drag, stochastic_equivalent
     from .drive import SPEED_BAND, DriveLimits
     from .equations import MEASUREMENTS, MOTION, displacement_names, parameter_values
     from .line import line_response, line_response_at, rope_transfers
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .payout import DrumTravel
     from .plant import MEAN_LOSSES, OperatingPoint, Plant, build_plant
     from .plant_data import PlantData, masses_for_bandwidth
+    from .resolvent import Resolvent, Transfer
     from .response import PlantResponse
     from .rope import MAX_MASSES, RopeLumps, fixed_top_modes, lump_rope, lumped_modes
     from .shaping import ShapingFilter, controllable_form, fit_shaping_filter, sampled_density

@@ -18,6 +18,8 @@ from scipy.special import erf
 from ..basics import SolverError, check_range
 
 _OWNER = "drag"
+_ROUNDS = 12  # of finding nodes for a drag; two are the rule
+_SETTLED = 1e-3  # relative change of a drag for which the nodes need not change
 
 
 def energy_equivalent(quadratic: float, amplitude: float, frequency: float) -> float:
@@ -155,3 +157,45 @@ def consistent_drag(
         return 1.0 if math.isinf(found := target(C)) else (found - C) / (found + C)
 
     return float(brentq(surplus, low, high, xtol=1e-12 * high, rtol=max(tolerance, 1e-14)))
+
+
+def settled_drag(
+    quadratic: float, about: Callable[[float], Callable[[float], float]], start: float
+) -> float:
+    """Return `consistent_drag` where the motion is an integral over frequencies.
+
+    What costs is to find nodes for the integral; on given nodes a change of C costs next to
+    nothing.  So the equation is solved on the nodes that suit a first C, then on those that
+    suit its solution, until that no longer moves.
+
+    Parameters
+    ----------
+    quadratic
+        q [N s2/m2].
+    about
+        Function of a C [N s/m] that returns `velocity_rms` of `consistent_drag` on nodes that
+        suit this C; it may raise SolverError where there are none (an undamped motion).
+    start
+        The first C [N s/m].
+
+    Raises
+    ------
+    InputError
+        If `quadratic` is out of range.
+    SolverError
+        If no C agrees with the motion it leads to, or none has nodes.
+    """
+    check_range(_OWNER, "quadratic", quadratic, low=0.0, unit="N s2/m2")
+    if quadratic == 0.0:
+        return 0.0
+    current = max(start, quadratic)
+    for _ in range(_ROUNDS):
+        try:
+            found = consistent_drag(quadratic, about(current))
+        except SolverError:
+            current *= 4.0  # more drag damps the motion, so that it can be integrated
+            continue
+        if found == 0.0 or abs(found - current) <= _SETTLED * found:
+            return found
+        current = found
+    return consistent_drag(quadratic, lambda C: about(C)(C))

@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     import control
 
 _OWNER = "linear plant"
+_UNDAMPED = 1e-12  # damping ratio of a pole that has none but for rounding
+_HAIR = 1e-8  # relative distance at which 1/(s - pole) leaves a closed loop eight digits
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, init=False)
@@ -198,6 +200,20 @@ class LinearPlant(StateSpace):
             outputs=self.outputs,
         )
 
+    def beside_poles(self, omega: FloatArray) -> FloatArray:
+        """Return frequencies [rad/s], (k,), those at an undamped pole moved a hair off it.
+
+        The responses have no value there, while those of a loop closed around the plant do,
+        and next to it they are the same.
+        """
+        poles = self.poles()
+        axis = poles.imag[(poles.imag > 0.0) & (np.abs(poles.real) <= _UNDAMPED * np.abs(poles))]
+        moved = np.array(omega, dtype=np.float64)
+        for at in axis:
+            close = np.abs(moved - at) < _HAIR * at
+            moved[close] = at * (1.0 + _HAIR * np.where(moved[close] < at, -1.0, 1.0))
+        return moved
+
     @cached_property
     def resolvent(self) -> Resolvent:
         """(s I - A)^-1, the same for all plants that are made of this one by `select`."""
@@ -242,6 +258,43 @@ class LinearPlant(StateSpace):
             A=self.A + np.outer(self.E[:, f], row),
             C=self.C + np.outer(self.F[:, f], row),
             Cz=self.Cz + np.outer(self.Fz[:, f], row),
+        )
+
+    def with_feedback(
+        self, A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray
+    ) -> LinearPlant:
+        """Return the plant with a controller x' = A x + B y, u = C x + D y + v around it.
+
+        Its inputs are the v that are added to the controller's commands, under their names.
+
+        Raises
+        ------
+        InputError
+            If a measurement is late: `without_delays` first.
+        """
+        if any(self.delays):
+            raise InputError(
+                f"{_OWNER}: no rational loop can be closed with delays {self.delays} s"
+            )
+        inverse = np.linalg.inv(np.eye(len(self.inputs)) - D @ self.D)
+        # u = inverse (C x_c + D (C x + F w) + v), then y and z with it.
+        states = inverse @ np.hstack([D @ self.C, C])
+        shaken = inverse @ D @ self.F
+        heard = np.hstack([self.C, np.zeros((len(self.C), len(A)))]) + self.D @ states
+        heard_w = self.F + self.D @ shaken
+        moved = np.hstack([self.A, np.zeros((len(self.A), len(A)))]) + self.B @ states
+        own = np.hstack([np.zeros((len(A), len(self.A))), A]) + B @ heard
+        return self._with(
+            A=np.vstack([moved, own]),
+            B=np.vstack([self.B @ inverse, B @ self.D @ inverse]),
+            E=np.vstack([self.E + self.B @ shaken, B @ heard_w]),
+            C=heard,
+            D=self.D @ inverse,
+            F=heard_w,
+            Cz=np.hstack([self.Cz, np.zeros((len(self.Cz), len(A)))]) + self.Dz @ states,
+            Dz=self.Dz @ inverse,
+            Fz=self.Fz + self.Dz @ shaken,
+            states=(*self.states, *(f"controller.x{i + 1}" for i in range(len(A)))),
         )
 
     def select(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -101,6 +102,9 @@ def pade_bank(
     A, B, C, D = np.zeros((n, n)), np.zeros((n, m)), np.zeros((m, n)), np.eye(m)
     for k, i in enumerate(late):
         block = slice(k * order, (k + 1) * order)
-        a, b, c, d = pade_state_space(delays[i], order)
+        a, b, c, d = _kept(delays[i], order)
         A[block, block], B[block, i], C[i, block], D[i, i] = a, b[:, 0], c[0], d[0, 0]
     return A, B, C, D
+
+
+_kept = lru_cache(maxsize=64)(pade_state_space)  # a loop is closed many times with one delay

@@ -16,12 +16,10 @@ from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
-from ..basics import ComplexArray, FloatArray
+from ..basics import BoolArray, ComplexArray, FloatArray
 
-BoolArray = npt.NDArray[np.bool_]
 Transfer = Callable[[ComplexArray], ComplexArray | None]
 
 _CHUNK = 512  # points solved at a time: keeps the stacked (n, k, columns) states in the cache

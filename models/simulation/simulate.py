@@ -23,6 +23,7 @@ import math
 import time as clock
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from typing_extensions import override
@@ -112,7 +113,7 @@ def run_simulation(
             while len(chunk):
                 at = store.seen
                 watching = simulation.trips if math.isnan(trip_time) else ()
-                state, log, trip = stepper.run(state, chunk, p, at, watching)
+                state, log, trip = stepper.run(state, _Part(chunk, p, at, watching))
                 chunk = chunk[len(log) :]
                 good = _finite(log)  # up to the divergence everything is kept
                 accumulator.update(log[:good], at * dt)
@@ -160,6 +161,15 @@ def run_simulation(
     )
 
 
+class _Part(NamedTuple):
+    """Rows to run over and their parameters as for `Kernel.run`, first sample, what to watch."""
+
+    rows: FloatArray
+    parameters: FloatArray
+    first: int
+    limits: Sequence[TripLimit]
+
+
 class Stepper(ABC):
     """Runs the loop of one run; made anew for each."""
 
@@ -171,24 +181,8 @@ class Stepper(ABC):
         self.events: list[Event] = []
 
     @abstractmethod
-    def run(
-        self,
-        state: FloatArray,
-        rows: FloatArray,
-        parameters: FloatArray,
-        first: int,
-        limits: Sequence[TripLimit],
-    ) -> Ran:
+    def run(self, state: FloatArray, part: _Part) -> Ran:
         """Run over rows, to their end or to the first trip, whose row is the last of the log.
-
-        Parameters
-        ----------
-        state, rows, parameters
-            As for `Kernel.run`.
-        first
-            Number of the first sample.
-        limits
-            What to watch.
 
         Returns
         -------
@@ -205,14 +199,8 @@ class _Fused(Stepper):
         self._kernel = simulation.kernels[0]
 
     @override
-    def run(
-        self,
-        state: FloatArray,
-        rows: FloatArray,
-        parameters: FloatArray,
-        first: int,
-        limits: Sequence[TripLimit],
-    ) -> Ran:
+    def run(self, state: FloatArray, part: _Part) -> Ran:
+        rows, parameters, first, limits = part
         after, log = self._kernel.run(state, rows, parameters)
         trip = find_trip(limits, self._signals, log, first, self._sample_time)
         if trip is not None and trip.sample - first + 1 < len(log):
@@ -236,14 +224,8 @@ class _FromPython(Stepper):
         self._controller.reset()
 
     @override
-    def run(
-        self,
-        state: FloatArray,
-        rows: FloatArray,
-        parameters: FloatArray,
-        first: int,
-        limits: Sequence[TripLimit],
-    ) -> Ran:
+    def run(self, state: FloatArray, part: _Part) -> Ran:
+        rows, parameters, first, limits = part
         log = np.empty((len(rows), len(self._signals)))
         given = np.empty(rows.shape[1] + 1)
         watched = [limit for limit in limits if limit.signal in self._signals]

@@ -15,6 +15,7 @@ from ..text import told_once
 
 if TYPE_CHECKING:
     from models import Case
+    from models.casefile import Quantity
 
 _NAMES = ("A", "a", "a1", "a2")
 
@@ -87,6 +88,25 @@ def split_pairs(
             raise InputError(f"{option}: {name} is given twice")
         found[name] = value
     return found
+
+
+def split_numbers(text: str) -> tuple[float, ...]:
+    """Return numbers from a text with commas between; none if one is no number."""
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        return ()
+
+
+def read_quantity_of(option: str, name: str, text: str, wanted: Quantity) -> float:
+    """Return a quantity as in a case file; `name` begins what the message says of it."""
+    from models.casefile import read_yaml
+
+    value, _ = read_yaml(text, option)
+    try:
+        return float(wanted.read(value))
+    except InputError as error:
+        raise InputError(f"{option}: {name}{error}") from None
 
 
 def read_pairs(option: str, form: str, texts: Sequence[str]) -> dict[str, Any]:

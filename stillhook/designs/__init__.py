@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .bound_text import bound_sentence
+    from .bound_text import bound_rows
     from .design_file import (
         design_data,
         design_text,

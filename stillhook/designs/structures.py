@@ -29,7 +29,7 @@ from ..text import (
     quantity,
     typeset,
 )
-from .bound_text import bound_cell, bound_figures, bounds_note
+from .bound_text import bound_cell, bound_figure, bounds_note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,10 +42,8 @@ SHARES = {"sea": ("hook.heave",), "MRU": ("mru.error",), "noise": ()}
 
 _TORQUE = "motor.torque.peak"
 _COLOURS = {"sea": AFTER, "MRU": "#e69f00", "noise": "#cc79a7"}
-_MARKS: Mapping[str, Mapping[str, Any]] = {
-    "best with its sensors": {"marker": "|", "color": "black", "ms": 15.0, "mew": 2.2},
-    "best with all sensors": {"marker": "|", "color": "0.45", "ms": 15.0, "mew": 1.2},
-}
+_BEST = "best with its sensors"
+_MARK: Mapping[str, Any] = {"marker": "|", "color": "black", "ms": 15.0, "mew": 2.2}
 _LABELS = {"sea": "from the sea", "MRU": "from the reference unit", "noise": "from other sensors"}
 
 
@@ -65,7 +63,7 @@ def structures(designs: Sequence[StructureDesign], *, bound: bool = True) -> Fig
     matplotlib.figure.Figure
         Left: payload rms on a logarithmic axis, coloured by shares of its variance, hatched
         where the design is not ok; a mark at the least that any linear controller leaves with
-        the same sensors, a lighter one with all sensors of the case.  Right: M_s.
+        the same sensors.  Right: M_s.
 
     Raises
     ------
@@ -77,8 +75,8 @@ def structures(designs: Sequence[StructureDesign], *, bound: bool = True) -> Fig
         raise InputError("structures: there is no stable design to draw")
     before, hook = 1e3 * stable[0].payload_rms_before, 1e3 * stable[0].hook_rms
     values = [1e3 * design.payload_rms for design in stable]
-    marks = {d.structure: bound_figures(d) if bound else (math.nan, math.nan) for d in stable}
-    least = [1e3 * value for pair in marks.values() for value in pair if math.isfinite(value)]
+    marks = {d.structure: bound_figure(d) if bound else math.nan for d in stable}
+    least = [1e3 * value for value in marks.values() if math.isfinite(value)]
     low = 0.5 * min([*values, *least, hook])
     high = 3.0 * max([*values, before])
     figure = new_figure(9.2, 1.9 + 0.38 * len(designs))
@@ -118,11 +116,10 @@ def structures(designs: Sequence[StructureDesign], *, bound: bool = True) -> Fig
             fontsize=9.0,
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
         )
-        for value, (text, style) in zip(marks[design.structure], _MARKS.items(), strict=True):
-            if math.isfinite(value):
-                shown = text if text not in seen else None
-                left.plot([1e3 * value], [place], linestyle="none", label=shown, **style)
-                seen.add(text)
+        if math.isfinite(value := marks[design.structure]):
+            shown = _BEST if _BEST not in seen else None
+            left.plot([1e3 * value], [place], linestyle="none", label=shown, **_MARK)
+            seen.add(_BEST)
         if design.margins is not None:
             right.plot(design.margins.max_sensitivity, place, "o", color=DRUM)
     for value, colour, text in ((before, BEFORE, "drum held"), (hook, HOOK, "hook")):
@@ -145,7 +142,7 @@ def structures_table(designs: Sequence[StructureDesign], *, bound: bool = True) 
     return Table(
         columns=heads,
         rows=[_row(design, bound=bound) for design in designs],
-        notes=(bounds_note(designs),) if bound else (),
+        notes=(bounds_note(),) if bound else (),
         broken=tuple(k for k, design in enumerate(designs) if not design.ok),
     )
 

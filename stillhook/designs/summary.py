@@ -24,7 +24,7 @@ from ..text import (
     remarks,
     scale,
 )
-from .bound_text import bound_sentence
+from .bound_text import bound_rows
 from .motion import MotionView
 
 #: What people call each limit, and where it stands in the case file.
@@ -182,7 +182,7 @@ def label_of(design: GainDesign, name: str) -> str:
 def facts(design: GainDesign, *, bound: bool = True) -> list[tuple[str, str]]:
     """Return what the figures rest on: sea, rope, drag, search, check, and the bound beside them.
 
-    `bound` says whether to compute that too, which takes about two seconds.
+    `bound` says whether to compute that too, which takes some ten seconds.
     """
     case = design.case
     if case.rope.lumping == "thesis":
@@ -201,9 +201,7 @@ def facts(design: GainDesign, *, bound: bool = True) -> list[tuple[str, str]]:
         rows.append(("search", f"{design.agreed} of {len(design.starts)} starts agree"))
     if design.verification is not None:
         rows.append(("check", design.verification.status))
-    if bound and (text := bound_sentence(design)):
-        rows.append(("bound", text))
-    return rows
+    return [*rows, *(bound_rows(design) if bound else ())]
 
 
 def required_table(design: GainDesign) -> Table | None:

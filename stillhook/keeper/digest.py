@@ -81,8 +81,10 @@ class _Reached:
             if module in self.contents or path is None:
                 continue
             self.contents[module], imports = _contents(path, path.stat().st_mtime_ns)
+            # That relative imports start from.
+            package = module if path.name == "__init__.py" else module.rpartition(".")[0]
             for line in imports:
-                todo += self._targets(line, _package(module, path))
+                todo += self._targets(line, package)
             if path.name == "__init__.py":  # imported as a whole: all that it hands on
                 todo += [self._source(*home) for home in self._face(module, path).values()]
 
@@ -139,11 +141,6 @@ def _contents(path: Path, changed: int) -> tuple[str, tuple[ast.Import | ast.Imp
     imports: list[ast.Import | ast.ImportFrom] = []
     _read(ast.parse(path.read_bytes()), words, imports)
     return hashlib.sha256("\0".join(words).encode()).hexdigest(), tuple(imports)
-
-
-def _package(module: str, path: Path) -> str:
-    """Return the package that relative imports of a module start from."""
-    return module if path.name == "__init__.py" else module.rpartition(".")[0]
 
 
 def _absolute(line: ast.ImportFrom, package: str) -> str:

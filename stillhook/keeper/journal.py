@@ -68,7 +68,7 @@ class Journal:
             for number, line in enumerate(self._file, 1):
                 if not line.endswith(b"\n"):  # a crash cut it short: the last, and one of ours
                     if not (line.startswith(_BEGIN) or _BEGIN.startswith(line)):
-                        raise _foreign(path, what) if number == 1 else self._spoilt(number)
+                        raise _foreign(path, what) if number == 1 else _spoilt(path, number)
                     self._file.truncate(whole)
                     break
                 self._read(number, line, question, take)
@@ -115,7 +115,7 @@ class Journal:
                 )
             return
         if content is None:
-            raise self._spoilt(number)
+            raise _spoilt(self.path, number)
         try:
             take(_numbers(content["key"]), _numbers(content["values"]))
         except (TypeError, KeyError, ValueError, IndexError) as error:
@@ -152,12 +152,6 @@ class Journal:
                 "another folder"
             ) from None
 
-    def _spoilt(self, number: int) -> InputError:
-        return InputError(
-            f"{self.path}: line {number} is not as it was written: the file is spoilt; remove it, "
-            "or take another folder"
-        )
-
     def _unwritten(self, error: OSError) -> InputError:
         return InputError(f"{self.path}: cannot be written: {error.strerror}")
 
@@ -193,10 +187,7 @@ def _question(path: Path, what: str, line: bytes) -> dict[str, Any]:
     """Return the question of a first line, not finite numbers still as texts."""
     content = _content(line)
     if content is None and _LINE.fullmatch(line):
-        raise InputError(
-            f"{path}: line 1 is not as it was written: the file is spoilt; remove it, or take "
-            "another folder"
-        )
+        raise _spoilt(path, 1)
     if content is None or content.get("stillhook") != what or content.get("format") != FORMAT:
         raise _foreign(path, what)
     return dict(content["question"])
@@ -209,6 +200,13 @@ def _content(line: bytes) -> dict[str, Any] | None:
         return None
     content: dict[str, Any] = json.loads(match[2])
     return content
+
+
+def _spoilt(path: Path, number: int) -> InputError:
+    return InputError(
+        f"{path}: line {number} is not as it was written: the file is spoilt; remove it, or take "
+        "another folder"
+    )
 
 
 def _foreign(path: Path, what: str) -> InputError:

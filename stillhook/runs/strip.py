@@ -321,7 +321,6 @@ _FASTER = 4.0  # than it is, if that many frames will do
 _LATELY = 0.4  # part of the picture's time that is shown behind the present
 _COLOURS = 48
 _DOTS = 84.0  # per inch
-_GROUND, _SEA = "#8c6d46", "#56b4e9"
 
 
 def animation(

@@ -189,7 +189,8 @@ def rows_of(compared: Sequence[Runs]) -> list[QuantityRow]:
         where = (*(_STAYS if first.stays else _MOVES), *_RESIDUAL)
     rows = _quantities(compared, "payload", (*where, *_HOOK))
     rows += _against_none(compared)
-    rows += _shares(compared, "payload", "lost lock", "runs that lost lock", _lock_note(first))
+    beyond = "" if first.lock_limit is None else f"beyond {quantity(first.lock_limit, 'm')}"
+    rows += _shares(compared, "payload", "lost lock", "runs that lost lock", beyond)
     rows += _fall_times(compared)
     rows += _trips(compared)
     rows += _quantities(compared, "drive", _DRIVE)
@@ -294,10 +295,6 @@ def _estimate(interval: Interval | None, factor: float = 1.0) -> Estimate:
     if interval is None or not interval.count:
         return _NONE
     return Estimate(*(x / factor for x in (interval.mean, interval.low, interval.high)))
-
-
-def _lock_note(runs: Runs) -> str:
-    return "" if runs.lock_limit is None else f"beyond {quantity(runs.lock_limit, 'm')}"
 
 
 def _note(key: str, case: Case) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.basics import GRAVITY, FloatArray
-from synth.operability import AtDepth, Contour, Criterion, Operability
+from synth.operability import AtDepth, Criterion, Operability
 
 from ..text import (
     AFTER,
@@ -75,14 +75,6 @@ def pale(name: str) -> tuple[float, float, float]:
     red, green, blue = to_rgb(colour)
     mixed = 0.15 if dashes == "-" else 0.5
     return tuple(c + (1.0 - c) * mixed for c in (red, green, blue))  # type: ignore[return-value]
-
-
-def own_heading(study: Operability, contour: Contour) -> int:
-    """Return the row of the case's own heading, or of the nearest."""
-    heading = getattr(study.case.vessel, "heading", None)
-    if contour.headings is None or heading is None:
-        return 0
-    return int(np.abs(np.angle(np.exp(1j * (contour.headings - heading)))).argmin())
 
 
 def steepest(periods: FloatArray) -> FloatArray:
@@ -147,7 +139,7 @@ def titled(figure: Figure, study: Operability, at: AtDepth | None, finding: str)
     if at is not None:
         about += f", {at.rope.length:g} m of rope"
     if study.headings is not None:
-        h = own_heading(study, study.depths[0].main)
+        h = study.own_heading(study.depths[0].main)
         about += f", heading {math.degrees(study.headings[h]):.0f} deg"
     return headline(figure, finding, about)
 
@@ -168,7 +160,7 @@ def contour_figure(study: Operability, at: AtDepth | None = None) -> Figure:
     """
     at = study.depths[0] if at is None else at
     contour = at.main
-    h = own_heading(study, contour)
+    h = study.own_heading(contour)
     periods = contour.periods
     held = at.contours["held"].limit[h]
     figure, axes = panel(8.0, 4.6)
@@ -207,7 +199,7 @@ def capability_figure(study: Operability, at: AtDepth | None = None) -> Figure:
     """
     at = study.depths[0] if at is None else at
     lines, contour = at.capability, at.main
-    h = own_heading(study, contour)
+    h = study.own_heading(contour)
     asked = []
     for column, limit in zip(at.columns, contour.limit[h], strict=True):
         if 0.0 < limit < contour.highest:
@@ -252,7 +244,7 @@ def depth_figure(study: Operability) -> Figure:
     """
     import matplotlib as mpl
 
-    h = own_heading(study, study.depths[0].main)
+    h = study.own_heading(study.depths[0].main)
     colours = mpl.colormaps["viridis"](np.linspace(0.0, 0.85, len(study.depths)))
     figure, axes = panel(8.0, 4.4)
     limits = [at.main.limit[h] for at in study.depths]
@@ -364,7 +356,7 @@ def scatter_figure(study: Operability, at: AtDepth | None = None) -> Figure:
     assert scatter is not None
     months = at.workable["held"].by_month
     main = "loop" if "loop" in at.contours else "held"
-    h = own_heading(study, at.main)
+    h = study.own_heading(at.main)
     figure = new_figure(9.6 if months else 7.2, 4.6)
     grid = figure.add_gridspec(1, 2 if months else 1, width_ratios=(3, 2) if months else None)
     axes = figure.add_subplot(grid[0, 0])
@@ -393,7 +385,7 @@ def scatter_figure(study: Operability, at: AtDepth | None = None) -> Figure:
         if best is not None:
             style: Any = {"linestyle": (0, (4, 2)), "zorder": 3}
             label = f"... best heading: {100.0 * best:.0f} %"
-            vaning = contour.weathervaning
+            vaning = contour.limit.max(axis=0)
             limit_line(axes, contour.periods, vaning, top, colour, label=label, **style)
     _frame(axes, at.main.periods, top, r"$H_s$ [m]")
     figure.legend(loc="outside lower center", ncols=3, fontsize=8.5)

@@ -10,8 +10,7 @@ it, as deviations from a static state that is shifted to the true one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -24,8 +23,7 @@ from synth.structures import RecursiveController
 _SHIFTED = ("drive.applied", "rope.tension", "motor.torque")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Shift:
+class Shift(NamedTuple):
     """A static state, or by how much the true one is above that which a controller knows.
 
     Attributes
@@ -42,34 +40,21 @@ class Shift:
     tension: float
     torque: float
 
-    def __bool__(self) -> bool:
-        """Whether there is any."""
-        return bool(self.command or self.tension or self.torque)
-
-    @property
-    def values(self) -> tuple[float, float, float]:
-        """In the order of what is measured of it."""
-        return self.command, self.tension, self.torque
-
 
 def static_of(case: Case) -> Shift:
     """Return the static state of a case, as the controllers reckon it."""
     point = build_plant(case).operating_point(MEAN_LOSSES)
-    return Shift(command=point.command, tension=point.tension, torque=point.torque)
+    return Shift(point.command, point.tension, point.torque)
 
 
 def shift_between(known: Shift, true: Shift) -> Shift:
     """Return the shift from the static state that a controller knows to the true one."""
-    return Shift(
-        command=true.command - known.command,
-        tension=true.tension - known.tension,
-        torque=true.torque - known.torque,
-    )
+    return Shift(*np.subtract(true, known).tolist())
 
 
 def trimmed(controller: Controller, shift: Shift) -> Controller:
     """Return a controller with its static part shifted; the same one if there is no shift."""
-    if not shift or holds_brake(controller):
+    if not any(shift) or holds_brake(controller):
         return controller
     recursion = recursion_of(controller)
     if recursion is None:
@@ -97,7 +82,7 @@ def _shifted(recursion: Recursion, shift: Shift) -> Recursion:
         ["xc", "m"],
         ["xc_next", "u"],
     )
-    return Recursion(function=function, initial=np.concatenate([recursion.initial, shift.values]))
+    return Recursion(function=function, initial=np.concatenate([recursion.initial, shift]))
 
 
 class _Trimmed:
@@ -125,5 +110,5 @@ class _Trimmed:
 
     def step(self, measurement: Measurement, time: float) -> float:
         values = measurement.values.copy()
-        values[self._at] -= self._shift.values
+        values[self._at] -= self._shift
         return self._controller.step(Measurement(values), time) + self._shift.command

@@ -17,16 +17,18 @@ reference unit) is outside of it.  `synth.bound.bound` has the figure that count
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from models.basics import ComplexArray, FloatArray, adaptive_nodes, check_range
+from models.basics import check_range
 
 from ..loop import Assessment
 
 _GONE = 0.1  # loop gain below which nothing is left to trade
+_NOTHING = 1e-3  # |S| below which the integral is no limit in practice
+_RAISED = 1.2  # |S| from which a mode is told of
+_LIGHT = 0.1  # damping ratio of one that rings
 _QUANTILES = (0.05, 0.95)  # of the variance, between which a sea has its band
 
 
@@ -45,22 +47,52 @@ class BodeEstimate:
     least
         The smallest |S| over the whole band that these allow.
     achieved
-        Geometric mean of |S| over the band; NaN if no loop was given.
+        Geometric mean of |S| over the band.
+    resonance, resonant
+        The lightly damped mode of the closed loop at which |S| is highest [rad/s], and |S| there;
+        NaN without one.
+    damping, open_damping
+        Damping ratios of that mode, and of the one next to it without the loop.
     """
 
     band: float
     available: float
     max_sensitivity: float
     least: float
-    achieved: float = math.nan
+    achieved: float
+    resonance: float = math.nan
+    resonant: float = math.nan
+    damping: float = math.nan
+    open_damping: float = math.nan
+
+    @property
+    def limits_band(self) -> bool:
+        """Whether the integral alone keeps |S| in the band from what would be nothing."""
+        return self.least > _NOTHING
+
+    @property
+    def pays_at_resonance(self) -> bool:
+        """Whether the loop wins in the band, and makes a mode livelier for it."""
+        livelier = self.damping < self.open_damping
+        return self.achieved < 1.0 and livelier and self.resonant > _RAISED
 
     def __str__(self) -> str:
-        """Return the one line."""
-        text = (
-            f"Bode: with M_s {self.max_sensitivity:.3g} and {self.available:.3g} rad/s of loop, "
-            f"feedback can hold |S| at {self.least:.3g} at best over {self.band:.3g} rad/s of sea"
-        )
-        return text if math.isnan(self.achieved) else f"{text}; this loop's is {self.achieved:.3g}"
+        """Return the one line; empty where the integral has nothing to say."""
+        said = []
+        if self.limits_band:
+            said.append(
+                f"with M_s {self.max_sensitivity:.3g} and {self.available:.3g} rad/s of loop, "
+                f"feedback can hold |S| at {self.least:.3g} at best over {self.band:.3g} rad/s of "
+                f"sea; this loop's is {self.achieved:.3g}"
+            )
+        if self.pays_at_resonance:
+            said.append(
+                f"what |S| is below one in the sea's band ({self.achieved:.2g} on average) it is "
+                f"above one elsewhere: the resonance at {self.resonance:.3g} rad/s stands there at "
+                f"|S| {self.resonant:.3g}, its damping {100.0 * self.damping:.2g} % instead of "
+                f"{100.0 * self.open_damping:.2g} %, and cannot be damped without paying elsewhere"
+            )
+        return f"Bode's integral: {'; '.join(said)}" if said else ""
 
 
 def least_sensitivity(max_sensitivity: float, available: float, band: float) -> float:
@@ -77,36 +109,6 @@ def least_sensitivity(max_sensitivity: float, available: float, band: float) -> 
         "Bode integral", "available", available, low=0.0, unit="rad/s", open_low=True
     )
     return math.exp(-math.log(peak) * max(high - width, 0.0) / width)
-
-
-def bode_integral(
-    log_sensitivity: Callable[[FloatArray], FloatArray],
-    poles: ComplexArray,
-) -> float:
-    """Return the integral of ln|S| over the half line [rad/s].
-
-    Parameters
-    ----------
-    log_sensitivity
-        omega (k,) [rad/s] -> ln|S|.
-    poles
-        Poles of the loop [1/s], about which it varies.
-    """
-    sizes = np.abs(poles)
-    sizes = sizes[sizes > 0.0]
-    low, high = 1e-4 * float(sizes.min(initial=1.0)), 1e4 * float(sizes.max(initial=1.0))
-    # ln|S| changes its sign, so the nodes are chosen by its size.
-    nodes = adaptive_nodes(
-        lambda w: np.abs(log_sensitivity(w)) ** 2 + 1e-300,
-        low,
-        high,
-        poles=[complex(p) for p in poles if p.imag > 0.0 and p.real < 0.0],
-        rtol=1e-9,
-    )
-    inside = float(nodes.integrate(log_sensitivity(nodes.omega)))
-    ends = log_sensitivity(np.array([low, high]))
-    # Even (or a mild logarithm) below; above, as 1/omega^2.
-    return inside + low * float(ends[0]) + high * float(ends[1])
 
 
 def bode_estimate(assessment: Assessment, *, available: float | None = None) -> BodeEstimate:
@@ -139,4 +141,25 @@ def bode_estimate(assessment: Assessment, *, available: float | None = None) -> 
         max_sensitivity=peak,
         least=least_sensitivity(max(peak, 1.0), top, float(end - begin)),
         achieved=float(np.exp(np.mean(inside))),
+        **_resonance(assessment),
     )
+
+
+def _resonance(assessment: Assessment) -> dict[str, float]:
+    """Return the mode of the closed loop at which |S| is highest, if one rings."""
+    closed, free = (
+        p[(p.imag > 0.0) & (-p.real < _LIGHT * np.abs(p))]
+        for p in (assessment.poles, assessment.plant.poles())
+    )
+    if not (closed.size and free.size):
+        return {}
+    size = 1.0 / np.abs(1.0 + assessment.loop_gain(closed.imag))
+    k = int(np.argmax(size))
+    mode = closed[k]
+    before = free[np.argmin(np.abs(free.imag - mode.imag))]
+    return {
+        "resonance": float(mode.imag),
+        "resonant": float(size[k]),
+        "damping": float(-mode.real / abs(mode)),
+        "open_damping": float(-before.real / abs(before)),
+    }

@@ -1,127 +1,421 @@
-r"""Bound of a case, alone (`bound_for`) or beside a design on the same terms (`bound_beside`).
+r"""Best possible for a case, or beside a design on its own terms: `bound_for`.
 
-    case -> plant with all sensors, spectra of sea and noise, drive limits -> `lqg_bound`
-    design -> its plant, drag, sensors, noise, limits -> bound with the sensors that it hears
-                                                      -> bound with all sensors of the case
-           -> its own rms on these terms              -> DesignBound
+    case -> plant with what its controller may hear, spectra of sea and noise, drive limits
+    design -> the same with its sensors and drag, and no limit tighter than what it uses
+      -> `lqg_bound`: the least of all linear controllers, whatever their margins
+      -> `youla_design` -> `high_order`: the best found within the M_s
 
 Everything is put on the side that makes the bound lower: peaks become limits on the rms with the
 smallest k = sqrt(2 ln(T/T_z)) that is plausible, limits on power and on the loop's margins are
 left out, and what a case calls an exact sensor has only a faint, stated noise.
 
-Beside a design the bound is below it by construction: both live on one plant with one linear drag,
-are shaken by the same spectra, and no limit of the bound is tighter than what the design itself
-uses.  So that a direct gain on white noise has a variance, the design's law stands behind a
-low-pass far above its loop.
+A design is above its bound by construction: both live on one plant with one linear drag and are
+shaken by the same spectra.  So that a direct gain on white noise has a variance, the design's law
+stands behind a low-pass far above its loop.  The best found is made on a finer rope, and holds on
+one that is finer still.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 
-from models.basics import InputError, White, check_range, one_thread
+from models.basics import (
+    ComplexArray,
+    FloatArray,
+    InputError,
+    SolverError,
+    SynthesisError,
+    White,
+    check_range,
+    one_thread,
+    pick,
+)
 from models.case import Case
 from models.hook import HookMotion
-from models.plant import LinearPlant, PlantData
+from models.plant import MAX_MASSES, MEASUREMENTS, LinearPlant, PlantData, line_response
 from models.sensing import MEASURED, sensed_plant, sensed_spectra
 
 from ..limits import Continuous, Limit, Minimum, Peak, Rms
-from ..loop import LinearController, closed_loop_poles, disturbances
-from ..question import PAYLOAD, pose
+from ..loop import (
+    Assessment,
+    Disturbance,
+    LinearController,
+    Margins,
+    closed_loop_poles,
+    disturbances,
+    loop_margins,
+)
+from ..question import PAYLOAD, DesignQuestion, pose
 from ..verify import LawMatrices, Loop, moments
+from .bode_integral import BodeEstimate, bode_estimate
 from .bound import Bound, lqg_bound
 from .dual import with_input_outputs
-from .spectral_factor import SpectralFactor, spectral_factor
+from .high_order import SPARE, HighOrder, high_order
 from .truth import banded
+from .youla import AffineLoop, Truth, margin_grid, youla_design
 
 _FAINT = 1e-3  # noise of an exact sensor, see `bound_for`
 _LONGER = 2.0  # T_z of any signal over that of the hook, at most
 _RTOL = 1e-7  # of the design's own variances
-_REFITS = 1
 _PADE = 6  # of the delays, for the design's poles: marks of its quadrature
 _PROPER = 1e4  # corner of the low-pass before a direct gain [rad/s]
 _SIGNALS = ("acceleration", "velocity", "displacement")
 _SAMPLE = 0.01  # of the faint noise [s]
 _SHAKEN = "payload.force"
 _FORCE = 0.1  # of the faint noise, on the payload
+_ENCODER = ("drum.haul", "motor.speed")
+_MRU = ("mru.heave", "mru.heave_rate")
+_FINE = 24  # rope masses on which the best found is made, if the bound has no more
+_NUMBERS, _FEWEST, _MOST = 120, 12, 24  # free numbers of Q, and its functions a measurement
 
 
+class JudgedDesign(Protocol):
+    """What of a design the best possible is told beside."""
+
+    @property
+    def sea_case(self) -> Case:
+        """The case in the sea that its figures hold for."""
+
+    @property
+    def controller(self) -> LinearController:
+        """Its controller, u = +C y."""
+
+    @property
+    def margins(self) -> Margins | None:
+        """Its margins; None if the loop is unstable."""
+
+    @property
+    def masses(self) -> int:
+        """Rope masses of its plant."""
+
+    @property
+    def drag(self) -> float:
+        """Linear drag coefficient [N s/m]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BestPossible:
+    """What linear controllers can do in a case at all, and what was found within an M_s.
+
+    Attributes
+    ----------
+    case
+        The case, in the sea of the figures.
+    free
+        The lower bound: no linear controller does better, whatever its margins.
+    exact
+        The sensors that tell of payload or ship and that the case calls exact: with these the
+        bound hangs on the faint noise, and means little.
+    max_sensitivity
+        M_s of the best found: the case's limit, or the design's own where it is more.
+    rms
+        The design's payload rms on these terms [m]: with the noise of all sensors that it hears, a
+        faint one where they are exact; None without a design.
+    controller, margins
+        The design's; None without one.
+    bode
+        What Bode's integral says of the design's loop; None without one.
+    """
+
+    case: Case
+    free: Bound
+    exact: tuple[str, ...]
+    max_sensitivity: float
+    rms: float | None = None
+    controller: LinearController | None = None
+    margins: Margins | None = None
+    bode: BodeEstimate | None = None
+    terms: _Terms = field(repr=False)
+
+    @property
+    def factor(self) -> float:
+        """The design's rms over the bound; infinite without one."""
+        return self.rms / self.free.value if self.rms and self.free.value > 0.0 else math.inf
+
+    @property
+    def meaningful(self) -> bool:
+        """Whether the bound is more than a consequence of the faint noise."""
+        return not self.exact and 0.0 < self.free.value < math.inf
+
+    @cached_property
+    def free_sensitivity(self) -> float:
+        """M_s of the LQG controller that comes next to the bound, with the exact delays."""
+        loop = AffineLoop(self.free, np.ones(1))
+        plant = self.free.plant
+
+        def distance(omega: Any) -> Any:
+            blocks = loop.at(omega)
+            off = plant.response(omega).yu[:, :, 0] - blocks.yu
+            late = 1.0 - np.sum(blocks.X * off, axis=1)
+            return late / (1.0 + np.sum(blocks.X * blocks.yu, axis=1)) - 1.0
+
+        grid = margin_grid(loop.marks)
+        return loop_margins(distance, grid, distance(grid)).max_sensitivity
+
+    @cached_property
+    def found(self) -> HighOrder | str:
+        """The best found within the M_s, of high order or the design itself; or why there is none.
+
+        Other margins than M_s are not imposed.  It holds on a finer rope than its own.
+        """
+        own = None
+        if self.rms is not None and self.controller is not None and self.margins is not None:
+            own = HighOrder(rms=self.rms, controller=self.controller, margins=self.margins)
+        try:
+            made = self._made()
+        except (SynthesisError, SolverError) as error:
+            return own or str(error)
+        return own if own is not None and own.rms <= made.rms else made
+
+    @property
+    def is_own(self) -> bool:
+        """Whether the best found is the design itself."""
+        found = self.found
+        return isinstance(found, HighOrder) and found.controller is self.controller
+
+    def _made(self) -> HighOrder:
+        terms, most = self.terms, self.max_sensitivity
+        modal = self.case.rope.lumping != "thesis"
+        fine = max(_FINE, terms.masses) if modal else terms.masses
+        bound = terms.bound(fine, refits=0, begin=self.free.multipliers)
+        plant = terms.plant(MAX_MASSES) if modal else bound.plant
+        truth = Truth(plant=plant, line=terms.line if modal else None)
+        heard = len(bound.plant.measurements)
+        design = youla_design(
+            bound,
+            max_sensitivity=1.0 + SPARE * (most - 1.0),
+            functions=int(np.clip(_NUMBERS // heard, _FEWEST, _MOST)),
+            truth=truth,
+        )
+        return high_order(design, most, truth)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What it says, in words: of the bound, of the best found, of the design."""
+        least = f"{1e3 * self.free.value:.3g} mm"
+        if not self.free.feasible:
+            return ("no linear controller keeps the limits",)
+        said = [
+            f"no linear controller does better than {least} whatever its margins "
+            f"(its LQG has M_s {self.free_sensitivity:.2g})"
+        ]
+        found = self.found
+        if isinstance(found, str):
+            said.append(f"none found within M_s {self.max_sensitivity:.3g}: {found}")
+        elif self.is_own:
+            said.append(
+                f"the best found at M_s {self.max_sensitivity:.3g} is the design "
+                f"itself: {1e3 * found.rms:.3g} mm"
+            )
+        else:
+            m = found.margins
+            said.append(
+                f"the best found at M_s {self.max_sensitivity:.3g} with order "
+                f"{found.order}: {1e3 * found.rms:.3g} mm (gain x {m.gain_down:.2g} to "
+                f"x {m.gain:.3g}, phase {math.degrees(m.phase):.0f} deg, delay "
+                f"{1e3 * m.delay:.0f} ms)"
+            )
+        if self.rms is not None:
+            times = [f"{self.factor:.3g} times the bound"]
+            if not self.is_own and isinstance(found, HighOrder):
+                times.append(f"{self.rms / found.rms:.3g} times the best found")
+            said.append(f"the design leaves {1e3 * self.rms:.3g} mm, {' and '.join(times)}")
+        return tuple(said)
+
+    def __str__(self) -> str:
+        """Return a small tree."""
+        first, *more = self.sentences
+        lines = [f"Best possible: {first}", *(f"├ {text}" for text in more)]
+        if self.exact:
+            lines.append(f"├ it means little: {', '.join(self.exact)} exact")
+        if str(self.bode or ""):
+            lines.append(f"├ {self.bode}")
+        for name, limit in self.free.limits.items():
+            lines.append(
+                f"├ {name} at the bound: {100.0 * self.free.rms[name] / limit:.1f} % of "
+                f"{limit:.4g} rms"
+            )
+        lines += [f"├ {text}" for text in (f"duality gap {self.free.gap:.1e}", *self.terms.said)]
+        lines[-1] = "└" + lines[-1][1:]
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Terms:
+    """The terms on which controllers are compared.
+
+    Attributes
+    ----------
+    case, hook
+        The case and its hook motion.
+    heard
+        What a controller hears.
+    masses, drag
+        Rope masses of the bound's plant; linear drag coefficient [N s/m].
+    faint
+        See `bound_for`.
+    limits
+        On the rms of outputs, by name.
+    said
+        Remarks.
+    """
+
+    case: Case
+    hook: HookMotion
+    heard: tuple[str, ...]
+    masses: int
+    drag: float
+    faint: float
+    limits: Mapping[str, float]
+    said: tuple[str, ...]
+
+    def plant(self, masses: int) -> LinearPlant:
+        """Return the plant on so many rope masses."""
+        return sensed_plant(self.case, masses=masses, drag=self.drag).select(
+            measurements=self.heard
+        )
+
+    def line(self, omega: FloatArray) -> ComplexArray:
+        """Return what is heard of the command on the distributed rope, (k, ny)."""
+        found = line_response(self.case, omega, drag=self.drag)
+        heard = dict(zip(found.measurements, found.yu[:, :, 0].T, strict=True))
+        for name in (*_ENCODER, "rope.tension"):
+            heard[name] = found.zu[:, found.outputs.index(name), 0]
+        if (cell := self.case.sensors.load_cell) is not None:
+            heard["rope.tension"] = heard["rope.tension"] / (1.0 + 1j * omega / cell.bandwidth)
+        still = np.zeros_like(found.zu[:, 0, 0])
+        return np.stack([heard.get(name, still) for name in self.heard], axis=1)
+
+    def shaken(self, masses: int) -> tuple[LinearPlant, dict[str, Any], tuple[str, ...]]:
+        """Return the plant with its faint noise, the spectra, and what is faint."""
+        spectra = _heard_by(sensed_spectra(self.case, self.hook), self.heard)
+        return faint_noise(self.case, self.plant(masses), self.hook, spectra, self.faint)
+
+    def bound(
+        self, masses: int, *, refits: int = 2, begin: Mapping[str, float] | None = None
+    ) -> Bound:
+        """Return the bound on so many rope masses."""
+        plant, spectra, _ = self.shaken(masses)
+        return lqg_bound(
+            plant,
+            spectra,
+            {PAYLOAD: 1.0},
+            self.limits,
+            refits=refits,
+            begin=begin,
+            assumptions=self.said,
+        )
+
+
+@one_thread()
 def bound_for(
-    case: Case,
+    subject: Case | JudgedDesign,
     *,
-    masses: int | None = None,
-    drag: float | None = None,
     measurements: Sequence[str] | None = None,
-    spectra: Mapping[str, Any] | None = None,
-    periods: Mapping[str, float] | None = None,
+    masses: int | None = None,
     faint: float = _FAINT,
-    pade: int = 2,
-    order: int = 8,
-) -> Bound:
-    """Return a lower bound on the payload's rms motion for any linear controller of a case.
+) -> BestPossible:
+    """Return the best possible for a case, or beside a design.
+
+    Parameters
+    ----------
+    subject
+        The case, or a design of any structure.
+    measurements
+        What a controller hears (`models.sensing.MEASURED`); by default what a design's structure
+        hears, or all that is aboard in a case (`aboard`), with the drive's encoder.
+    masses
+        Rope masses; by default the design's or the case's, or a number that suits a quick loop.
+    faint
+        Noise of a sensor that the case calls exact: an independent error every 10 ms, over the
+        rms of the hook's motion (for a tension: over the static one).  A tenth of it, over the
+        static tension, is a force on the payload.
+
+    Returns
+    -------
+    BestPossible
+        The bound at once; the best found within the M_s, some ten seconds, when it is asked for.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, a design's loop is unstable, or a limit lies below the static load.
+    SolverError
+        If a Riccati equation has no stabilising solution.
+    """
+    check_range("bound", "faint", faint, low=0.0, open_low=True)
+    design = None if isinstance(subject, Case) else subject
+    case = subject if isinstance(subject, Case) else subject.sea_case
+    if design is not None and design.margins is None:
+        raise InputError("bound: the design's loop must be stable")
+    if masses is None and design is not None:
+        masses = design.masses
+    question = pose(case, masses=masses)
+    controller = design.controller if design is not None else None
+    heard = measurements
+    if heard is None:
+        heard = aboard(case) if controller is None else (*controller.measurements, *_ENCODER)
+    terms = _terms(question, heard, question.drag_before if design is None else design.drag, faint)
+    rms = None
+    if controller is not None:
+        made = _rms(terms, controller)
+        # What the design itself uses is allowed: else it might not be among those compared with.
+        room = {
+            name: max(bound, made[name]) if math.isfinite(bound) else made[name]
+            for name, bound in terms.limits.items()
+        }
+        terms, rms = replace(terms, limits=room), made[PAYLOAD]
+    most = case.limits.max_sensitivity
+    if design is not None and design.margins is not None:
+        most = max(design.margins.max_sensitivity, most)
+    return BestPossible(
+        case=case,
+        free=terms.bound(terms.masses),
+        exact=exact_sensors(case, terms.heard),
+        max_sensitivity=most,
+        rms=rms,
+        controller=controller,
+        margins=design.margins if design is not None else None,
+        bode=_bode(terms, controller) if controller is not None else None,
+        terms=terms,
+    )
+
+
+def aboard(case: Case) -> tuple[str, ...]:
+    """Return what is measured aboard: what the case names, and the drive's own encoder."""
+    named = {
+        **dict.fromkeys(MEASUREMENTS, True),
+        **dict.fromkeys(_MRU, case.sensors.mru is not None),
+        **dict.fromkeys(_ENCODER, True),
+        "rope.tension": case.sensors.load_cell is not None,
+    }
+    return tuple(name for name in MEASURED if named[name])
+
+
+def exact_sensors(case: Case, measurements: Sequence[str] | None = None) -> tuple[str, ...]:
+    """Return the sensors that tell of payload or ship and to which a case gives no noise.
 
     Parameters
     ----------
     case
         The case.
-    masses
-        Rope masses; by default the case's, or a number that suits a quick loop.
-    drag
-        Linear drag coefficient [N s/m], such as a design's; by default that with the drum held.
     measurements
-        What the controller hears (`models.sensing.plant.MEASURED`); by default everything.
-    spectra
-        Further disturbances, or others than the case's (`models.sensing.plant.sensed_spectra`).
-    periods
-        Mean period T_z of signals by name [s], such as a design's; by default twice the hook's.
-        The longer, the smaller the k of peak limits and the lower the bound.
-    faint
-        Noise of a sensor that the case calls exact: an independent error every 10 ms, over the
-        rms of the hook's motion (for a tension: over the static one).  A tenth of it, over the
-        static tension, is a force on the payload.
-    pade, order
-        See `lqg_bound`.
-
-    Raises
-    ------
-    InputError
-        If a name is unknown or a limit lies below the static load.
+        What is heard; by default all that is aboard.
     """
-    check_range("bound", "faint", faint, low=0.0, open_low=True)
-    question = pose(case, masses)
-    hook = question.hook
-    coefficient = question.drag_before if drag is None else drag
-    plant = sensed_plant(case, masses=question.masses, drag=coefficient)
-    if measurements is not None:
-        plant = plant.select(measurements=measurements)
-    given = {**sensed_spectra(case, hook), **(spectra or {})}
-    known = _heard(plant)
-    given = {k: v for k, v in given.items() if k not in known or known[k] in plant.measurements}
-    longest = _LONGER * float(hook.displacement.zero_crossing_period)
-    rms = rms_limits(question.limits, periods or {}, longest)
-    command, top = command_limit(case, plant)
-    rms = {**{command: top}, **rms} if command not in rms else rms
-    plant, given, added = faint_noise(case, plant, hook, given, faint)
-    said = [
-        f"drag {coefficient:.4g} N s/m; {question.masses} rope masses",
-        f"peaks as rms with T_z {'of the design' if periods else f'{longest:.3g} s'}; no limits on "
-        "margins or power",
-    ]
-    if added:
-        said.append(f"faint noise ({faint:g}) of {', '.join(added)}")
-    return lqg_bound(
-        plant, given, {PAYLOAD: 1.0}, rms, pade=pade, order=order, assumptions=tuple(said)
-    )
+    payload, mru = case.sensors.payload, case.sensors.mru
+    noise = {f"payload.{name}": getattr(payload, f"{name}_noise") for name in _SIGNALS}
+    noise |= dict.fromkeys(_MRU, 0.0 if mru is None else mru.noise_floor + mru.noise_fraction)
+    heard = aboard(case) if measurements is None else measurements
+    return tuple(name for name in heard if noise.get(name, 1.0) == 0.0)
 
 
-def rms_limits(
-    limits: Sequence[Limit], periods: Mapping[str, float], longest: float
-) -> dict[str, float]:
+def rms_limits(limits: Sequence[Limit], period: float) -> dict[str, float]:
     """Return the limits on signals as limits on their rms by name; others are left out.
 
     |static| + k sigma <= bound with k = sqrt(2 ln(T/T_z)), and sqrt(static^2 + sigma^2) <= bound.
@@ -130,10 +424,8 @@ def rms_limits(
     ----------
     limits
         As of a case.
-    periods
-        T_z of a signal by name [s].
-    longest
-        T_z of the others [s].
+    period
+        T_z of the signals [s].
 
     Raises
     ------
@@ -147,7 +439,6 @@ def rms_limits(
         elif isinstance(limit, Continuous):
             room = math.sqrt(max(limit.bound**2 - limit.static**2, 0.0))
         elif isinstance(limit, Peak | Minimum):
-            period = periods.get(limit.output, longest)
             k = math.sqrt(2.0 * math.log(max(limit.duration / period, math.e**0.5)))
             least = isinstance(limit, Minimum)
             room = (limit.static - limit.bound if least else limit.bound - abs(limit.static)) / k
@@ -196,6 +487,78 @@ def faint_noise(
     return noisy, result, tuple(added)
 
 
+def command_limit(case: Case, plant: LinearPlant) -> tuple[str, float]:
+    """Return the input and what its rms cannot exceed, whatever the drive does."""
+    name = plant.inputs[0]
+    motor, drive = case.winch.motor, case.winch.drive
+    if motor.type == "dc":
+        return name, float(drive.voltage or math.inf)
+    if getattr(motor, "speed_gain", 0.0):
+        return name, float(case.winch.speed_limit or math.inf)
+    return name, float(drive.torque_peak or math.inf)
+
+
+def _terms(question: DesignQuestion, heard: Sequence[str], drag: float, faint: float) -> _Terms:
+    """Return the terms of a case, with its limits on signals as limits on their rms."""
+    case, hook = question.case, question.hook
+    pick("bound", "measurement", MEASURED, heard)
+    period = _LONGER * float(hook.displacement.zero_crossing_period)
+    terms = _Terms(
+        case=case,
+        hook=hook,
+        heard=tuple(name for name in MEASURED if name in heard),
+        masses=question.masses,
+        drag=drag,
+        faint=faint,
+        limits=rms_limits(question.limits, period),
+        said=(
+            f"heard: {', '.join(name for name in MEASURED if name in heard)}",
+            f"drag {drag:.4g} N s/m; {question.masses} rope masses",
+            f"peaks as rms with T_z {period:.3g} s; no limits on margins or power",
+        ),
+    )
+    plant, _, added = terms.shaken(terms.masses)
+    command, top = command_limit(case, plant)
+    limits = terms.limits if command in terms.limits else {command: top, **terms.limits}
+    faintly = (f"faint noise ({faint:g}) of {', '.join(added)}",) if added else ()
+    return replace(terms, limits=limits, said=(*terms.said, *faintly))
+
+
+def _loop(
+    terms: _Terms, controller: LinearController
+) -> tuple[LinearPlant, tuple[Disturbance, ...]]:
+    """Return a design's own plant, and what shakes it."""
+    plant, spectra, _ = terms.shaken(terms.masses)
+    plant = with_input_outputs(plant, list(terms.limits)).select(
+        measurements=controller.measurements
+    )
+    heard = _heard_by(spectra, controller.measurements)
+    return plant, disturbances(heard, plant.independent_disturbances)
+
+
+def _rms(terms: _Terms, controller: LinearController) -> dict[str, float]:
+    """Return the rms of the payload and of what is limited in a design's loop."""
+    plant, sources = _loop(terms, controller)
+    controller = _proper(controller)
+    law = LawMatrices.of(controller, plant)
+    poles = closed_loop_poles(plant.without_delays(_PADE), controller)
+    loop = Loop(
+        plant=plant.response_at,
+        law=law,
+        marks=np.concatenate([poles, plant.poles(), np.linalg.eigvals(law.A)]),
+    )
+    names = list(dict.fromkeys([PAYLOAD, *terms.limits]))
+    inside = [banded(source) for source in sources]
+    found = moments(loop, names, inside, orders=(0,), rtol=_RTOL)
+    return {name: math.sqrt(value[0]) for name, value in found.items()}
+
+
+def _bode(terms: _Terms, controller: LinearController) -> BodeEstimate:
+    """Return Bode's integral of a design's loop."""
+    plant, sources = _loop(terms, controller)
+    return bode_estimate(Assessment(plant, controller, sources))
+
+
 def _scales(case: Case, hook: HookMotion) -> dict[str, float]:
     """Return the size of each measured signal if the payload is held still."""
     heave, rate = float(hook.displacement.rms), float(hook.velocity.rms)
@@ -210,196 +573,6 @@ def _scales(case: Case, hook: HookMotion) -> dict[str, float]:
         "motor.speed": rate * per_haul,
         "rope.tension": float(case.static_tension),
     }
-
-
-def command_limit(case: Case, plant: LinearPlant) -> tuple[str, float]:
-    """Return the input and what its rms cannot exceed, whatever the drive does."""
-    name = plant.inputs[0]
-    motor, drive = case.winch.motor, case.winch.drive
-    if motor.type == "dc":
-        return name, float(drive.voltage or math.inf)
-    if getattr(motor, "speed_gain", 0.0):
-        return name, float(case.winch.speed_limit or math.inf)
-    return name, float(drive.torque_peak or math.inf)
-
-
-def _heard(plant: LinearPlant) -> dict[str, str]:
-    """Return which measurement each sensor's own noise belongs to."""
-    noises = {n: n.removesuffix("_noise") for n in plant.disturbances if n.endswith("_noise")}
-    if "mru.error" in plant.disturbances:
-        heard = "mru.heave" if "mru.heave" in plant.measurements else "mru.heave_rate"
-        noises["mru.error"] = heard
-    return noises
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class DesignBound:
-    """A design next to the best that any linear controller could do.
-
-    Attributes
-    ----------
-    rms
-        The design's payload rms on the terms of the bounds [m]: with the noise of all sensors
-        that it hears, a faint one where they are exact.
-    heard, every
-        The bounds for a controller with the same sensors, and with all sensors of the case.
-    exact_heard, exact_every
-        The sensors among either that tell of payload or ship and that the case calls exact:
-        with these the bound hangs on the faint noise, and means little.
-    """
-
-    rms: float
-    heard: Bound
-    every: Bound
-    exact_heard: tuple[str, ...]
-    exact_every: tuple[str, ...]
-
-    @property
-    def factor(self) -> float:
-        """The design's rms over the bound with the sensors that it hears; infinite without one."""
-        return self.rms / self.heard.value if self.heard.value > 0.0 else math.inf
-
-    @property
-    def sentence(self) -> str:
-        """How far the design is from the best with the sensors that it hears."""
-        return _sentence(self.rms, self.heard, self.exact_heard)
-
-    def __str__(self) -> str:
-        """Return a small tree."""
-        every = _sentence(self.rms, self.every, self.exact_every)
-        gaps = f"duality gap {self.heard.gap:.1e} and {self.every.gap:.1e}"
-        return (
-            f"DesignBound: payload {1e3 * self.rms:.4g} mm rms\n"
-            f"├ {self.sentence}\n"
-            f"├ {every.replace('these sensors', 'all sensors of the case')}\n"
-            f"├ {gaps}\n"
-            f"└ {'; '.join(self.heard.assumptions[-3:])}"
-        )
-
-
-@one_thread()
-def bound_beside(
-    case: Case,
-    hook: HookMotion,
-    controller: LinearController,
-    *,
-    masses: int,
-    drag: float,
-    limits: Sequence[Limit],
-) -> DesignBound:
-    """Return a design beside the bounds of its case.
-
-    Parameters
-    ----------
-    case, hook
-        The case and its hook motion.
-    controller
-        The design's, stable on this case.
-    masses, drag
-        Rope masses and linear drag coefficient of the design [N s/m].
-    limits
-        Limits that the design had to keep; those on margins and power are left out, which
-        lowers the bound.
-
-    Returns
-    -------
-    DesignBound
-
-    Raises
-    ------
-    SolverError
-        If a Riccati equation has no stabilising solution.
-    InputError
-        If a limit leaves no room above the static load.
-    """
-    plant, shaken, added = faint_noise(
-        case,
-        sensed_plant(case, masses=masses, drag=drag),
-        hook,
-        sensed_spectra(case, hook),
-        _FAINT,
-    )
-    command, top = command_limit(case, plant)
-    plant = with_input_outputs(plant, [command])
-    longest = _LONGER * float(hook.displacement.zero_crossing_period)
-    named = [limit.output for limit in limits if hasattr(limit, "output")]
-    signals = list(dict.fromkeys([PAYLOAD, command, *(n for n in named if n in plant.outputs)]))
-    rms = _rms(plant, controller, shaken, signals)
-    room = rms_limits(limits, {}, longest)
-    room[command] = min(top, room.get(command, math.inf))
-    if not math.isfinite(room[command]):
-        room[command] = rms[command]
-    # What the design itself uses is allowed: else it might not be among those compared with.
-    room = {name: max(bound, rms[name]) for name, bound in room.items()}
-    said = (
-        f"drag {drag:.4g} N s/m; {masses} rope masses",
-        "peaks as rms; no limits on margins or power",
-        f"faint noise ({_FAINT:g}) of {', '.join(added)}" if added else "no faint noise",
-    )
-    factors = _factors(plant, shaken)
-
-    def bound_with(names: Sequence[str], begin: Mapping[str, float] | None) -> Bound:
-        return lqg_bound(
-            plant.select(measurements=names),
-            _heard_by(shaken, names),
-            {PAYLOAD: 1.0},
-            room,
-            refits=_REFITS,
-            assumptions=said,
-            factors=factors,
-            begin=begin,
-        )
-
-    heard = bound_with(controller.measurements, None)
-    every = bound_with(MEASURED, heard.multipliers)
-    return DesignBound(
-        rms=rms[PAYLOAD],
-        heard=heard,
-        every=every,
-        exact_heard=exact_sensors(case, controller.measurements),
-        exact_every=exact_sensors(case),
-    )
-
-
-def exact_sensors(case: Case, measurements: Sequence[str] = MEASURED) -> tuple[str, ...]:
-    """Return the sensors that tell of payload or ship and to which a case gives no noise.
-
-    Parameters
-    ----------
-    case
-        The case.
-    measurements
-        What is heard; by default everything.
-    """
-    payload, mru = case.sensors.payload, case.sensors.mru
-    noise = {f"payload.{name}": getattr(payload, f"{name}_noise") for name in _SIGNALS}
-    noise["mru.heave"] = 0.0 if mru is None else mru.noise_floor + mru.noise_fraction
-    noise["mru.heave_rate"] = noise["mru.heave"]
-    return tuple(name for name in measurements if noise.get(name, 1.0) == 0.0)
-
-
-def _rms(
-    plant: LinearPlant,
-    controller: LinearController,
-    spectra: Mapping[str, Any],
-    signals: Sequence[str],
-) -> dict[str, float]:
-    """Return the rms of signals in the design's loop."""
-    plant = plant.select(measurements=controller.measurements)
-    controller = _proper(controller)
-    law = LawMatrices.of(controller, plant)
-    poles = closed_loop_poles(plant.without_delays(_PADE), controller)
-    loop = Loop(
-        plant=plant.response_at,
-        law=law,
-        marks=np.concatenate([poles, plant.poles(), np.linalg.eigvals(law.A)]),
-    )
-    sources = disturbances(
-        _heard_by(spectra, controller.measurements), plant.independent_disturbances
-    )
-    inside = [banded(source) for source in sources]
-    found = moments(loop, signals, inside, orders=(0,), rtol=_RTOL)
-    return {name: math.sqrt(value[0]) for name, value in found.items()}
 
 
 def _proper(controller: LinearController) -> LinearController:
@@ -421,28 +594,9 @@ def _proper(controller: LinearController) -> LinearController:
     )
 
 
-def _factors(plant: LinearPlant, spectra: Mapping[str, Any]) -> dict[str, SpectralFactor]:
-    """Return the spectral factors of what is not white, for both bounds."""
-    coloured = {name: s for name, s in spectra.items() if not isinstance(s, White)}
-    sources = disturbances(coloured, plant.independent_disturbances)
-    return {source.name: spectral_factor(source) for source in sources}
-
-
 def _heard_by(spectra: Mapping[str, Any], measurements: Sequence[str]) -> dict[str, Any]:
     """Return the spectra without those of sensors that are not heard."""
     heard = set(measurements)
-    sensors = {f"{name}{end}": name for name in MEASURED for end in ("_noise", ".faint")}
-    if not heard & {"mru.heave", "mru.heave_rate"}:
-        sensors["mru.error"] = "mru.heave"
-        heard.discard("mru.heave")
-    return {
-        name: value
-        for name, value in spectra.items()
-        if name not in sensors or sensors[name] in heard
-    }
-
-
-def _sentence(rms: float, bound: Bound, exact: Sequence[str]) -> str:
-    if exact:
-        return f"{', '.join(exact)} exact: no meaningful bound with these sensors"
-    return f"{bound.sentence(rms)}, {1e3 * bound.value:.4g} mm"
+    own = {f"{name}{end}": {name} for name in MEASURED for end in ("_noise", ".faint")}
+    own["mru.error"] = set(_MRU)
+    return {name: value for name, value in spectra.items() if own.get(name, heard) & heard}

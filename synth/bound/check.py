@@ -7,7 +7,7 @@ through a Lyapunov equation, its true spectra through `quad_vec`, and a rival ha
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -93,8 +93,10 @@ def verify_bound(bound: Bound) -> Verification:
 
 
 @one_thread()
-def weighted_rms(bound: Bound, controller: LinearController) -> float:
-    """Return the root of the weighted variance of another controller on a bound's terms.
+def controller_rms(
+    bound: Bound, controller: LinearController, names: Sequence[str]
+) -> dict[str, float]:
+    """Return what another controller makes of outputs on a bound's terms, rms by name.
 
     Raises
     ------
@@ -117,8 +119,20 @@ def weighted_rms(bound: Bound, controller: LinearController) -> float:
     # Only a controller with a direct path makes a delayed loop ring.
     late = max(bound.plant.delays) if np.any(law.D) else 0.0
     sources = [banded(source) for source in bound.sources]
-    found = moments(loop, list(bound.minimise), sources, orders=(0,), delay=late, rtol=_QUADRATURE)
-    return math.sqrt(sum(w * found[name][0] for name, w in bound.minimise.items()))
+    found = moments(loop, names, sources, orders=(0,), delay=late, rtol=_QUADRATURE)
+    return {name: math.sqrt(found[name][0]) for name in names}
+
+
+def weighted_rms(bound: Bound, controller: LinearController) -> float:
+    """Return the root of the weighted variance of another controller on a bound's terms.
+
+    Raises
+    ------
+    SynthesisError
+        If its loop is unstable.
+    """
+    found = controller_rms(bound, controller, list(bound.minimise))
+    return math.sqrt(sum(w * found[name] ** 2 for name, w in bound.minimise.items()))
 
 
 def _variances(bound: Bound, names: list[str], point: DualPoint) -> dict[str, float]:

@@ -1,11 +1,11 @@
 r"""Controllers of high order within margins, by Youla's parametrisation: `youla_design`.
 
     Bound -> its LQG controller as the observer -> Q(s) from innovations to command
-      -> cone programme on frequency nodes (cvxpy, Clarabel) -> Controller
+      -> cone programme on frequency nodes (cvxpy, Clarabel) -> YoulaDesign
 
 Every stabilising controller is an observer with state feedback whose innovations drive the command
 through a stable Q, and every closed-loop response is affine in Q.  Variances, limits on rms
-values, M_s and roll-off are then convex, and with Q in a Laguerre basis a second-order cone
+values, M_s and roll-off are then convex, and with Q in a basis of fixed poles a second-order cone
 programme (Boyd and Barratt, *Linear Controller Design*, 1991).  The answer is achievable, so it
 lies above the best possible and falls with the number of functions; a bound it is not.
 
@@ -13,14 +13,21 @@ lies above the best possible and falls with the number of functions; a bound it 
 
 x^ is the observer's state, M = I + K (s - A - BK)^-1 B, N = I - C (s - A + LC)^-1 L, and X the
 response from noise on the measurements to the command.
+
+The observer knows delays by Pade models and the rope by some masses.  With P~ its model, P the
+truth and S~ = 1 + X P~, the true sensitivity is S~ / (1 - X (P - P~)), so that
+
+.. math::  |\tilde S| / M_s + |X (P - \tilde P)| \le 1
+
+at every frequency keeps the true loop stable and its M_s: convex too.
 """
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -34,130 +41,136 @@ from models.basics import (
     InputError,
     SolverError,
     SynthesisError,
-    balanced_truncation,
     check_range,
     one_thread,
-    solve_lyapunov,
 )
 from models.plant import LinearPlant
 
-from ..loop import Assessment, LinearController, Margins, closed_loop_poles
-from ..verify import (
-    Check,
-    LawMatrices,
-    Verification,
-    agreement,
-    bounded,
-    closed_matrices,
-    lyapunov_variances,
-)
+from ..loop import LinearController
 from .bound import Bound
-from .check import weighted_rms
 from .truth import densities, filter_plant, frequencies, lqg_poles
 
 cp: Any = cvxpy  # its functions come through a star import that mypy does not follow
-_POINTS, _DENSE = 200, 2000  # at which M_s holds at first, and is looked at
-_EXCHANGES = 5
-_ABOVE = 1.5  # times the mean frequency of the sea: the functions' pole
+_SLOWEST = 0.4  # of the functions' poles, over the mean frequency of the sea
+_FASTEST = 2.5  # ... over the bandwidth of the LQG loop
+_WORKS = 0.5  # |T| of a loop that does something
+_DENSE, _EVERY = 1500, 10  # frequencies at which M_s is looked at; each tenth holds it at first
+_LOWEST, _TOP = 1e-4, 3e3  # ... [rad/s]
+_EXCHANGES = 8
 _INSIDE = 0.998  # of a limit between them
-_PADE = 6  # of the delays, in the verification
-_TIME, _SPREAD = 0.03, 5e-3  # agreement with the fitted sea, and of a margin
 
 
-def laguerre(a: float, count: int, channels: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return A, B of Laguerre functions sqrt(2a)/(s+a) ((s-a)/(s+a))^k of every channel, C of ones.
+def poles_of_functions(low: float, high: float, count: int) -> FloatArray:
+    """Return poles [1/s] that fill the decades between two frequencies ever more densely.
 
-    The states are the functions themselves, channel by channel.
+    In the order of van der Corput, so that the first ones are those of a smaller basis.
     """
-    A = -a * np.eye(count) - 2.0 * a * np.tril(np.ones((count, count)), -1)
-    B = math.sqrt(2.0 * a) * np.ones((count, 1))
-    return block_diag(*[A] * channels), block_diag(*[B] * channels), np.ones((1, count * channels))
+    share = [sum((k + 1 >> i & 1) * 0.5 ** (i + 1) for i in range(20)) for k in range(count)]
+    return np.asarray(low * (high / low) ** np.array(share), dtype=np.float64)
+
+
+def basis(omega: FloatArray, poles: FloatArray) -> ComplexArray:
+    """Return orthonormal functions of given poles at frequencies, (k, count).
+
+    Those of Takenaka and Malmquist, sqrt(2 a_k)/(s + a_k) times (s - a_j)/(s + a_j) of all before;
+    Laguerre's, where all poles are one.
+    """
+    s = 1j * omega[:, None]
+    passed = np.cumprod((s - poles) / (s + poles), axis=1)
+    before = np.hstack([np.ones((omega.size, 1)), passed[:, :-1]])
+    return np.asarray(np.sqrt(2.0 * poles) / (s + poles) * before)
+
+
+def realised_basis(poles: FloatArray, channels: int) -> tuple[FloatArray, FloatArray]:
+    """Return A, B of the functions of every channel; the states are the functions themselves."""
+    A = -np.diag(poles) - 2.0 * np.tril(np.sqrt(np.outer(poles, poles)), -1)
+    B = np.sqrt(2.0 * poles)[:, None]
+    return block_diag(*[A] * channels), block_diag(*[B] * channels)
 
 
 class AffineLoop:
-    """Responses of the closed loop that are affine in Q."""
+    """Responses of the closed loop that are affine in Q.
 
-    def __init__(self, bound: Bound) -> None:
-        plant = bound.dual.plant
-        K, L = bound.point.regulator.gain, bound.dual.estimator.gain
-        AK, AL = plant.A + plant.B @ K, plant.A - L @ plant.C
-        ny, nu = len(plant.measurements), len(plant.inputs)
-        own = lqg_poles(plant, bound.point.regulator, bound.dual.estimator)
+    Parameters
+    ----------
+    bound
+        The question, with its observer and state feedback.
+    poles
+        Of the functions of which Q is made, for each measurement [1/s], (count,).
+    """
+
+    def __init__(self, bound: Bound, poles: FloatArray) -> None:
+        self.model, self.poles = bound.dual.plant, poles
+        self.K, self.L = bound.point.regulator.gain, bound.dual.estimator.gain
+        n, ny = self.L.shape
+        states = np.eye(n)
+        forced = np.hstack([self.L, self.model.B])
+        fed = self.model.A + self.model.B @ self.K
+        self.driven = filter_plant(fed, forced, states, np.zeros((n, forced.shape[1])))
+        self.feedback = filter_plant(fed, states, self.K, np.zeros((1, n)))
+        self.error = filter_plant(
+            self.model.A - self.L @ self.model.C, states, -self.model.C, np.zeros((ny, n))
+        )
+        own = lqg_poles(self.model, bound.point.regulator, bound.dual.estimator)
         self.marks = np.concatenate([own, bound.plant.poles()])
-        self.plant = bound.plant
-        self.shaking = [source.name for source in bound.sources]
 
-        self.from_innovations = filter_plant(AK, L, K, np.zeros((nu, ny)))
-        self.from_command = filter_plant(AK, plant.B, K, np.eye(nu))
-        self.innovations = filter_plant(AL, L, -plant.C, np.eye(ny))
-
-    def response(
-        self, omega: FloatArray, columns: ComplexArray
-    ) -> tuple[ComplexArray, ComplexArray]:
-        """Return X at Q = 0, (k, ny), and its columns, (k, q, ny)."""
-        N = self.innovations.response(omega).yu
-        X = (self.from_innovations.response(omega).yu @ N)[:, 0]
-        M = self.from_command.response(omega).yu[:, 0, 0]
-        # Function k of channel j: M phi_k N[j, :]
-        each = M[:, None, None, None] * columns[:, None, :, None] * N[:, :, None, :]
-        return X, each.reshape(len(omega), -1, N.shape[2])
-
-    def outputs(
-        self, omega: FloatArray, columns: ComplexArray
-    ) -> tuple[ComplexArray, ComplexArray]:
-        """Return F at Q = 0, (k, nz, nw), and its columns, (k, nz, q, nw)."""
-        X, each = self.response(omega, columns)
-        blocks = self.plant.response(omega).select(disturbances=self.shaking)
-        constant = blocks.zw + blocks.zu @ (X[:, None] @ blocks.yw)
-        slope = blocks.zu[:, :, 0, None, None] * (each @ blocks.yw)[:, None]
-        return constant, slope
-
-    def sensitivity(
-        self, omega: FloatArray, columns: ComplexArray
-    ) -> tuple[ComplexArray, ComplexArray]:
-        """Return S = 1 + X P_yu at Q = 0, (k,), and its columns, (k, q)."""
-        X, each = self.response(omega, columns)
-        yu = self.plant.response(omega).yu[:, :, 0]
-        return 1.0 + np.einsum("ky,ky->k", X, yu), np.einsum("kqy,ky->kq", each, yu)
+    def at(self, omega: FloatArray) -> LoopBlocks:
+        """Return what the responses are made of at frequencies [rad/s], (k,)."""
+        driven = self.driven.response(omega).yu
+        estimated, pushed = driven[:, :, :-1], driven[:, :, -1]
+        error = self.error.response(omega).yu
+        N = np.eye(error.shape[1]) + error @ self.L
+        return LoopBlocks(
+            functions=basis(omega, self.poles),
+            estimated=estimated,
+            pushed=pushed,
+            error=error,
+            N=N,
+            M=1.0 + pushed @ self.K[0],
+            X=((self.K @ estimated) @ N)[:, 0],
+            yu=self.model.response(omega).yu[:, :, 0],
+        )
 
 
-def basis(omega: FloatArray, a: float, count: int) -> ComplexArray:
-    """Return the Laguerre functions at frequencies, (k, count)."""
-    s = 1j * omega[:, None]
-    return np.asarray(math.sqrt(2.0 * a) / (s + a) * ((s - a) / (s + a)) ** np.arange(count))
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LoopBlocks:
+    """Responses at frequencies, (k,) first.
 
+    Attributes
+    ----------
+    functions
+        Of the basis, (k, count).
+    estimated, pushed
+        From innovations and from the command to the observer's states, (k, n, ny), (k, n).
+    error
+        From the observer's states to the innovations, (k, ny, n).
+    N, M
+        From noise on the measurements to the innovations, (k, ny, ny), and from v to the command.
+    X
+        From noise on the measurements to the command, at Q = 0, (k, ny).
+    yu
+        The model's, from the command to the measurements, (k, ny).
+    """
 
-def compressed(
-    constant: ComplexArray, slope: ComplexArray, spectra: FloatArray, row: int
-) -> tuple[FloatArray, FloatArray]:
-    """Return R, r with ||R q + r||^2 the variance of an output; few rows for many nodes."""
-    weight = spectra.T  # (k, nw)
-    r = (constant[:, row] * weight).ravel()
-    R = np.moveaxis(slope[:, row] * weight[:, None], 1, 2).reshape(r.size, -1)
-    stacked = np.column_stack([R, r])
-    triangle: FloatArray = np.linalg.qr(np.vstack([stacked.real, stacked.imag]))[1]
-    return triangle[:, :-1], triangle[:, -1]
+    functions: ComplexArray
+    estimated: ComplexArray
+    pushed: ComplexArray
+    error: ComplexArray
+    N: ComplexArray
+    M: ComplexArray
+    X: ComplexArray
+    yu: ComplexArray
 
-
-def realised(
-    plant: LinearPlant, K: FloatArray, L: FloatArray, Aq: FloatArray, Bq: FloatArray, Cq: FloatArray
-) -> LinearController:
-    """Return the observer with Q as one controller."""
-    A, B, C, D = plant.A, plant.B, plant.C, plant.D
-    seen = C + D @ K
-    return LinearController(
-        A=np.block([[A + B @ K - L @ seen, (B - L @ D) @ Cq], [-Bq @ seen, Aq - Bq @ D @ Cq]]),
-        B=np.vstack([L, Bq]),
-        C=np.hstack([K, Cq]),
-        D=np.zeros((len(plant.inputs), len(plant.measurements))),
-        measurements=plant.measurements,
-        inputs=plant.inputs,
-    )
+    @cached_property
+    def slope(self) -> ComplexArray:
+        """Columns of X, (k, q, ny): function k of channel j is M phi_k N[j, :]."""
+        each = (self.M[:, None] * self.functions)[:, None, :, None] * self.N[:, :, None, :]
+        return each.reshape(len(self.M), -1, self.N.shape[2])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class YoulaDesign:
-    """A controller of high order, and what it achieves.
+    """A controller of full order, and what it achieves.
 
     Attributes
     ----------
@@ -169,103 +182,63 @@ class YoulaDesign:
         Of what is limited, by name.
     max_sensitivity
         The M_s that was asked for, or infinity.
-    margins
-        Of the loop with its exact delays.
-    functions
-        Laguerre functions of each measurement.
-    controller
-        The controller, u = +C y.
+    weights
+        Of the functions, measurement by measurement, (q,).
+    loop
+        The loop that is affine in them.
     """
 
     bound: Bound
     value: float
     rms: Mapping[str, float]
     max_sensitivity: float
-    margins: Margins
-    functions: int
-    controller: LinearController
-
-    def reduced(self, order: int) -> LinearController:
-        """Return the controller truncated to at most `order` states.
-
-        The states of least weight in the closed loop are dropped: reached as the disturbances
-        drive them there, heard in what is minimised and limited and in the command.  It need not
-        be stabilising: a start for a search, or to be looked at with `Bound.of`.
-        """
-        heard, reached = self._gramians
-        left, right = balanced_truncation(heard, reached, order)
-        given = self.controller
-        return replace(given, A=left @ given.A @ right, B=left @ given.B, C=given.C @ right)
+    weights: FloatArray
+    loop: AffineLoop = field(repr=False)
 
     @cached_property
-    def _gramians(self) -> tuple[FloatArray, FloatArray]:
-        """Observability and controllability of the controller's states in the closed loop."""
-        plant, point = self.bound.dual.plant, self.bound.point
-        given = self.controller
-        A, E, Cz, _ = closed_matrices(plant, LawMatrices.of(given, plant))
-        n = len(plant.states)
-        reached = solve_lyapunov(A, E @ E.T)
-        moved = np.hstack([np.zeros((len(plant.inputs), n)), given.C])
-        charge = self.bound.dual.charge(point.multipliers)
-        cost = float(charge @ np.sum((Cz @ reached) * Cz, axis=1))
-        effort = np.sum((moved @ reached) * moved, axis=1)
-        rows = np.vstack([np.sqrt(charge)[:, None] * Cz, np.sqrt(cost / effort)[:, None] * moved])
-        heard = solve_lyapunov(A.T, rows.T @ rows)
-        return heard[n:, n:], reached[n:, n:]
-
-    def lowest(self, *, within: float = 0.1, most: int = 20) -> LinearController:
-        """Return the controller of lowest order that is stable and loses at most a share `within`.
-
-        Raises
-        ------
-        SynthesisError
-            If there is none of at most `most` states.
-        """
-        for order in range(1, most + 1):
-            controller = self.reduced(order)
-            try:
-                found = weighted_rms(self.bound, controller)
-            except SynthesisError:
-                continue
-            if found <= (1.0 + within) * self.value:
-                return controller
-        raise SynthesisError(
-            f"Youla: no truncation to at most {most} states keeps within {100 * within:g} %"
+    def controller(self) -> LinearController:
+        """The observer with Q as one controller, u = +C y."""
+        plant, K, L = self.loop.model, self.loop.K, self.loop.L
+        Aq, Bq = realised_basis(self.loop.poles, len(plant.measurements))
+        A, B, C, D, Cq = plant.A, plant.B, plant.C, plant.D, self.weights[None]
+        seen = C + D @ K
+        return LinearController(
+            A=np.block([[A + B @ K - L @ seen, (B - L @ D) @ Cq], [-Bq @ seen, Aq - Bq @ D @ Cq]]),
+            B=np.vstack([L, Bq]),
+            C=np.hstack([K, Cq]),
+            D=np.zeros((len(plant.inputs), len(plant.measurements))),
+            measurements=plant.measurements,
+            inputs=plant.inputs,
         )
-
-    @one_thread()
-    def verify(self) -> Verification:
-        """Check stability, M_s and variance of the realised controller by other routes."""
-        bound, plant = self.bound, self.bound.plant
-        rational = plant.without_delays(_PADE, at="measurements")
-        growth = float(closed_loop_poles(rational, self.controller).real.max())
-        checks = [Check(name="poles", ok=growth < 0.0, found=growth, note="Pade delays")]
-        if growth < 0.0:
-            law = LawMatrices.of(self.controller, rational)
-            by_time = lyapunov_variances(rational, law, bound.filters)
-            rms = math.sqrt(sum(w * by_time[n] for n, w in bound.minimise.items()))
-            worst = max([0.0, *bound.fits.values()])
-            checks.append(
-                agreement("value.time", self.value, rms, _TIME + worst, "Lyapunov, fitted sea")
-            )
-            checks.append(
-                agreement("value", self.value, weighted_rms(bound, self.controller), 1e-3, "exact")
-            )
-            checks.append(bounded("bound", bound.value, self.value, 0.0, "", at_least=True))
-            found = Assessment(plant, self.controller, bound.sources).margins.max_sensitivity
-            checks.append(
-                bounded("max_sensitivity", self.max_sensitivity, found, _SPREAD, "exact delays")
-            )
-        return Verification.of(checks, f"verified: {len(checks)} checks passed")
 
     def __str__(self) -> str:
         """Return a small tree."""
         return (
             f"YoulaDesign: {self.value:.5g} rms of {self.bound.whole}, "
             f"{self.bound.sentence(self.value)}\n"
-            f"├ order {len(self.controller.A)}, {self.functions} functions a measurement\n"
-            f"└ M_s {self.margins.max_sensitivity:.3f}, delay margin {self.margins.delay:.4g} s"
+            f"└ order {len(self.controller.A)}, {self.loop.poles.size} functions a measurement"
         )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Truth:
+    """The plant on which a loop has to hold.
+
+    Attributes
+    ----------
+    plant
+        With the command and the measurements of the loop and exact delays; its poles count.
+    line
+        From frequencies [rad/s], (k,), to the exact responses of the measurements to the command,
+        (k, ny); by default the plant's.
+    """
+
+    plant: LinearPlant
+    line: Callable[[FloatArray], ComplexArray] | None = None
+
+    def yu(self, omega: FloatArray) -> ComplexArray:
+        """Return the responses from command to measurements at frequencies [rad/s], (k, ny)."""
+        return self.plant.response(omega).yu[:, :, 0] if self.line is None else self.line(omega)
 
 
 @one_thread()
@@ -274,8 +247,8 @@ def youla_design(
     *,
     max_sensitivity: float = math.inf,
     roll_off: tuple[float, float] | None = None,
-    functions: int = 8,
-    pace: float | None = None,
+    functions: int = 16,
+    truth: Truth | None = None,
 ) -> YoulaDesign:
     """Return the best controller with a Q of so many functions.
 
@@ -288,9 +261,9 @@ def youla_design(
     roll_off
         (bound, above): |L| at most `bound` from the frequency `above` on [rad/s].
     functions
-        Laguerre functions for each measurement.
-    pace
-        Their pole [rad/s]; by default half as much again as the mean frequency of the sea.
+        Functions of each measurement.
+    truth
+        On which stability and M_s hold; by default the bound's plant, with its exact delays.
 
     Raises
     ------
@@ -304,24 +277,10 @@ def youla_design(
     if not max_sensitivity > 1.0:
         raise InputError(f"Youla: max_sensitivity must be above 1, got {max_sensitivity!r}")
     check_range("Youla", "functions", functions, low=1, high=60)
-    dual, point = bound.dual, bound.point
-    plant, K, L = dual.plant, point.regulator.gain, dual.estimator.gain
-    parts = AffineLoop(bound)
-    marks = parts.marks
-    a = pace or _pace(bound, marks)
-    Aq, Bq, Cq = laguerre(a, functions, len(plant.measurements))
-    omega, weights = frequencies(bound.sources, marks)
-    omega, weights = omega[1:], weights[1:]
-    columns = basis(omega, a, functions)
-    q = cp.Variable(Cq.shape[1])
-    constant, slope = parts.outputs(omega, columns)
-    spectra = np.sqrt(densities(bound.sources, omega) * weights)
-    names = list(bound.plant.outputs)
+    loop = AffineLoop(bound, poles_of_functions(*_range(bound), functions))
+    rows = _variances(bound, loop)
+    q = cp.Variable(functions * len(bound.plant.measurements))
     # Unit columns, as the measurements differ by many decades.
-    rows = {
-        n: compressed(constant, slope, spectra, names.index(n))
-        for n in dict.fromkeys([*bound.minimise, *bound.limits])
-    }
     scale = np.sqrt(sum(w * np.sum(rows[n][0] ** 2, axis=0) for n, w in bound.minimise.items()))
     scale = 1.0 / np.maximum(scale, 1e-12 * scale.max())
     unit = bound.attained or 1.0
@@ -335,41 +294,87 @@ def youla_design(
         cp.norm(rows[n][0] * (scale / b) @ q + rows[n][1] / b) <= _INSIDE
         for n, b in bound.limits.items()
     ]
+    true = truth or Truth(plant=bound.plant)
     if roll_off is not None:
         level, above = roll_off
-        high = np.geomspace(above, 100.0 * above, 100)
-        base, moved = parts.sensitivity(high, basis(high, a, functions))
+        at = np.geomspace(above, 100.0 * above, 100)
+        blocks = loop.at(at)
+        base, moved = _affine(blocks, blocks.yu, scale)
         # |L| <= b wherever |T| <= b/(1 + b), and T = 1 - S is affine.
-        limits.append(_size(base - 1.0, moved * scale, q) <= _INSIDE * level / (1.0 + level))
-    dense = np.unique(np.concatenate([np.geomspace(0.002 * a, 200.0 * a, _DENSE), *_around(marks)]))
-    base, moved = parts.sensitivity(dense, basis(dense, a, functions))
-    moved, chosen = moved * scale, np.zeros(dense.size, dtype=np.bool_)
-    chosen[:: _DENSE // _POINTS] = math.isfinite(max_sensitivity)
-    # |S| on all of the dense grid would be thousands of cones: those that are broken join in turn.
+        limits.append(_size(base, moved, q) <= _INSIDE * level / (1.0 + level))
+    dense = margin_grid(np.concatenate([loop.marks, true.plant.poles()]))
+    blocks = loop.at(dense)
+    base, moved = _affine(blocks, blocks.yu, scale)
+    off, shifted = _affine(blocks, true.yu(dense) - blocks.yu, scale)
+    base, moved = (1.0 + base) / max_sensitivity, moved / max_sensitivity
+    chosen = np.zeros(dense.size, dtype=np.bool_)
+    chosen[::_EVERY] = math.isfinite(max_sensitivity)
+    # On all of the dense grid these would be thousands of cones: the peaks of those that are
+    # broken join in turn.
     for _ in range(_EXCHANGES):
         held = list(limits)
         if chosen.any():
-            held.append(_size(base[chosen], moved[chosen], q) <= _INSIDE * max_sensitivity)
+            size = _size(base[chosen], moved[chosen], q) + _size(off[chosen], shifted[chosen], q)
+            held.append(size <= _INSIDE)
         _solve(cp.Problem(cp.Minimize(cp.norm(stacked)), held), q)
-        broken = np.abs(base + moved @ q.value) > max_sensitivity
+        used = np.abs(base + moved @ q.value) + np.abs(off + shifted @ q.value)
+        around = np.concatenate([[0.0], used, [0.0]])
+        broken = (used > 1.0) & (used >= around[:-2]) & (used >= around[2:])
         if not broken.any():
             break
         chosen |= broken
     values = np.asarray(q.value, dtype=np.float64) * scale
-    controller = realised(plant, K, L, Aq, Bq, Cq * values)
-    assessment = Assessment(bound.plant, controller, bound.sources)
-    if not assessment.stable:
-        raise SynthesisError("Youla: the realised controller does not stabilise the true plant")
     rms = {n: float(np.linalg.norm(r @ values + r0)) for n, (r, r0) in rows.items()}
     return YoulaDesign(
         bound=bound,
         value=math.sqrt(sum(w * rms[n] ** 2 for n, w in bound.minimise.items())),
         rms={n: rms[n] for n in bound.limits},
         max_sensitivity=max_sensitivity,
-        margins=assessment.margins,
-        functions=functions,
-        controller=controller,
+        weights=values,
+        loop=loop,
     )
+
+
+def margin_grid(poles: ComplexArray) -> FloatArray:
+    """Return frequencies [rad/s] that see every lightly damped pole [1/s]."""
+    light = poles[(poles.imag > 0.0) & (np.abs(poles.real) < 0.3 * poles.imag)]
+    steps = np.linspace(-4.0, 4.0, 17)
+    near = light.imag + np.maximum(np.abs(light.real), 1e-4 * light.imag) * steps[:, None]
+    grid = np.unique(np.concatenate([np.geomspace(_LOWEST, _TOP, _DENSE), near.ravel()]))
+    return np.asarray(grid[(grid >= _LOWEST) & (grid <= _TOP)])
+
+
+def _variances(bound: Bound, loop: AffineLoop) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return R, r by output, with ||R q + r||^2 its variance: few rows for many nodes."""
+    omega, weights = frequencies(bound.sources, loop.marks)
+    omega, weights = omega[1:], weights[1:]
+    plant = bound.plant.response(omega).select(disturbances=[s.name for s in bound.sources])
+    blocks = loop.at(omega)
+    shaken = np.sqrt(densities(bound.sources, omega) * weights).T[:, None]  # (k, 1, nw)
+    constant = (blocks.X[:, None] @ plant.yw * shaken)[:, 0]
+    slope = np.moveaxis(blocks.slope @ plant.yw * shaken, 1, 2)
+    found = {}
+    for name in dict.fromkeys([*bound.minimise, *bound.limits]):
+        row = plant.outputs.index(name)
+        pushed = plant.zu[:, row, 0]
+        r = plant.zw[:, row] * shaken[:, 0] + pushed[:, None] * constant
+        R = (pushed[:, None, None] * slope).reshape(r.size, -1)
+        whole = np.column_stack([R, r.ravel()])
+        triangle = upper_triangle(whole)
+        found[name] = triangle[:, :-1], triangle[:, -1]
+    return found
+
+
+def upper_triangle(rows: ComplexArray | FloatArray) -> FloatArray:
+    """Return R with R'R = Re rows^H rows, (n, n)."""
+    return np.asarray(np.linalg.qr(np.vstack([rows.real, rows.imag]), mode="r"), dtype=np.float64)
+
+
+def _affine(
+    blocks: LoopBlocks, yu: ComplexArray, scale: FloatArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return X yu at Q = 0, (k,), and its columns, (k, q)."""
+    return np.einsum("ky,ky->k", blocks.X, yu), (blocks.slope @ yu[:, :, None])[:, :, 0] * scale
 
 
 def _solve(problem: Any, q: Any) -> None:
@@ -391,23 +396,22 @@ def _size(base: ComplexArray, moved: ComplexArray, q: Any) -> Any:
     return cp.norm(cp.vstack([real, imaginary]), 2, axis=0)
 
 
-def _around(marks: ComplexArray) -> list[FloatArray]:
-    """Return frequencies about lightly damped poles [rad/s]."""
-    light = marks[(marks.imag > 0.0) & (np.abs(marks.real) < 0.3 * marks.imag)]
-    steps = np.linspace(-4.0, 4.0, 17)
-    found = [m.imag + max(abs(m.real), 1e-4 * m.imag) * steps for m in light]
-    return [at[at > 0.0] for at in found]
+def _range(bound: Bound) -> tuple[float, float]:
+    """Return the slowest and the fastest pole of the functions [rad/s].
 
-
-def _pace(bound: Bound, marks: ComplexArray) -> float:
-    """Return a frequency amid what there is to be done [rad/s]: somewhat above the sea's mean."""
+    From below the sea's mean frequency to above that where the LQG loop ends.
+    """
+    loop = AffineLoop(bound, np.ones(1))
+    omega = margin_grid(loop.marks)
+    blocks = loop.at(omega)
+    works = np.abs(np.sum(blocks.X * blocks.yu, axis=1)) > _WORKS
+    sizes = np.abs(bound.plant.poles())
+    mean = float(np.exp(np.median(np.log(sizes[sizes > 1e-3]))))
     found = []
     for source in bound.sources:
         if source.band is not None:
             edges = np.geomspace(*source.band, 500)
             density = source.density(edges)
             found.append(np.trapezoid(edges * density, edges) / np.trapezoid(density, edges))
-    if found:
-        return _ABOVE * float(max(found))
-    sizes = np.abs(marks)
-    return float(np.exp(np.median(np.log(sizes[sizes > 1e-3]))))
+    slowest = _SLOWEST * float(max(found, default=mean))
+    return slowest, max(_FASTEST * float(omega[works].max(initial=0.0)), 10.0 * slowest)

@@ -41,7 +41,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from models.basics import FloatArray, SynthesisError, check_range
+from models.basics import SynthesisError, check_range
 from models.case import Case
 from models.hook import HookMotion
 from models.plant import build_plant, zero_order_hold
@@ -130,7 +130,10 @@ class VelocityFeedForward(RecursiveController):
         period = case.sensors.mru.heave_filter_period if case.sensors.mru else None
         self._set(_corner=0.0 if period is None else 2.0 * math.pi / period)
         called = name or ("feed-forward-lead" if lead > 0.0 else "feed-forward")
-        self._adopt(called, sample_time, self._initial, self._law)
+        # Drum-speed loop (2), strength, rate before, acceleration, is it known, filter (2, 0).
+        own = np.zeros(2 if self._corner > 0.0 and self.restore > 1.0 else 0)
+        initial = np.concatenate([self.loop.initial, [1.0, 0.0, 0.0, 0.0], own])
+        self._adopt(called, sample_time, initial, self._law)
         found = sampled_loop(case, plant, self.recursion, sample_time)
         if not found.stable:
             raise SynthesisError(
@@ -146,12 +149,6 @@ class VelocityFeedForward(RecursiveController):
         in more of the MRU's slow error.
         """
         return cls(case, lead=lead_of(case, sample_time=sample_time), sample_time=sample_time)
-
-    @property
-    def _initial(self) -> FloatArray:
-        """Drum-speed loop (2), strength, rate before, acceleration, is it known, filter (2, 0)."""
-        own = np.zeros(2 if self._corner > 0.0 and self.restore > 1.0 else 0)
-        return np.concatenate([self.loop.initial, [1.0, 0.0, 0.0, 0.0], own])
 
     def _law(self, xc: ca.SX, m: Signals) -> tuple[ca.SX, ca.SX]:
         T = self.loop.sample_time

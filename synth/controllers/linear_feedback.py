@@ -33,6 +33,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -165,13 +166,7 @@ class LinearFeedback(RecursiveController):
         design: GainDesign | Tuning,
         *,
         case: Case | None = None,
-        sample_time: float = 0.01,
-        anti_windup: bool = True,
-        method: str = "tustin",
-        prewarp: float | None = None,
-        filter_bandwidth: float | None = None,
-        hold_for: float | None = None,
-        name: str = "feedback",
+        **options: Any,
     ) -> LinearFeedback:
         """Return the feedback of a design.
 
@@ -182,6 +177,8 @@ class LinearFeedback(RecursiveController):
         case
             The case that it is to run on; by default the design's own.  A `Tuning` knows of
             none.
+        options
+            As of the class.
 
         Raises
         ------
@@ -197,17 +194,7 @@ class LinearFeedback(RecursiveController):
             law = design.controller
         if case is None:
             raise InputError(f"{_OWNER}: a Tuning does not know its case: say case=...")
-        return cls(
-            case,
-            law,
-            sample_time=sample_time,
-            anti_windup=anti_windup,
-            method=method,
-            prewarp=prewarp,
-            filter_bandwidth=filter_bandwidth,
-            hold_for=hold_for,
-            name=name,
-        )
+        return cls(case, law, **options)
 
     @property
     def dynamic(self) -> bool:

@@ -14,18 +14,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics import InputError
 from models.case import Case
 from models.plant import MEASUREMENTS
 
-from ..loop import Assessment, Margins
-from ..question import assess_gains, pose
+from ..loop import Assessment, LinearController, Margins
+from ..question import assess_gains
 from ..search import Start
 from ..verify import Verification, verify_design
 from .tuning import LimitUse
 
 if TYPE_CHECKING:
-    from ..bound import DesignBound
+    from ..bound import BestPossible
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,12 +110,17 @@ class GainDesign:
         return assess_gains(self.sea_case, self.gains, masses=self.masses, drag=self.drag)
 
     @property
+    def controller(self) -> LinearController:
+        """The gains as a controller, u = +C y."""
+        return self.assessment.controller
+
+    @property
     def measurements(self) -> tuple[str, ...]:
         """What the gains hear."""
         return MEASUREMENTS
 
     @cached_property
-    def bound(self) -> DesignBound:
+    def bound(self) -> BestPossible:
         """The best that any linear controller could do, computed when it is asked for.
 
         Raises
@@ -126,19 +130,9 @@ class GainDesign:
         SolverError
             If there is no bound.
         """
-        from ..bound import bound_beside
+        from ..bound import bound_for
 
-        if self.margins is None:
-            raise InputError("bound: the loop must be stable")
-        question = pose(self.sea_case, self.masses)
-        return bound_beside(
-            self.sea_case,
-            question.hook,
-            question.assess(self.gains, self.drag).controller,
-            masses=self.masses,
-            drag=self.drag,
-            limits=question.limits,
-        )
+        return bound_for(self)
 
     def verify(self) -> Verification:
         """Check everything that is claimed by code that the optimiser did not use."""

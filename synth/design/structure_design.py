@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics import InputError
 from models.case import Case
 
 from ..loop import LinearController, Margins
@@ -24,7 +23,7 @@ from ..verify import Verification, verify_structure
 from .tuning import LimitUse, Tuning
 
 if TYPE_CHECKING:
-    from ..bound import DesignBound
+    from ..bound import BestPossible
 
 #: What disturbances are called in reports; others by their own names.
 SOURCE_NAMES: Mapping[str, str] = {HOOK: "the sea", "mru.error": "the reference unit"}
@@ -91,6 +90,11 @@ class StructureDesign:
         return pose_structure(self.case, self.structure, self.masses)
 
     @property
+    def sea_case(self) -> Case:
+        """The case in the sea that the figures hold for."""
+        return self.case
+
+    @property
     def controller(self) -> LinearController:
         """The controller in state space, u = +C y, as `LinearFeedback` takes it.
 
@@ -108,7 +112,7 @@ class StructureDesign:
         return self.posed.plant.measurements
 
     @cached_property
-    def bound(self) -> DesignBound:
+    def bound(self) -> BestPossible:
         """The best that any linear controller could do, computed when it is asked for.
 
         Raises
@@ -118,19 +122,9 @@ class StructureDesign:
         SolverError
             If there is no bound.
         """
-        from ..bound import bound_beside
+        from ..bound import bound_for
 
-        if self.margins is None or not self.parameters:
-            raise InputError("bound: the loop must be stable")
-        posed = self.posed
-        return bound_beside(
-            self.case,
-            posed.question.hook,
-            self.controller,
-            masses=self.masses,
-            drag=self.drag,
-            limits=(*posed.limits, *(posed.drive if self.drive_kept else ())),
-        )
+        return bound_for(self)
 
     @property
     def binding(self) -> tuple[str, ...]:

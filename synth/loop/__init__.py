@@ -39,5 +39,6 @@ if TYPE_CHECKING:
         with_drag,
     )
     from .margins import Margins, crossings, loop_margins, refine_minima
+    from .pole_region import PoleRegion
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -8,6 +8,7 @@ agrees with the response.  Everything is computed when asked for and kept.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property, partial
 from typing import Any
 
@@ -21,12 +22,13 @@ from models.basics import (
     adaptive_nodes,
     peak_factor,
 )
-from models.plant import LinearPlant, consistent_drag
+from models.plant import LinearPlant, settled_drag
 
-from .controller import LinearController, closed_loop_poles
+from .controller import LinearController, closed_loop_plant, closed_loop_poles
 from .disturbance import Disturbance
 from .loop import DragElement, closed_loop, numeric_blocks, return_differences, with_drag
-from .margins import Margins, loop_margins, refine_minima, worst_margins
+from .margins import Margins, loop_margins, refine_minima, sensitivity_peaks, worst_margins
+from .pole_region import PoleRegion
 
 _RTOL = 1e-8  # of every variance
 _PADE = 6  # order of the delay models that the poles are those of
@@ -85,9 +87,20 @@ class Assessment:
     @cached_property
     def poles(self) -> ComplexArray:
         """Poles of the closed loop [1/s], delays as Pade models."""
+        return closed_loop_poles(self._modelled, self.controller)
+
+    @cached_property
+    def pole_region(self) -> PoleRegion:
+        """Decay, damping and frequency of the closed loop's poles, without the delay models'."""
+        own = len(self.plant.states)
+        models = np.linalg.eigvals(self._modelled.A[own:, own:])
+        return PoleRegion.of(self.poles, np.asarray(models, dtype=np.complex128))
+
+    @cached_property
+    def _modelled(self) -> LinearPlant:
+        """The plant with Pade models for its delays, their states after its own."""
         late = max(self.plant.delays, default=0.0) > _LATE
-        rational = self.plant.without_delays(_LATE_PADE if late else _PADE)
-        return closed_loop_poles(rational, self.controller)
+        return self.plant.without_delays(_LATE_PADE if late else _PADE)
 
     @property
     def stable(self) -> bool:
@@ -105,7 +118,7 @@ class Assessment:
         """Margins of the loops broken at the inputs."""
         return worst_margins(
             [
-                loop_margins(partial(self.loop_gain, index=i), self.grid, gain)
+                loop_margins(partial(self.loop_gain, index=i), self.grid, gain, self._peaks[i])
                 for i, gain in enumerate(self._grid_gain)
             ]
         )
@@ -119,7 +132,7 @@ class Assessment:
     def _peaks(self) -> list[tuple[FloatArray, FloatArray]]:
         """Places of the local minima of |1 + L| of each loop, and their values."""
         return [
-            refine_minima(partial(self._distance, i), self.grid, np.abs(1.0 + gain))
+            sensitivity_peaks(partial(self.loop_gain, index=i), self.grid, gain)
             for i, gain in enumerate(self._grid_gain)
         ]
 
@@ -196,37 +209,62 @@ class Assessment:
         )
 
     def _moment(self, output: str) -> tuple[float, float]:
+        if output not in self._moments and not self._moments and self._bounded:
+            # One set of nodes for all outputs costs little more than one for this.
+            with suppress(SolverError):
+                self._integrate(self.plant.outputs)
         if output not in self._moments:
             try:
-                nodes = self.quadrature([output])
+                self._integrate([output])
             except SolverError:
                 # A pole so close to the axis that the variance has no digits: it has no bound.
                 self._moments[output] = np.inf, np.inf
-                return self._moments[output]
-            density = self.spectrum(output, nodes.omega)
+        return self._moments[output]
+
+    @property
+    def _bounded(self) -> bool:
+        """Whether every variance is finite: no disturbance is white without end."""
+        return all(d.band is not None for d in self.disturbances)
+
+    def _integrate(self, outputs: Sequence[str]) -> None:
+        nodes = self.quadrature(outputs)
+        count, spectra = len(self.disturbances), self._spectra(outputs, nodes.omega)
+        for i, output in enumerate(outputs):
+            density = np.sum(spectra[i * count : (i + 1) * count], axis=0)
             m0 = float(nodes.integrate(density))
             self._moments[output] = m0, float(nodes.integrate(density * nodes.omega**2))
-        return self._moments[output]
 
     def _responses(
         self, omega: FloatArray, pairs: Sequence[tuple[str, str]]
     ) -> Mapping[tuple[str, str], Any]:
+        if self._rational is not None:
+            response = self._rational.response(omega)
+            return {pair: response.column(*pair) for pair in pairs}
+        omega = self.plant.beside_poles(omega)
         return closed_loop(numeric_blocks(self.plant.response(omega)), self._law(omega), pairs)
+
+    @cached_property
+    def _rational(self) -> LinearPlant | None:
+        """The closed loop as a plant, finite at the poles of the open one; None if it is late."""
+        return None if any(self.plant.delays) else closed_loop_plant(self.plant, self.controller)
 
     def _spectra(self, outputs: Sequence[str], omega: FloatArray) -> list[FloatArray]:
         """Return what each disturbance alone makes of each output, (k,) each."""
-        pairs = [(output, d) for output in outputs for d in self.disturbances]
-        found = self._responses(omega, [(output, d.name) for output, d in pairs])
-        return [np.abs(found[output, d.name]) ** 2 * d.density(omega) for output, d in pairs]
+        densities = {d.name: d.density(omega) for d in self.disturbances}
+        found = self._responses(omega, [(output, name) for output in outputs for name in densities])
+        return [np.abs(response) ** 2 * densities[name] for (_, name), response in found.items()]
 
     def _gains(self, omega: FloatArray) -> list[ComplexArray]:
         """Return L of each loop, (k,) each."""
-        blocks = numeric_blocks(self.plant.response(omega))
+        omega = self.plant.beside_poles(omega)
+        blocks = numeric_blocks(self._heard.response(omega))
         differences = return_differences(blocks, self._law(omega))
         return [np.asarray(d, dtype=np.complex128) - 1.0 for d in differences]
 
-    def _distance(self, index: int, omega: FloatArray) -> FloatArray:
-        return np.abs(1.0 + self._gains(omega)[index])
+    @cached_property
+    def _heard(self) -> LinearPlant:
+        """The plant without its outputs, which no loop gain needs."""
+        return self.plant.select(outputs=())
 
     def _law(self, omega: FloatArray) -> list[list[ComplexArray]]:
         response = self.controller.response_at(1j * omega)
@@ -254,7 +292,9 @@ def frequency_grid(poles: ComplexArray) -> FloatArray:
     light = (omega > 0.0) & (damping < 0.3 * omega)
     steps = np.array([0.0, 0.1, 0.25, 0.5, 0.8, 1.2, 2.0, 3.5, 6.0, 10.0])
     steps = np.concatenate([-steps[:0:-1], steps])
-    near = omega[light, None] + np.maximum(damping[light], 1e-7 * omega[light])[:, None] * steps
+    widths = np.maximum(damping[light], 1e-7 * omega[light])
+    near = omega[light, None] + widths[:, None] * steps
+    near[damping[light] <= 1e-9 * omega[light], steps == 0.0] = np.inf  # at an undamped one is none
     grid = np.concatenate([np.geomspace(low, high, count), near.ravel()])
     return np.unique(grid[(grid >= low) & (grid <= high)])
 
@@ -289,11 +329,30 @@ def consistent_coefficient(
         If no coefficient agrees: the loop is unstable with any drag.
     """
 
-    def velocity(coefficient: float) -> float:
-        assessment = Assessment(plant, controller, disturbances, drag=drag, coefficient=coefficient)
-        return assessment.sigma(drag.velocity) if assessment.stable else np.inf
+    def loop(coefficient: float) -> Assessment:
+        return Assessment(plant, controller, disturbances, drag=drag, coefficient=coefficient)
 
-    return consistent_drag(drag.quadratic, velocity)
+    def about(coefficient: float) -> Callable[[float], float]:
+        here, calm = loop(coefficient), np.inf
+        nodes = here.quadrature([drag.velocity])
+        felt = here.response(drag.velocity, drag.force, nodes.omega)
+        weights = nodes.weights * here.spectrum(drag.velocity, nodes.omega)
+
+        def velocity(other: float) -> float:
+            nonlocal calm  # the least drag known to do; more of it does too, as is checked below
+            if other < calm:
+                if not loop(other).stable:
+                    return np.inf
+                calm = other
+            # More drag is a rank-one change of the closed loop, as in `close_scalar`.
+            return float(np.sqrt(np.abs(1.0 + (other - coefficient) * felt) ** -2 @ weights))
+
+        return velocity
+
+    found = settled_drag(drag.quadratic, about, drag.reference)
+    if not loop(found).stable:
+        raise SolverError(f"drag: the loop is unstable at {found:.4g} N s/m but not with less")
+    return found
 
 
 def _off_axis(poles: ComplexArray) -> list[complex]:

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from models.basics import ComplexArray, FloatArray, InputError, check_finite, read_only
-from models.plant import LinearPlant
+from models.plant import LinearPlant, Resolvent, Transfer
 
 if TYPE_CHECKING:
     import control
@@ -71,17 +72,21 @@ class LinearController:
         )
 
     def response_at(self, s: npt.ArrayLike) -> ComplexArray:
-        """Return C(s) at points `s` [1/s], (k, nu, ny)."""
-        points = np.asarray(s, dtype=np.complex128).reshape(-1)
-        n = self.A.shape[0]
-        result = np.repeat(self.D[None].astype(np.complex128), points.size, axis=0)
-        if n:
-            inner = np.linalg.solve(
-                points[:, None, None] * np.eye(n) - self.A,
-                np.broadcast_to(self.B.astype(np.complex128), (points.size, *self.B.shape)),
-            )
-            result += self.C @ inner
-        return result
+        """Return C(s) at points `s` [1/s], (k, nu, ny).
+
+        Raises
+        ------
+        InputError
+            If a point is a pole of the controller.
+        """
+        found = self._transfer(np.asarray(s, dtype=np.complex128).reshape(-1))
+        if found is None:
+            raise InputError("controller: the response is asked for at one of its own poles")
+        return found + self.D
+
+    @cached_property
+    def _transfer(self) -> Transfer:
+        return Resolvent(self.A).between(self.C, self.B)
 
     def to_control(self) -> control.StateSpace:
         """Return a python-control system from the measurements to the inputs."""
@@ -97,25 +102,23 @@ class LinearController:
         )
 
 
+def closed_loop_plant(plant: LinearPlant, controller: LinearController) -> LinearPlant:
+    """Return plant and controller in a loop, as a plant of the same signals.
+
+    Delays of the plant are ignored: replace them first (`LinearPlant.without_delays`).
+    """
+    plain = plant.without_delays(0)
+    return plain.with_feedback(controller.A, controller.B, controller.C, controller.D)
+
+
 def closed_loop_matrix(plant: LinearPlant, controller: LinearController) -> FloatArray:
     """Return the state matrix of plant and controller in a loop, (n + nk, n + nk).
 
     Delays of the plant are ignored: replace them first (`LinearPlant.without_delays`).
     """
-    Dk, Ck = controller.D, controller.C
-    inverse = np.linalg.inv(np.eye(len(plant.inputs)) - Dk @ plant.D)
-    on_plant, on_states = inverse @ Dk @ plant.C, inverse @ Ck  # u = on_plant x + on_states xk
-    return np.block(
-        [
-            [plant.A + plant.B @ on_plant, plant.B @ on_states],
-            [
-                controller.B @ (plant.C + plant.D @ on_plant),
-                controller.A + controller.B @ plant.D @ on_states,
-            ],
-        ]
-    )
+    return closed_loop_plant(plant, controller).A
 
 
 def closed_loop_poles(plant: LinearPlant, controller: LinearController) -> ComplexArray:
     """Return the poles of the closed loop [1/s]; delays are ignored."""
-    return np.asarray(np.linalg.eigvals(closed_loop_matrix(plant, controller)), dtype=np.complex128)
+    return closed_loop_plant(plant, controller).poles()

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.basics import ComplexArray, FloatArray
+from models.basics import BoolArray, ComplexArray, FloatArray
 
 LoopGain = Callable[[FloatArray], ComplexArray]
 
-_TRIES = 60  # at a crossing
-_WIDTH, _ZERO = 1e-14, 1e-15  # of a bracket, relative, and of what crosses
+_NOTHING = 1e-9  # |L| below which neither a peak nor a crossing matters to any margin
+_CLOSE, _MOST_STEPS = 4e-16, 60  # relative width of a bracket that is a point; steps towards it
 _ZOOM = np.linspace(0.0, 1.0, 17)
 _ROUNDS = 7  # each zooms by a factor of eight: 8^7 is 2e6
 _FORETOLD = 1e-13  # relative error of a parabola that is as good as the function itself
@@ -65,15 +65,24 @@ class Margins:
         )
 
 
-def loop_margins(loop: LoopGain, grid: FloatArray, gain: ComplexArray) -> Margins:
-    """Return the margins of `loop`(omega) -> L, (k,), known as `gain` on a grid [rad/s]."""
-    peak_at, distance = refine_minima(lambda w: np.abs(1.0 + loop(w)), grid, np.abs(1.0 + gain))
+def loop_margins(
+    loop: LoopGain,
+    grid: FloatArray,
+    gain: ComplexArray,
+    peaks: tuple[FloatArray, FloatArray] | None = None,
+) -> Margins:
+    """Return the margins of `loop`(omega) -> L, (k,), known as `gain` on a grid [rad/s].
+
+    `peaks` are its `sensitivity_peaks`, where they are known already.
+    """
+    peak_at, distance = sensitivity_peaks(loop, grid, gain) if peaks is None else peaks
+    felt = np.abs(gain) > _NOTHING
     # |S - 1/2| = |1 - L| / (2 |1 + L|)
-    _, disk = refine_minima(lambda w: _disk_distance(loop(w)), grid, _disk_distance(gain))
+    _, disk = refine_minima(lambda w: _disk_distance(loop(w)), grid, _disk_distance(gain), felt)
     crossovers = crossings(lambda w: np.abs(loop(w)) - 1.0, grid, np.abs(gain) - 1.0)
     at_unity = loop(crossovers) if crossovers.size else np.zeros(0, complex)
     turn = np.angle(-at_unity)  # angle beyond -180 deg
-    axis = crossings(lambda w: loop(w).imag, grid, gain.imag)
+    axis = crossings(lambda w: loop(w).imag, grid, gain.imag, felt)
     on_axis = loop(axis).real if axis.size else np.zeros(0)
     axis, on_axis = _with_ends(grid, gain, axis, on_axis)
     negative = on_axis < 0.0
@@ -109,21 +118,28 @@ def worst_margins(margins: list[Margins]) -> Margins:
     )
 
 
+def sensitivity_peaks(
+    loop: LoopGain, grid: FloatArray, gain: ComplexArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return places and values of the local minima of |1 + L|, as in `refine_minima`."""
+    felt = np.abs(gain) > _NOTHING
+    return refine_minima(lambda w: np.abs(1.0 + loop(w)), grid, np.abs(1.0 + gain), felt)
+
+
 def refine_minima(
     function: Callable[[FloatArray], FloatArray],
     grid: FloatArray,
     values: FloatArray,
-    *,
-    below: float = np.inf,
+    among: BoolArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return places and values of all local minima of `function`, refined from a grid.
 
-    Minima above `below` on the grid are left out; the ends of the grid count as minima.  All
-    brackets are zoomed into at once, so the function is called a handful of times with long
-    vectors.
+    The ends of the grid count as minima.  All brackets are zoomed into at once, so the
+    function is called a handful of times with long vectors.  Where `among` is given, the
+    others of the grid's points are no minima worth it.
     """
-    inner = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])) + 1
-    inner = inner[values[inner] < below]
+    lower = (values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])
+    inner = np.flatnonzero(lower if among is None else lower & among[1:-1]) + 1
     ends = np.array([0, grid.size - 1])
     if not inner.size:
         return grid[ends], values[ends]
@@ -153,35 +169,39 @@ def refine_minima(
 
 
 def crossings(
-    function: Callable[[FloatArray], FloatArray], grid: FloatArray, values: FloatArray
+    function: Callable[[FloatArray], FloatArray],
+    grid: FloatArray,
+    values: FloatArray,
+    among: BoolArray | None = None,
 ) -> FloatArray:
-    """Return where `function` changes its sign between grid points, all of them zoomed into."""
+    """Return where `function` changes its sign between grid points, all of them at once.
+
+    By Chandrupatla's method (Adv. Eng. Software 28, 1997): inverse quadratic interpolation
+    where it is safe, bisection elsewhere.
+    """
     # Zero counts as positive, so that a crossing that falls on a grid point is seen once.
-    at = np.flatnonzero((values[:-1] >= 0.0) != (values[1:] >= 0.0))
-    low, high, left = grid[at], grid[at + 1], values[at] >= 0.0
-    if not at.size:
-        return np.zeros(0)
-    f_low, f_high = values[at], values[at + 1]
-    for _ in range(_TRIES):
-        # False position with Anderson and Bjorck's weight on the end that stays.
-        middle = np.clip(
-            high - f_high * (high - low) / np.where(f_high == f_low, np.inf, f_high - f_low),
-            low,
-            high,
-        )
-        found = function(middle)
-        same = (found >= 0.0) == left
-        against = np.where(same, f_low, f_high)
-        weight = 1.0 - found / np.where(against == 0.0, np.inf, against)
-        weight = np.where(weight > 0.0, weight, 0.5)
-        f_low, f_high = (
-            np.where(same, found, f_low * weight),
-            np.where(same, f_high * weight, found),
-        )
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
-        if np.all((high - low <= _WIDTH * high) | (np.abs(found) <= _ZERO)):
+    changed = (values[:-1] >= 0.0) != (values[1:] >= 0.0)
+    at = np.flatnonzero(changed if among is None else changed & (among[:-1] | among[1:]))
+    a, b, fa, fb = grid[at + 1], grid[at], values[at + 1], values[at]  # a is the latest point
+    step = np.full(at.size, 0.5)
+    for _ in range(_MOST_STEPS):
+        width = np.abs(b - a)
+        smallest = _CLOSE * np.abs(a)
+        if not np.any((width > smallest) & (fa != 0.0)):
             break
-    return middle
+        least = np.minimum(0.5, smallest / np.maximum(width, smallest))
+        x = a + np.clip(step, least, 1.0 - least) * (b - a)
+        fx = function(x)
+        same = (fx >= 0.0) == (fa >= 0.0)
+        c, fc = np.where(same, a, b), np.where(same, fa, fb)
+        b, fb = np.where(same, b, a), np.where(same, fb, fa)
+        a, fa = x, fx
+        with np.errstate(divide="ignore", invalid="ignore"):
+            xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
+            inverse = fa / (fb - fa) * fc / (fb - fc)
+            inverse += (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+        step = np.where((phi**2 < xi) & ((1.0 - phi) ** 2 < 1.0 - xi), inverse, 0.5)
+    return np.asarray(np.where(np.abs(fa) <= np.abs(fb), a, b))
 
 
 def _with_ends(

@@ -67,11 +67,6 @@ class Contour:
         names = np.array([c.name for c in self.criteria])
         return np.where(np.isfinite(self.limit), names[self.heights.argmin(axis=0)], "")
 
-    @property
-    def weathervaning(self) -> FloatArray:
-        """Limiting H_s in the best heading of each period (p,) [m]."""
-        return np.asarray(self.limit.max(axis=0))
-
     def at(self, periods: npt.ArrayLike, headings: npt.ArrayLike | None = None) -> FloatArray:
         """Return the limiting H_s between the points of the contour [m], linear in both.
 

@@ -165,25 +165,20 @@ def payload_criteria(
             raise InputError(f"operability: {name}: {error}") from None
         return check_range("operability", name, number, low=0.0, unit=unit, open_low=True)
 
-    found = []
-    if rms is not None:
-        bound = read("payload_rms", rms, "length", "m")
-        limit: Limit = Rms(bound=bound, output=PAYLOAD, unit="m", name="payload.rms")
-        found.append(Criterion(name=limit.name, limit=limit))
-    if significant is not None:
-        bound = read("payload_significant", significant, "length", "m")
-        limit = Rms(bound=bound / 4.0, output=PAYLOAD, unit="m", name="payload.significant")
-        found.append(Criterion(name=limit.name, limit=limit, shown=4.0))
-    if maximum is not None:
-        bound = read("payload_max", maximum, "length", "m")
-        limit = Peak(bound=bound, output=PAYLOAD, duration=time, unit="m", name="payload.max")
-        found.append(Criterion(name=limit.name, limit=limit))
-    if speed is not None:
-        bound = read("payload_speed", speed, "speed", "m/s")
-        limit = Peak(
-            bound=bound, output="payload.velocity", duration=time, unit="m/s", name="payload.speed"
-        )
-        found.append(Criterion(name=limit.name, limit=limit))
+    found: list[Criterion] = []
+    for end, value, shown in (("rms", rms, 1.0), ("significant", significant, 4.0)):
+        if value is not None:
+            bound = read(f"payload_{end}", value, "length", "m") / shown
+            limit = Rms(bound=bound, output=PAYLOAD, unit="m", name=f"payload.{end}")
+            found.append(Criterion(name=limit.name, limit=limit, shown=shown))
+    for end, value, output, kind, unit in (
+        ("max", maximum, PAYLOAD, "length", "m"),
+        ("speed", speed, "payload.velocity", "speed", "m/s"),
+    ):
+        if value is not None:
+            bound, name = read(f"payload_{end}", value, kind, unit), f"payload.{end}"
+            peak = Peak(bound=bound, output=output, duration=time, unit=unit, name=name)
+            found.append(Criterion(name=name, limit=peak))
     return tuple(found)
 
 

@@ -63,19 +63,23 @@ class Operability:
         return self.depths[0].main.headings
 
     @property
+    def own_depth(self) -> AtDepth:
+        """The contours at the length of rope nearest the case's own."""
+        return min(self.depths, key=lambda d: abs(d.rope.length - self.case.rope.length))
+
+    @property
     def ok(self) -> bool:
         """Whether the case's own sea lies below the contour, at the case's own length of rope.
 
         The nearest length that was asked for stands for it, and the nearest heading.
         """
-        at = min(self.depths, key=lambda d: abs(d.rope.length - self.case.rope.length))
-        limit = self._own_limit(at.main)
+        limit = self._own_limit(self.own_depth.main)
         return bool(self.case.sea.significant_height <= limit * (1.0 + _PRESSES))
 
     @property
     def status(self) -> str:
         """The sentence for the user."""
-        at = min(self.depths, key=lambda d: abs(d.rope.length - self.case.rope.length))
+        at = self.own_depth
         own, limit = self.case.sea.significant_height, self._own_limit(at.main)
         period = self.case.sea.spectral_peak_period
         sea = f"H_s {own:.3g} m, T_p {period:.3g} s"
@@ -83,7 +87,8 @@ class Operability:
             return f"the case's own sea, {sea}, lies outside the contour"
         if limit >= at.main.highest:
             return f"nothing binds in the case's own sea, {sea}, nor in any looked at"
-        name = self._own_binding(at.main)
+        p = int(np.abs(at.main.periods - period).argmin())
+        name = str(at.main.binding[self.own_heading(at.main), p]) or "nothing"
         verdict = "lies within the limit" if self.ok else "is beyond the limit"
         return f"the case's own sea, {sea}, {verdict}, H_s {limit:.3g} m, set by {name}"
 
@@ -91,6 +96,13 @@ class Operability:
     def dataset(self) -> xr.Dataset:
         """Everything as an xarray Dataset, with units and long names; `to_netcdf` writes it."""
         return dataset_of(self.case, self.depths, self.status)
+
+    def own_heading(self, contour: Contour) -> int:
+        """Return the row of the case's own heading, or of the nearest."""
+        heading = getattr(self.case.vessel, "heading", None)
+        if contour.headings is None or heading is None:
+            return 0
+        return int(np.abs(np.angle(np.exp(1j * (contour.headings - heading)))).argmin())
 
     def margin_text(self, at: AtDepth) -> str:
         """Return the sensitivity of the design's loop with a rope, against its limit, in words."""
@@ -177,15 +189,6 @@ class Operability:
             return float(contour.at([period], [heading])[0])
         except InputError:
             return math.nan
-
-    def _own_binding(self, contour: Contour) -> str:
-        p = int(np.abs(contour.periods - self.case.sea.spectral_peak_period).argmin())
-        heading = getattr(self.case.vessel, "heading", None)
-        h = 0
-        if contour.headings is not None and heading is not None:
-            turn = np.angle(np.exp(1j * (contour.headings - heading)))
-            h = int(np.abs(turn).argmin())
-        return str(contour.binding[h, p]) or "nothing"
 
 
 def _range_text(contour: Contour) -> str:

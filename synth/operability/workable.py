@@ -47,16 +47,6 @@ class Rule:
     safe: float
     marginal: float
 
-    @property
-    def safe_significant(self) -> float:
-        """H_s up to which it is safe [m]."""
-        return self.safe / HIGHEST_TENTH
-
-    @property
-    def marginal_significant(self) -> float:
-        """H_s up to which it is at least marginal [m]."""
-        return self.marginal / HIGHEST_TENTH
-
 
 RULES = (
     Rule(operation="crew boat 20-30 m, crew transfer at a platform", safe=0.9, marginal=1.5),
@@ -164,10 +154,11 @@ def rule_shares(scatter: Scatter) -> list[tuple[Rule, float, float]]:
     """Return the operations of the thesis's Table 2 with the shares safe, and safe or marginal."""
     height, width = scatter.significant_height, class_width(scatter)
 
-    def share(limit: float) -> float:
+    def share(highest_tenth: float) -> float:
+        limit = highest_tenth / HIGHEST_TENTH
         return float(scatter.occurrence @ _part_below(height, width, np.full(height.size, limit)))
 
-    return [(r, share(r.safe_significant), share(r.marginal_significant)) for r in RULES]
+    return [(r, share(r.safe), share(r.marginal)) for r in RULES]
 
 
 def class_width(scatter: Scatter) -> float:

@@ -47,6 +47,7 @@ from .problem import Goal, Problem
 
 _CLOSE = 1.5  # dips of |1 + L| below this many times the margin are followed between the nodes
 _LEAST_MARGIN = 0.1  # ... or times this one
+_FAINT = 1e-3  # loop gains whose crossings of the axis no gain margin is about
 _SHIFT = 1e-6  # relative, of a frequency, of differences
 _LEAST_CYCLES = float(np.exp(0.5))  # of a peak: a factor of one, below which the log turns negative
 
@@ -394,7 +395,7 @@ class LoopNumbers:
                 lambda w, i=i: np.abs(value_of(fresh(w, False).difference(i))),
                 self.omega,
                 np.abs(value_of(d)),
-                below=_CLOSE * max(self.module_margin, _LEAST_MARGIN),
+                np.abs(value_of(d)) < _CLOSE * max(self.module_margin, _LEAST_MARGIN),
             )
             found.append(self._padded(fresh(at, isinstance(d, Dual)).difference(i)))
         return found
@@ -411,7 +412,12 @@ class LoopNumbers:
         found = []
         for i, d in enumerate(self.differences):
             gain = value_of(d) - 1.0
-            at = crossings(lambda w, i=i: _gain(fresh(w, False), i).imag, self.omega, gain.imag)
+            at = crossings(
+                lambda w, i=i: _gain(fresh(w, False), i).imag,
+                self.omega,
+                gain.imag,
+                np.abs(gain) > _FAINT,
+            )
             ends = self.omega[[0, -1]][_flat(gain[[0, -1]])]
             for places, moves in ((at, True), (ends, False)):
                 loop = self._padded(fresh(places, isinstance(d, Dual)).difference(i) - 1.0)

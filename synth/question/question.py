@@ -9,7 +9,7 @@ they bind, what the drag is before compensation, how many rope masses the plant 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,9 +22,9 @@ from models.plant import (
     LinearPlant,
     PlantData,
     build_plant,
-    consistent_drag,
     fixed_top_modes,
     rope_transfers,
+    settled_drag,
 )
 
 from ..limits import HOOK, PAYLOAD, Limit, RollOff, drive_limits, loop_limits, modelled_bandwidth
@@ -160,29 +160,29 @@ def uncompensated(case: Case, data: PlantData, hook: HookMotion) -> tuple[float,
     modes = _modes(data, hook.band[1])
     mass = data.payload_mass + data.rope_mass * (1.0 if data.lumping == "thesis" else 1.0 / 3.0)
 
-    def rms(C: float, power: int) -> float:
+    def moved(C: float, omega: FloatArray) -> FloatArray:
+        P_Y = _locked(data, np.asarray(1j * omega, dtype=np.complex128), C)
+        return np.asarray(np.abs(P_Y) ** 2)
+
+    def about(C: float, power: int) -> Callable[[float], float]:
         damping = 0.5 * data.damping_time * modes**2
         damping[0] += 0.5 * C / mass  # the drag is the payload's, which hardly moves above
         if damping[0] <= 0.0:
-            return math.inf  # undamped resonance: no stationary motion
-
-        def motion(omega: FloatArray) -> FloatArray:
-            P_Y = _locked(data, np.asarray(1j * omega, dtype=np.complex128), C)
-            return np.asarray(np.abs(P_Y) ** 2 * hook.density(omega) * omega**power)
-
+            return lambda C: math.inf  # undamped resonance: no stationary motion
         nodes = adaptive_nodes(
-            motion,
+            lambda omega: moved(C, omega) * hook.density(omega) * omega**power,
             *hook.band,
             splits=hook.splits,
             poles=[complex(-h, w) for h, w in zip(damping, modes, strict=True) if h > 0.0],
             rtol=1e-9,
         )
-        return float(np.sqrt(nodes.integrate(motion(nodes.omega))))
+        weights = nodes.weights * hook.density(nodes.omega) * nodes.omega**power
+        return lambda C: math.sqrt(moved(C, nodes.omega) @ weights)
 
     fixed = case.payload.fixed_drag
     if fixed is None:
-        fixed = consistent_drag(data.quadratic_drag, lambda C: rms(C, 2))
-    return fixed, rms(fixed, 0)
+        fixed = settled_drag(data.quadratic_drag, lambda C: about(C, 2), 0.0)
+    return fixed, about(fixed, 0)(fixed)
 
 
 def _modes(data: PlantData, highest: float) -> FloatArray:

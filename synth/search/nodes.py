@@ -59,7 +59,8 @@ def margin_nodes(problem: Problem, poles: ComplexArray, per_decade: int) -> Floa
     light = (omega > 0.5 * low) & (omega < 2.0 * high) & (damping < 0.1 * omega)
     near = omega[light, None] + damping[light, None] * np.array([-2.0, -0.7, 0.0, 0.7, 2.0])
     edges = [share * e for limit in problem.limits for e in limit.edges for share in _INSIDE]
-    return np.unique(np.concatenate([slow, dense, fast, near[near > 0.0], edges]))
+    nodes = np.unique(np.concatenate([slow, dense, fast, near[near > 0.0], edges]))
+    return problem.plant.beside_poles(nodes)
 
 
 def around(values: Sequence[ComplexArray]) -> ComplexArray:

@@ -85,14 +85,9 @@ class Waterplane:
         return self.volume / (self.length * self.beam * self.draught)
 
     @property
-    def centre_of_flotation(self) -> tuple[float, float]:
-        """Centre of the waterplane [m]."""
-        return self.first[0] / self.area, self.first[1] / self.area
-
-    @property
     def metacentric_radii(self) -> tuple[float, float]:
         """Of roll and of pitch, from the waterplane's moments about its own centre [m]."""
-        x, y = self.centre_of_flotation
+        x, y = (moment / self.area for moment in self.first)
         return (
             (self.second[1] - self.area * y**2) / self.volume,
             (self.second[0] - self.area * x**2) / self.volume,

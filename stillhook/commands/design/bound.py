@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     report = Report(
         name=case.name,
         status=verdict,
-        ok=None if found.feasible else False,
+        ok=None if found.free.feasible else False,
         sections=[ReportSection("", [rest])] if rest else [],
     )
     return conclude(report, arguments, following=lambda: following)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...designs import (
-    bound_sentence,
+    bound_rows,
     design_data,
     structure_text,
     structures_report,
@@ -100,8 +100,8 @@ def optimise_one(arguments: argparse.Namespace) -> int:
     written = folder.write(f"{design.structure}.yaml", structure_text(design))
     report = structures_report([design], bound=arguments.bound and not arguments.quiet)
     sections = list(report.sections)
-    if not arguments.quiet and arguments.bound and (text := bound_sentence(design)):
-        sections.append(ReportSection("", [pairs([("bound", text)])]))
+    if not arguments.quiet and arguments.bound and (rows := bound_rows(design)):
+        sections.append(ReportSection("", [pairs(rows)]))
     if design.parameters:
         units = design.units
         rows = [(k, f"{number(v, 6)} {units.get(k, '')}") for k, v in design.parameters.items()]

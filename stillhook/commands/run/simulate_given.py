@@ -10,10 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 from models import Case
 from models.basics import InputError, check_range
-from models.casefile import Quantity, read_yaml
+from models.casefile import Quantity
 
 from ...text import told_once
-from ..given import given_case, parse_gains, parse_options
+from ..given import (
+    given_case,
+    parse_gains,
+    parse_options,
+    read_quantity_of,
+    split_numbers,
+)
 
 if TYPE_CHECKING:
     from models.operation import MotionSource, Scenario
@@ -175,15 +181,8 @@ def again(arguments: argparse.Namespace, case: str, **changes: object) -> str:
 
 
 def _quantity(arguments: argparse.Namespace, name: str) -> float | None:
-    text = getattr(arguments, name)
-    if text is None:
-        return None
-    option = f"--{name.replace('_', '-')}"
-    value, _ = read_yaml(text, option)
-    try:
-        return float(_QUANTITIES[name].read(value))
-    except InputError as error:
-        raise InputError(f"{option}: {error}") from None
+    text, option = getattr(arguments, name), f"--{name.replace('_', '-')}"
+    return None if text is None else read_quantity_of(option, "", text, _QUANTITIES[name])
 
 
 def _hook(arguments: argparse.Namespace) -> MotionSource | None:
@@ -197,25 +196,15 @@ def _hook(arguments: argparse.Namespace) -> MotionSource | None:
             raise InputError(
                 f"--sine: must be AMPLITUDE,PERIOD, as in '0.5 m, 8 s', got {arguments.sine!r}"
             )
-        found = []
-        for name, part, wanted in zip(
-            ("amplitude", "period"), parts, (_LENGTH, _TIME), strict=True
-        ):
-            value, _ = read_yaml(part, "--sine")
-            try:
-                found.append(float(wanted.read(value)))
-            except InputError as error:
-                raise InputError(f"--sine: {name} {error}") from None
-        return SineMotion(amplitude=found[0], period=found[1])
+        amplitude = read_quantity_of("--sine", "amplitude ", parts[0], _LENGTH)
+        period = read_quantity_of("--sine", "period ", parts[1], _TIME)
+        return SineMotion(amplitude=amplitude, period=period)
     if arguments.hook is None:
         return None
     with told_once():
         if arguments.tip is None:
             return RecordMotion.read(arguments.hook)
-        try:
-            tip = [float(part) for part in arguments.tip.split(",")]
-        except ValueError:
-            tip = []
+        tip = split_numbers(arguments.tip)
         if len(tip) != 3:
             raise InputError(f"--tip: must be three numbers X,Y,Z [m], got {arguments.tip!r}")
         return SixDofMotion.read(arguments.hook, tip=tip)

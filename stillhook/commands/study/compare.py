@@ -16,7 +16,7 @@ from models.basics import InputError, check_range
 from ...comparison import Comparison, comparison_report, write_comparison
 from ...text import OutputFolder, Report, ReportSection, console, count, pairs, show
 from ..declare import CASE, choice, switch, text, whole
-from ..given import case_words, given_case
+from ..given import case_words, given_case, split_numbers
 from ..working import conclude, counting, figure_kinds, place_for, tidy
 
 _MANY = 10_000  # seeds: more than anybody wants on purpose
@@ -156,9 +156,8 @@ def _controllers(text: str | None) -> list[object] | None:
 def _heights(text: str | None) -> list[float] | None:
     if text is None:
         return None
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
+    if not (found := split_numbers(text)):
         raise InputError(
             f"--hs: must be heights [m] with commas between, as in 1.25,1.9,2.43; got {text!r}"
-        ) from None
+        )
+    return list(found)

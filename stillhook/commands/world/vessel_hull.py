@@ -16,6 +16,7 @@ from models.vessel.readers import check_long_waves, write_raos
 from ...seas import hull_report
 from ...text import progress
 from ..declare import choice, declared, group, real, switch, text, whole
+from ..given import split_numbers
 from ..vary import parse_range
 from ..working import conclude, prepared_table
 
@@ -171,10 +172,7 @@ def _hull(arguments: argparse.Namespace) -> Hull:
 
 
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
-    try:
-        found = tuple(float(word) for word in text.split(","))
-    except ValueError:
-        found = ()
+    found = split_numbers(text)
     if len(found) != count:
         raise InputError(f"hull: {option} must be {count} numbers with commas, got {text!r}")
     return found

@@ -12,6 +12,7 @@ from models.vessel.readers import check_long_waves, read_raos, write_raos
 from ...seas import rao_report
 from ...text import told_once
 from ..declare import choice, positional, real, switch, text
+from ..given import split_numbers
 from ..working import conclude, prepared_table
 
 ARGUMENTS = (
@@ -50,12 +51,13 @@ ARGUMENTS = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, check, show and write; return 0."""
+    body = arguments.body
     with told_once():
         raos = read_raos(
             arguments.file,
             file_format=arguments.read_as,
             speed=arguments.speed,
-            body=_body(arguments.body),
+            body=int(body) if body and body.isdigit() else body,
             length=arguments.length,
             depth=arguments.depth,
             origin=_point(arguments.origin),
@@ -83,17 +85,10 @@ def run(arguments: argparse.Namespace) -> int:
     return conclude(report, arguments, written=written, following=lambda: following)
 
 
-def _body(word: str | None) -> int | str | None:
-    return int(word) if word is not None and word.isdigit() else word
-
-
 def _point(text: str | None) -> tuple[float, ...] | None:
     if text is None:
         return None
-    try:
-        found = tuple(float(word) for word in text.split(","))
-    except ValueError:
-        found = ()
+    found = split_numbers(text)
     if len(found) != 3:
         raise InputError(f"vessel: --origin must be 3 numbers [m], as in -5.4,0,0; got {text!r}")
     return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -12,8 +13,14 @@ from hypothesis import strategies as st
 from plant_numbers import THESIS
 
 from models import load_case
-from models.basics import InputError, SolverError
-from models.plant import build_plant, consistent_drag, energy_equivalent, stochastic_equivalent
+from models.basics import InputError, SolverError, spectral_nodes
+from models.plant import (
+    build_plant,
+    consistent_drag,
+    energy_equivalent,
+    settled_drag,
+    stochastic_equivalent,
+)
 from models.plant.drag import gaussian_gain
 
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(200)
@@ -121,6 +128,40 @@ def test_consistent_drag_on_the_winch_plant() -> None:
     again = stochastic_equivalent(THESIS.quadratic_drag, velocity_rms(C))
     assert pytest.approx(again, rel=1e-6) == C
     assert C > 1e3
+
+
+def test_settled_drag_is_the_consistent_one_with_few_sets_of_nodes() -> None:
+    """A mass on a spring under a force with a spectrum, its nodes chosen for each drag anew."""
+    mass, stiffness, q = 9e4, 9e4, 2e4
+    asked: list[float] = []
+
+    def about(near: float) -> Callable[[float], float]:
+        asked.append(near)
+        pole = complex(-0.5 * near / mass, 1.0)
+        nodes = spectral_nodes(0.1, 3.0, poles=[pole])
+
+        def velocity(C: float) -> float:
+            s = 1j * nodes.omega
+            response = s / (mass * s**2 + C * s + stiffness)
+            return float(np.sqrt(nodes.integrate(4e8 * np.abs(response) ** 2)))
+
+        return velocity
+
+    C = settled_drag(q, about, 0.0)
+    assert asked[0] == q
+    assert len(asked) <= 3
+    exact = consistent_drag(q, lambda c: about(c)(c) if c > 0.0 else math.inf)
+    assert pytest.approx(exact, rel=1e-9) == C
+    assert settled_drag(0.0, about, 1.0) == 0.0
+
+
+def test_settled_drag_starts_where_there_are_nodes() -> None:
+    def about(near: float) -> Callable[[float], float]:
+        if near < 1.2e3:
+            raise SolverError("no nodes")
+        return lambda C: 1.0 / (1.0 + C / 1e4)
+
+    assert settled_drag(1e3, about, 0.0) == consistent_drag(1e3, lambda C: 1.0 / (1.0 + C / 1e4))
 
 
 def test_a_current_adds_drag() -> None:

@@ -400,3 +400,47 @@ def test_an_element_closed_around_a_plant_needs_a_pure_state() -> None:
         plant.with_element("effort", "force", 1.0)
     with pytest.raises(InputError, match="there is no output 'speed'"):
         plant.with_element("speed", "force", 1.0)
+
+
+@pytest.mark.parametrize("order", [0, 2])
+def test_controller_closed_around_a_plant_is_the_loop_of_its_responses(order: int) -> None:
+    """[z; y] = G [v; w] with u = K y + v: z = zw w + zu (I - K yu)^-1 (K yw w + v)."""
+    plant, rng = random_plant(), np.random.default_rng(1)
+    matrices = [rng.normal(size=shape) for shape in ((order,) * 2, (order, 3), (2, order), (2, 3))]
+    A, B, C, D = matrices
+    closed = plant.with_feedback(A, B, C, D).response(OMEGA)
+    r = plant.response(OMEGA)
+    s = 1j * OMEGA[:, None, None]
+    K = C @ np.linalg.solve(s * np.eye(order) - A, np.broadcast_to(B, (OMEGA.size, order, 3))) + D
+    inverse = np.linalg.inv(np.eye(2) - K @ r.yu)
+    for found, want in (
+        (closed.zw, r.zw + r.zu @ inverse @ K @ r.yw),
+        (closed.zu, r.zu @ inverse),
+        (closed.yw, r.yw + r.yu @ inverse @ K @ r.yw),
+        (closed.yu, r.yu @ inverse),
+    ):
+        np.testing.assert_allclose(found, want, rtol=1e-9, atol=1e-12)
+    assert len(plant.with_feedback(A, B, C, D).states) == 5 + order
+
+
+def test_controller_is_not_closed_around_delays() -> None:
+    with pytest.raises(InputError, match="no rational loop can be closed with delays"):
+        random_plant(delays=(0.1, 0.0, 0.0)).with_feedback(
+            np.zeros((0, 0)), np.zeros((0, 3)), np.zeros((2, 0)), np.zeros((2, 3))
+        )
+
+
+def test_frequencies_at_an_undamped_pole_are_moved_a_hair_off_it() -> None:
+    plant = LinearPlant(
+        A=scipy.linalg.block_diag([[0.0, 2.0], [-2.0, 0.0]], [[0.0, 5.0], [-5.0, -0.1]]),
+        B=np.ones((4, 1)),
+        E=np.ones((4, 1)),
+        C=np.ones((1, 4)),
+    )
+    omega = np.array([1.0, 2.0, 2.0 + 1e-12, 2.0 - 1e-12, 5.0, 7.0])
+    moved = plant.beside_poles(omega)
+    assert moved == pytest.approx(omega, rel=2e-8)
+    assert moved[[0, 4, 5]].tolist() == [1.0, 5.0, 7.0]
+    assert np.abs(moved[1:4] - 2.0).min() > 1e-9
+    assert moved[2] > moved[3]
+    assert np.isfinite(plant.response(moved).yu).all()

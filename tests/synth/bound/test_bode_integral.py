@@ -2,17 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pytest
 
-from models.basics import InputError
+from models.basics import InputError, adaptive_nodes
 from models.plant import LinearPlant
 from models.sea import SeaSpectrum
-from synth.bound.bode_integral import bode_estimate, bode_integral, least_sensitivity
+from synth.bound.bode_integral import bode_estimate, least_sensitivity
 from synth.loop import Assessment, LinearController, disturbances, loop_margins
 
 FloatArray = npt.NDArray[np.float64]
+
+
+def bode_integral(
+    log_sensitivity: Callable[[FloatArray], FloatArray], poles: npt.NDArray[np.complex128]
+) -> float:
+    """Return the integral of ln|S| over the half line [rad/s]; `poles` are those of the loop."""
+    sizes = np.abs(poles)
+    low, high = 1e-4 * float(sizes.min()), 1e4 * float(sizes.max())
+    # ln|S| changes its sign, so the nodes are chosen by its size.
+    nodes = adaptive_nodes(
+        lambda w: np.abs(log_sensitivity(w)) ** 2 + 1e-300,
+        low,
+        high,
+        poles=[complex(p) for p in poles if p.imag > 0.0 and p.real < 0.0],
+        rtol=1e-9,
+    )
+    inside = float(nodes.integrate(log_sensitivity(nodes.omega)))
+    ends = log_sensitivity(np.array([low, high]))
+    # Even below; above, as 1/omega^2.
+    return inside + low * float(ends[0]) + high * float(ends[1])
 
 
 def test_bode_integral_of_a_stable_loop_is_zero() -> None:
@@ -59,9 +82,45 @@ def test_estimate_of_a_loop_is_one_line() -> None:
     found = bode_estimate(view)
     assert 0.0 < found.least < found.achieved < found.max_sensitivity
     assert "\n" not in str(found)
-    assert "this loop's is" in str(found)
+    assert found.limits_band == ("this loop's is" in str(found))
+    assert "this loop's is" in str(replace(found, least=0.1))
     # More bandwidth, more to trade.
     assert bode_estimate(view, available=50.0).least < bode_estimate(view, available=5.0).least
+
+
+def ringing(gain: float) -> Assessment:
+    """A resonance at 1 rad/s that rate feedback damps, and one at 8 that it hears too late."""
+    plant = LinearPlant(
+        A=[
+            [0.0, 1.0, 0.0, 0.0],
+            [-1.0, -0.06, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+            [0.0, 0.0, -64.0, -0.48],
+        ],
+        B=[[0.0], [1.0], [0.0], [0.4]],
+        E=[[0.0], [1.0], [0.0], [0.0]],
+        C=[[0.0, 1.0, 0.0, 1.0]],
+        Cz=[[1.0, 0.0, 0.0, 0.0]],
+        delays=(0.35,),
+        disturbances=("hook",),
+    )
+    sea = SeaSpectrum(kind="jonswap", significant_height=2.0, peak_period=6.5)
+    sources = disturbances({"hook": sea}, ("hook",))
+    return Assessment(plant, LinearController.static([[-gain]], ("y1",), ("u1",)), sources)
+
+
+def test_a_resonance_pays_for_what_the_band_wins() -> None:
+    view = ringing(0.5)
+    assert view.stable
+    found = bode_estimate(view)
+    assert found.resonance == pytest.approx(8.0, rel=0.05)
+    assert found.damping < found.open_damping == pytest.approx(0.03, rel=1e-6)
+    S = 1.0 / (1.0 + view.loop_gain(np.array([found.resonance])))
+    assert found.resonant == pytest.approx(float(np.abs(S)[0]))
+    assert found.pays_at_resonance
+    assert "cannot be damped without paying elsewhere" in str(found)
+    # With the other sign the same delay lets the loop damp it, and shake the band.
+    assert not bode_estimate(ringing(-0.02)).pays_at_resonance
 
 
 def test_disk_margin_of_the_textbook_loop() -> None:

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from models.basics import InputError, SynthesisError, White
 from models.plant import LinearPlant
 from models.sea import SeaSpectrum
+from models.sensing import MEASURED
 from stillhook import load_case
 from synth.bound import Bound, bound_for, verify_bound, weighted_rms
 from synth.bound.bound import lqg_bound
@@ -283,21 +284,17 @@ def test_limits_on_peaks_as_rms() -> None:
         Power(bound=1.0, torque="a", speed="b"),
     ]
     k = np.sqrt(2.0 * np.log(10800.0 / 12.0))
-    found = rms_limits(limits, {"b": 8.0}, 12.0)
-    assert found == pytest.approx(
-        {"a": min(6.0 / k, 3.0), "b": 8.0 / np.sqrt(2.0 * np.log(10800.0 / 8.0))}
-    )
+    assert rms_limits(limits, 12.0) == pytest.approx({"a": min(6.0 / k, 3.0), "b": 8.0 / k})
 
 
 @pytest.mark.parametrize("name", ["thesis-1975", "subsea-crane"])
 def test_bound_of_a_case_with_all_its_sensors(name: str) -> None:
-    case = load_case(name)
-    hook = 0.5  # [m], about
+    # An error of 5 mm, and the like, every quarter of a second.
     noise = {
-        f"payload.{signal}_noise": White((0.01 * hook) ** 2 * 0.25)
+        f"sensors.payload.{signal}_noise": 0.005 * np.sqrt(2.0 * 0.25)
         for signal in ("acceleration", "velocity", "displacement")
     }
-    bound = bound_for(case, spectra=noise)
+    bound = bound_for(load_case(name).replace(noise), measurements=MEASURED).free
     assert bound.gap < 1e-4
     assert 0.0 < bound.value <= bound.attained < 1.1 * bound.value
     assert any("peaks as rms with T_z" in text for text in bound.assumptions)
@@ -309,5 +306,5 @@ def test_bound_is_below_the_gains_of_a_case() -> None:
     case = load_case("thesis-1975")
     gains = {"A": 1.0, "a": 4394.0, "a1": 2393.0, "a2": 13691.0}  # the best at M_s <= 2
     design = evaluate_gains(case, gains)
-    bound = bound_for(case, drag=design.drag)
-    assert bound.value < design.payload_rms
+    bound = bound_for(design)
+    assert bound.free.value < design.payload_rms

@@ -75,11 +75,12 @@ def gain_of(tuning) -> np.ndarray:
     ("plant", "minimise"),
     [
         (with_full_state(double_integrator()), {"x": 1.0, "effort": 0.1}),
+        (with_full_state(oscillator(4.0, 0.0)), {"x": 1.0, "effort": 0.1}),
         (with_full_state(oscillator(-9.0)), {"x": 1.0, "effort": 1e-3}),
         (with_full_state(two_carts(1)), {"x1": 1.0, "x2": 2.0, "effort1": 0.1}),
         (with_full_state(two_carts(2)), CART_WEIGHTS),
     ],
-    ids=["double integrator", "unstable", "two carts", "two carts, two inputs"],
+    ids=["double integrator", "mass on a spring", "unstable", "two carts", "two carts, two inputs"],
 )
 def test_gain_on_the_full_state_is_the_linear_quadratic_regulator(plant, minimise) -> None:
     weights = [minimise[name] for name in plant.outputs]
@@ -106,11 +107,19 @@ def test_gain_on_the_full_state_is_the_linear_quadratic_regulator(plant, minimis
     [
         (double_integrator(), WHITE, WEIGHTS, None),
         (oscillator(), WHITE, WEIGHTS, 1),
+        (oscillator(4.0, 0.0), WHITE, WEIGHTS, 1),
         (oscillator(-9.0), {"f": White(1.0), "n": White(1e-3)}, {"x": 1.0, "effort": 1e-3}, None),
         (*cart_problem(1), 2),
         (*cart_problem(2), 2),
     ],
-    ids=["double integrator", "oscillator", "unstable", "two carts", "two carts, two inputs"],
+    ids=[
+        "double integrator",
+        "oscillator",
+        "mass on a spring",
+        "unstable",
+        "two carts",
+        "two carts, two inputs",
+    ],
 )
 def test_controller_of_the_plants_order_is_the_lqg_optimum(
     plant, spectrum, minimise, lower: int | None
