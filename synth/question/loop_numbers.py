@@ -531,7 +531,7 @@ def _flat(gain: ComplexArray) -> Any:
 
 def _times(a: ComplexArray, b: ComplexArray) -> ComplexArray:
     """Return the product of matrices that stand on the first two axes."""
-    return np.asarray(sum(a[:, k, None] * b[None, k] for k in range(len(b))))
+    return np.asarray(np.einsum("ij...,jk...->ik...", a, b))
 
 
 def _inverse(a: ComplexArray) -> ComplexArray:

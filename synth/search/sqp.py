@@ -39,8 +39,7 @@ _STIFF = 1.5  # weight of the rows over the sum of their multipliers
 _HEAVY = 1e4  # of the penalty: if rows are broken still, nothing near mends them
 INFEASIBLE = "the limits exclude each other"
 _KEPT = 1e-8  # row that counts as kept
-_RENEWED = 6  # steps after which differences replace what BFGS has gathered
-_DAMPED = 0.2  # of Powell's damping
+_SKIPPED = 1e-6  # an update along less than this share of a step is left out
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -138,17 +137,18 @@ def descend(
     at = evaluate(x)
     if not at.finite:
         return _ended(x, at, np.zeros(at.rows.size), np.zeros(at.equations.size), "no number", 0)
-    hessian: FloatArray | None = None
+    rest: FloatArray | None = None  # of the Hessian beside the model of the curvature
     room, weight = _ROOM, 10.0
-    stalled, age = 0, 0
+    stalled = 0
     prices, equation_prices = np.zeros(at.rows.size), np.zeros(at.equations.size)
     for k in range(most):
         size = np.where(logarithmic, 1.0, _sizes(x, at))
-        if hessian is None or age >= _RENEWED:
-            age = 0
-            hessian = _differences(
-                evaluate, x, size, at, prices, equation_prices, high
-            )
+        if rest is None:
+            rest = np.zeros((x.size, x.size))
+            if k:
+                rest = _differences(evaluate, x, size, at, prices, equation_prices, high)
+                rest -= at.curvature
+        hessian = at.curvature + rest
         reach = room * size
         box = np.maximum(low - x, -reach), np.minimum(high - x, reach)
         found = _quadratic(at, at.rows, at.equations, hessian, box, weight)
@@ -180,17 +180,17 @@ def descend(
             room *= 0.2
             stalled += 1
             if stalled == 2:
-                hessian = None  # the differences anew: what BFGS has gathered may mislead
+                rest = None  # by differences: what the updates have gathered may mislead
             if room < _LEAST_ROOM or stalled > 4:
                 small = promised <= 1e2 * tolerance and at.broken <= 1e2 * _KEPT
                 done = "" if small else "no step helps"
                 return _ended(x, at, prices, equation_prices, done, k + 1)
             continue
-        stalled, age = 0, age + 1
+        stalled = 0
         moved, new = ahead
         limited = bool(np.any(np.abs(step) >= 0.99 * reach))
         room = min(_MOST_ROOM, 2.0 * room) if share == 1.0 and limited else room * max(share, 0.25)
-        hessian = _updated(hessian, moved - x, at, new, prices, equation_prices)
+        rest = _updated(rest, moved - x, at, new, prices, equation_prices)
         x, at = moved, new
         if prices.size != at.rows.size:
             prices = np.zeros(at.rows.size)
@@ -341,25 +341,21 @@ def _convex(curvature: FloatArray, model: FloatArray) -> FloatArray:
 
 
 def _updated(
-    hessian: FloatArray,
+    rest: FloatArray,
     step: FloatArray,
     old: Evaluation,
     new: Evaluation,
     prices: FloatArray,
     equation_prices: FloatArray,
 ) -> FloatArray:
-    """Return the Hessian after a step, by Powell's damped BFGS."""
+    """Return the rest of the Hessian after a step, by the symmetric rank-one formula."""
     if new.rows.size != old.rows.size:
-        return hessian
+        return rest
     change = new.lagrangian_slope(prices, equation_prices) - old.lagrangian_slope(
         prices, equation_prices
     )
-    along = hessian @ step
-    curve, bend = float(step @ along), float(step @ change)
-    if curve <= 0.0 or not np.isfinite(bend):
-        return hessian
-    if bend < _DAMPED * curve:
-        theta = (1.0 - _DAMPED) * curve / (curve - bend)
-        change = theta * change + (1.0 - theta) * along
-        bend = float(step @ change)
-    return np.asarray(hessian - np.outer(along, along) / curve + np.outer(change, change) / bend)
+    missing = change - (new.curvature + rest) @ step
+    along = float(missing @ step)
+    if abs(along) <= _SKIPPED * float(np.linalg.norm(missing) * np.linalg.norm(step)):
+        return rest
+    return np.asarray(rest + np.outer(missing, missing) / along)
