@@ -244,11 +244,15 @@ class Programme:
     def lagrangian(self, x: FloatArray, multipliers: FloatArray) -> float:
         """Return log cost plus multipliers times rows and equations at a vector.
 
-        The row that keeps slow poles off is normalised by the reference: it has no price.
+        The row that keeps slow poles off is normalised by the reference: it has no price.  With
+        true margins it is nan where other rows are there than the multipliers are for: a crossing
+        has come or gone.
         """
         costs, rows, balances = self._numbers(x, slopes=False)
         priced = [row if key[1] != _SLOW else 0.0 * row for key, row in rows]
         flat = np.concatenate([*priced, *balances])
+        if flat.size != multipliers.size:
+            return np.nan
         return float(costs[0].item() + multipliers @ flat)
 
     def _box(self, start: FloatArray, reach: float | None) -> tuple[FloatArray, FloatArray]:

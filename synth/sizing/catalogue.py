@@ -158,7 +158,14 @@ def choose(
         for i in range(_GEARS):
             gear = float(f"{gears[0] * step**i:.3g}")
             put = case.variant({**motor.changes, "winch.gearbox.ratio": gear})
-            found = _factor(put, structure, target, masses, answer, near)
+            posed = Posed.of(put, structure, masses)
+            problem = posed.problem(with_target(posed, target))
+            relaxed = [
+                m.name for m in posed.drive if not m.at_least and not m.name.startswith("rope.")
+            ]
+            begins = dict.fromkeys((answer, near))
+            tried = (follow(problem, [b], goal=Goal.RELAX, relaxed=relaxed) for b in begins)
+            found = next((a for a in tried if a is not None), None)
             if found is None:
                 continue
             answer = found
@@ -177,27 +184,6 @@ def choose(
             smaller=tuple(smaller),
         )
     return f"none of the {len(catalogue)} motors of the catalogue does it behind any of these gears"
-
-
-def _factor(
-    case: Case, structure: str, target: float, masses: int, answer: Answer, free: Answer
-) -> Answer | None:
-    """Return the answer with the least factor on all the limits of a drive."""
-    posed = Posed.of(case, structure, masses)
-    problem = posed.problem(with_target(posed, target))
-    relaxed = [m.name for m in posed.drive if not m.at_least and not m.name.startswith("rope.")]
-    for begin in (answer, free):
-        found = follow(
-            problem,
-            [begin.carried(problem)],
-            near=begin,
-            goal=Goal.RELAX,
-            relaxed=relaxed,
-            extra=begin.solved.extra,
-        )
-        if found is not None:
-            return found
-    return None
 
 
 def _completed(case: Case, own: Mapping[str, Any]) -> dict[str, Any]:

@@ -5,10 +5,10 @@ r"""Co-design: gear ratio and drum radius together with the gains, for a given m
 
 The gear enters plant and limits: reflected inertia I_D/n^2, speed n/r of the haul, torque r/n of
 the tension.  So it is searched around the gains, whose optimum behind a neighbouring gear is a
-start that needs two rounds of the exchange.  That the outer search has arrived is checked by
-another route: the derivative of the optimum by the envelope theorem
-(`synth.sizing.follow.slope`), zero at a smooth optimum, pointing out of the range at its ends, and
-of either sign at a corner, where one limit hands over to another.
+start that needs a few steps.  That the outer search has arrived is checked by another route: the
+derivative of the optimum by the envelope theorem (`synth.sizing.follow.slope`), zero at a smooth
+optimum, pointing out of the range at its ends, and of either sign at a corner, where one limit
+hands over to another.
 
 A drum of another radius keeps its width and the thickness of its wall: its inertia goes with the
 cube.  Nearly everything hangs on n/r alone, so the pair is searched in n/r and r, whose optima
@@ -34,7 +34,7 @@ from .follow import Answer, Posed, begin_from, designed, follow, least_between, 
 _GRID = 7  # gears that are tried before the Brent's method
 _FINE = 2e-3  # of the logarithm of the gear
 _RADII = 3  # Brent's methods along the radius and back
-_STEP = 1e-4  # of the logarithm, for the slope
+_STEP = 1e-5  # of the logarithm, for the slope
 _GAIN = 1e-3  # share of the rms that another drum must gain at least
 _SMOOTH = 0.02  # slope below which an optimum is one without a corner
 _DRUM = 3.0  # inertia of a drum over its radius
@@ -124,12 +124,9 @@ class _Gears:
             known.sort(key=lambda k: abs(math.log(k[0] / gear)) + abs(math.log(k[1] / radius)))
             near = self.answers[known[0]] if known else self.begin
             problem = self.problem(gear, radius)
-            found = None
-            if near is not None:
-                found = follow(problem, [near.carried(problem)], near=near)
-            if found is None and self.begin is not None and near is not self.begin:
-                found = follow(problem, [self.begin.carried(problem)], near=self.begin)
-            self.answers[key] = found
+            begins = dict.fromkeys(a for a in (near, self.begin) if a is not None)
+            tried = (follow(problem, [answer]) for answer in begins)
+            self.answers[key] = next((found for found in tried if found is not None), None)
         return self.answers[key]
 
     def cost(self, gear: float, radius: float) -> float:
@@ -308,7 +305,7 @@ def _finished(
 
 
 def _binding(answer: Answer) -> tuple[str, ...]:
-    prices = answer.solved.prices
+    prices = answer.prices
     return tuple(
         sorted((n for n, p in prices.items() if abs(p) > 1e-4), key=lambda n: -abs(prices[n]))
     )

@@ -1,11 +1,10 @@
 r"""Optima followed from case to case: each solved again from its neighbour's answer.
 
-    Posed (case, structure) + neighbour's Answer -> programme on inherited nodes -> Answer
+    Posed (case, structure) + neighbour's Answer -> descent on true margins -> Answer
 
 A sweep over gear ratios, motors or seas solves nearly the same problem again and again.  Each
-solve begins at its neighbour's answer and with the frequencies at which that one pressed a
-limit, so one or two rounds of the exchange (`synth.search.polishing`) suffice.  `slope` gives the
-derivative of the optimum by the envelope theorem: that of the Lagrangian at the answer,
+descent begins at its neighbour's answer, where a few steps suffice.  `slope` gives the derivative
+of the optimum by the envelope theorem: that of the Lagrangian at the answer,
 
 .. math:: dJ^*/d\theta = \partial_\theta (\log J + \lambda^T g),
 
@@ -15,38 +14,35 @@ is counted right.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from models.basics import FloatArray, Quadrature
+from models.basics import FloatArray
 from models.case import Case
 
-from ..design import StructureDesign, design_of, tuning_of, verified
+from ..design import StructureDesign, Tuning, design_of, tuning_of, verified
 from ..limits import Limit, drive_limits
 from ..loop import Assessment
 from ..question import PAYLOAD, Goal, Problem, StructureQuestion, pose_structure
 from ..search import (
+    KEPT,
     Found,
     Programme,
     Progress,
     Solution,
-    SolverPace,
     assess,
     begin_points,
     cost_nodes,
     margin_nodes,
     polish,
-    thinned,
+    settle,
 )
 
-EXCESS = 1e-4  # relative excess over a limit that an answer on the way may have
-ROUNDS = 5  # of the exchange of nodes
 _FRESH = 3  # starts where no neighbour's answer is stable
-_MOST_HELD = 200  # frequencies that are inherited
-_RTOL = 1e-6  # of the integrals on the way
+_PER_DECADE = 60  # margin nodes of a slope
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,22 +94,21 @@ class Answer:
     problem, solved, assessment
         The problem, the solver's answer, and its assessment.
     excess
-        Largest relative excess over a limit that was to be kept.
-    nodes, omega, held
-        Where its spectra were integrated and its margins held, and which of those frequencies
-        the exchange added [rad/s].
-    vector
-        The programme's vector.
+        Largest relative excess over a limit that was to be kept; at most `synth.search.KEPT`.
     """
 
     problem: Problem
     solved: Solution
     assessment: Assessment
     excess: float
-    nodes: Quadrature
-    omega: FloatArray
-    held: FloatArray
-    vector: FloatArray
+
+    @classmethod
+    def of(cls, problem: Problem, found: Found) -> Answer | None:
+        """Return what a search found, None if it keeps no limits."""
+        solved, assessment, excess = found.solved, found.assessment, found.excess
+        if solved is None or assessment is None or not solved.converged or excess > KEPT:
+            return None
+        return cls(problem=problem, solved=solved, assessment=assessment, excess=excess)
 
     @property
     def payload_rms(self) -> float:
@@ -125,15 +120,37 @@ class Answer:
         """The structure's parameters by name."""
         return self.problem.law.named([float(v) for v in self.solved.values])
 
+    @property
+    def prices(self) -> Mapping[str, float]:
+        """Price of each limit by name: d log(cost) / d log(bound)."""
+        return self.solved.prices[0]
+
+    @property
+    def tuning(self) -> Tuning:
+        """The answer in words and numbers."""
+        assessments = (self.assessment,)
+        found = Found(solved=self.solved, assessments=assessments, excess=self.excess)
+        return tuning_of(self.problem, found)
+
     def uses(self) -> dict[str, float]:
         """Return the use of every limit by name."""
         return {lim.name: lim.use(lim.measure(self.assessment)) for lim in self.problem.limits}
 
     def carried(self, problem: Problem) -> FloatArray:
-        """Return the parameters for another problem, each as large for it as here."""
+        """Return the parameters for another problem, each as large for it as here.
+
+        As they are, if the loop is unstable with them.
+        """
         old, new = self.problem.law.parameters, problem.law.parameters
         ratio = np.array([b.scale / a.scale for a, b in zip(old, new, strict=True)])
-        return problem.law.clipped(self.solved.values * ratio)
+        values = problem.law.clipped(self.solved.values * ratio)
+        return values if problem.stable(values, self.solved.coefficient) else self.solved.values
+
+
+def with_bound(problem: Problem, name: str, bound: float) -> Problem:
+    """Return the problem with another bound of one of its limits."""
+    limits = tuple(replace(m, bound=bound) if m.name == name else m for m in problem.limits)
+    return replace(problem, limits=limits)
 
 
 def begin_from(problem: Problem, design: StructureDesign) -> FloatArray:
@@ -144,15 +161,11 @@ def begin_from(problem: Problem, design: StructureDesign) -> FloatArray:
 
 def follow(
     problem: Problem,
-    begins: Sequence[FloatArray],
+    begins: Sequence[Answer | FloatArray],
     *,
-    near: Answer | None = None,
     goal: Goal = Goal.COST,
     relaxed: Sequence[str] = (),
     coefficient: float | None = None,
-    extra: float = 0.0,
-    fine: bool = False,
-    rounds: int = ROUNDS,
 ) -> Answer | None:
     """Return the optimum of a problem from starts close to it, or None if none arrives.
 
@@ -161,52 +174,67 @@ def follow(
     problem
         The problem.
     begins
-        Starts; those that do not stabilise the loop are left out.
-    near
-        A neighbour's answer, whose margin frequencies are held too.
-    goal, relaxed, extra
-        See `synth.search.programme.Programme`; `extra` begins the variable of the goal.
+        Starts: answers of neighbours, or parameters.  Those that do not stabilise the loop are
+        left out.
+    goal, relaxed
+        See `synth.search.Programme`.
     coefficient
-        Drag coefficient to begin with [N s/m].
-    rounds
-        Most rounds of the exchange; with one the answer is a rough one.
-    fine
-        Whether to polish the answer until no limit is broken by more than 1e-5.
+        Drag coefficient of starts that are no answers [N s/m].
     """
-    drag = problem.drag
-    if drag is not None and coefficient is None:
-        coefficient = near.solved.coefficient if near is not None else drag.reference
-    starts = [b for b in begins if problem.stable(b, coefficient)]
-    if not starts and len(begins):
-        starts = begin_points(problem, _FRESH, 0, [list(b) for b in begins])
-    best: Answer | None = None
-    for begin in starts:
-        found = _arrived(problem, begin, near, goal, relaxed, coefficient, extra, rounds)
-        if found is not None and (best is None or found.solved.objective < best.solved.objective):
-            best = found
-    if best is None or not fine:
-        return best
-    solved, assessment, excess = polish(problem, best.solved, starts[0], goal, relaxed)
-    if not solved.converged or excess > max(best.excess, EXCESS):
-        return best
-    return replace(best, solved=solved, assessment=assessment, excess=excess)
+    drag = None if problem.drag is None else coefficient or problem.drag.reference
+    starts = [
+        (b.carried(problem), b.solved.coefficient, b.solved.extra)
+        if isinstance(b, Answer)
+        else (b, drag, 0.0)
+        for b in begins
+    ]
+    stable = [s for s in starts if problem.stable(s[0], s[1])]
+    if not stable and starts:
+        fresh = begin_points(problem, _FRESH, 0, [values for values, _, _ in starts])
+        stable = [(values, drag, 0.0) for values in fresh]
+    found = [_arrived(problem, *start, goal, relaxed) for start in stable]
+    arrived = (answer for answer in found if answer is not None)
+    return min(arrived, key=lambda answer: answer.solved.objective, default=None)
+
+
+def _arrived(
+    problem: Problem,
+    begin: FloatArray,
+    coefficient: float | None,
+    extra: float,
+    goal: Goal,
+    relaxed: Sequence[str],
+) -> Answer | None:
+    solved = settle(
+        problem,
+        begin,
+        (coefficient,),
+        goal,
+        reference=begin,
+        relaxed=relaxed,
+        extra=extra,
+        fine=True,
+    )
+    if not np.isfinite(solved.objective) or not problem.stable(solved.values, solved.coefficient):
+        return None
+    assessments, excess = assess(problem, solved, goal, relaxed)
+    if excess > KEPT:
+        solved, assessments, excess = polish(problem, solved, begin, goal, relaxed)
+    if not solved.converged or excess > KEPT:
+        return None
+    return Answer(problem=problem, solved=solved, assessment=assessments[0], excess=excess)
 
 
 def designed(
     case: Case, structure: str, near: Answer, masses: int, tell: Progress
 ) -> StructureDesign | None:
     """Return the best gains of a case close to a known answer, verified; None if none keep it."""
-    posed = Posed.of(case, structure, masses)
-    problem = posed.asked_by(case)
-    begins = [near.carried(problem), near.solved.values]
-    answer = follow(problem, begins, near=near, fine=True)
+    problem = Posed.of(case, structure, masses).asked_by(case)
+    answer = follow(problem, [near])
     if answer is None:
         return None
-    found = Found(solved=answer.solved, assessment=answer.assessment, excess=answer.excess)
-    tuning = tuning_of(problem, found)
-    return verified(
-        design_of(pose_structure(case, structure, masses), tuning, drive_kept=True), tell
-    )
+    asked = pose_structure(case, structure, masses)
+    return verified(design_of(asked, answer.tuning, drive_kept=True), tell)
 
 
 def least_between(cost: Callable[[float], float], low: float, high: float, fine: float) -> float:
@@ -235,6 +263,8 @@ def least_between(cost: Callable[[float], float], low: float, high: float, fine:
 def slope(answer: Answer, changed: Problem, step: float) -> float:
     """Return d log(cost) of the optimum per `step`, by the envelope theorem.
 
+    It is nan where a crossing that a margin is measured at comes or goes with the change.
+
     Parameters
     ----------
     answer
@@ -244,86 +274,17 @@ def slope(answer: Answer, changed: Problem, step: float) -> float:
     step
         By how much.
     """
-    here = _lagrangian(answer, answer.problem, answer.vector)
-    vector = answer.vector.copy()
-    parameters = answer.problem.law.parameters
-    for k, (old, new) in enumerate(zip(parameters, changed.law.parameters, strict=True)):
-        vector[k] *= old.scale / new.scale  # the same parameter in the units of its new size
-    return (_lagrangian(answer, changed, vector) - here) / step
-
-
-def _lagrangian(answer: Answer, problem: Problem, vector: FloatArray) -> float:
-    programme = Programme(problem, answer.nodes, answer.omega, reference=answer.solved.values)
-    bounds = np.array([limit.bound for limit in problem.limits], dtype=np.float64)
-    cost, rows = programme.evaluate(vector, bounds)
-    flat = np.array(rows, dtype=np.float64).ravel()
-    assert answer.solved.multipliers is not None
-    prices = answer.solved.multipliers.copy()
-    # The row that keeps slow poles off is normalised by the reference: it has no price.
-    prices[-1 if problem.drag is None else -2] = 0.0
-    return float(cost) + float(np.dot(prices, flat))
-
-
-def _arrived(
-    problem: Problem,
-    begin: FloatArray,
-    near: Answer | None,
-    goal: Goal,
-    relaxed: Sequence[str],
-    coefficient: float | None,
-    extra: float,
-    rounds: int,
-) -> Answer | None:
-    assessment = problem.assess(begin, coefficient)
-    held = near.held if near is not None else np.zeros(0)
-    solved: Solution | None = None
-    best: Answer | None = None
-    for k in range(rounds):
-        nodes = cost_nodes(problem, [assessment], rtol=_RTOL)
-        omega = np.union1d(margin_nodes(problem, [assessment.poles], 40), held)
-        programme = Programme(
-            problem, nodes, omega, goal, reference=begin, relaxed=relaxed, tolerance=1e-8
-        )
-        values = begin if solved is None else solved.values
-        start = programme.pack(
-            values,
-            coefficient if solved is None else solved.coefficient,
-            extra if solved is None else solved.extra,
-        )
-        again = _solved(programme, start, first=k == 0 and near is None)
-        if again is None:
-            break
-        solved = again
-        assessment, excess = assess(problem, solved, goal, relaxed)
-        answer = Answer(
-            problem=problem,
-            solved=solved,
-            assessment=assessment,
-            excess=excess,
-            nodes=nodes,
-            omega=omega,
-            held=_fewer(assessment, problem, held),
-            vector=programme.pack(solved.values, solved.coefficient, solved.extra),
-        )
-        if best is None or answer.excess < best.excess:
-            best = answer
-        if excess <= 0.5 * EXCESS:
-            return answer
-        held = _fewer(assessment, problem, held)
-    rough = rounds < ROUNDS
-    return best if best is not None and (rough or best.excess <= 10.0 * EXCESS) else None
-
-
-def _fewer(assessment: Assessment, problem: Problem, held: FloatArray) -> FloatArray:
-    """Return the frequencies that a neighbour should hold: where limits are pressed, and were."""
-    extremes = [f(assessment) for limit in problem.limits for f in (limit.critical, limit.worst)]
-    recent = held[:: 1 + held.size // _MOST_HELD]
-    return np.union1d(recent, thinned(extremes))
-
-
-def _solved(programme: Programme, start: FloatArray, *, first: bool) -> Solution | None:
-    for pace in (SolverPace.FAR, SolverPace.NEAR) if first else (SolverPace.NEAR, SolverPace.FAR):
-        solved = programme.solve(start, pace=pace)
-        if solved.converged and programme.problem.stable(solved.values, solved.coefficient):
-            return solved
-    return None
+    problem, values, drags = answer.problem, answer.solved.values, answer.solved.coefficients
+    poles = problem.loop_poles(values, drags[0])
+    nodes = [cost_nodes(problem, poles, fine=True)], [margin_nodes(problem, poles, _PER_DECADE)]
+    here, there = (
+        Programme(asked, *nodes, reference=values, tolerance=1e-10, exact=True)
+        for asked in (problem, changed)
+    )
+    solved = here.solve(here.pack(values, drags))
+    assert solved.multipliers is not None
+    costs = [
+        programme.lagrangian(programme.pack(solved.values, solved.coefficients), solved.multipliers)
+        for programme in (there, here)
+    ]
+    return (costs[0] - costs[1]) / step

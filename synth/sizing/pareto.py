@@ -1,19 +1,18 @@
 """Pareto fronts: how still the payload can be held against what it costs.
 
-    question -> end points -> bounds in between -> warm-started continuation, both ways
-             -> exchange of nodes over the whole front -> ParetoFront
+    question -> end points -> bounds in between -> continuation, both ways -> ParetoFront
 
 The epsilon-constraint method: the payload's variance is minimised under a bound on the other
-quantity, the bound moved in steps.  A bound is a number that the programme is given with each
-solve, so one programme serves the whole front and every solve begins at its neighbour's
-answer.  A front may change basins: it is walked from both ends and from every basin that the
-search at its ends found, and the best answer at each bound counts.
+quantity, the bound moved in steps, and every descent begins at its neighbour's answer.  A front
+may change basins: it is walked from both ends, from its middle and from every basin that the
+searches there found, and the best answer at each bound counts (`synth.sizing.pareto_walk`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -22,9 +21,10 @@ from models.case import Case
 
 from ..limits import DelayMargin, Limit, MaxSensitivity, Rms
 from ..question import Problem, pose
-from ..search import KEPT, Found, Progress, Solution, polish, search
-from .pareto_point import ParetoPoint, point_of
-from .pareto_walk import FrontWalk, exchanged, with_bound
+from ..search import KEPT, Found, Progress, search
+from ..verify import Verification
+from .follow import Answer, with_bound
+from .pareto_walk import walked
 
 #: What a front can be drawn against: name -> (limit's name, unit).
 AGAINST: Mapping[str, tuple[str, str]] = {
@@ -36,11 +36,69 @@ AGAINST: Mapping[str, tuple[str, str]] = {
 }
 _STARTS = 6  # of the searches at the ends and in the middle
 _ENDS = 2  # distinct answers of each that a walk begins from
+_OTHER = 1e-3  # difference of log costs that tells two ends apart
 _FROM, _TO = 1.15, 3.0  # of M_s, where the user does not say
 _LONGER = 4.0  # that of the best motion, which a front of delay margins ends at
 _LONGEST = 0.2  # of a telemetry delay [s]
-_DELAY_STARTS = 8  # of the searches of a front of delays, whose points share no programme
-_SAME = 1e-6  # log costs that differ by less are the same answer
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ParetoPoint:
+    """One point of a front.
+
+    Attributes
+    ----------
+    bound
+        What the other quantity was held to.
+    name
+        Name of the limit that it bounds, if it does.
+    answer
+        The optimum.
+    """
+
+    bound: float
+    name: str
+    answer: Answer
+
+    @cached_property
+    def value(self) -> float:
+        """What the other quantity is."""
+        limits, loop = self.answer.problem.limits, self.answer.assessment
+        return next((m.measure(loop) for m in limits if m.name == self.name), self.bound)
+
+    @cached_property
+    def payload_rms(self) -> float:
+        """Standard deviation of the payload [m]."""
+        return self.answer.payload_rms
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """The gains by name."""
+        return self.answer.parameters
+
+    @property
+    def max_sensitivity(self) -> float:
+        """Largest sensitivity M_s [-]."""
+        return self.answer.assessment.max_sensitivity
+
+    @cached_property
+    def torque_rms(self) -> float:
+        """Standard deviation of the dynamic motor torque [N m]."""
+        return self.answer.assessment.sigma("motor.torque")
+
+    @property
+    def price(self) -> float:
+        """Relative change of the payload's rms per relative change of the bound."""
+        return float(self.answer.prices.get(self.name, 0.0))
+
+    @property
+    def excess(self) -> float:
+        """Largest relative excess over a limit."""
+        return self.answer.excess
+
+    def verify(self) -> Verification:
+        """Check the point by code that no search uses."""
+        return self.answer.tuning.verify()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,45 +214,43 @@ def pareto_front(
     if between is not None and not 0.0 <= between[0] < between[1]:
         raise InputError(f"pareto: between must be two ascending numbers, got {between}")
     tell = progress or (lambda stage, done, total: None)
-    if against == "delay":
-        found = delay_points(case, points, between or (0.0, _LONGEST), seed, tell)
-    else:
-        found = _bound_points(case, against, points, between, seed, tell)
-    return _checked(case, against, found, checks, tell)
+    name = AGAINST[against][0]
+    guesses = [[case.gains.a, case.gains.a1, case.gains.a2]] if case.gains is not None else []
+    tell("ends of the front", 0, 4)
+    bounds, problems, known = _posed(case, against, int(points), between, seed, guesses)
+    begins: list[tuple[int, Answer | FloatArray]] = []
+    for n, k in enumerate((0, len(bounds) // 2, len(bounds) - 1)):
+        tell("ends of the front", n + 1, 4)
+        found = known.get(k) or search(problems[k], _STARTS, seed, guesses)
+        begins += [(k, begin) for begin in _begins(problems[k], found)]
+    if not begins:
+        raise SynthesisError(f"pareto: no gains keep the limits for any {name} in the range")
+    harder = against in ("delay", "delay_margin")
+    best = walked(problems, begins, harder=harder, tell=tell)
+    return _checked(case, against, list(zip(bounds, best, strict=True)), checks, tell)
 
 
-def _bound_points(
+def _posed(
     case: Case,
     against: str,
     count: int,
     between: tuple[float, float] | None,
     seed: int,
-    tell: Progress,
-) -> list[tuple[float, ParetoPoint | None]]:
-    question = pose(case)
-    name = AGAINST[against][0]
+    guesses: Sequence[Sequence[float]],
+) -> tuple[FloatArray, list[Problem], dict[int, Found]]:
+    """Return the bounds of a front, the problem at each, and what is known already by index."""
+    if against == "delay":
+        delays = np.linspace(*(between or (0.0, _LONGEST)), count)
+        cases = [case.replace({"sensors.telemetry.delay": float(d)}) for d in delays]
+        return delays, [pose(late).problem for late in cases], {}
+    question, name = pose(case), AGAINST[against][0]
     others = tuple(limit for limit in question.limits if limit.name != name)
-    guesses = [[case.gains.a, case.gains.a1, case.gains.a2]] if case.gains is not None else []
-    tell("ends of the front", 0, 4)
     known: dict[int, Found] = {}
     if between is None:
         between, known = _ends(question.problem_with(others), against, count, seed, guesses)
-    low, high = between
-    bounds = _spaced(low, high, count, against)
-    # What a programme covers by the bound that it is made with, it must cover for all: the disc of
-    # the loosest M_s, the arc of the longest delay.
-    problem = question.problem_with((*others, _limit(against, float(bounds[-1]))))
-    walk = FrontWalk(problem, name, bounds)
-    for n, k in enumerate((0, count // 2, count - 1)):
-        tell("ends of the front", n + 1, 4)
-        if k not in known:
-            here = with_bound(problem, name, float(bounds[k]))
-            known[k] = search(here, _STARTS, seed, guesses)
-        walk.begins += [(k, *end) for end in _ends_of(known[k])]
-    if not walk.begins:
-        raise SynthesisError(f"pareto: no gains keep the limits for any {name} in the range")
-    walk.go(tell)
-    return exchanged(walk, tell)
+    bounds = _spaced(*between, count, against)
+    problem = question.problem_with((*others, _limit(against, float(bounds[0]))))
+    return bounds, [with_bound(problem, name, float(bound)) for bound in bounds], known
 
 
 def _limit(against: str, bound: float) -> Limit:
@@ -238,28 +294,30 @@ def _spaced(low: float, high: float, count: int, against: str) -> FloatArray:
     return np.geomspace(low, high, count) if low > 0.0 else np.linspace(low, high, count)
 
 
-def _ends_of(found: Found) -> list[tuple[FloatArray, float | None]]:
-    """Return the best distinct ends of a search."""
-    if found.solved is None:
-        return []
+def _begins(problem: Problem, found: Found) -> list[Answer | FloatArray]:
+    """Return the best answer of a search, and its best distinct ends."""
     chosen: list[tuple[FloatArray, float]] = []
     for start in sorted((s for s in found.starts if s.converged), key=lambda s: s.cost):
-        if all(abs(np.log(start.cost / cost)) > 1e-3 for _, cost in chosen):
+        if all(abs(np.log(start.cost / cost)) > _OTHER for _, cost in chosen):
             chosen.append((start.end, start.cost))
-    ends: list[tuple[FloatArray, float | None]] = [(v, None) for v, _ in chosen[:_ENDS]]
-    if found.excess <= KEPT:
-        ends.insert(0, (found.solved.values, found.solved.coefficient))
-    return ends
+    answer = Answer.of(problem, found)
+    ends = [values for values, _ in chosen[:_ENDS]]
+    return [*ends] if answer is None else [answer, *ends]
 
 
 def _checked(
     case: Case,
     against: str,
-    found: Sequence[tuple[float, ParetoPoint | None]],
+    found: Sequence[tuple[float, Answer | None]],
     checks: int,
     tell: Progress,
 ) -> ParetoFront:
-    points = [p for _, p in found if p is not None]
+    name = AGAINST[against][0]
+    points = [
+        ParetoPoint(bound=float(bound), name=name, answer=answer)
+        for bound, answer in found
+        if answer is not None
+    ]
     chosen = np.unique(np.linspace(0, len(points) - 1, min(checks, len(points))).astype(int))
     passed = 0
     for n, k in enumerate(chosen if points else []):
@@ -270,65 +328,7 @@ def _checked(
         against=against,
         unit=AGAINST[against][1],
         points=tuple(points),
-        lost=tuple(bound for bound, p in found if p is None),
+        lost=tuple(float(bound) for bound, answer in found if answer is None),
         amplifier=case.gains.A if case.gains is not None else 1.0,
         verified=(passed, len(chosen) if points else 0),
     )
-
-
-def delay_points(
-    case: Case, count: int, between: tuple[float, float], seed: int, tell: Progress
-) -> list[tuple[float, ParetoPoint | None]]:
-    """Return the best answer at each delay [s], None where there is none."""
-    delays = np.linspace(*between, count)
-    problems = [pose(case.replace({"sensors.telemetry.delay": float(d)})).problem for d in delays]
-    guesses = [[case.gains.a, case.gains.a1, case.gains.a2]] if case.gains is not None else []
-    best: list[tuple[Solution, float] | None] = [None] * count
-    begins: list[tuple[int, Solution, FloatArray]] = []
-    for n, k in enumerate((0, count // 2, count - 1)):
-        tell("ends of the front", n, 3)
-        found = search(problems[k], _DELAY_STARTS, seed, guesses)
-        if found.solved is not None and found.excess <= KEPT and found.reference is not None:
-            begins.append((k, found.solved, found.reference))
-            _keep(best, k, found.solved, found.excess)
-    if not begins:
-        raise SynthesisError("pareto: no gains keep the limits at any delay in the range")
-    for n, (k, solved, reference) in enumerate(begins):
-        tell("walking along the front", n, len(begins))
-        _along(problems, best, range(k + 1, count), solved, reference)
-        _along(problems, best, range(k - 1, -1, -1), solved, reference)
-    points: list[tuple[float, ParetoPoint | None]] = []
-    for delay, problem, kept in zip(delays, problems, best, strict=True):
-        point = None if kept is None else point_of(problem, "", float(delay), kept[0])
-        points.append((float(delay), point))
-    return points
-
-
-def _along(
-    problems: Sequence[Problem],
-    best: list[tuple[Solution, float] | None],
-    order: Sequence[int],
-    solved: Solution,
-    reference: FloatArray,
-) -> None:
-    """Go on from delay to delay until another walk has been there with a better answer."""
-    for i in order:
-        problem = problems[i]
-        if not problem.stable(solved.values, solved.coefficient):
-            return
-        again, _, excess = polish(problem, solved, solved.values)
-        if again is solved or excess > KEPT:
-            return
-        if not _keep(best, i, again, excess):
-            return
-        solved = again
-
-
-def _keep(
-    best: list[tuple[Solution, float] | None], index: int, solved: Solution, e: float
-) -> bool:
-    known = best[index]
-    if known is not None and known[0].objective <= solved.objective + _SAME:
-        return False
-    best[index] = solved, e
-    return True

@@ -22,7 +22,7 @@ from models.hook import HookMotion
 from ..limits import Limit, Rms
 from ..question import Goal, Problem
 from ..search import Progress
-from .follow import ROUNDS, Answer, Posed, follow
+from .follow import Answer, Posed, follow
 from .motor import MotorData, with_motor
 
 TARGET = "payload.displacement.rms"
@@ -43,7 +43,6 @@ _STEPS = 12
 _LEAST_STEP = 0.1  # of the logarithm of the scale, where no motor was found yet
 _LARGEST = 1e3  # scale that is looked at
 _ABOVE = 1.0 + 1e-6  # the load at rest, at least
-_FAR = 1.0  # guess of the factor's logarithm where that of the neighbour does not serve
 _BINDING = 5e-3  # a limit that is used up to this share of itself binds
 _SEA_STEPS, _SEA_FINE = 8, 2e-3  # of the search
 _LOWEST, _HIGHEST = 0.05, 6.0  # of the sea asked for, that are looked at
@@ -122,11 +121,12 @@ def least_motor(
     """
     known: list[tuple[float, float]] = []
     rest = math.log(_at_rest(case, gear))
-    size, answer, extra = max(math.log(scale), rest), near, 0.0
+    size, answer = max(math.log(scale), rest), near
     while len(known) < _STEPS:
         posed = Posed.of(with_motor(case, math.exp(size), gear), structure, masses)
         problem = posed.problem(with_target(posed, target))
-        found = _rated(problem, answer, extra)
+        ratings = [m.name for m in problem.limits if m.name in RATINGS]
+        found = follow(problem, [answer], goal=Goal.RELAX, relaxed=ratings)
         if found is None:
             return SmallestMotor(point=_stopped(problem, answer, gear), answer=None)
         answer, extra = found, found.solved.extra
@@ -151,28 +151,6 @@ def _at_rest(case: Case, gear: float) -> float:
     if drive.current_continuous is not None:
         rating = min(rating, drive.current_continuous * case.winch.torque_constant)
     return _ABOVE * torque / rating
-
-
-def _rated(problem: Problem, near: Answer, extra: float) -> Answer | None:
-    """Return the answer with the least factor on the motor's ratings."""
-    ratings = [m.name for m in problem.limits if m.name in RATINGS]
-    guesses = (_least_factor(problem, near, ratings, guess) for guess in (extra, _FAR))
-    return next((found for found in guesses if found is not None), None)
-
-
-def _least_factor(
-    problem: Problem, near: Answer, relaxed: Sequence[str], extra: float, rounds: int = ROUNDS
-) -> Answer | None:
-    """Return the answer with the least factor on some limits, from that of a neighbour.
-
-    It begins with parameters as large for the new plant as for its own, or as they are.
-    """
-    begin = near.carried(problem)
-    if not problem.stable(begin, near.solved.coefficient):
-        begin = near.solved.values
-    return follow(
-        problem, [begin], near=near, goal=Goal.RELAX, relaxed=relaxed, extra=extra, rounds=rounds
-    )
 
 
 def _next(known: Sequence[tuple[float, float]], rest: float) -> float | None:
@@ -218,7 +196,7 @@ def _point(case: Case, gear: float, size: float, answer: Answer, *, at_rest: boo
     names = [n for n, use in uses.items() if use / (factor if n in RATINGS else 1.0) > 1 - _BINDING]
     # The target binds at every smallest motor: that goes without saying.
     names = [name for name in names if name != TARGET]
-    prices = answer.solved.prices
+    prices = answer.prices
     return SizePoint(
         gear=gear,
         scale=scale,
@@ -236,10 +214,10 @@ def _stopped(problem: Problem, near: Answer, gear: float) -> SizePoint:
     though they do not grow with the motor are what stops it.
     """
     relaxed = [m.name for m in problem.limits if m.drive and not m.at_least]
-    wide = _least_factor(problem, near, relaxed, 0.5, rounds=1)
+    wide = follow(problem, [near], goal=Goal.RELAX, relaxed=relaxed)
     if wide is None:
         return _none(gear, ("stability",))
-    uses, prices = wide.uses(), wide.solved.prices
+    uses, prices = wide.uses(), wide.prices
     broken = {n: u for n, u in uses.items() if u > 1.0 + _BINDING and n not in RATINGS}
     fixed = sorted((n for n in broken if n != TARGET), key=lambda n: -broken[n])
     if fixed:
@@ -326,7 +304,7 @@ def highest_sea(
         problem = posed.problem(with_target(posed, aim))
         relaxed = [m.name for m in problem.limits if m.drive and not m.at_least]
         # At a factor of one or less (`extra` at most 0) the winch meets the target there.
-        found = _least_factor(problem, answer, relaxed, answer.solved.extra)
+        found = follow(problem, [answer], goal=Goal.RELAX, relaxed=relaxed)
         if found is None:
             if size <= math.log(_LOWEST):
                 break

@@ -24,16 +24,15 @@ from ..design import StructureDesign, optimise_structure
 from ..limits import Limit
 from ..question import Problem
 from ..search import Progress
-from .follow import Answer, Posed, begin_from, follow, slope
+from .follow import Answer, Posed, begin_from, follow, slope, with_bound
 from .motor import motor_changes
-from .pareto_walk import with_bound
 
 _RPM = 0.10471975511965977
 _NOISE = ("acceleration", "velocity", "displacement")
 #: Natural steps of a limit by its unit [SI].
 _STEPS = {"N m": 1e3, "rad/s": 100.0 * _RPM, "W": 1e5, "V": 100.0, "A": 100.0, "N": 1e4}
 _STEP = 0.05  # of the logarithm, for the elasticity
-_SMALL = 1e-4  # of the logarithm, for the price
+_SMALL = 1e-5  # of the logarithm, for the price
 _FREE = 1e-6  # price below which a limit is one that does not bind
 _SHARES = (1.0, 0.5, 0.25, 0.125)  # of a factor of two, for the gear
 _WORTH = 0.01  # share of the rms below which nothing is worth its money
@@ -384,7 +383,7 @@ def _price(design: StructureDesign, here: Answer, item: Item) -> float:
     if item.value == 0.0:
         return math.nan
     if item.limit is not None:
-        return -item.better * abs(here.solved.prices[item.limit])
+        return -item.better * abs(here.prices[item.limit])
     changed = _changed(design, here, item, math.exp(_SMALL))
     return slope(here, changed, _SMALL) if changed is not None else math.nan
 
@@ -396,8 +395,7 @@ def _again(
     problem = _changed(design, here, item, factor)
     if problem is None:
         return None
-    begins = [answer.carried(problem) for answer in dict.fromkeys((near, here))]
-    return follow(problem, begins, near=here)
+    return follow(problem, list(dict.fromkeys((near, here))))
 
 
 def _changed(design: StructureDesign, here: Answer, item: Item, factor: float) -> Problem | None:

@@ -29,7 +29,7 @@ from ..loop import Assessment
 from ..question import HOOK, PAYLOAD
 from ..search import KEPT, Progress, search
 from .catalogue import ChosenMotor, choose, read_catalogue
-from .follow import EXCESS, Answer, Posed, designed, follow, least_between
+from .follow import Answer, Posed, designed, follow, least_between
 from .motor import MotorData, with_motor
 from .point import SizePoint, SmallestMotor, highest_sea, least_motor, target_of
 
@@ -224,9 +224,7 @@ def _sized(
     rope = [lim for lim in posed.drive if lim.name.startswith("rope.")]
     problem = posed.problem((*posed.loop, *rope))
     found = search(problem, starts, seed, [], tell)
-    solved, free = found.solved, None
-    if solved is not None and solved.converged and found.excess <= KEPT:
-        free = follow(problem, [solved.values], coefficient=solved.coefficient)
+    free = Answer.of(problem, found)
     empty = Sizing(
         case=base,
         structure=structure,
@@ -315,9 +313,7 @@ def _given(walk: _Search, posed: Posed) -> Answer | None:
     own = walk.case.winch.gearbox.ratio
     gears = sorted(walk.found, key=lambda g: abs(g / own - 1.0))
     known = [a for g in gears if (a := walk.found[g].answer) is not None]
-    begins = [a.carried(problem) for a in [*known[:1], walk.free]]
-    answer = follow(problem, begins, coefficient=walk.free.solved.coefficient)
-    return answer if answer is not None and answer.excess <= 10.0 * EXCESS else None
+    return follow(problem, [*known[:1], walk.free])
 
 
 def _chosen(sizing: Sizing, walk: _Search, best: SmallestMotor) -> Sizing:
@@ -383,7 +379,7 @@ def _why_not(sizing: Sizing, free: Answer) -> str:
     """
     if sizing.unlimited_rms > sizing.target:
         binding = [n for n, use in free.uses().items() if use > 1.0 - 5e-3]
-        binding.sort(key=lambda n: -abs(free.solved.prices[n]))
+        binding.sort(key=lambda n: -abs(free.prices[n]))
         assessment = free.assessment
         for d in free.problem.disturbances:
             share = (

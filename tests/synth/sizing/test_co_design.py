@@ -25,7 +25,7 @@ def answer(case: sh.Case, near: Answer | None = None) -> Answer:
         design = sh.optimise_structure(case, STRUCTURE, starts=2)
         found = follow(problem, [begin_from(problem, design)])
     else:
-        found = follow(problem, [near.carried(problem)], near=near, fine=True)
+        found = follow(problem, [near])
     assert found is not None
     return found
 
