@@ -33,8 +33,8 @@ from models import PhysicsWarning, load_case
 from models.basics import one_thread
 from synth.loop import closed_loop_poles, with_drag
 from synth.question import Problem, pose
-from synth.search import Solution, briskest, coarse_programme
-from synth.search.starts import crossover_grid, start_coefficient
+from synth.search import Solution, briskest, settle, start_coefficients
+from synth.search.starts import crossover_grid
 from synth.verify import LawMatrices, winding_of_plant
 
 FloatArray = npt.NDArray[np.float64]
@@ -55,7 +55,6 @@ QUESTIONS: Mapping[str, tuple[str, Mapping[str, object]]] = {
 }
 REACHED = 0.02  # of the log cost: first answers leak about as much between their nodes
 _BATCH = 2000
-_NODES = 16  # loops whose poles make the nodes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,13 +75,14 @@ def drawn(problem: Problem, count: int, seed: int) -> tuple[list[FloatArray], in
     rng = np.random.default_rng(seed)
     omega = crossover_grid(problem)
     yu = problem.plant.response_at((1e-3 + 1j) * omega).yu
+    (drag,) = start_coefficients(problem)
     found: list[FloatArray] = []
     total = 0
     while len(found) < count:
         points = problem.law.draw(rng.random((_BATCH, problem.law.dimensions)), omega, yu)
         for point in points:
             total += 1
-            if problem.stable(point, start_coefficient(problem)):
+            if problem.stable(point, drag):
                 found.append(point)
                 if len(found) == count:
                     break
@@ -107,11 +107,11 @@ def rows_of(name: str, count: int, seed: int = 1) -> tuple[list[Row], int]:
     problem = pose(load_case(bundled).replace(dict(changes))).problem
     with one_thread():
         begins, total = drawn(problem, count, seed)
-        programme = coarse_programme(problem, begins[:_NODES], briskest(problem, begins))
+        reference, drags = briskest(problem, begins), start_coefficients(problem)
         rows = []
         for k, begin in enumerate(begins):
             began = time.process_time()
-            solved = programme.solve(programme.pack(begin, start_coefficient(problem)))
+            solved = settle(problem, begin, drags, reference=reference)
             stable = problem.stable(solved.values, solved.coefficient)
             accepted = bool(solved.converged and stable)
             rows.append(

@@ -32,8 +32,7 @@ from synth.question import FamilyProblem
 from synth.robust import Family, optimise_robust
 from synth.robust.family_plants import FamilyPlants
 from synth.robust.worst_case import draw_check
-from synth.search import search_family
-from synth.search.family_search import begin_points, coarse_programme
+from synth.search import begin_points, briskest, search, settle, start_coefficients
 from synth.sizing import pareto_front
 from synth.structures import structure_names
 
@@ -59,24 +58,21 @@ def minimax(starts: int, draws: int) -> None:
     problem = FamilyProblem(scenarios=members)
     with one_thread():
         begins = begin_points(problem, 3 * starts, 0)
-        reference = min(begins, key=problem.abscissa)
-        began = time.perf_counter()
-        programme = coarse_programme(problem, begins, reference)
-        print(f"27 scenarios: stated in {time.perf_counter() - began:.2f} s")
+        reference, drags = briskest(problem, begins), start_coefficients(problem)
         seconds, ends = [], []
         for begin in begins:
             began = time.perf_counter()
-            solved = programme.solve(programme.pack(begin))
+            solved = settle(problem, begin, drags, reference=reference)
             seconds.append(time.perf_counter() - began)
             good = solved.converged and problem.stable(solved.values, solved.coefficients)
             ends.append(solved.objective if good else np.inf)
         reached = int(np.sum(np.array(ends) < min(ends) + REACHED))
         print(
-            f"  a start: median {np.median(seconds):.2f} s, longest {max(seconds):.2f} s; "
+            f"27 scenarios: a start: median {np.median(seconds):.2f} s, longest {max(seconds):.2f} s; "
             f"{int(np.isfinite(ends).sum())} of {len(ends)} converged, {reached} at the best"
         )
         began = time.perf_counter()
-        found = search_family(problem, starts, 0)
+        found = search(problem, starts, 0)
         assert found.solved is not None
         print(
             f"  whole search: {time.perf_counter() - began:.1f} s, worst "

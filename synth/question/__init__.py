@@ -11,6 +11,16 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from ..limits import HOOK, PAYLOAD
     from .family_problem import FamilyLoop, FamilyProblem, Objective
+    from .family_question import PAYLOAD_FEEDBACK, FamilyQuestion, pose_family
+    from .loop_numbers import (
+        Closing,
+        LoopBlocks,
+        LoopNumbers,
+        LoopResponses,
+        Moments,
+        Point,
+        moment_weights,
+    )
     from .problem import Goal, Problem, Values
     from .question import (
         DesignQuestion,
@@ -21,14 +31,5 @@ if TYPE_CHECKING:
         with_masses,
     )
     from .structure_question import SampledNoise, StructureQuestion, pose_structure
-    from .loop_numbers import (
-        Closing,
-        LoopBlocks,
-        LoopNumbers,
-        LoopResponses,
-        Moments,
-        Point,
-        moment_weights,
-    )
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -1,9 +1,6 @@
 """The plants of a family as synthesis sees them: from a member to its scenario.
 
-    Family + structure -> FamilyPlants -> FamilyLoop of a member, PlantStack of many
-
-The controller is one: its law is bound to the family's nominal plant and used around every
-member.  Members that differ in nothing but the sea share their plant where drag is fixed.
+Family + structure -> FamilyPlants -> FamilyLoop of a member, PlantStack of many
 """
 
 from __future__ import annotations
@@ -15,16 +12,14 @@ from functools import cached_property
 import numpy as np
 
 from models.basics import FloatArray, Quadrature, spectral_nodes
-from models.plant import LinearPlant
-from models.sensing import sensed_plant, sensed_spectra
+from models.case import Case
+from models.sensing import sensed_plant
 
-from ..loop import Disturbance, disturbances
-from ..question import HOOK, PAYLOAD, DesignQuestion, FamilyLoop, Problem, pose
-from ..structures import ParametrisedController, Structure, structure_named
+from ..loop import Assessment
+from ..question import PAYLOAD_FEEDBACK, DesignQuestion, FamilyLoop, FamilyQuestion
+from ..structures import ParametrisedController
 from .family import Family, Member
 from .plant_stack import PlantStack, numbers_of, stacked_members
-
-PAYLOAD_FEEDBACK = "payload-feedback"
 
 
 class FamilyPlants:
@@ -35,84 +30,66 @@ class FamilyPlants:
     family
         The family.
     structure
-        ``payload-feedback``, the name of another structure of a winch, or a structure of your
-        own on the plant with all its sensors.
+        Name of the structure.
     masses
         Rope masses of every plant; by default what each case asks for.
     """
 
     def __init__(
-        self,
-        family: Family,
-        structure: str | Structure = PAYLOAD_FEEDBACK,
-        masses: int | None = None,
+        self, family: Family, structure: str = PAYLOAD_FEEDBACK, masses: int | None = None
     ) -> None:
-        self.family, self.structure, self.masses = family, structure, masses
-        self._questions: dict[Member, DesignQuestion] = {}
+        self.family = family
+        self.posed = FamilyQuestion(family.case_at(family.nominal()[0]), structure, masses)
+        self._cases: dict[Member, Case] = {}
         self._scenarios: dict[Member, FamilyLoop] = {}
-        self._plants: dict[tuple[object, ...], LinearPlant] = {}
-        self._sensed = structure != PAYLOAD_FEEDBACK
-
-    @cached_property
-    def nominal(self) -> DesignQuestion:
-        """The question of the nominal member in the first sea."""
-        return self.question(self.family.nominal()[0])
-
-    @cached_property
-    def law(self) -> ParametrisedController:
-        """The controller's law, bound to the nominal plant."""
-        if not self._sensed:
-            return self.nominal.structure.bind(self.nominal.plant)
-        structure = self.structure
-        if isinstance(structure, str):
-            structure = structure_named(structure, self.nominal.case)
-        return structure.bind(self._plant(self.family.nominal()[0]))
-
-    @cached_property
-    def guesses(self) -> list[list[float]]:
-        """The gains in use, if the case has any that are this structure's."""
-        gains = self.family.case.gains
-        return [] if self._sensed or gains is None else [[gains.a, gains.a1, gains.a2]]
 
     @property
-    def most_masses(self) -> int:
-        """The largest number of rope masses of any member posed so far."""
-        return max([self.nominal.masses, *(q.masses for q in self._questions.values())])
+    def structure(self) -> str:
+        """Name of the structure."""
+        return self.posed.structure
 
-    def with_masses(self, masses: int) -> FamilyPlants:
-        """Return the same family on plants of more rope masses."""
+    @property
+    def nominal(self) -> DesignQuestion:
+        """The question of the nominal member in the first sea."""
+        return self.posed.nominal
+
+    @property
+    def law(self) -> ParametrisedController:
+        """The controller's law, bound to the nominal plant."""
+        return self.posed.law
+
+    @property
+    def guesses(self) -> list[list[float]]:
+        """The gains in use, if the case has any that are this structure's."""
+        return self.posed.guesses
+
+    def for_assessed(
+        self, members: Sequence[Member], assessments: Sequence[Assessment]
+    ) -> FamilyPlants:
+        """Return the family on as many rope masses as loops of its members ask for."""
+        masses = self.posed.masses_wanted([self._case(m) for m in members], assessments)
+        if masses <= self.posed.most_masses:
+            return self
         return FamilyPlants(self.family, self.structure, masses)
 
     def question(self, member: Member) -> DesignQuestion:
         """Return the question of a member."""
-        if member not in self._questions:
-            self._questions[member] = pose(self.family.case_at(member), self.masses)
-        return self._questions[member]
+        return self.posed.question(self._case(member))
 
     def scenario(self, member: Member) -> FamilyLoop:
         """Return the scenario of a member, its weight the sea's occurrence."""
         if member not in self._scenarios:
-            question = self.question(member)
-            plant = self._plant(member)
-            problem = Problem(
-                plant=plant,
-                law=self.law,
-                disturbances=disturbances(self._spectra(member), plant.independent_disturbances),
-                minimise={PAYLOAD: 1.0},
-                limits=question.limits,
-                drag=question.drag,
-            )
-            self._scenarios[member] = FamilyLoop(
-                name=self.family.name_of(member),
-                problem=problem,
-                weight=float(self.family.occurrence[member.sea]),
+            self._scenarios[member] = self.posed.loop(
+                self._case(member),
+                self.family.name_of(member),
+                float(self.family.occurrence[member.sea]),
             )
         return self._scenarios[member]
 
     def stack(self, members: Sequence[Member]) -> PlantStack:
         """Return the plants of many members at once, all with the most rope masses."""
-        masses = self.masses or self.most_masses
-        if not self._sensed:
+        masses = self.posed.masses or self.posed.most_masses
+        if self.structure == PAYLOAD_FEEDBACK:
             return stacked_members(self.family, members, masses)
         case = self.family.case
         fixed = case.payload.fixed_drag
@@ -128,9 +105,12 @@ class FamilyPlants:
             linear_drag=np.full(len(members), fixed or 0.0),
         )
 
-    def shaken(self, members: Sequence[Member]) -> tuple[Quadrature, dict[str, FloatArray]]:
-        """Return common nodes, and each disturbance's density there for each member."""
-        seas = [self._sea_sources(k) for k in range(len(self.family.seas))]
+    @cached_property
+    def _shaken(self) -> tuple[Quadrature, dict[str, FloatArray]]:
+        """Common nodes, and each disturbance's density there in each sea, (seas, nodes)."""
+        nominal = self.family.nominal()[0]
+        members = [replace(nominal, sea=k) for k in range(len(self.family.seas))]
+        seas = [self.scenario(member).problem.disturbances for member in members]
         every = [d for sources in seas for d in sources]
         bands = [d.band for d in every if d.band is not None]
         nodes = spectral_nodes(
@@ -139,32 +119,18 @@ class FamilyPlants:
             splits=sorted({w for d in every for w in d.splits}),
             half_line=len(bands) < len(every),
         )
-        which = np.array([m.sea for m in members])
-        densities = {
-            d.name: np.stack([sources[k].density(nodes.omega) for sources in seas])[which]
+        return nodes, {
+            d.name: np.stack([sources[k].density(nodes.omega) for sources in seas])
             for k, d in enumerate(seas[0])
         }
-        return nodes, densities
 
-    def _sea_sources(self, sea: int) -> tuple[Disturbance, ...]:
-        member = replace(self.family.nominal()[0], sea=sea)
-        return self.scenario(member).problem.disturbances
+    def shaken(self, members: Sequence[Member]) -> tuple[Quadrature, dict[str, FloatArray]]:
+        """Return common nodes, and each disturbance's density there for each member."""
+        nodes, densities = self._shaken
+        which = np.array([m.sea for m in members])
+        return nodes, {name: density[which] for name, density in densities.items()}
 
-    def _plant(self, member: Member) -> LinearPlant:
-        question = self.question(member)
-        key: tuple[object, ...] = member.point
-        if question.drag is not None:
-            key = (*member.point, member.sea)
-        if key not in self._plants:
-            self._plants[key] = question.plant
-            if self._sensed:
-                self._plants[key] = sensed_plant(
-                    question.case, masses=question.masses, drag=question.drag_before
-                )
-        return self._plants[key]
-
-    def _spectra(self, member: Member) -> dict[str, object]:
-        question = self.question(member)
-        if not self._sensed:
-            return {HOOK: question.hook}
-        return dict(sensed_spectra(question.case, question.hook))
+    def _case(self, member: Member) -> Case:
+        if member not in self._cases:
+            self._cases[member] = self.family.case_at(member)
+        return self._cases[member]

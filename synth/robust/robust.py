@@ -15,15 +15,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.basics import FloatArray, InputError, check_range, one_thread
+from models.basics import InputError, check_range, one_thread
 from models.case import Case
-from models.plant import masses_for_bandwidth
 
-from ..question import FamilyLoop, FamilyProblem, Objective
-from ..search import KEPT, FamilyFound, Progress, search, search_family
-from ..structures import Structure
+from ..question import PAYLOAD_FEEDBACK, FamilyProblem, Objective
+from ..search import KEPT, Found, Progress, search, with_bests
 from .family import Family, Member
-from .family_plants import PAYLOAD_FEEDBACK, FamilyPlants
+from .family_plants import FamilyPlants
 from .robust_result import RobustDesign as RobustDesign
 from .robust_result import ScenarioResult as ScenarioResult
 from .robust_result import answer_of
@@ -32,45 +30,7 @@ from .worst_case import worst_members
 _MOST_FIRST = 64  # members that a design begins with at most
 _ROUNDS = 8  # of looking for the worst member
 _HURTS = 2e-3  # what a member may ask for more than the set gives, relatively
-_MODES = 5.0  # every rope mode below this many crossovers belongs in the plant
-_MOST_MASSES = 40
-_BEST_STARTS = 6  # of the search for the best gains of one scenario alone
-
-
-@one_thread()
-def tune_family(
-    scenarios: Sequence[FamilyLoop],
-    *,
-    objective: str | Objective = "worst",
-    starts: int = 8,
-    seed: int = 0,
-    guesses: Sequence[Sequence[float]] = (),
-    progress: Progress | None = None,
-) -> tuple[FamilyProblem, FamilyFound]:
-    """Return the parameters that serve all scenarios best, on plants of any kind.
-
-    Parameters
-    ----------
-    scenarios
-        Problems with laws of the same parameters, `synth.question.family_problem.FamilyLoop`.
-    objective
-        ``worst`` cost, ``mean`` (root of the weighted mean square) or ``regret`` (worst ratio
-        of cost to `FamilyLoop.best`).
-    starts, seed
-        Size and seed of the multi-start search.
-    guesses
-        Parameters to start from before any that are drawn.
-    progress
-        Called as progress(stage, done, total).
-
-    Raises
-    ------
-    InputError
-        If there is no scenario, or an unknown objective is asked for.
-    """
-    check_range("tune_family", "starts", starts, low=1)
-    family = FamilyProblem(scenarios=tuple(scenarios), objective=Objective.of(objective))
-    return family, search_family(family, int(starts), seed, guesses, progress)
+_ENDS = 3  # ends of a search that the next one begins from, besides its answer
 
 
 @one_thread()
@@ -79,7 +39,7 @@ def optimise_robust(
     family: Family,
     objective: str | Objective = "worst",
     *,
-    structure: str | Structure = PAYLOAD_FEEDBACK,
+    structure: str = PAYLOAD_FEEDBACK,
     starts: int = 8,
     seed: int = 0,
     draws: int = 10_000,
@@ -98,7 +58,7 @@ def optimise_robust(
         mean square over the combinations given; ``regret``: least worst ratio to what gains
         of its own would reach in each scenario.
     structure
-        The controller, see `synth.robust.family_plants.FamilyPlants`.
+        Name of the controller's structure, see `synth.structures.structure_names`.
     starts, seed
         Size and seed of the multi-start search.
     draws
@@ -123,15 +83,17 @@ def optimise_robust(
         raise InputError("robust: the family must be one of this case, see Family.of(case, ...)")
     plants = FamilyPlants(family, structure)
     members = _first(family)
-    found: FamilyFound | None = None
-    records: FamilyFound | None = None
-    given, problem, quiet = len(members), None, False
+    problem = _problem(plants, members, wanted, seed, progress)
+    records = found = search(problem, starts, seed, plants.guesses, progress)
+    given, quiet = len(members), False
     for k in range(_ROUNDS):
-        problem = _problem(plants, members, wanted, seed, progress)
-        found, plants, problem = _searched(
-            plants, problem, members, wanted, found, starts, seed, progress
-        )
-        records = records or found
+        if found.solved is None:
+            break
+        more = plants.for_assessed(members, found.assessments)
+        if more is not plants:
+            plants = more
+            problem = _problem(plants, members, wanted, seed, progress)
+            found = _again(problem, found, starts, seed, progress)
         if found.solved is None or found.excess > KEPT:
             break
         if progress is not None:
@@ -149,9 +111,8 @@ def optimise_robust(
             quiet = True
             break
         members = [*members, *(f.member for f in hurting)]
-    assert found is not None
-    assert records is not None
-    assert problem is not None
+        problem = _problem(plants, members, wanted, seed, progress)
+        found = _again(problem, found, starts, seed, progress)
     return answer_of(
         case, family, wanted, plants, problem, members, found, records,
         given=given, quiet=quiet, draws=draws, seed=seed, progress=progress,
@@ -170,6 +131,19 @@ def _first(family: Family) -> list[Member]:
     return family.nominal()
 
 
+def _again(
+    problem: FamilyProblem, earlier: Found, starts: int, seed: int, progress: Progress | None
+) -> Found:
+    """Return the answer on a changed family, from where an earlier search ended."""
+    assert earlier.solved is not None
+    ends = sorted((s for s in earlier.starts if s.converged), key=lambda s: s.cost)
+    guesses = [earlier.solved.values, *(s.end for s in ends[:_ENDS])]
+    found = search(problem, starts, seed, guesses, progress, only_guesses=True)
+    if found.solved is None or found.excess > KEPT:
+        found = search(problem, starts, seed, guesses, progress)
+    return found
+
+
 def _problem(
     plants: FamilyPlants,
     members: Sequence[Member],
@@ -178,74 +152,11 @@ def _problem(
     progress: Progress | None,
 ) -> FamilyProblem:
     scenarios = [plants.scenario(m) for m in members]
-    if objective is Objective.REGRET:
-        bests = []
-        for k, scenario in enumerate(scenarios):
-            if progress is not None:
-                progress("the best of each scenario", k, len(scenarios))
-            bests.append(_best_of(scenario, plants, seed))
-        scenarios = [replace(s, best=b) for s, b in zip(scenarios, bests, strict=True)]
-    elif objective is Objective.MEAN:
+    if objective is Objective.MEAN:
         # Members that were added for their limits have no occurrence of their own.
-        first = {m: k < len(_first(plants.family)) for k, m in enumerate(members)}
-        scenarios = [
-            s if first[m] else replace(s, weight=0.0)
-            for s, m in zip(scenarios, members, strict=True)
-        ]
-    return FamilyProblem(scenarios=tuple(scenarios), objective=objective)
-
-
-def _best_of(scenario: FamilyLoop, plants: FamilyPlants, seed: int) -> float:
-    """Return the least payload rms that gains of its own reach in a scenario [m]."""
-    found = search(scenario.problem, _BEST_STARTS, seed, plants.guesses)
-    if found.solved is None or found.assessment is None or found.excess > KEPT:
-        raise InputError(
-            f"regret: {scenario.name}: no gains of its own keep the limits, so there is no best "
-            "to compare with"
-        )
-    return float(np.exp(found.solved.objective))
-
-
-def _searched(
-    plants: FamilyPlants,
-    problem: FamilyProblem,
-    members: Sequence[Member],
-    objective: Objective,
-    earlier: FamilyFound | None,
-    starts: int,
-    seed: int,
-    progress: Progress | None,
-) -> tuple[FamilyFound, FamilyPlants, FamilyProblem]:
-    """Return the answer on a set of members, on plants with as many rope masses as it needs."""
-    guesses: list[FloatArray] = [np.array(g) for g in plants.guesses]
-    if earlier is not None and earlier.solved is not None:
-        ends = sorted((s for s in earlier.starts if s.converged), key=lambda s: s.cost)
-        guesses = [earlier.solved.values, *(s.end for s in ends[:3])]
-    again = earlier is not None
-    found = search_family(problem, starts, seed, guesses, progress, only_guesses=again)
-    if again and (found.solved is None or found.excess > KEPT):
-        found = search_family(problem, starts, seed, guesses, progress)
-    masses = _masses_wanted(plants, members, found)
-    if masses > plants.most_masses and found.solved is not None:
-        plants = plants.with_masses(masses)
-        problem = _problem(plants, members, objective, seed, progress)
-        more = [found.solved.values, *(s.end for s in found.starts if s.converged)][:4]
-        found = search_family(problem, starts, seed, more, progress, only_guesses=True)
-    return found, plants, problem
-
-
-def _masses_wanted(plants: FamilyPlants, members: Sequence[Member], found: FamilyFound) -> int:
-    """Return the rope masses that the fastest crossover of any scenario asks for."""
-    most = plants.most_masses
-    if plants.masses is not None or found.solved is None:
-        return most
-    for member, assessment in zip(members, found.assessments, strict=True):
-        data = plants.question(member).data
-        crossovers = assessment.margins.crossovers
-        if data.masses is not None or not crossovers.size or not assessment.stable:
-            continue
-        try:
-            most = max(most, masses_for_bandwidth(data, _MODES * float(crossovers.max())))
-        except InputError:
-            return _MOST_MASSES
-    return most
+        first = len(_first(plants.family))
+        scenarios[first:] = [replace(s, weight=0.0) for s in scenarios[first:]]
+    family = FamilyProblem(scenarios=tuple(scenarios), objective=objective)
+    if objective is Objective.REGRET:
+        return with_bests(family, seed, plants.guesses, progress)
+    return family

@@ -12,10 +12,10 @@ from models.case import Case
 
 from ..design import LimitUse, limit_uses, tuning_of
 from ..loop import LinearController
-from ..question import FamilyProblem, Objective
-from ..search import KEPT, FamilyFound, Found, Progress
+from ..question import PAYLOAD_FEEDBACK, FamilyProblem, Objective
+from ..search import KEPT, Found, Progress
 from .family import Family, Member
-from .family_plants import PAYLOAD_FEEDBACK, FamilyPlants
+from .family_plants import FamilyPlants
 from .perturbation import GainRadius, gain_radius
 from .worst_case import DrawCheck, draw_check
 
@@ -155,8 +155,8 @@ def answer_of(
     plants: FamilyPlants,
     problem: FamilyProblem,
     members: Sequence[Member],
-    found: FamilyFound,
-    records: FamilyFound,
+    found: Found,
+    records: Found,
     *,
     given: int,
     quiet: bool,
@@ -169,7 +169,6 @@ def answer_of(
     `given` members were there before the search for the worst added any, and `quiet` says
     whether it came to an end.
     """
-    structure = plants.structure if isinstance(plants.structure, str) else "structure"
     solved = found.solved
     values = [] if solved is None else [float(v) for v in solved.values]
     results = [] if solved is None else _results(plants, problem, members, found)
@@ -187,7 +186,7 @@ def answer_of(
         case=case,
         family=family,
         objective=objective,
-        structure=structure,
+        structure=plants.structure,
         ok=ok,
         status=_status(objective, results, found, kept, quiet, check, notes),
         parameters={} if solved is None else plants.law.named(values),
@@ -203,7 +202,7 @@ def answer_of(
 
 
 def _results(
-    plants: FamilyPlants, problem: FamilyProblem, members: Sequence[Member], found: FamilyFound
+    plants: FamilyPlants, problem: FamilyProblem, members: Sequence[Member], found: Found
 ) -> list[ScenarioResult]:
     solved = found.solved
     assert solved is not None
@@ -251,13 +250,12 @@ def _results(
 
 def _verified(
     problem: FamilyProblem,
-    found: FamilyFound,
+    found: Found,
     results: Sequence[ScenarioResult],
     notes: list[str],
     progress: Progress | None,
 ) -> list[ScenarioResult]:
     """Return the results, the hardest of them checked by code that no search uses."""
-    assert found.solved is not None
     ranked = sorted(
         range(len(results)), key=lambda i: (-results[i].pressure, -results[i].max_sensitivity)
     )
@@ -267,9 +265,7 @@ def _verified(
         if progress is not None:
             progress("verify", k, len(chosen))
         scenario = problem.scenarios[i]
-        own = found.solved.of(i, scenario)
-        single = Found(solved=own, assessment=found.assessments[i], excess=found.excess)
-        verdict = tuning_of(scenario.problem, single).verify()
+        verdict = tuning_of(scenario.problem, found.member(i, scenario)).verify()
         checked[i] = replace(checked[i], verified=verdict.ok)
         if not verdict.ok:
             notes.append(f"{scenario.name}: {verdict.status}")
@@ -281,7 +277,7 @@ def _verified(
 def _status(
     objective: Objective,
     results: Sequence[ScenarioResult],
-    found: FamilyFound,
+    found: Found,
     kept: bool,
     quiet: bool,
     check: DrawCheck | None,

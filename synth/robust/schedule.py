@@ -25,8 +25,8 @@ from models.basics import FloatArray, InputError, check_range, one_thread, read_
 from models.case import Case
 
 from ..design import tuning_of
-from ..question import FamilyLoop, FamilyProblem, Objective
-from ..search import KEPT, FamilyFound, Found, Progress, assessment_of, search, search_family
+from ..question import FamilyProblem, Objective
+from ..search import KEPT, Found, Progress, search
 from .family import Family, Member
 from .family_plants import FamilyPlants
 from .worst_case import exact_figures
@@ -382,7 +382,6 @@ class _ScheduleSearch:
         parameters = self.plants.law.parameters
         count = len(parameters)
         starts = np.array([f.solved.values for f in self.own if f is not None and f.solved])
-        found: FamilyFound | None = None
         scenarios = []
         for length in members:
             weights = blend_of(self.lengths[list(nodes)], length)
@@ -401,9 +400,10 @@ class _ScheduleSearch:
         # Between nodes in different basins a spline may be unstable: then one set for all.
         guesses += [np.tile(starts[k], len(nodes)) for k in (0, len(starts) // 2, -1)]
         stable = [g for g in guesses if problem.stable(g)]
-        if stable:
-            found = search_family(problem, len(stable), self._seed, stable, only_guesses=True)
-        if found is None or found.solved is None or found.excess > 10.0 * KEPT:
+        if not stable:
+            return None
+        found = search(problem, len(stable), self._seed, stable, only_guesses=True)
+        if found.solved is None or found.excess > 10.0 * KEPT:
             return None
         return np.asarray(found.solved.values.reshape(len(nodes), count))
 
@@ -428,18 +428,15 @@ class _ScheduleSearch:
 
     def _verified(self, nodes: Sequence[int], gains: FloatArray, index: int) -> bool:
         """Return whether other code confirms the loop at one length."""
-        scenario: FamilyLoop = self.plants.scenario(self.members[index])
+        problem = self.plants.scenario(self.members[index]).problem
         own = self.own[index]
         assert own is not None
         assert own.solved is not None
         values = blend_of(self.lengths[list(nodes)], float(self.lengths[index])) @ gains
-        solved = replace(own.solved, values=np.asarray(values), coefficient=None)
-        assessment = assessment_of(scenario.problem, solved)
-        drag = scenario.problem.drag is not None
-        solved = replace(solved, coefficient=assessment.coefficient if drag else None)
-        tuning = tuning_of(
-            scenario.problem, Found(solved=solved, assessment=assessment, excess=0.0)
-        )
+        assessment = problem.assess(values)
+        drag = assessment.coefficient if problem.drag is not None else None
+        solved = replace(own.solved, values=np.asarray(values), coefficients=(drag,))
+        tuning = tuning_of(problem, Found(solved=solved, assessments=(assessment,), excess=0.0))
         failed = tuning.verify().failed
         return not [name for name in failed if not name.startswith("limits")]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .multistart import Found, Progress, Start, least_violation, search
+    from .multistart import Found, Progress, Start, least_violation, search, with_bests
     from .nodes import cost_nodes, margin_nodes
     from .polishing import KEPT, assess, polish, settle, stated
     from .programme import Programme, Solution

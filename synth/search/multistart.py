@@ -8,14 +8,14 @@ A single plant is a family of one.  The descents stop once three starts agree on
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.basics import FloatArray
+from models.basics import FloatArray, InputError
 
 from ..loop import Assessment
-from ..question import FamilyProblem, Goal, Problem, Values
+from ..question import FamilyLoop, FamilyProblem, Goal, Problem, Values
 from .polishing import KEPT, assess, polish, settle, stated
 from .programme import Solution
 from .sqp import INFEASIBLE
@@ -29,6 +29,7 @@ _NEAR, _BESIDE = 3e-3, 0.03  # of log cost and parameters, relative: descents on
 _POLISHED = 6  # distinct answers that are polished at most
 _RESERVE = 16  # further starts for a search of which none arrived
 _VIOLATION = 3  # starts of the least violation
+_BEST_STARTS = 6  # of the search for the best of one member alone
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,6 +95,24 @@ class Found:
     def costs(self) -> FloatArray:
         """The members' costs."""
         return np.zeros(0) if self.solved is None else self.solved.costs
+
+    def member(self, index: int, scenario: FamilyLoop) -> Found:
+        """Return the answer as that of one member's own problem."""
+        assert self.solved is not None
+        return Found(
+            solved=replace(
+                self.solved,
+                values=scenario.values(self.solved.values),
+                coefficients=self.solved.coefficients[index : index + 1],
+                objective=float(np.log(self.solved.costs[index])),
+                prices=self.solved.prices[index : index + 1],
+                costs=self.solved.costs[index : index + 1],
+                pressure=np.ones(1),
+                multipliers=None,
+            ),
+            assessments=self.assessments[index : index + 1],
+            excess=self.excess,
+        )
 
 
 def search(
@@ -240,6 +259,33 @@ def least_violation(
         costs=np.full(len(free), np.inf),
         pressure=np.full(len(free), 1.0 / len(free)),
     )
+
+
+def with_bests(
+    family: FamilyProblem,
+    seed: int = 0,
+    guesses: Sequence[Values] = (),
+    progress: Progress | None = None,
+) -> FamilyProblem:
+    """Return a family with the best cost of its own for each member, for the regret.
+
+    Raises
+    ------
+    InputError
+        If no parameters of its own keep a member's limits.
+    """
+    scenarios = []
+    for k, scenario in enumerate(family.scenarios):
+        if progress is not None:
+            progress("the best of each scenario", k, len(family.scenarios))
+        found = search(scenario.problem, _BEST_STARTS, seed, guesses)
+        if found.solved is None or found.excess > KEPT:
+            raise InputError(
+                f"regret: {scenario.name}: no gains of its own keep the limits, so there is no "
+                "best to compare with"
+            )
+        scenarios.append(replace(scenario, best=float(found.costs[0])))
+    return replace(family, scenarios=tuple(scenarios))
 
 
 def distinct(solved: Sequence[Solution], most: int) -> list[Solution]:

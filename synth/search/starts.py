@@ -167,9 +167,9 @@ def briskest(asked: FamilyProblem | Problem, points: Sequence[FloatArray]) -> Fl
     return min(points, key=FamilyProblem.of(asked).abscissa)
 
 
-def start_coefficients(family: FamilyProblem) -> tuple[float | None, ...]:
+def start_coefficients(asked: FamilyProblem | Problem) -> tuple[float | None, ...]:
     """Return the drag coefficients that a search begins with [N s/m]."""
-    drags = [scenario.problem.drag for scenario in family.scenarios]
+    drags = [scenario.problem.drag for scenario in FamilyProblem.of(asked).scenarios]
     return tuple(None if drag is None else drag.reference for drag in drags)
 
 
