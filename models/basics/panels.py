@@ -48,18 +48,21 @@ class FrequencyAxis:
             return self.end + 1.0 - self.high / omega
         return cmath.log(omega / self.low)
 
+    def at(self, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the frequencies [rad/s] of points of one panel, and their slopes d omega/dt."""
+        middle = 0.5 * (t[0] + t[-1])
+        if middle <= 0.0 and self.half_line:
+            return self.low * (1.0 + t), np.full_like(t, self.low)
+        if middle >= self.end and self.half_line:
+            inverse = 1.0 / (1.0 - (t - self.end))
+            return self.high * inverse, self.high * inverse**2
+        omega = self.low * np.exp(t)
+        return omega, omega
+
     def rule(self, a: float, b: float, count: int) -> tuple[FloatArray, FloatArray]:
         """Return nodes [rad/s] and weights [rad/s] of one panel."""
         x, w = _gauss_legendre(count)
-        t = 0.5 * (a + b) + 0.5 * (b - a) * x
-        if b <= 0.0:
-            omega, slope = self.low * (1.0 + t), np.full_like(t, self.low)
-        elif a >= self.end:
-            inverse = 1.0 / (1.0 - (t - self.end))
-            omega, slope = self.high * inverse, self.high * inverse**2
-        else:
-            omega = self.low * np.exp(t)
-            slope = omega
+        omega, slope = self.at(0.5 * (a + b) + 0.5 * (b - a) * x)
         return omega, 0.5 * (b - a) * w * slope
 
     def poles(self, poles: Iterable[complex]) -> list[complex]:

@@ -3,7 +3,7 @@
 An option has a kind and a range, as the fields of a case file have, so that `height="5 m"` and
 `height=5.0` are the same and a wrong unit is told.  Its default is a number or a figure of the
 case: a speed that the winch has to spare, a length of rope that the drum holds, a wave height.
-The recipes of `models.operation.station_scenarios` and `models.operation.contact_scenarios` are
+The recipes of `models.operation.scenarios` and `models.operation.contact_scenarios` are
 made of them.
 """
 

@@ -5,6 +5,13 @@
 Every result is kept as soon as it is there (`stillhook.comparison.store`), and a comparison that
 was stopped goes on where it was.  What a contender cannot do is part of the answer and no error: it
 says why it did not take part.
+
+`Campaign` says which task comes next, and what becomes of its answer.
+
+    question, contenders --> Campaign.share (in processes), Campaign.alone (here) --> Comparison
+
+Designs come first, since runs wait for them.  A process is given what it has prepared already, as
+long as there is any.
 """
 
 from __future__ import annotations
@@ -13,19 +20,20 @@ import contextlib
 import sys
 import time as clock
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from models.basics import InputError, check_choice, check_range
 from models.case import Case
 from models.simulation import EASE
 
-from ..controllers import contenders_of
-from ..keeper import Processes, usable_cores
+from ..controllers import Contender, StoredDesign, contenders_of
+from ..keeper import POLL, Died, Processes, usable_cores
 from ..runs import seconds_of, seeds_of
 from ..text import Progress
-from .bench import CellSetup
-from .campaign import Campaign
-from .cell import ComparisonQuestion
+from .bench import CellBench, CellSetup, CellTask, Refused
+from .cell import Cell, ComparisonQuestion, Trace
 from .comparison import Comparison
 from .mismatch import Mismatch
 from .store import STORE, Store
@@ -177,3 +185,235 @@ def _heights(case: Case, heights: Sequence[float] | None) -> tuple[float, ...]:
     if not found or len(set(found)) != len(found):
         raise InputError(f"compare: heights must be distinct, at least one, got {list(found)}")
     return tuple(sorted(found))
+
+
+@dataclass(kw_only=True)
+class Campaign:
+    """Designs and runs of a comparison that are to be done, and what came of those that are.
+
+    Parameters
+    ----------
+    question, contenders, heights, seeds
+        What all are asked, who takes part, in seas of which height [m], with which seeds.
+    store
+        Where results are kept; None for nowhere.
+    progress
+        Called as progress(what, done, total), in runs.
+    """
+
+    question: ComparisonQuestion
+    contenders: tuple[Contender, ...]
+    heights: tuple[float, ...]
+    seeds: tuple[int, ...]
+    store: Store | None
+    progress: Progress
+    laws: dict[tuple[str, float], StoredDesign] = field(default_factory=dict)
+    refused: dict[tuple[str, float], str] = field(default_factory=dict)
+    cells: dict[tuple[str, float, int], Cell] = field(default_factory=dict)
+    traces: tuple[Trace, ...] = ()
+    no_design: dict[tuple[str, float], str] = field(default_factory=dict)
+    under_way: set[CellTask] = field(default_factory=set)
+    _bench: CellBench | None = None
+    _names: dict[str, Contender] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Take what the store has."""
+        self._names = {each.name: each for each in self.contenders}
+        if self.store is None:
+            return
+        for task in self._designs():
+            law = self.store.law(task.name, task.height)
+            if law is not None:
+                self.laws[task.group] = law
+        for task in self._runs():
+            contender = self._names[task.name]
+            if self._waits(task) or not contender.portable:
+                continue
+            cell = self.store.cell(contender, self._law(task), task.height, task.seed)
+            if cell is not None:
+                self.cells[task.name, task.height, task.seed] = cell
+
+    def share(self, pool: Processes) -> None:
+        """Do everything that can be sent to other processes."""
+        self._tell("starting")
+        while True:
+            todo = [
+                task
+                for task in self._todo()
+                if task not in self.under_way
+                and (task.kind == "design" or self._names[task.name].portable)
+            ]
+            while pool.idle and todo:
+                task = self._next(pool, todo)
+                todo.remove(task)
+                self.under_way.add(task)
+                pool.submit(self._full(task))
+            if not pool.busy:
+                return
+            answered = pool.wait(POLL)
+            self._tell()
+            if answered is None:
+                continue
+            task, answer = answered
+            self.under_way.discard(task)
+            self._take(task, answer)
+
+    def alone(self) -> None:
+        """Do the rest in this process."""
+        while todo := self._todo():
+            task = todo[0]
+            self._take(task, self._do(task))
+            self._tell()
+
+    def look_closely(self) -> None:
+        """Run the worst moment of the best linear law once more, for everybody."""
+        found = self.comparison(complete=True, seconds=0.0).worst_moment
+        if found is None:
+            return
+        height, seed, moment = found
+        traces = []
+        for contender in self.contenders:
+            cell = self.cells.get((contender.name, height, seed))
+            if cell is None or cell.status in ("failed", "died"):
+                continue
+            self._tell(f"traces of {contender.name}")
+            name = contender.name
+            task = CellTask(kind="trace", name=name, height=height, seed=seed, moment=moment)
+            trace = self._do(task)
+            if isinstance(trace, Trace):
+                traces.append(trace)
+        self.traces = tuple(traces)
+
+    def comparison(self, *, complete: bool, seconds: float) -> Comparison:
+        """Return what there is."""
+        order = [(c.name, h, s) for c in self.contenders for h in self.heights for s in self.seeds]
+        return Comparison(
+            case=self.question.case,
+            contenders=self.contenders,
+            heights=self.heights,
+            seeds=self.seeds,
+            question=self.question,
+            cells=tuple(self.cells[key] for key in order if key in self.cells),
+            refused=dict(self.refused),
+            laws={
+                (c.name, h): law
+                for c in self.contenders
+                for h in self.heights
+                if (law := self._law_of(c, h)) is not None
+            },
+            traces=self.traces,
+            complete=complete,
+            seconds=seconds,
+        )
+
+    def _designs(self) -> list[CellTask]:
+        wanted = {
+            CellTask(
+                kind="design", name=each.needs, height=self.question.design_height(height)
+            ): None
+            for height in self.heights
+            for each in self.contenders
+            if each.needs
+        }
+        # The longest first, so that nobody waits for it at the end.
+        return sorted(wanted, key=lambda task: not task.name.startswith("combined"))
+
+    def _runs(self) -> list[CellTask]:
+        return [
+            CellTask(kind="run", name=each.name, height=height, seed=seed)
+            for each in self.contenders
+            for height in self.heights
+            for seed in self.seeds
+        ]
+
+    def _todo(self) -> list[CellTask]:
+        """Return what can be done now: designs first, then runs whose design is there."""
+        known = {**self.laws, **self.no_design}
+        designs = [task for task in self._designs() if task.group not in known]
+        runs = [
+            task
+            for task in self._runs()
+            if (task.name, task.height, task.seed) not in self.cells
+            and task.group not in self.refused
+            and not self._waits(task)
+        ]
+        return designs + runs
+
+    def _next(self, pool: Processes, todo: list[CellTask]) -> CellTask:
+        """Return what fits best: what an idle process has prepared, then what nobody has."""
+        if todo[0].kind == "design":
+            return todo[0]
+        prepared = [last for last in pool.lasts if last is not None]
+        known = next((task for task in todo if task.group in prepared), None)
+        if known is not None:
+            return known
+        taken = {task.group for task in self.under_way}
+        return next((task for task in todo if task.group not in taken), todo[0])
+
+    def _waits(self, task: CellTask) -> bool:
+        """Return whether a run's design is still to come; note a run that will have none."""
+        needs = self._names[task.name].needs
+        if not needs:
+            return False
+        at = (needs, self.question.design_height(task.height))
+        if at in self.no_design:
+            self.refused[task.group] = self.no_design[at]
+        return at not in self.laws
+
+    def _law(self, task: CellTask) -> StoredDesign | None:
+        return self._law_of(self._names[task.name], task.height)
+
+    def _law_of(self, contender: Contender, height: float) -> StoredDesign | None:
+        return self.laws.get((contender.needs, self.question.design_height(height)))
+
+    def _do(self, task: CellTask) -> Any:
+        """Do a task in this process."""
+        if self._bench is None:
+            self._bench = CellSetup(question=self.question, contenders=self._names).bench()
+        full = self._full(task)
+        self._tell(_words(task))
+        if task.kind == "design":
+            return self._bench.do(full, lambda stage, done, total: self._tell(_words(task)))
+        return self._bench.do(full, lambda share: self._tell(_words(task)))
+
+    def _full(self, task: CellTask) -> CellTask:
+        """Return a task with the law that it takes."""
+        law = None if task.kind == "design" else self._law(task)
+        return task if law is None else replace(task, law=law)
+
+    def _take(self, task: CellTask, answer: Any) -> None:
+        """Keep an answer."""
+        key = (task.name, task.height, task.seed)
+        if isinstance(answer, Died | Refused):
+            if task.kind == "design":
+                self.no_design[task.group] = f"no design: {answer.reason}"
+            elif isinstance(answer, Refused) and answer.always:
+                self.refused[task.group] = answer.reason
+            else:
+                self.cells[key] = Cell(
+                    contender=task.name,
+                    height=task.height,
+                    seed=task.seed,
+                    status="died" if isinstance(answer, Died) else "failed",
+                    message=answer.reason,
+                )
+        elif isinstance(answer, StoredDesign):
+            self.laws[task.group] = answer
+            if self.store is not None:
+                self.store.add_law(task.name, task.height, answer)
+        else:
+            self.cells[key] = answer
+            if self.store is not None:
+                self.store.add_cell(self._names[task.name], self._law(task), answer)
+
+    def _tell(self, what: str = "") -> None:
+        total = (len(self.contenders) * len(self.heights) - len(self.refused)) * len(self.seeds)
+        if not what:
+            what = _words(next(iter(self.under_way))) if self.under_way else ""
+        self.progress(what, len(self.cells), max(total, len(self.cells)))
+
+
+def _words(task: CellTask) -> str:
+    if task.kind == "design":
+        return f"designing {task.name}, H_s {task.height:.4g} m"
+    return f"{task.name}, H_s {task.height:.4g} m, seed {task.seed}"

@@ -18,7 +18,7 @@ import numpy as np
 from models.case import Case
 from models.plant import MEAN_LOSSES, build_plant
 from models.sensing import HEARD, Controller, Measurement, Recursion, holds_brake, recursion_of
-from synth.structures import RecursiveController
+from synth.structures import RecursiveController, Signals, make_recursion
 
 _SHIFTED = ("drive.applied", "rope.tension", "motor.torque")
 
@@ -69,20 +69,14 @@ def trimmed(controller: Controller, shift: Shift) -> Controller:
 def _shifted(recursion: Recursion, shift: Shift) -> Recursion:
     """Return the recursion with the shift as states: the compiled loop is the same for any."""
     n = recursion.initial.size
-    state, m = ca.SX.sym("xc", n + len(_SHIFTED)), ca.SX.sym("m", len(HEARD))
-    by = state[n:]
-    seen = ca.SX(m)
-    for i, name in enumerate(_SHIFTED):
-        seen[HEARD.index(name)] = m[HEARD.index(name)] - by[i]
-    following, command = recursion.function(state[:n], seen)
-    function = ca.Function(
-        "trimmed",
-        [state, m],
-        [ca.densify(ca.vertcat(following, by)), ca.densify(command + by[0])],
-        ["xc", "m"],
-        ["xc_next", "u"],
-    )
-    return Recursion(function=function, initial=np.concatenate([recursion.initial, shift]))
+
+    def law(state: ca.SX, m: Signals) -> tuple[ca.SX, ca.SX]:
+        by = state[n:]
+        seen = {**m, **{name: m[name] - by[i] for i, name in enumerate(_SHIFTED)}}
+        following, command = recursion.function(state[:n], ca.vertcat(*seen.values()))
+        return ca.vertcat(following, by), command + by[0]
+
+    return make_recursion(np.concatenate([recursion.initial, shift]), law)
 
 
 class _Trimmed:

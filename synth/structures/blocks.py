@@ -17,7 +17,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -41,10 +41,19 @@ class FilterSection(ABC):
 
     name: str
 
+    bounded: ClassVar[tuple[tuple[str, str], ...]]
+    """Field of the bounds and unit of each parameter, in the order of the values."""
+
     @property
-    @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
         """The parameters, in the order in which the methods take their values."""
+        found = []
+        for field, unit in self.bounded:
+            low, high = getattr(self, field)
+            scale = float(np.sqrt(low * high)) if low > 0.0 else high
+            name = f"{self.name}.{field}"
+            found.append(Parameter(name=name, scale=scale, low=low, high=high, unit=unit))
+        return tuple(found)
 
     @abstractmethod
     def response(self, values: Sequence[Any], s: Any) -> Any:
@@ -65,11 +74,6 @@ class FilterSection(ABC):
                 found[:, k] = low + (high - low) * points[:, k]
         return found
 
-    def _parameter(self, name: str, limits: Range, unit: str = "") -> Parameter:
-        low, high = limits
-        scale = float(np.sqrt(low * high)) if low > 0.0 else high
-        return Parameter(name=f"{self.name}.{name}", scale=scale, low=low, high=high, unit=unit)
-
 
 @dataclass(frozen=True, kw_only=True)
 class RollOffFilter(FilterSection):
@@ -84,13 +88,7 @@ class RollOffFilter(FilterSection):
     corner: Range
     damping: Range = (0.2, 2.0)
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Corner and damping."""
-        return (
-            self._parameter("corner", self.corner, "rad/s"),
-            self._parameter("damping", self.damping),
-        )
+    bounded = (("corner", "rad/s"), ("damping", ""))
 
     def response(self, values: Sequence[Any], s: Any) -> Any:
         """Return the transfer function."""
@@ -117,13 +115,7 @@ class LeadLag(FilterSection):
     zero: Range
     pole: Range
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Zero and pole."""
-        return (
-            self._parameter("zero", self.zero, "rad/s"),
-            self._parameter("pole", self.pole, "rad/s"),
-        )
+    bounded = (("zero", "rad/s"), ("pole", "rad/s"))
 
     def response(self, values: Sequence[Any], s: Any) -> Any:
         """Return the transfer function."""
@@ -151,14 +143,7 @@ class Notch(FilterSection):
     width: Range = (0.05, 2.0)
     depth: Range = (0.0, 1.0)
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Frequency, width and depth."""
-        return (
-            self._parameter("frequency", self.frequency, "rad/s"),
-            self._parameter("width", self.width),
-            self._parameter("depth", self.depth),
-        )
+    bounded = (("frequency", "rad/s"), ("width", ""), ("depth", ""))
 
     def response(self, values: Sequence[Any], s: Any) -> Any:
         """Return the transfer function."""
@@ -186,10 +171,7 @@ class Integral(FilterSection):
 
     corner: Range
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Corner."""
-        return (self._parameter("corner", self.corner, "rad/s"),)
+    bounded = (("corner", "rad/s"),)
 
     def response(self, values: Sequence[Any], s: Any) -> Any:
         """Return the transfer function."""
@@ -209,20 +191,14 @@ class LeadTime(FilterSection):
 
     Parameters
     ----------
-    time, bandwidth
+    lead, bandwidth
         Bounds of tau [s] and w [rad/s].
     """
 
-    time: Range = (0.0, 2.0)
+    lead: Range = (0.0, 2.0)
     bandwidth: Range = (2.0, 60.0)
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Lead time and bandwidth."""
-        return (
-            self._parameter("lead", self.time, "s"),
-            self._parameter("bandwidth", self.bandwidth, "rad/s"),
-        )
+    bounded = (("lead", "s"), ("bandwidth", "rad/s"))
 
     def response(self, values: Sequence[Any], s: Any) -> Any:
         """Return the transfer function."""

@@ -30,9 +30,8 @@ from models.spread import Spread
 from ..design import GainDesign, StructureDesign
 from ..search import Progress
 from .dataset import dataset_of
-from .gain_rows import GainRows
+from .design_rows import DesignRows
 from .metrics import chosen_metrics
-from .structure_rows import StructureRows
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,7 +48,7 @@ class FrequencyEngine:
     Parameters
     ----------
     design
-        A design of three gains (fast), or of any structure (one case after the other).
+        A design of any structure.  Its controller stays what it is, whatever the case becomes.
     spread
         What varies.
     metrics
@@ -58,7 +57,7 @@ class FrequencyEngine:
         Relative difference of a variance by two rules from which it gets finer nodes; what is
         then left of the error is some two digits less.
     nodes
-        Nodes for all integrals (three gains only), with no look at their error.
+        Nodes for all integrals, with no look at their error.
 
     Raises
     ------
@@ -94,13 +93,7 @@ class FrequencyEngine:
         self.case: Case = case
         self.spread = spread.on(case, gains, design.drag)
         self.metrics = chosen_metrics(metrics, dc=case.winch.motor.type == "dc")
-        self.rows: GainRows | StructureRows
-        if isinstance(design, GainDesign):
-            self.rows = GainRows(design, self.spread, self.metrics, accuracy=accuracy, nodes=nodes)
-        elif nodes is not None:
-            raise InputError("sweep: nodes are for a design of three gains; leave them out")
-        else:
-            self.rows = StructureRows(design, self.spread, self.metrics)
+        self.rows = DesignRows(design, self.spread, self.metrics, accuracy=accuracy, nodes=nodes)
 
     def evaluate(
         self, rows: FloatArray, progress: Progress | None = None
@@ -161,8 +154,7 @@ class FrequencyEngine:
             first=first,
             notes={
                 **(notes or {}),
-                "engine": "columns" if isinstance(self.rows, GainRows) else "one by one",
-                "nodes": len(self.rows.level_nodes()) if isinstance(self.rows, GainRows) else 0,
+                "nodes": len(self.rows.level_nodes()),
                 "refined": self.rows.refined,
                 "unresolved": self.rows.unresolved,
             },
@@ -221,7 +213,7 @@ def frequency_sweep(
     Parameters
     ----------
     design
-        A design of three gains, or of any structure.
+        A design of any structure.
     spread
         What varies, see `models.spread.Spread`.
     samples

@@ -31,7 +31,7 @@ from .numbers import PlantNumbers, at_rows
 
 Columns = list[FloatArray]  # coefficients of s^0, s^1, .., each (n,), or (1,) if all have the same
 
-CHUNK = 500  # loops at once: two arrays of 500 x 200 numbers stay in the second-level cache
+CHUNK = 200  # loops at once: two arrays of 200 x 200 numbers stay in the second-level cache
 _COMMON = 64
 _STEP = 1024  # loops at once
 _NEAR = np.array([-3.0, -1.5, -0.7, -0.3, 0.0, 0.3, 0.7, 1.5, 3.0])

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -53,7 +54,28 @@ _KNOWN = {
     "sensors.telemetry.bandwidth",
     "sensors.telemetry.delay",
 }
-_ELSEWHERE = ("sea.", "vessel.", "limits.", GAINS)
+_ELSEWHERE = ("sea.", "vessel.", "limits.", "sensors.", GAINS)
+# What the other sensors are made of, by path; nothing of a case's plant depends on them.
+_SENSED = {
+    "acceleration_noise": "sensors.payload.acceleration_noise",
+    "velocity_noise": "sensors.payload.velocity_noise",
+    "displacement_noise": "sensors.payload.displacement_noise",
+    "mru_period": "sensors.mru.heave_filter_period",
+    "mru_floor": "sensors.mru.noise_floor",
+    "mru_fraction": "sensors.mru.noise_fraction",
+    "mru_bandwidth": "sensors.mru.noise_bandwidth",
+    "mru_delay": "sensors.mru.delay",
+    "cell_bandwidth": "sensors.load_cell.bandwidth",
+    "cell_noise": "sensors.load_cell.noise_fraction",
+}
+NOISE_OF = {
+    "payload.acceleration": "acceleration_noise",
+    "payload.velocity": "velocity_noise",
+    "payload.displacement": "displacement_noise",
+    "mru.heave": "mru_error",
+    "rope.tension": "cell_noise",
+}
+"""Number of the sensors by what is measured; zero or NaN where it is without noise."""
 _PLAIN = tuple(
     f.name
     for f in fields(PlantData)
@@ -76,12 +98,16 @@ class PlantNumbers:
         The plant of the case itself: its kind of motor, how its rope is lumped.
     fixed_drag
         Linear drag coefficient [N s/m]; NaN where it agrees with the response.
+    sensors
+        Numbers of the sensors besides those of the payload's signals, likewise; NaN where there
+        is no such sensor.
     """
 
     count: int
     values: Mapping[str, FloatArray]
     like: PlantData
     fixed_drag: FloatArray
+    sensors: Mapping[str, FloatArray]
 
     def __len__(self) -> int:
         return self.count
@@ -102,6 +128,7 @@ class PlantNumbers:
             else len(index),
             values={name: some(column) for name, column in self.values.items()},
             fixed_drag=some(self.fixed_drag),
+            sensors={name: some(column) for name, column in self.sensors.items()},
         )
 
     @property
@@ -148,26 +175,25 @@ class PlantNumbers:
 
 
 def numbers_of(
-    case: Case, spread: Spread, rows: FloatArray, *, checked: int | None = None
+    case: Case, spread: Spread, rows: FloatArray, *, checked: int = 1
 ) -> tuple[PlantNumbers, bool]:
     """Return the plants of a spread's rows, (n, d), and whether columns sufficed.
 
-    `checked` rows of them are compared with their checked cases; one if left out.
+    `checked` rows of them are compared with their checked cases.
 
     Raises
     ------
     InputError
         If a row is no valid case; its values are named.
     """
-    paths = [p for p in spread.paths if p != DRAG and not p.startswith(_ELSEWHERE)]
+    paths = {p for p in spread.paths if p in _KNOWN or not p.startswith((DRAG, *_ELSEWHERE))}
     drag = rows[:, spread.paths.index(DRAG)] if DRAG in spread.paths else None
     like = PlantData.from_case(case)
     count = len(rows)
-    if not set(paths) <= _KNOWN or (case.payload.shape and "payload.water_density" in paths):
-        found = _one_by_one(like, spread, rows)
-        return _with_drag(found, drag), False
+    if not paths <= _KNOWN or (case.payload.shape and "payload.water_density" in paths):
+        return _with_drag(_one_by_one(like, spread, rows), drag), False
     quick = _columns(case, like, spread, rows)
-    for k in np.unique(np.linspace(0, count - 1, min(checked or 1, count)).astype(int)):
+    for k in np.unique(np.linspace(0, count - 1, min(checked, count)).astype(int)):
         exact = PlantData.from_case(_case_at(spread, rows[k]))
         for name in _PLAIN:
             value, own = getattr(exact, name), float(quick[name][k % quick[name].size])
@@ -201,7 +227,28 @@ def _one_by_one(like: PlantData, spread: Spread, rows: FloatArray) -> PlantNumbe
     kinds = {(d.motor, d.lumping, d.masses) for d in data}
     if kinds != {(like.motor, like.lumping, like.masses)}:
         raise InputError("sweep: the motor's kind and the rope's lumping cannot vary within one")
-    return PlantNumbers(count=len(rows), values=values, like=like, fixed_drag=np.array(fixed))
+    return PlantNumbers(
+        count=len(rows),
+        values=values,
+        like=like,
+        fixed_drag=np.array(fixed),
+        sensors=_sensors(spread, rows),
+    )
+
+
+def _sensors(spread: Spread, rows: FloatArray) -> dict[str, FloatArray]:
+    """Return the sensors' numbers, NaN where the case has no such sensor."""
+
+    def of(path: str) -> FloatArray:
+        if path in spread.paths:
+            return rows[:, spread.paths.index(path)]
+        found: Any = spread.case
+        for key in path.split("."):
+            found = getattr(found, key, None)
+        return np.array([math.nan if found is None else float(found)])
+
+    found = {name: of(path) for name, path in _SENSED.items()}
+    return {**found, "mru_error": np.maximum(found["mru_floor"], found["mru_fraction"])}
 
 
 def _columns(case: Case, like: PlantData, spread: Spread, rows: FloatArray) -> PlantNumbers:
@@ -264,7 +311,13 @@ def _columns(case: Case, like: PlantData, spread: Spread, rows: FloatArray) -> P
     ):
         values[name] = of(f"winch.motor.{name}", getattr(like, name))
     drag = _fixed_drag(case, given, quadratic)
-    return PlantNumbers(count=len(rows), values=values, like=like, fixed_drag=drag)
+    return PlantNumbers(
+        count=len(rows),
+        values=values,
+        like=like,
+        fixed_drag=drag,
+        sensors=_sensors(spread, rows),
+    )
 
 
 def _fixed_drag(case: Case, given: Mapping[str, FloatArray], quadratic: FloatArray) -> FloatArray:

@@ -64,13 +64,13 @@ class SeaRows:
         return self._scaling is None or self._scaling.period is not None
 
     def frame(self) -> tuple[float, float, list[float]]:
-        """Return the band that holds all densities, and their kinks [rad/s]."""
+        """Return the band that holds all densities, and where they have kinks or end [rad/s]."""
         hooks = [self.hook]
         if self.varies:
             # Ends and some in between: a kink that lies elsewhere meets panels that are short.
             hooks += [self._own(row) for row in self._some(16)]
         low, high = min(h.band[0] for h in hooks), max(h.band[1] for h in hooks)
-        splits = sorted({w for h in hooks for w in h.splits if low < w < high})
+        splits = sorted({w for h in hooks for w in (*h.band, *h.splits) if w > 0.0})
         return low, high, splits
 
     def factors(self, rows: FloatArray) -> FloatArray:
@@ -80,6 +80,17 @@ class SeaRows:
         j = self.spread.paths.index(self._scaling.height)
         factor: FloatArray = (rows[:, j] / self.spread.nominal[self._scaling.height]) ** 2
         return factor
+
+    def heave_rms(
+        self, rows: FloatArray, ratios: FloatArray | None, weights: FloatArray
+    ) -> FloatArray:
+        """Return the standard deviation of the hook's heave of each row, (n,) or (1,) [m].
+
+        `weights` are those of the nodes that `ratios` are at.
+        """
+        own = float(self.hook.displacement.rms)
+        common = np.array([own**2]) if ratios is None else ratios @ weights
+        return np.asarray(np.sqrt(common * self.factors(rows)))
 
     def density(self, omega: FloatArray) -> FloatArray:
         """Return the case's own density at nodes, (k,) [m2 s/rad]."""

@@ -4,16 +4,20 @@ Nodes made for one loop (`models.basics.quadrature.adaptive_nodes`) do not suit 
 So every panel gets a Gauss-Kronrod pair: the nodes of the longer rule hold those of the shorter
 one, and a second column of weights tells for each loop how far the two differ, at no further
 evaluation.  Loops for which that is too far (a resonance narrower than the panels) go on to the
-next level, of panels half as long.
+next level, of panels half as long.  The first panels are halved where some pilots of the sweep ask
+for it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
+from scipy.linalg import block_diag
 
 from models.basics import (
     FloatArray,
@@ -24,32 +28,30 @@ from models.basics import (
     longest_panel,
 )
 
-_SHORT = 0.12  # panels shorter than this, in ln omega, get the 7-point rule
-_PER_DECADE = 3.0
+Density = Callable[[FloatArray], FloatArray]
+Panel = tuple[float, float]
 
-# Kronrod's extensions of the 3- and the 7-point Gauss rules (Kronrod 1964; QUADPACK's qk15): nodes
-# from the outermost to the middle, their weights, and Gauss's weights of every other one.
-_RULES = {
-    7: (
-        (0.960491268708020283423507092629080, 0.774596669241483377035853079956480,
-         0.434243749346802558002071502844628, 0.0),
-        (0.104656226026467265193823857192073, 0.268488089868333440728569280666710,
-         0.401397414775962222905051818618432, 0.450916538658474142345110087045571),
-        (0.0, 5.0 / 9.0, 0.0, 8.0 / 9.0),
-    ),
-    15: (
-        (0.991455371120812639206854697526329, 0.949107912342758524526189684047851,
-         0.864864423359769072789712788640926, 0.741531185599394439863864773280788,
-         0.586087235467691130294144691693040, 0.405845151377397166906606412076961,
-         0.207784955007898467600689403773245, 0.0),
-        (0.022935322010529224963732008058970, 0.063092092629978553290700663189204,
-         0.104790010322250183839876322541518, 0.140653259715525918745189590510238,
-         0.169004726639267902826583426598550, 0.190350578064785409913256402421014,
-         0.204432940075298892414161999234649, 0.209482141084727828012999174891714),
-        (0.0, 0.129484966168869693270611432679082, 0.0, 0.279705391489276667901467771423780,
-         0.0, 0.381830050505118944950369775488975, 0.0, 0.417959183673469387755102040816327),
-    ),
-}  # fmt: skip
+_PER_DECADE = 1.5
+_FINE, _FINE_RULE = 0.1, 16  # pieces on which a density itself is integrated, and nodes of each
+
+# Kronrod's extension of the 7-point Gauss rule (Kronrod 1964; QUADPACK's qk15): nodes from the
+# outermost to the middle, their weights, and Gauss's weights of every other one.
+_NODES = (
+    0.991455371120812639206854697526329, 0.949107912342758524526189684047851,
+    0.864864423359769072789712788640926, 0.741531185599394439863864773280788,
+    0.586087235467691130294144691693040, 0.405845151377397166906606412076961,
+    0.207784955007898467600689403773245, 0.0,
+)  # fmt: skip
+_KRONROD = (
+    0.022935322010529224963732008058970, 0.063092092629978553290700663189204,
+    0.104790010322250183839876322541518, 0.140653259715525918745189590510238,
+    0.169004726639267902826583426598550, 0.190350578064785409913256402421014,
+    0.204432940075298892414161999234649, 0.209482141084727828012999174891714,
+)  # fmt: skip
+_GAUSS = (
+    0.0, 0.129484966168869693270611432679082, 0.0, 0.279705391489276667901467771423780,
+    0.0, 0.381830050505118944950369775488975, 0.0, 0.417959183673469387755102040816327,
+)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,44 +63,42 @@ class SweepNodes(ReadOnlyArrays):
     omega
         Nodes, ascending (k,) [rad/s].
     weights
-        The rules, (2, k) [rad/s]: the one that counts, and the shorter one; (1, k) if there is
-        none to compare with.
+        The rules, (rules, k) [rad/s]: the one that counts, and the shorter one; the one alone if
+        there is none to compare with.
+    sea
+        The rules with the common density of the hook's motion in their weights, likewise [m2].
     """
 
     omega: FloatArray
     weights: FloatArray
+    sea: FloatArray
 
     def __len__(self) -> int:
         return int(self.omega.size)
 
     @classmethod
-    def of(cls, nodes: Quadrature) -> SweepNodes:
+    def of(cls, nodes: Quadrature, density: Density) -> SweepNodes:
         """Return given nodes, of which no error is known."""
-        return cls(omega=nodes.omega, weights=nodes.weights[None])
-
-    @property
-    def quadrature(self) -> Quadrature:
-        """The rule that counts."""
-        return Quadrature(omega=self.omega, weights=self.weights[0])
+        weights = nodes.weights[None]
+        return cls(omega=nodes.omega, weights=weights, sea=weights * density(nodes.omega))
 
 
-def sweep_nodes(
-    low: float,
-    high: float,
+def sweep_panels(
+    axis: FrequencyAxis,
     splits: Sequence[float],
     *,
     level: int = 0,
     marks: Sequence[complex] = (),
     clearance: float = 1.5,
-) -> SweepNodes:
-    """Return nodes from `low` to `high` [rad/s].
+) -> list[Panel]:
+    """Return panels of an axis, as their ends on it.
 
     Parameters
     ----------
-    low, high
+    axis
         The band.
     splits
-        Kinks of the density [rad/s], where panels end.
+        Frequencies where panels end [rad/s].
     level
         Panels are shorter by 2 to this power.
     marks
@@ -106,24 +106,89 @@ def sweep_nodes(
     clearance
         Half of a panel over its distance from each pole, at most.
     """
-    axis = FrequencyAxis(low, high, half_line=False)
     longest = longest_panel(_PER_DECADE * 2.0**level)
     near = axis.poles(p for p in marks if p.real != 0.0)
-    omega, fine, rough = [], [], []
-    for a, b in cut_panels(axis, splits, near, longest, clearance):
-        x, kronrod, gauss = _rule(7 if b - a < _SHORT * 0.5**level else 15)
-        at = axis.low * np.exp(0.5 * (a + b) + 0.5 * (b - a) * x)
+    return cut_panels(axis, splits, near, longest, clearance)
+
+
+def halved(panels: Sequence[Panel]) -> list[Panel]:
+    """Return the halves of panels."""
+    return [half for a, b in panels for half in ((a, 0.5 * (a + b)), (0.5 * (a + b), b))]
+
+
+def sweep_nodes(
+    axis: FrequencyAxis,
+    panels: Sequence[Panel],
+    density: Density,
+    *,
+    kinks: Sequence[float] = (),
+    apart: bool = False,
+) -> SweepNodes:
+    """Return nodes on panels of an axis.
+
+    Parameters
+    ----------
+    axis, panels
+        The band, and its panels.
+    density
+        The density of the hook's motion, of omega [rad/s].
+    kinks
+        Kinks of that density [rad/s] that lie within panels.  They then stand in the weights
+        (product integration: what is integrated with the density is the polynomial through the
+        nodes), and panels need to be no shorter than the responses ask for.
+    apart
+        Whether the difference of the two rules on each panel is wanted instead of the shorter
+        rule, as many more rules.
+    """
+    cuts = [axis.cut(complex(w)).real for w in kinks]
+    omega, weights, sea = [], [], []
+    for a, b in panels:
+        x, *rules = _rule()
+        at, slope = axis.at(0.5 * (a + b) + 0.5 * (b - a) * x)
+        own = np.stack([0.5 * (b - a) * rule * slope for rule in rules])
         omega.append(at)
-        fine.append(0.5 * (b - a) * kronrod * at)
-        rough.append(0.5 * (b - a) * gauss * at)
-    weights = np.stack([np.concatenate(fine), np.concatenate(rough)])
-    return SweepNodes(omega=np.concatenate(omega), weights=weights)
+        weights.append(own)
+        sea.append(_product(axis, a, b, x, cuts, density) if cuts else own * density(at))
+    return SweepNodes(
+        omega=np.concatenate(omega),
+        weights=_rules_of(weights, apart),
+        sea=_rules_of(sea, apart),
+    )
 
 
-@lru_cache(maxsize=4)
-def _rule(count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _rules_of(pairs: Sequence[FloatArray], apart: bool) -> FloatArray:
+    both = np.concatenate(pairs, axis=1)
+    if not apart:
+        return both
+    differences = block_diag(*(pair[:1] - pair[1:] for pair in pairs))
+    return np.concatenate([both[:1], differences])
+
+
+def _product(
+    axis: FrequencyAxis, a: float, b: float, x: FloatArray, cuts: list[float], density: Density
+) -> FloatArray:
+    """Return the weights of both rules of a panel for the integral with a density, (2, k)."""
+    inner = sorted({a, b, *(t for t in cuts if a < t < b)})
+    edges = [
+        np.linspace(one, two, int((two - one) / _FINE) + 2)[:-1] for one, two in pairwise(inner)
+    ]
+    parts = [axis.rule(one, two, _FINE_RULE) for one, two in pairwise([*np.concatenate(edges), b])]
+    fine = np.concatenate([weight * density(at) for at, weight in parts])
+    t = np.array([axis.cut(complex(w)).real for at, _ in parts for w in at])
+    points = (2.0 * t - a - b) / (b - a)
+    found = np.zeros((2, x.size))
+    for row, step in ((0, 1), (1, 2)):
+        # Gauss's nodes are every other one of Kronrod's.
+        chosen = np.arange(step - 1, x.size, step)
+        moments = fine @ legvander(points, chosen.size - 1)
+        found[row, chosen] = np.linalg.solve(legvander(x[chosen], chosen.size - 1).T, moments)
+    return found
+
+
+@lru_cache(maxsize=1)
+def _rule() -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return nodes on [-1, 1], Kronrod's weights and Gauss's."""
-    x, kronrod, gauss = (np.array(part) for part in _RULES[count])
+    x, kronrod, gauss = (np.array(part) for part in (_NODES, _KRONROD, _GAUSS))
     return (
         np.concatenate([-x, x[-2::-1]]),
         np.concatenate([kronrod, kronrod[-2::-1]]),

@@ -6,10 +6,11 @@ much, and the difference is pi for every zero that the two enclose with the real
 image counted with it (argument principle; Nyquist 1932).  R is so large that the loop gain is
 small on the arc and, by the maximum principle, beyond it.
 
-All loops begin with the same kind of grid, eight points for each axial mode of the rope; where
-phase or size jumps between neighbours, the interval is halved, for all loops in one call, as
-`synth.verify.winding.trace` does for one.  So delays, waves and light damping are followed exactly;
-a phase that cannot be followed means a pole on the axis, and counts as unstable.
+All loops begin on one grid, eight points for each axial mode of the rope; where phase or size
+of `closed`, and of `open` where M_s is wanted, jumps between neighbours, the interval is halved,
+for all loops in one call, as `synth.verify.winding.trace` does for one.  So delays, waves and light
+damping are followed exactly; a phase that cannot be followed means a pole on the axis, and counts
+as unstable.  M_s is the largest |open/closed| of the same points, its place refined.
 
 From which linear drag on a loop is stable (`calming_drag`): the characteristic function is affine
 in the drag, closed = c0 + C c1, so a pole is on the axis at i omega for the C that makes it zero
@@ -21,8 +22,7 @@ pole is in the right half plane whatever the drag.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,42 +30,35 @@ from models.basics import BoolArray, ComplexArray, FloatArray, IndexArray
 
 from .chain import ChainLoops, abs2
 
-Follow = Callable[[IndexArray, ComplexArray], ComplexArray]
-
-_TURN, _GROWTH = 0.5, 1.0  # largest steps of phase [rad] and of the logarithm of the size
+_TURN, _GROWTH = 0.5, np.exp(2.0)  # largest steps of phase [rad] and of the size's square
 _PER_DECADE, _PER_MODE = 24, 8
 _LOW = 1e-4  # first frequency above zero [rad/s]
+_ZERO = 1e-12 + 0.0j  # just right of a pole at zero [1/s]
 _ARC = 49
 _ROUNDS = 46  # of halving: then the interval is a rounding error wide
+_NARROW = 1e-12  # ... or where size alone cannot be followed
 _SMALL = 0.5  # loop gain on the arc
-_STEP = 64  # loops at once
+_STEP = 512  # loops at once
 _GOLDEN = 0.5 * (3.0 - 5.0**0.5)
 _SOUGHT = 4  # light poles of one loop
 _NEAR = 1.5  # local minima up to so much above the least are looked into
 _CALMING_ROUNDS = 50  # of halving, where a pole is on the axis
 
 
-class Loops(Protocol):
-    """What is needed of a stack of loops."""
+class _Path(NamedTuple):
+    """What following loops along points gave.
 
-    def __len__(self) -> int: ...
+    `turn` is by how much the phase of `closed` changes for each loop, (m,) [rad], NaN where it
+    cannot be followed; `loop`, `s` and `size` are all points looked at, and |closed/open|^2 there.
+    """
 
-    @property
-    def masses(self) -> int:
-        """Masses along the rope."""
-        ...
-
-    @property
-    def mode_spacing(self) -> FloatArray:
-        """Distance of the rope's modes [rad/s], (n,) or (1,)."""
-        ...
-
-    def responses(self, rows: IndexArray, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return closed and open characteristic functions, (m, k) each."""
-        ...
+    turn: FloatArray
+    loop: IndexArray
+    s: ComplexArray
+    size: FloatArray
 
 
-def count_unstable(loops: Loops, rows: IndexArray | None = None) -> IndexArray:
+def count_unstable(loops: ChainLoops, rows: IndexArray | None = None) -> IndexArray:
     """Return how many poles each loop has in the right half plane; -1 where one is on the axis.
 
     Parameters
@@ -75,31 +68,32 @@ def count_unstable(loops: Loops, rows: IndexArray | None = None) -> IndexArray:
     rows
         Which of them; all if left out.
     """
+    return survey(loops, rows, peaks=False)[0]
+
+
+def survey(
+    loops: ChainLoops, rows: IndexArray | None = None, *, peaks: bool = True
+) -> tuple[IndexArray, FloatArray]:
+    """Return `count_unstable`, and M_s = max 1/|1 + L| of each loop, stable or not, (m,).
+
+    Without `peaks` there is no M_s (NaN), and what stands in its way need not be followed.
+    """
     chosen = np.arange(len(loops)) if rows is None else rows
-    found = np.empty(chosen.size, dtype=np.intp)
+    count = np.empty(chosen.size, dtype=np.intp)
+    found = np.full(chosen.size, np.nan)
     for at in range(0, chosen.size, _STEP):
-        part = chosen[at : at + _STEP]
-        found[at : at + _STEP] = _count(loops, part)
-    return found
+        part = slice(at, at + _STEP)
+        count[part], found[part] = _surveyed(loops, chosen[part], peaks)
+    return count, found
 
 
-def peak_sensitivity(loops: Loops, rows: IndexArray | None = None) -> FloatArray:
-    """Return M_s = max 1/|1 + L| of each loop, stable or not, (m,)."""
-    chosen = np.arange(len(loops)) if rows is None else rows
-    found = np.empty(chosen.size)
-    for at in range(0, chosen.size, _STEP):
-        part = chosen[at : at + _STEP]
-        found[at : at + _STEP] = _peaks(loops, part)
-    return found
-
-
-def light_poles(loops: Loops, row: int) -> ComplexArray:
+def light_poles(loops: ChainLoops, row: int) -> ComplexArray:
     """Return the poles of one loop that its |1 + L| is least near, the upper half [1/s].
 
     Newton's rule from the lowest minima along the imaginary axis.
     """
     rows = np.array([row])
-    omega = _grid(loops, rows, _radius(loops, rows))[0, 1:]
+    omega = frequencies(loops, rows)
     closed, free = loops.responses(rows, _imaginary(omega))
     size = (abs2(closed) / abs2(free))[0]
     inner = np.flatnonzero((size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])) + 1
@@ -117,59 +111,53 @@ def light_poles(loops: Loops, row: int) -> ComplexArray:
     return np.asarray(found, dtype=np.complex128)
 
 
-def frequencies(loops: Loops, rows: IndexArray) -> FloatArray:
-    """Return frequencies of each loop between which little happens, (m, k) [rad/s], ascending."""
-    return _grid(loops, rows, _radius(loops, rows))[:, 1:]
+def frequencies(loops: ChainLoops, rows: IndexArray) -> FloatArray:
+    """Return frequencies of some loops between which little happens, (k,) [rad/s], ascending."""
+    return _grid(loops, rows, _radius(loops, rows))
 
 
-def _count(loops: Loops, rows: IndexArray) -> IndexArray:
-    radius = _radius(loops, rows)
-
-    def closed(at: IndexArray, s: ComplexArray) -> ComplexArray:
-        return loops.responses(at, s)[0]
-
+def _surveyed(loops: ChainLoops, rows: IndexArray, peaks: bool) -> tuple[IndexArray, FloatArray]:
     # The first quadrant's contour: up the imaginary axis, and along the arc from the real one, on
     # which `closed` is real and its phase takes no part.
-    axis = _follow(closed, rows, _imaginary(_grid(loops, rows, radius)))
-    angle = np.linspace(0.0, 0.5 * np.pi, _ARC)
-    points = np.asarray(radius[:, None] * np.exp(1j * angle), dtype=np.complex128)
-    arc = _follow(closed, rows, points, around=True)
-    zeros = (arc - axis) / np.pi
+    radius = _radius(loops, rows)
+    axis = np.append(_ZERO, _imaginary(_grid(loops, rows, radius)))
+    turn = np.linspace(0.0, 0.5 * np.pi, _ARC)
+    up = _follow(loops, rows, axis, both=peaks)
+    arc = _follow(loops, rows, radius * np.exp(1j * turn), around=True)
+    zeros = (arc.turn - up.turn) / np.pi
     with np.errstate(invalid="ignore"):
         count = np.where(np.abs(zeros - np.round(zeros)) < 0.05, np.round(zeros), -1.0)
-    return count.astype(np.intp)
+    highest = _highest(loops, rows, up) if peaks else np.full(rows.size, np.nan)
+    return count.astype(np.intp), highest
 
 
-def _radius(loops: Loops, rows: IndexArray) -> FloatArray:
-    """Return a radius of each loop on which, and beyond, the loop gain is small, (m,) [1/s]."""
+def _radius(loops: ChainLoops, rows: IndexArray) -> float:
+    """Return a radius on which, and beyond, the gains of some loops are small [1/s]."""
     angle = np.exp(1j * np.linspace(0.0, 0.5 * np.pi, 13))
     beyond = 1j * np.geomspace(1.0, 30.0, 25)[1:]
-    directions = np.concatenate([angle, beyond])
-    spacing = np.broadcast_to(loops.mode_spacing, (len(loops),))[rows]
-    radius = np.maximum(100.0, 2.0 * spacing * loops.masses)
-    open_still = np.ones(rows.size, dtype=bool)
+    directions = np.append(angle, beyond)
+    spacing = float(np.max(loops.mode_spacing))
+    radius = max(100.0, 2.0 * spacing * loops.masses, 2.0 * loops.swiftest)
+    large = rows
     for _ in range(30):
-        at = np.flatnonzero(open_still)
         with np.errstate(over="ignore", invalid="ignore"):
-            closed, free = loops.responses(rows[at], radius[at, None] * directions)
+            closed, free = loops.responses(large, np.asarray(radius * directions))
             gain = np.abs(closed / free - 1.0).max(axis=1)
-        open_still[at] = ~(gain < _SMALL)
-        if not open_still.any():
+        large = large[~(gain < _SMALL)]
+        if not large.size:
             break
-        radius[open_still] *= 2.0
+        radius *= 2.0
     return radius
 
 
-def _grid(loops: Loops, rows: IndexArray, radius: FloatArray) -> FloatArray:
-    """Return frequencies from 0 to the radius, (m, k) [rad/s]: by decades, and by modes."""
-    decades = np.log10(radius / _LOW)
-    count = int(_PER_DECADE * decades.max()) + 2
-    slow = _LOW * 10.0 ** (decades[:, None] * np.linspace(0.0, 1.0, count))
+def _grid(loops: ChainLoops, rows: IndexArray, radius: float) -> FloatArray:
+    """Return frequencies up to the radius, (k,) [rad/s]: by decades, and by modes."""
+    count = int(_PER_DECADE * np.log10(radius / _LOW)) + 2
     spacing = np.broadcast_to(loops.mode_spacing, (len(loops),))[rows]
-    steps = np.arange(1.0, _PER_MODE * loops.masses + 1.0) / _PER_MODE
-    modes = np.minimum(spacing[:, None] * steps, radius[:, None])
-    both = np.sort(np.concatenate([slow, modes], axis=1), axis=1)
-    return np.asarray(np.concatenate([np.zeros((rows.size, 1)), both], axis=1))
+    step = float(spacing.min()) / _PER_MODE
+    last = min(loops.masses * float(spacing.max()), radius)
+    modes = np.arange(step, last + step, step)
+    return np.unique([*np.geomspace(_LOW, radius, count), *modes[modes < radius]])
 
 
 def _imaginary(omega: FloatArray) -> ComplexArray:
@@ -177,91 +165,78 @@ def _imaginary(omega: FloatArray) -> ComplexArray:
 
 
 def _follow(
-    function: Follow, rows: IndexArray, points: ComplexArray, *, around: bool = False
-) -> FloatArray:
-    """Return by how much the phase of each loop's function changes along its points, (m,) [rad].
+    loops: ChainLoops,
+    rows: IndexArray,
+    points: ComplexArray,
+    *,
+    both: bool = False,
+    around: bool = False,
+) -> _Path:
+    """Follow `closed` of each loop along points, (k,), and `open` too if `both`.
 
-    NaN where it cannot be followed.  `around` halves intervals along an arc about the origin.
+    `around` halves intervals along an arc about the origin.
     """
-    values = function(rows, points)
-    turn, smooth = _steps(values[:, :-1], values[:, 1:])
-    total = np.asarray(np.where(smooth, turn, 0.0).sum(axis=1), dtype=np.float64)
+    seen = [(np.repeat(np.arange(rows.size), points.size), np.tile(points, rows.size))]
+    marks = np.stack([_marks(v) for v in loops.responses(rows, points)], axis=1)
+    sizes = [(marks[1, 0] / marks[1, 1]).ravel()]
+    turn, smooth = _steps(marks[..., :-1], marks[..., 1:])
+    total = np.where(smooth[0], turn, 0.0).sum(axis=1)
     # All intervals of all loops that are not smooth are halved in one call, until none is left.
-    loop, k = np.nonzero(~smooth)
-    a, b = points[loop, k], points[loop, k + 1]
-    va, vb = values[loop, k], values[loop, k + 1]
-    for _ in range(_ROUNDS):
-        if not loop.size:
-            return total
-        middle = _middle(a, b, around)
-        vm = function(rows[loop], middle[:, None])[:, 0]
-        loop = np.concatenate([loop, loop])
-        a, b = np.concatenate([a, middle]), np.concatenate([middle, b])
-        va, vb = np.concatenate([va, vm]), np.concatenate([vm, vb])
-        turn, smooth = _steps(va, vb)
-        np.add.at(total, loop[smooth], turn[smooth])
-        rest = ~smooth
-        loop, a, b, va, vb = loop[rest], a[rest], b[rest], va[rest], vb[rest]
-    total[loop] = np.nan
-    return total
-
-
-def _middle(a: ComplexArray, b: ComplexArray, around: bool) -> ComplexArray:
-    middle = 0.5 * (a + b)
-    return np.asarray(middle * (np.abs(a) / np.abs(middle)) if around else middle)
-
-
-def _steps(one: ComplexArray, other: ComplexArray) -> tuple[FloatArray, BoolArray]:
-    """Return the phase step between neighbours, and whether phase and size are followed."""
-    with np.errstate(all="ignore"):
-        ratio = other / one
-        turn = np.angle(ratio)
-        growth = np.abs(np.log(np.abs(ratio)))
-    smooth = (np.abs(turn) <= _TURN) & (growth <= _GROWTH)
-    same = one == other  # coinciding points
-    return np.where(same, 0.0, turn), smooth | same
-
-
-def _peaks(loops: Loops, rows: IndexArray) -> FloatArray:
-    omega = _grid(loops, rows, _radius(loops, rows))[:, 1:]
-    closed, free = loops.responses(rows, _imaginary(omega))
-    m, k = omega.shape
-    every = [(np.repeat(np.arange(m), k), omega.ravel(), (abs2(closed) / abs2(free)).ravel())]
-    smooth = _steps(closed[:, :-1], closed[:, 1:])[1] & _steps(free[:, :-1], free[:, 1:])[1]
-    loop, at = np.nonzero(~smooth)
-    a, b = omega[loop, at], omega[loop, at + 1]
-    ends = [closed[loop, at], closed[loop, at + 1], free[loop, at], free[loop, at + 1]]
+    loop, k = np.nonzero(~(smooth[0] & smooth[1]) if both else ~smooth[0])
+    due = ~smooth[0, loop, k]  # whether their turn is yet to be counted
+    a, b, at_a, at_b = points[k], points[k + 1], marks[..., loop, k], marks[..., loop, k + 1]
     for _ in range(_ROUNDS):
         if not loop.size:
             break
         middle = 0.5 * (a + b)
-        here = [v[:, 0] for v in loops.responses(rows[loop], _imaginary(middle[:, None]))]
-        with np.errstate(all="ignore"):
-            every.append((loop, middle, abs2(here[0]) / abs2(here[1])))
-        loop = np.concatenate([loop, loop])
+        if around:
+            middle *= np.abs(a) / np.abs(middle)
+        here = [_marks(v[:, 0]) for v in loops.responses(rows[loop], middle[:, None])]
+        at_middle = np.stack(here, axis=1)
+        seen.append((loop, middle))
+        sizes.append(at_middle[1, 0] / at_middle[1, 1])
+        loop, due = np.concatenate([loop, loop]), np.concatenate([due, due])
         a, b = np.concatenate([a, middle]), np.concatenate([middle, b])
-        ends = [
-            np.concatenate([ends[0], here[0]]),
-            np.concatenate([here[0], ends[1]]),
-            np.concatenate([ends[2], here[1]]),
-            np.concatenate([here[1], ends[3]]),
-        ]
-        rest = ~(_steps(ends[0], ends[1])[1] & _steps(ends[2], ends[3])[1])
-        rest &= (b - a) > 1e-12 * b
-        loop, a, b = loop[rest], a[rest], b[rest]
-        ends = [v[rest] for v in ends]
-    return _least(loops, rows, *(np.concatenate(column) for column in zip(*every, strict=True)))
+        at_a = np.concatenate([at_a, at_middle], axis=-1)
+        at_b = np.concatenate([at_middle, at_b], axis=-1)
+        turn, smooth = _steps(at_a, at_b)
+        counted = due & smooth[0]
+        np.add.at(total, loop[counted], turn[counted])
+        due &= ~smooth[0]
+        wide = np.abs(b - a) > _NARROW * np.abs(b)
+        rest = due | (~smooth[1] & wide) if both else due
+        loop, due, a, b = loop[rest], due[rest], a[rest], b[rest]
+        at_a, at_b = at_a[..., rest], at_b[..., rest]
+    total[loop[due]] = np.nan
+    loop, s = (np.concatenate(column) for column in zip(*seen, strict=True))
+    return _Path(turn=total, loop=loop, s=s, size=np.concatenate(sizes))
 
 
-def _least(
-    loops: Loops, rows: IndexArray, loop: IndexArray, omega: FloatArray, size: FloatArray
-) -> FloatArray:
-    """Return 1/min|1 + L| from points (loop, omega, |1 + L|^2), the lowest minima refined."""
-    size = np.where(np.isfinite(size), size, np.inf)
-    order = np.lexsort((omega, loop))
-    loop, omega, size = loop[order], omega[order], size[order]
+def _marks(values: ComplexArray) -> FloatArray:
+    """Return phases and squared sizes of values, (2, ..)."""
+    return np.stack([np.arctan2(values.imag, values.real), abs2(values)])
+
+
+def _steps(one: FloatArray, other: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Return the phase step of the first function between neighbours, and what is followed.
+
+    Both are of marks (2, functions, ..); a function is followed where phase and size hardly move.
+    """
+    with np.errstate(all="ignore"):
+        turn = other[0] - one[0]
+        turn -= 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
+        growth = other[1] / one[1]
+        smooth = (np.abs(turn) <= _TURN) & (growth <= _GROWTH) & (growth >= 1.0 / _GROWTH)
+    return turn[0], smooth
+
+
+def _highest(loops: ChainLoops, rows: IndexArray, path: _Path) -> FloatArray:
+    """Return 1/min|1 + L| of each loop from the points of a path, the lowest minima refined."""
+    size = np.where(np.isfinite(path.size) & (path.s.real == 0.0), path.size, np.inf)
     best = np.full(rows.size, np.inf)
-    np.minimum.at(best, loop, size)
+    np.minimum.at(best, path.loop, size)
+    order = np.lexsort((path.s.imag, path.loop))
+    loop, omega, size = path.loop[order], path.s.imag[order], size[order]
     same = loop[1:] == loop[:-1]
     lower_left = np.append(True, ~same | (size[1:] <= size[:-1]))
     lower_right = np.append(~same | (size[:-1] <= size[1:]), True)
@@ -297,14 +272,11 @@ def calming_drag(loops: ChainLoops) -> FloatArray:
     Infinite where no drag makes it so.
     """
     found = np.zeros(len(loops))
-    bare, unit = loops.with_drag(np.zeros(1)), loops.scale
-    more = loops.with_drag(np.array([unit]))
+    bare = loops.with_drag(np.zeros(1))
 
     def parts(rows: IndexArray, omega: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return Im(c0 conj c1), zero where C is real, and that C."""
-        s = np.asarray(1j * omega, dtype=np.complex128)
-        c0 = bare.responses(rows, s)[0]
-        c1 = (more.responses(rows, s)[0] - c0) / unit
+        c0, c1 = loops.of_drag(rows, _imaginary(omega))
         both = c0 * c1.conj()
         with np.errstate(all="ignore"):
             return np.asarray(both.imag), np.asarray(-both.real / abs2(c1))
@@ -317,7 +289,7 @@ def calming_drag(loops: ChainLoops) -> FloatArray:
         # Only what might beat the others: C hardly changes within an interval.
         change &= np.maximum(C[:, :-1], C[:, 1:]) > 0.0
         loop, k = np.nonzero(change)
-        low, high = omega[loop, k], omega[loop, k + 1]
+        low, high = omega[k], omega[k + 1]
         left = turn[loop, k] > 0.0
         for _ in range(_CALMING_ROUNDS):
             if not loop.size:
@@ -328,6 +300,6 @@ def calming_drag(loops: ChainLoops) -> FloatArray:
         if loop.size:
             value = parts(rows[loop], high[:, None])[1][:, 0]
             np.maximum.at(found, rows[loop], np.where(np.isfinite(value), value, 0.0))
-        drift = bare.responses(rows, np.zeros(1, dtype=np.complex128))[0][:, 0].real
+        drift = bare.responses(rows, np.array([_ZERO]))[0][:, 0].real
         found[rows[drift <= 0.0]] = np.inf
     return found

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 
 from models import load_case
+from models.case import Case
 from synth import GainDesign, evaluate_gains
-from synth.design import LimitUse
+from synth.design import LimitUse, StructureDesign
+from synth.question import pose_structure
 
 THESIS_GAINS = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
 
@@ -50,4 +53,31 @@ def infeasible_design() -> GainDesign:
         status="not feasible at H_s 2.44 m: motor.torque.peak breaks first",
         limits=limits,
         required={"motor.torque.peak": 13012.0},
+    )
+
+
+def structure_design(
+    case: Case, structure: str, parameters: Mapping[str, float], masses: int | None = None
+) -> StructureDesign:
+    """Parameters of a structure as a design, found by nobody and not verified."""
+    posed = pose_structure(case, structure, masses)
+    problem, question = posed.problem(()), posed.question
+    view = problem.assess([parameters[p.name] for p in posed.law.parameters])
+    fixed = float(case.payload.fixed_drag or 0.0)
+    return StructureDesign(
+        case=case,
+        structure=structure,
+        ok=True,
+        status="given",
+        parameters=dict(parameters),
+        units={p.name: p.unit for p in posed.law.parameters},
+        payload_rms=view.sigma("payload.displacement"),
+        payload_rms_before=question.payload_rms_before,
+        hook_rms=float(question.hook.displacement.rms),
+        parts={},
+        margins=view.margins if view.stable else None,
+        limits={},
+        drag=view.coefficient if problem.drag is not None else fixed,
+        drag_before=question.drag_before,
+        masses=question.masses,
     )

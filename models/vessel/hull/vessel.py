@@ -26,8 +26,7 @@ from ...basics import (
     check_range,
 )
 from ..raos import VesselRaos
-from .bem import Progress, shortest_wave, versions
-from .bem_cache import cached_hydrodynamics
+from .bem import Progress, cached_hydrodynamics, shortest_wave, versions
 from .hull import Hull
 from .hydrodynamics import FloatingBody, NaturalPeriods
 from .hydrostatics import Loading, Waterplane, mass_matrix, stiffness_matrix
@@ -120,7 +119,7 @@ def vessel_from_hull(
     name, command
         What the vessel is called, and how it was made, for the file.
     threads, cache, progress
-        As for :func:`models.vessel.hull.bem_cache.cached_hydrodynamics`.
+        As for :func:`models.vessel.hull.bem.cached_hydrodynamics`.
 
     Returns
     -------

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from models import InputError
 from models.basics import GRAVITY
 from models.rig import ACMotor, GainBounds, Gains, Payload, Rope, Sensors, Winch
-from models.rig.drum import Drum
 from models.rig.payload import EnergyDrag, GivenDrag, StochasticDrag
 from models.rig.tables import (
     ADDED_MASS_PRISM,
@@ -20,6 +19,7 @@ from models.rig.tables import (
     DRUM_LAYERS,
     prism_added_mass,
 )
+from models.rig.winch import Drum
 from models.sea.sea_section import Bretschneider1975Sea, JonswapSea
 from models.vessel import HeaveTable
 

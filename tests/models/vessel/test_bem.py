@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-import models.vessel.hull.bem_cache as bem_cache
+import models.vessel.hull.bem as bem
 from models.basics import GRAVITY, SEA_WATER_DENSITY, InputError, wave_number
 from models.vessel import VesselRaos
 from models.vessel.hull import (
@@ -171,8 +171,8 @@ def solved(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[int]:
         )
 
     monkeypatch.setenv("STILLHOOK_CACHE", str(tmp_path))
-    monkeypatch.setattr(bem_cache, "solve_hull", pretend)
-    monkeypatch.setattr(bem_cache, "versions", lambda: {"capytaine": "3"})
+    monkeypatch.setattr(bem, "solve_hull", pretend)
+    monkeypatch.setattr(bem, "versions", lambda: {"capytaine": "3"})
     monkeypatch.setattr("models.vessel.hull.vessel.versions", lambda: {"capytaine": "3"})
     return asked
 

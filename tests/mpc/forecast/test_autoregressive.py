@@ -14,7 +14,7 @@ from wiener import Wiener
 
 from models.basics import InputError
 from mpc.forecast import AdaptiveAR
-from mpc.forecast.regression import smoother
+from mpc.forecast.autoregressive import smoother
 
 
 def predictor(**options) -> AdaptiveAR:

@@ -14,7 +14,8 @@ from designs import thesis_design
 
 import stillhook as sh
 from models.sensing import HEARD, Measurement
-from stillhook.comparison import Comparison, campaign, comparison_report, sentences_of
+from stillhook.comparison import Comparison, comparison_report, sentences_of
+from stillhook.comparison import run as compare_run
 from stillhook.comparison import store as compare_store
 from stillhook.comparison.bench import CellBench, CellTask
 from stillhook.comparison.cell import Cell, ComparisonQuestion, Prepared
@@ -269,9 +270,9 @@ def test_another_contender_of_the_same_name_is_run_anew(tmp_path, monkeypatch):
 @pytest.mark.ci
 def test_a_process_that_dies_costs_its_own_runs_only_and_is_tried_twice(monkeypatch):
     made = []
-    begin = campaign.Processes.submit
+    begin = compare_run.Processes.submit
     monkeypatch.setattr(
-        campaign.Processes,
+        compare_run.Processes,
         "submit",
         lambda self, task: made.append(task.name) or begin(self, task),
     )

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from designs import THESIS_GAINS, thesis_design, unstable_design
+from solved_loops import solved_variance
 
 from models import load_case
 from models.basics import InputError, Quadrature, spectral_nodes
@@ -92,27 +93,6 @@ def posed(engine: FrequencyEngine, row: tuple[float, ...]) -> DesignQuestion:
 
 def variance(view: Assessment, output: str, nodes: Quadrature) -> float:
     return float(nodes.integrate(view.spectrum(output, nodes.omega)))
-
-
-def solved_variance(view: Assessment, output: str, nodes: Quadrature) -> float:
-    """The same from the state space, one linear solve a node: `view.spectrum` loses ten digits
-    of a torque that is a small difference, as extended precision shows."""
-    p, s = view.plant, 1j * nodes.omega
-    heave, rate = (p.disturbances.index(n) for n in ("hook.heave", "hook.heave_rate"))
-    z = p.outputs.index(output)
-    shaken = p.E[:, heave, None] + s * p.E[:, rate, None]
-    matrix = s[:, None, None] * np.eye(len(p.A)) - p.A
-    right = np.stack([shaken.T, np.broadcast_to(p.B[:, 0], shaken.T.shape)], axis=2)
-    x = np.linalg.solve(matrix, right)
-    direct = np.stack([p.F[:, heave, None] + s * p.F[:, rate, None], 0.0 * s + p.D], axis=2)
-    heard = p.C @ x + direct.transpose(1, 0, 2)
-    feedback = (view.controller.D @ heard)[:, 0] * np.exp(-s * p.delays[0])[:, None]
-    command = feedback[:, 0] / (1.0 - feedback[:, 1])
-    seen = (p.Cz[z] @ x) + np.stack(
-        [p.Fz[z, heave] + s * p.Fz[z, rate], 0.0 * s + p.Dz[z, 0]], axis=1
-    )
-    density = sum(d.density(nodes.omega) for d in view.disturbances if d.name == "hook.heave")
-    return float(nodes.integrate(np.abs(seen[:, 0] + seen[:, 1] * command) ** 2 * density))
 
 
 def test_columns_of_numbers_are_those_of_the_checked_cases() -> None:
@@ -407,7 +387,7 @@ def test_progress_ends_with_all_cases() -> None:
 
 
 @pytest.mark.slow
-def test_design_of_any_structure_is_swept_case_by_case() -> None:
+def test_design_of_a_search_has_its_own_figures_in_a_sweep() -> None:
     case = load_case("thesis-1975").replace({"sensors.telemetry.delay": 0.03})
     design = optimise_structure(case, "payload-feedback", starts=2)
     gain = next(iter(design.parameters))

@@ -10,6 +10,7 @@ import pytest
 from designs import thesis_design
 
 from models import load_case
+from models.basics import FrequencyAxis
 from models.plant import build_plant, lump_rope
 from models.spread import LogNormal, Normal, Spread
 from synth import evaluate_gains
@@ -19,9 +20,10 @@ from synth.structures import PayloadFeedback
 from synth.sweeps import FrequencyEngine
 from synth.sweeps.chain import ChainLoops
 from synth.sweeps.kernel import hurwitz
+from synth.sweeps.law_rows import DesignLaw
 from synth.sweeps.numbers import numbers_of
-from synth.sweeps.sweep_nodes import sweep_nodes
-from synth.sweeps.winding_count import calming_drag, count_unstable, peak_sensitivity
+from synth.sweeps.sweep_nodes import sweep_nodes, sweep_panels
+from synth.sweeps.winding_count import calming_drag, count_unstable, survey
 from synth.verify import LawMatrices
 from synth.verify.winding import count_unstable as wind_one
 
@@ -67,10 +69,8 @@ def chains(masses: int, count: int, seed: int, delay: float) -> tuple[FrequencyE
     engine = FrequencyEngine(design, Spread({**wide, "payload.mass": "40 %", "depth": "-0 %"}))
     rows = engine.spread.sample(count, seed=seed)
     numbers, _ = numbers_of(case, engine.spread, rows)
-    gains = np.stack(
-        [rows[:, engine.spread.paths.index(f"gains.{g}")] for g in ("a", "a1", "a2")], 1
-    )
-    return engine, ChainLoops(numbers, gains, numbers.fixed_drag, lumps=lump_rope(masses))
+    law = DesignLaw(design, case).columns(engine.spread, rows)
+    return engine, ChainLoops(numbers, law, numbers.fixed_drag, lumps=lump_rope(masses))
 
 
 @pytest.mark.parametrize("degree", range(1, 10))
@@ -136,7 +136,7 @@ def test_winding_number_with_delay_is_that_of_one_loop_followed_alone() -> None:
 def test_peak_sensitivity_is_that_of_a_dense_search() -> None:
     engine, loops = chains(6, 40, seed=2, delay=0.03)
     rows = engine.spread.sample(40, seed=2)
-    peaks = peak_sensitivity(loops)
+    peaks = survey(loops)[1]
     for k, row in enumerate(rows[:12]):
         poles = closed_poles(engine, row)  # without the delay: near enough to look around
         omega = np.geomspace(1e-3, 1e3, 60_001)
@@ -160,15 +160,13 @@ def test_spring_and_chain_agree_where_both_are_possible() -> None:
     rows = engine.spread.sample(500, seed=3)
     found = engine.evaluate(rows)
     numbers, _ = numbers_of(engine.case, engine.spread, rows)
-    at = [engine.spread.paths.index(f"gains.{g}") for g in ("a", "a1", "a2")]
-    loops = ChainLoops(
-        numbers, 200.0 * rows[:, at], numbers.fixed_drag, lumps=lump_rope(1, "thesis")
-    )
+    law = DesignLaw(thesis_design(), engine.case).columns(engine.spread, rows)
+    loops = ChainLoops(numbers, law, numbers.fixed_drag, lumps=lump_rope(1, "thesis"))
     stable = found["stable"].astype(bool)
     np.testing.assert_array_equal(count_unstable(loops) == 0, stable)
     chosen = np.flatnonzero(stable)
     np.testing.assert_allclose(
-        peak_sensitivity(loops, chosen), found["max_sensitivity"][chosen], rtol=1e-8
+        survey(loops, chosen)[1], found["max_sensitivity"][chosen], rtol=1e-8
     )
 
 
@@ -190,13 +188,35 @@ def test_drag_from_which_a_loop_is_stable_is_where_the_axis_is_crossed() -> None
     assert np.all(count_unstable(loops.with_drag(np.zeros(1)), calm) == 0)
 
 
-def test_gauss_kronrod_pairs_are_exact_to_their_degree() -> None:
-    for splits, degree, rough in (([], 22, 13), ([1.02, 1.05], 10, 5)):
-        # Polynomials in ln omega on one panel: weights hold the omega of d omega.
-        nodes = sweep_nodes(1.0, 1.05 if splits else 2.0, splits)
-        t = np.log(nodes.omega)
-        top = float(np.log(1.05 if splits else 2.0))
-        for rule, most in zip(nodes.weights, (degree, rough), strict=True):
-            for power in range(most + 1):
-                found = float((rule / nodes.omega) @ (t / top) ** power)
-                assert found == pytest.approx(top / (power + 1.0), rel=1e-13)
+def test_gauss_kronrod_pair_is_exact_to_its_degree() -> None:
+    # Polynomials in ln omega on one panel: weights hold the omega of d omega.
+    axis = FrequencyAxis(1.0, 2.0, half_line=False)
+    nodes = sweep_nodes(axis, sweep_panels(axis, []), np.ones_like)
+    t, top = np.log(nodes.omega), np.log(2.0)
+    for rule, most in zip(nodes.weights, (22, 13), strict=True):
+        for power in range(most + 1):
+            found = float((rule / nodes.omega) @ (t / top) ** power)
+            assert found == pytest.approx(top / (power + 1.0), rel=1e-13)
+
+
+@pytest.mark.parametrize("half_line", [False, True])
+def test_density_with_kinks_stands_in_the_weights(half_line: bool) -> None:
+    def density(omega: FloatArray) -> FloatArray:
+        return np.interp(omega, [1.0, 1.3, 2.2, 4.0], [1.0, 5.0, 0.5, 2.0], right=0.0)
+
+    axis = FrequencyAxis(1.0, 5.0, half_line)
+    panels = sweep_panels(axis, [])
+    smooth = sweep_nodes(axis, panels, density, kinks=[1.3, 2.2, 4.0])
+    cut = sweep_nodes(axis, sweep_panels(axis, [1.3, 2.2, 4.0]), density)
+    assert len(smooth) < len(cut)
+
+    def response(omega: FloatArray) -> FloatArray:
+        return 1.0 / ((1.0 - 0.3 * omega**2) ** 2 + omega**2)
+
+    for rule, accuracy in zip((0, 1), (1e-9, 1e-4), strict=True):
+        found = response(smooth.omega) @ smooth.sea[rule]
+        assert found == pytest.approx(response(cut.omega) @ cut.sea[0], rel=accuracy)
+    # On its own panels the difference of the two rules is the whole's.
+    apart = sweep_nodes(axis, panels, density, kinks=[1.3, 2.2, 4.0], apart=True)
+    difference = response(smooth.omega) @ (smooth.sea[0] - smooth.sea[1])
+    assert (response(apart.omega) @ apart.sea[1:].T).sum() == pytest.approx(difference, rel=1e-9)

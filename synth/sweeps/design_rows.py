@@ -1,0 +1,517 @@
+"""Any design on rows of a spread: the vectorised engine behind a sweep.
+
+    rows (n, d) -> numbers, controllers, densities -> loops -> drag, variances -> stability, M_s
+                -> metrics, (n,) each; NaN where a loop is unstable
+
+Everything goes through the rope's recursion (`synth.sweeps.chain`) but three gains on one spring
+without delay and noise, for which polynomials (`synth.sweeps.kernel`) are a hundred times faster.
+Rows whose variances two rules disagree on begin again on finer nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from models.basics import (
+    BoolArray,
+    ComplexArray,
+    FloatArray,
+    FrequencyAxis,
+    IndexArray,
+    Quadrature,
+)
+from models.plant import lump_rope
+from models.spread import Spread
+
+from ..design import GainDesign, StructureDesign
+from ..question import SampledNoise
+from .chain import BLOCK, VELOCITY, ChainLoops, Shaken
+from .kernel import SpringLoops, spring_peaks
+from .law_rows import DesignLaw, LawColumns
+from .metrics import FrequencyMetric, finished
+from .numbers import NOISE_OF, PlantNumbers, numbers_of
+from .sea_rows import SeaRows
+from .sweep_nodes import Panel, SweepNodes, halved, sweep_nodes, sweep_panels
+from .winding_count import calming_drag, light_poles, survey
+
+Velocity = Callable[[IndexArray, FloatArray], FloatArray]
+
+_REFERENCE = 3.0  # frequency by which polynomials are scaled [rad/s]
+_LEVELS = 6  # of nodes, each with panels half as long
+_PILOTS = 16  # rows that ask for panels
+_SHARE = 0.005  # of the accuracy, that a panel of theirs may take
+_MOST_PANELS = 200
+_AT_ONCE = 2000  # rows of one pass where each has a density of its own, or finer nodes
+_EDGE = 1.0 + 1e-6  # drag over the least that is stable, up to which a loop counts as unstable
+_LAST = 1e-3  # difference of two rules that is told where no finer nodes are left
+_DRAG_ROUNDS = 60
+_AGREES = 3e-13  # of the logarithm of C
+_CLOSE = 1e-10  # ... and what will do
+_STEP = 1.5  # of it, at most
+_SLOWEST = 0.1  # of the design's own poles, that variances with errors of slow sensors begin at
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Batch:
+    """Rows with all that their loops are made of."""
+
+    rows: FloatArray
+    numbers: PlantNumbers
+    law: LawColumns
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def part(self, index: IndexArray) -> _Batch:
+        return _Batch(
+            rows=self.rows[index], numbers=self.numbers.part(index), law=self.law.part(index)
+        )
+
+
+class _Solved:
+    """What is known of n rows: drag, stability, M_s and moments by (output, order), all rules."""
+
+    def __init__(self, count: int, outputs: Sequence[str], rules: int) -> None:
+        self.drag = np.full(count, np.nan)
+        self.stable = np.zeros(count, dtype=bool)
+        self.peak = np.full(count, np.nan)
+        self.moments = {name: np.full((count, 2, rules), np.nan) for name in outputs}
+
+    def put(self, at: IndexArray, other: _Solved) -> None:
+        """Take over some rows' numbers, of the rule that counts."""
+        self.drag[at], self.stable[at], self.peak[at] = other.drag, other.stable, other.peak
+        for name, column in other.moments.items():
+            self.moments[name][at] = column[:, :, :1]
+
+
+class DesignRows:
+    """A design, asked about rows of a spread.
+
+    Parameters
+    ----------
+    design
+        The design.
+    spread
+        The spread on its case (`Spread.on`).
+    metrics
+        What is wanted.
+    accuracy
+        Relative difference of two rules from which a variance gets finer nodes.
+    nodes
+        Nodes to use for all, with no look at their error; chosen here if left out.
+
+    Raises
+    ------
+    InputError
+        If the design has no controller.
+    """
+
+    def __init__(
+        self,
+        design: GainDesign | StructureDesign,
+        spread: Spread,
+        metrics: Sequence[FrequencyMetric],
+        *,
+        accuracy: float,
+        nodes: Quadrature | None = None,
+    ) -> None:
+        assert spread.case is not None
+        case = spread.case
+        self.design, self.spread, self.case = design, spread, case
+        self.metrics = tuple(metrics)
+        self.accuracy = accuracy
+        self.law = DesignLaw(design, case)
+        self.lumps = lump_rope(design.masses, case.rope.lumping)
+        self.sea = SeaRows(case, spread)
+        self.given = None if nodes is None else SweepNodes.of(nodes, self.sea.density)
+        self._nodes: dict[int, SweepNodes] = {}  # by level
+        self.columns = True  # whether column arithmetic has sufficed so far
+        self.refined = 0  # rows that needed finer nodes
+        self.unresolved = 0  # ... and those that none of them resolved
+        self._outputs = tuple(dict.fromkeys(m.output for m in metrics if m.output))
+        self._second = tuple(
+            dict.fromkeys(m.output for m in metrics if m.kind in ("peak", "least", "period"))
+        )
+        self._peaks = any(m.name == "max_sensitivity" for m in metrics)
+        delayed = case.sensors.telemetry.delay > 0.0 or "sensors.telemetry.delay" in spread.paths
+        three = getattr(design, "structure", "payload-feedback") == "payload-feedback"
+        self.spring = design.masses == 1 and three and not delayed and not self._noisy
+
+    @property
+    def block(self) -> int:
+        """Rows that are best looked at together: their columns stay in the cache."""
+        return 8192 if self.spring else 2048
+
+    def evaluate(self, rows: FloatArray) -> dict[str, FloatArray | BoolArray]:
+        """Return ``stable`` and the metrics of rows, (n,) each.
+
+        Raises
+        ------
+        InputError
+            If a row is no valid case.
+        """
+        batch = self._batch(rows)
+        solved = _Solved(len(rows), self._outputs, 1)
+        # All rows on common nodes first; those whose two rules disagree begin again on panels half
+        # as long, and so on: narrow resonances are few, and pay for themselves.
+        at: IndexArray = np.arange(len(rows))
+        for level in range(_LEVELS):
+            doubtful = []
+            step = _AT_ONCE if level or self.sea.varies else max(len(rows), 1)
+            for k in range(0, at.size, step):
+                some = at[k : k + step]
+                own = batch.part(some) if some.size < len(rows) else batch
+                found = self._solved(own, self.level_nodes(level))
+                solved.put(some, found)
+                doubtful.append(some[self._doubt(found, level)])
+            at = np.concatenate(doubtful) if doubtful else at[:0]
+            if not at.size:
+                break
+            self.refined += at.size if level == 0 else 0
+        for k in at:  # at the very edge of stability: nodes that know the loop's own poles
+            one = np.array([k])
+            own = batch.part(one)
+            found = self._solved(own, self._closely(own, solved.drag[one]))
+            solved.put(one, found)
+            self.unresolved += self._doubt(found, _LEVELS).size
+        if self.spring and self._peaks and solved.stable.any():
+            chosen = np.flatnonzero(solved.stable)
+            solved.peak[chosen] = spring_peaks(self._spring(batch, solved.drag), chosen)
+        numbers = batch.numbers
+        values = finished(
+            self.metrics,
+            moments={
+                (name, 2 * k): column[:, k, 0]
+                for name, column in solved.moments.items()
+                for k in (0, 1)
+            },
+            drag=solved.drag,
+            max_sensitivity=solved.peak,
+            tension=numbers.static_tension,
+            arm=numbers["drum_radius"] / (numbers["gear_ratio"] * numbers["gear_efficiency"]),
+            exposure=self.case.limits.exposure_time,
+            count=len(rows),
+        )
+        kept = {name: np.where(solved.stable, column, np.nan) for name, column in values.items()}
+        return {"stable": solved.stable, **kept}
+
+    def loop_gain(self, rows: FloatArray, omega: FloatArray) -> ComplexArray:
+        """Return L(i omega) of rows, (n, k), at frequencies above zero [rad/s]."""
+        batch = self._batch(rows)
+        drag = self._solved(batch, self.level_nodes()).drag
+        loops = self._chains(batch, drag)
+        s = np.asarray(1j * omega, dtype=np.complex128)
+        closed, free = loops.responses(np.arange(len(rows)), s)
+        return np.asarray(closed / free - 1.0)
+
+    def level_nodes(self, level: int = 0) -> SweepNodes:
+        """Return the common nodes of a level."""
+        if self.given is not None:
+            return self.given
+        if level not in self._nodes:
+            panels = self._panels
+            for _ in range(level):
+                panels = halved(panels)
+            self._nodes[level] = self._nodes_on(panels)
+        return self._nodes[level]
+
+    @cached_property
+    def _pilots(self) -> _Batch:
+        """The design's own row and some others."""
+        nominal = [self.spread.nominal[path] for path in self.spread.paths]
+        rows = np.vstack([nominal, self.spread.sample(_PILOTS - 1, "random", 1)])
+        return self._batch(rows)
+
+    @cached_property
+    def _noisy(self) -> set[str]:
+        """What the controller hears with errors or noise, if they count."""
+        sensors = self._pilots.numbers.sensors
+        heard = [name for name in self.law.measurements if name in NOISE_OF]
+        return {y for y in heard if self.law.noisy and np.any(sensors[NOISE_OF[y]] > 0.0)}
+
+    @cached_property
+    def _panels(self) -> list[Panel]:
+        """The panels that the pilots ask for."""
+        axis, splits = self._frame
+        panels = sweep_panels(axis, splits if self.sea.varies else [])
+        while len(panels) < _MOST_PANELS:
+            found = self._solved(self._pilots, self._nodes_on(panels, apart=True), alone=True)
+            error = np.zeros(len(panels))
+            for name, column in found.moments.items():
+                with np.errstate(all="ignore"):
+                    share = (
+                        np.abs(column[:, self._orders(name), 1:])
+                        / column[:, self._orders(name), :1]
+                    )
+                error = np.maximum(error, np.nanmax(share, axis=(0, 1), initial=0.0))
+            coarse = error > _SHARE * self.accuracy
+            if not coarse.any():
+                break
+            kept = [p for p, c in zip(panels, coarse, strict=True) if not c]
+            panels = sorted(kept + halved([p for p, c in zip(panels, coarse, strict=True) if c]))
+        return panels
+
+    def _nodes_on(self, panels: Sequence[Panel], *, apart: bool = False) -> SweepNodes:
+        axis, splits = self._frame
+        kinks = [] if self.sea.varies else splits
+        return sweep_nodes(axis, panels, self.sea.density, kinks=kinks, apart=apart)
+
+    @cached_property
+    def _frame(self) -> tuple[FrequencyAxis, list[float]]:
+        """The band of all disturbances, and kinks of the hook's density [rad/s]."""
+        low, high, splits = self.sea.frame()
+        if not self._noisy:
+            return FrequencyAxis(low, high, half_line=False), splits
+        endless = "mru.heave" in self._noisy
+        white = SampledNoise(intensity=1.0).band
+        if self._noisy - {"mru.heave"}:
+            low, high = min(low, white[0]), max(high, white[1])
+        if endless:
+            slow = min((abs(p) for p in self._poles if abs(p) > 1e-6), default=low)
+            low = min(low, _SLOWEST * slow)
+        return FrequencyAxis(low, high, half_line=endless), splits
+
+    @cached_property
+    def _poles(self) -> ComplexArray:
+        """Poles of the design itself: most rows have something like them."""
+        design = self.design
+        if design.margins is None:
+            return np.zeros(0, dtype=np.complex128)
+        if isinstance(design, GainDesign):
+            return design.assessment.poles
+        values = [design.parameters[p.name] for p in design.posed.law.parameters]
+        return design.posed.problem(()).assess(values, design.drag).poles
+
+    def _batch(self, rows: FloatArray) -> _Batch:
+        numbers, quick = numbers_of(self.case, self.spread, rows)
+        self.columns &= quick
+        return _Batch(rows=rows, numbers=numbers, law=self.law.columns(self.spread, rows))
+
+    def _spring(self, batch: _Batch, drag: FloatArray) -> SpringLoops:
+        return SpringLoops(
+            batch.numbers,
+            np.stack(np.broadcast_arrays(*batch.law.values), axis=1),
+            np.where(np.isfinite(drag), drag, 0.0),
+            mass_share=float(self.lumps.masses[0]),
+            reference=_REFERENCE,
+        )
+
+    def _chains(self, batch: _Batch, drag: FloatArray) -> ChainLoops:
+        sound = np.where(np.isfinite(drag), drag, 0.0)
+        return ChainLoops(batch.numbers, batch.law, sound, lumps=self.lumps)
+
+    def _doubt(self, found: _Solved, level: int) -> IndexArray:
+        """Return the stable rows whose two rules disagree."""
+        error = np.zeros(found.stable.size)
+        for name, column in found.moments.items():
+            if column.shape[2] > 1:
+                orders = column[:, self._orders(name)]
+                with np.errstate(all="ignore"):
+                    gap = np.abs(orders[:, :, 1] - orders[:, :, 0]) / orders[:, :, 0]
+                error = np.maximum(error, gap.max(axis=1))
+        limit = self.accuracy if level < _LEVELS else max(self.accuracy, _LAST)
+        return np.flatnonzero(found.stable & ~(error <= limit))
+
+    def _orders(self, output: str) -> slice:
+        """Return the moments of an output whose error is looked at.
+
+        Where noise goes on to infinity that of its rate may not be finite: it is then what the
+        nodes of the variance make of it.
+        """
+        return slice(0, 2 if output in self._second and not self._frame[0].half_line else 1)
+
+    def _closely(self, batch: _Batch, drag: FloatArray) -> SweepNodes:
+        """Return nodes for one row, its panels short near its own poles."""
+        if self.spring:
+            poles = self._spring(batch, drag).poles(np.zeros(1, dtype=np.intp))[0]
+        else:
+            poles = light_poles(self._chains(batch, drag), 0)
+        marks = [complex(p) for p in poles if p.real < 0.0 and p.imag >= 0.0]
+        axis, splits = self._frame
+        panels = sweep_panels(axis, splits, level=2, marks=marks, clearance=0.6)
+        return sweep_nodes(axis, panels, self.sea.density)
+
+    def _solved(self, batch: _Batch, nodes: SweepNodes, *, alone: bool = False) -> _Solved:
+        """Return drag, stability and moments of rows; M_s too, but of springs.
+
+        `alone` leaves stability and M_s out: all count as stable.
+        """
+        found = _Solved(len(batch), self._outputs, len(nodes.weights))
+        ratios = self.sea.ratios(batch.rows, nodes.omega)
+        shaken = Shaken(
+            factors=self.sea.factors(batch.rows),
+            ratios=ratios,
+            heave_rms=self.sea.heave_rms(batch.rows, ratios, nodes.weights[0]),
+            noisy=bool(self._noisy),
+        )
+        found.drag[:] = batch.numbers.fixed_drag
+        if self.spring:
+            self._solve_springs(batch, nodes, shaken, found)
+            return found
+        loops = self._chains(batch, np.zeros(1))
+        at = np.arange(len(batch))
+        free = np.isnan(found.drag)
+        self._settle(loops, at, nodes, shaken, np.zeros(at.size), found, free)
+        if alone:
+            return found
+        # Whether a chain is stable costs more than its variance: it is asked at the answer first.
+        count, found.peak[:] = survey(self._chains(batch, found.drag), peaks=self._peaks)
+        again = np.flatnonzero(free & (count != 0))
+        if again.size:
+            edge = np.zeros(at.size)
+            edge[again] = calming_drag(self._chains(batch.part(again), np.zeros(1)))
+            self._settle(loops, again, nodes, shaken, edge, found, free)
+            calmed = survey(self._chains(batch, found.drag), again, peaks=self._peaks)
+            count[again], found.peak[again] = calmed
+        found.stable[:] = np.isfinite(found.drag) & (count == 0)
+        return found
+
+    def _settle(
+        self,
+        loops: ChainLoops,
+        chosen: IndexArray,
+        nodes: SweepNodes,
+        shaken: Shaken,
+        edge: FloatArray,
+        found: _Solved,
+        free: BoolArray,
+    ) -> None:
+        """Find the drag of chosen loops where it is free, above its edge, and their moments."""
+        s = np.asarray(1j * nodes.omega, dtype=np.complex128)
+        step = max(1, BLOCK // len(nodes))
+        start = self.design.drag or 1.0
+        quadratic = np.broadcast_to(loops.numbers["quadratic_drag"], (len(loops),))
+        for at in range(0, chosen.size, step):
+            rows = chosen[at : at + step]
+            chain = loops.chain(rows, s)
+            if free[rows].any():
+                velocity = _velocity_of(
+                    *loops.velocity_of_drag(rows, chain, nodes, shaken), edge[rows]
+                )
+                agreed = _agreeing_drag(quadratic[rows], start, velocity)
+                # At the very edge the motion that calms a loop is that of its own instability.
+                agreed = np.where(agreed <= _EDGE * edge[rows], np.inf, agreed)
+                found.drag[rows] = np.where(free[rows], agreed, found.drag[rows])
+            if self._outputs:
+                drag = np.where(np.isfinite(found.drag[rows]), found.drag[rows], 0.0)
+                moments = loops.moments(rows, chain, self._outputs, nodes, shaken, drag)
+                for name, column in moments.items():
+                    found.moments[name][rows] = column
+
+    def _solve_springs(
+        self, batch: _Batch, nodes: SweepNodes, shaken: Shaken, found: _Solved
+    ) -> None:
+        """Find the drag of springs, their stability and their moments."""
+        free = np.flatnonzero(np.isnan(found.drag))
+        if free.size:
+            own = batch.part(free)
+            quadratic = np.broadcast_to(batch.numbers["quadratic_drag"], (len(batch),))[free]
+
+            def velocity(some: IndexArray, C: FloatArray) -> FloatArray:
+                loops = self._spring(own.part(some), C)
+                seen = _spring_moments(loops, [VELOCITY], nodes, shaken.part(free[some]))
+                return np.where(loops.stable, np.sqrt(seen[VELOCITY][:, 0]), np.inf)
+
+            agreed = _agreeing_drag(quadratic, self.design.drag or 1.0, velocity)
+            below = np.where(np.isfinite(agreed), agreed, 0.0) / _EDGE
+            found.drag[free] = np.where(self._spring(own, below).stable, agreed, np.inf)
+        loops = self._spring(batch, found.drag)
+        found.stable[:] = np.isfinite(found.drag) & loops.stable
+        with np.errstate(all="ignore"):
+            for order, outputs in enumerate((self._outputs, self._second)):
+                several = _spring_moments(loops, outputs, nodes, shaken, second=order == 1)
+                for name, columns in several.items():
+                    found.moments[name][:, order] = columns
+
+
+def _spring_moments(
+    loops: SpringLoops,
+    outputs: Sequence[str],
+    nodes: SweepNodes,
+    shaken: Shaken,
+    *,
+    second: bool = False,
+) -> dict[str, FloatArray]:
+    """Return moments of outputs by all rules, (n, rules) each."""
+    if not outputs:
+        return {}
+    weights = nodes.sea if shaken.ratios is None else nodes.weights
+    found = loops.moments(outputs, nodes.omega, weights, shaken.ratios, second=second)
+    return {name: columns * shaken.factors[:, None] for name, columns in found.items()}
+
+
+def _velocity_of(
+    p0: FloatArray, p1: FloatArray, p2: FloatArray, driven: FloatArray, edge: FloatArray
+) -> Velocity:
+    """Return the rms velocity of loops: its variance is sum driven/(p0 + C p1 + C^2 p2)."""
+
+    def velocity(some: IndexArray, C: FloatArray) -> FloatArray:
+        every = some.size == len(p0)
+        a, b, c, w = (p if every else p[some] for p in (p0, p1, p2, driven))
+        slope = C[:, None]
+        total = c * slope
+        total += b
+        total *= slope
+        total += a
+        np.divide(w, total, out=total)
+        sigma = np.sqrt(total.sum(axis=1))
+        return np.where(edge[some] < C, sigma, np.inf)
+
+    return velocity
+
+
+def _agreeing_drag(quadratic: FloatArray, start: float, velocity: Velocity) -> FloatArray:
+    """Return the drag that agrees with each loop's response, (n,) [N s/m]; infinite for none.
+
+    C = q sqrt(8/pi) sigma_v(C), by the secant rule on logarithms, as `synth.robust.plant_stack`
+    does.  More drag means less motion, so that the right side falls; where a loop is unstable it
+    is given more.
+
+    Parameters
+    ----------
+    quadratic
+        q of the drag force q |v| v of each, (n,) [N s2/m2].
+    start
+        About where to begin [N s/m].
+    velocity
+        rms of the payload's velocity of loops `rows` with drag C, (m,); infinite if unstable.
+    """
+    slope = quadratic * np.sqrt(8.0 / np.pi)
+    x = np.full(quadratic.size, np.log(max(start, 1.0)))
+    found = np.where(quadratic > 0.0, np.inf, 0.0)
+    left, right = np.full_like(x, -np.inf), np.full_like(x, np.inf)
+    before, gap_before = np.full_like(x, np.nan), np.full_like(x, np.nan)
+    rows = np.flatnonzero(quadratic > 0.0)
+    for _ in range(_DRAG_ROUNDS):
+        if not rows.size:
+            break
+        sigma = velocity(rows, np.exp(x[rows]))
+        sound = np.isfinite(sigma)
+        with np.errstate(divide="ignore"):
+            gap = np.where(sound, np.log(np.maximum(slope[rows] * sigma, 1e-300)) - x[rows], _STEP)
+        done = np.abs(gap) < _AGREES
+        found[rows[done]] = np.exp(x[rows[done]])
+        # The gap falls with x: its sign says on which side the answer lies.
+        left[rows] = np.where(gap > 0.0, x[rows], left[rows])
+        right[rows] = np.where(gap > 0.0, right[rows], x[rows])
+        with np.errstate(all="ignore"):
+            rise = (gap - gap_before[rows]) / (x[rows] - before[rows])
+        rise = np.where(np.isfinite(rise) & sound, np.clip(rise, -3.0, -0.3), -1.5)
+        before[rows], gap_before[rows] = x[rows], np.where(sound, gap, np.nan)
+        step = np.clip(-gap / rise, -_STEP, _STEP)
+        ahead = x[rows] + step
+        outside = (ahead <= left[rows]) | (ahead >= right[rows])
+        middle = 0.5 * (left[rows] + right[rows])
+        ahead = np.where(outside & np.isfinite(middle), middle, ahead)
+        x[rows] = ahead
+        narrow = right[rows] - left[rows] < _AGREES
+        found[rows[narrow & ~done]] = np.exp(right[rows[narrow & ~done]])
+        # Rounding may keep the last digits from agreeing.
+        close = np.abs(gap) < _CLOSE
+        found[rows[close & ~done]] = np.exp(before[rows[close & ~done]])
+        rows = rows[~(done | narrow)]
+    return found

@@ -1,0 +1,143 @@
+"""The controller of a design on rows of a spread: its response and poles, whatever its structure.
+
+A design's controller stays what it is while the world varies: the structure is bound to the
+design's own plant, and only the parameters that the spread names move.  `ParametrisedController`
+states C(s, p) in plain arithmetic, so columns of parameters give all rows at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from models.basics import ComplexArray, FloatArray, IndexArray, InputError
+from models.case import Case
+from models.plant import build_plant
+from models.spread import GAINS, Spread
+
+from ..design import GainDesign, StructureDesign
+from ..structures import ParametrisedController, PayloadFeedback
+from .numbers import at_rows
+
+_NUDGE = 1.01  # of a parameter, to see whether the controller's poles move with it
+_SAME = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LawColumns:
+    """A controller's parameters as columns.
+
+    Attributes
+    ----------
+    law, measurements
+        The structure bound to its plant, and what it hears, in its plant's order.
+    values
+        Column of each parameter, (n,) or (1,).
+    poles
+        The controller's own poles, (n, p) or (1, p) [1/s].
+    """
+
+    law: ParametrisedController
+    measurements: tuple[str, ...]
+    values: tuple[FloatArray, ...]
+    poles: ComplexArray
+
+    def part(self, index: IndexArray) -> LawColumns:
+        """Return some of the rows."""
+
+        def some(column: Any) -> Any:
+            return column[index] if len(column) > 1 else column
+
+        return LawColumns(
+            law=self.law,
+            measurements=self.measurements,
+            values=tuple(some(column) for column in self.values),
+            poles=some(self.poles),
+        )
+
+    def response(self, rows: IndexArray, s: ComplexArray) -> dict[str, Any]:
+        """Return C of each measurement of some rows at s, each (1 or m, 1 or k)."""
+        values = [at_rows(v, rows) if v.size > 1 else float(v[0]) for v in self.values]
+        found = self.law.response(values, s)[0]
+        return dict(zip(self.measurements, found, strict=True))
+
+    def without_poles(self, rows: IndexArray, s: ComplexArray) -> Any:
+        """Return the factor that takes the controller's poles out of a function of s.
+
+        prod (s - p)/(s + |p|): what had them has neither poles nor new zeros in the right half
+        plane, and nothing that is narrow because the controller is.
+        """
+        factor: Any = 1.0
+        for column in self.poles.T:
+            p = column[rows, None] if len(column) > 1 else column
+            size = np.abs(p)
+            factor = factor * ((s - p) / (s + np.where(size > _SAME, size, 1.0)))
+        return factor
+
+
+class DesignLaw:
+    """A design's controller, asked about rows of a spread.
+
+    Parameters
+    ----------
+    design, case
+        The design, and the case that its figures hold for.
+
+    Raises
+    ------
+    InputError
+        If the design has no controller.
+    """
+
+    def __init__(self, design: GainDesign | StructureDesign, case: Case) -> None:
+        self.noisy = isinstance(design, StructureDesign)
+        self.law: ParametrisedController
+        if isinstance(design, StructureDesign):
+            if not design.parameters:
+                raise InputError(f"sweep: the design has no controller: {design.status}")
+            self.law, self._own = design.posed.law, dict(design.parameters)
+        else:
+            plant = build_plant(case, design.masses).linearise(drag=design.drag)
+            self.law, self._own = PayloadFeedback().bind(plant), dict(design.gains)
+        self.measurements = tuple(design.measurements)
+        self._names = [p.name for p in self.law.parameters]
+        poles = self._poles(self._row(self._own))
+        self._fixed = {
+            name
+            for name in self._names
+            if poles.size == 0 or self._still(poles, {**self._own, name: _NUDGE * self._own[name]})
+        }
+
+    def columns(self, spread: Spread, rows: FloatArray) -> LawColumns:
+        """Return the parameters of a spread's rows, (n, d)."""
+        own = {name: np.array([value]) for name, value in self._own.items()}
+        moved = set()
+        for j, path in enumerate(spread.paths):
+            if path.startswith(GAINS):
+                name = path.removeprefix(GAINS)
+                own[name] = rows[:, j]
+                moved.add(name)
+        values = tuple(np.broadcast_arrays(*self._row(own)) if "A" in moved else self._row(own))
+        if moved & {*self._names} <= self._fixed:
+            poles = self._poles([column[0] for column in values])[None]
+        else:
+            table = np.stack(np.broadcast_arrays(*values), axis=1)
+            poles = np.array([self._poles(row) for row in table])
+        return LawColumns(law=self.law, measurements=self.measurements, values=values, poles=poles)
+
+    def _row(self, own: Mapping[str, Any]) -> list[Any]:
+        """Return the law's parameters of named ones; the amplifier A multiplies every gain."""
+        return [own.get("A", 1.0) * own[name] for name in self._names]
+
+    def _poles(self, values: Sequence[float]) -> ComplexArray:
+        A = self.law.controller([float(v) for v in values]).A
+        return np.asarray(np.linalg.eigvals(A), dtype=np.complex128)
+
+    def _still(self, poles: ComplexArray, own: Mapping[str, float]) -> bool:
+        """Return whether the controller has the same poles with other parameters."""
+        moved = self._poles(self._row(own))
+        gap = np.abs(moved[:, None] - poles).min(axis=1)
+        return bool(np.all(gap <= _SAME * np.maximum(np.abs(poles).max(), 1.0)))

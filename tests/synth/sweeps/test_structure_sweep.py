@@ -1,0 +1,166 @@
+"""Sweeps of every structure against one loop at a time, with its sensors, noise and delays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from designs import structure_design
+from solved_loops import solved_variance
+
+from models import load_case
+from models.basics import spectral_nodes
+from models.case import Case
+from models.hook import HookMotion
+from models.plant import consistent_drag
+from models.spread import Spread, Uniform
+from synth.loop import Assessment
+from synth.sensitivity.fixed_design import fixed_design
+from synth.sweeps import FrequencyEngine
+
+FloatArray = npt.NDArray[np.float64]
+
+COMBINED = {
+    "payload.acceleration_gain": 0.98162,
+    "payload.velocity_gain": 1.6166,
+    "payload.position_gain": 2.8879,
+    "drum.position_gain": 0.65588,
+    "heave.gain": 0.93224,
+    "rolloff.corner": 20.741,
+    "rolloff.damping": 1.0217,
+    "heave.lead": 0.028445,
+    "heave.bandwidth": 7.3838,
+}
+TENSION = {"drum.position_gain": 0.0052691, "tension.gain": 8.491e-06}
+INTEGRAL = {
+    "a": 21.3,
+    "a1": 11.9,
+    "a2": 66.4,
+    "integral.corner": 0.05,
+    "rolloff.corner": 120.0,
+    "rolloff.damping": 0.7,
+}
+# A controller that is unstable itself, which the loop needs: its phase turns the other way.
+LOW_ORDER = {
+    "alpha1[1]": -8.1645,
+    "alpha0[1]": 147750.0,
+    "B[1.1,payload.acceleration]": -313410000.0,
+    "B[1.1,payload.velocity]": -10873000000.0,
+    "B[1.1,payload.displacement]": -15264000000000.0,
+    "B[1.2,payload.acceleration]": 7646900000.0,
+    "B[1.2,payload.velocity]": 15249000000000.0,
+    "B[1.2,payload.displacement]": -62728000000.0,
+}
+VELOCITY = "payload.velocity"
+OUTPUTS = {
+    "payload_rms": "payload.displacement",
+    "velocity_rms": "payload.velocity",
+    "torque_rms": "motor.torque",
+    "speed_rms": "motor.speed",
+    "haul_rms": "drum.haul",
+    "tension_rms": "rope.tension",
+    "current_rms": "motor.current",
+}
+PLANT: Mapping[str, object] = {
+    "payload.mass": "20 %",
+    "stiffness": "20 %",
+    "delay": Uniform("5 ms", "60 ms"),
+    "winch.motor.inertia": "10 %",
+    "payload.area": "30 %",
+    "winch.gearbox.ratio": "2 %",
+    "sensors.mru.delay": Uniform("0 ms", "80 ms"),
+}
+CRANE: Mapping[str, object] = {
+    **PLANT,
+    "sensors.mru.heave_filter_period": Uniform("60 s", "200 s"),
+    "sensors.mru.noise_bandwidth": Uniform(0.5, 2.0),
+    "sensors.mru.noise_fraction": Uniform(0.05, 0.3),
+    "sensors.load_cell.bandwidth": Uniform("3 Hz", "8 Hz"),
+    "sensors.payload.velocity_noise": "50 %",
+    "sensors.payload.bandwidth": "20 %",
+}
+SLIGHT = {"payload.mass": "0.5 %"}
+
+
+def crane() -> Case:
+    return load_case("subsea-crane").replace({"rope.masses": 5})
+
+
+def late_thesis() -> Case:
+    """The thesis's winch with all sensors, its telemetry late, its payload's velocity noisy."""
+    return load_case("thesis-1975").replace(
+        {
+            "sensors.telemetry.delay": 0.025,
+            "sensors.mru": {"delay": 0.02, "noise_floor": 0.02},
+            "sensors.payload.velocity_noise": 1e-3,
+        }
+    )
+
+
+QUESTIONS = {
+    "crane, combined": (crane, "combined", COMBINED, CRANE, "payload.velocity_gain"),
+    "crane, tension": (crane, "constant-tension", TENSION, CRANE, "tension.gain"),
+    "crane, corner": (crane, "combined", COMBINED, SLIGHT, "rolloff.corner"),
+    "thesis, integral": (late_thesis, "payload-feedback-integral", INTEGRAL, PLANT, "a1"),
+    "thesis, low order": (late_thesis, "low-order-2", LOW_ORDER, SLIGHT, "alpha1[1]"),
+}
+
+
+def alone(engine: FrequencyEngine, row: FloatArray) -> Assessment | None:
+    """The same controller on the same case through state space; None if it is unstable."""
+    own = fixed_design(engine.design)
+    moved = engine.spread.gains(row)
+    values = [moved.get(name, value) for name, value in zip(own.names, own.values, strict=True)]
+    return replace(own, values=tuple(values), drag=None).assessment(engine.spread.case_at(row))
+
+
+def with_drag(view: Assessment, coefficient: float) -> Assessment:
+    """The loop with a drag that is given."""
+    return Assessment(
+        view._bare,
+        view.controller,
+        view.disturbances,
+        drag=view._drag,
+        coefficient=coefficient,
+    )
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("name", QUESTIONS)
+def test_sweep_of_a_structure_is_one_by_one_evaluation(name: str) -> None:
+    make, structure, parameters, vary, gain = QUESTIONS[name]
+    case = make()
+    design = structure_design(case, structure, parameters)
+    spread = Spread({**vary, f"gains.{gain}": "5 %"})
+    hook = HookMotion.from_case(case)
+    nodes = spectral_nodes(hook.band[0], 60.0, splits=hook.splits, per_panel=5)
+    close = FrequencyEngine(design, spread, metrics=[*OUTPUTS, "drag"], nodes=nodes)
+    own = FrequencyEngine(design, spread, metrics=[*OUTPUTS, "max_sensitivity"])
+    rows = close.spread.sample(4, seed=2)
+    found, free = close.evaluate(rows), own.evaluate(rows)
+    assert own.rows.unresolved == 0
+    # A free controller's numbers of 1e13 leave fewer digits to the state space.
+    digits = 3e-8 if structure.startswith("low-order") else 1e-10
+    assert found["stable"].any()
+    for k, row in enumerate(rows):
+        view = alone(close, row)
+        assert bool(found["stable"][k]) == bool(free["stable"][k]) == (view is not None)
+        if view is None:
+            continue
+        if view._drag is not None:
+            quadratic = view._drag.quadratic
+
+            def velocity(C: float, view: Assessment = view) -> float:
+                return float(np.sqrt(solved_variance(with_drag(view, C), VELOCITY, nodes)))
+
+            C = consistent_drag(quadratic, velocity, tolerance=1e-13)
+            assert found["drag"][k] == pytest.approx(C, rel=1e-10)
+        held = with_drag(view, float(found["drag"][k])) if view._drag is not None else view
+        for metric, output in OUTPUTS.items():
+            expected = np.sqrt(solved_variance(held, output, nodes))
+            assert found[metric][k] == pytest.approx(expected, rel=digits), metric
+            assert free[metric][k] == pytest.approx(view.sigma(output), rel=1e-7), metric
+        assert free["max_sensitivity"][k] == pytest.approx(view.max_sensitivity, rel=10.0 * digits)
