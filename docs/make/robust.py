@@ -68,8 +68,8 @@ def minimax(starts: int, draws: int) -> None:
             ends.append(solved.objective if good else np.inf)
         reached = int(np.sum(np.array(ends) < min(ends) + REACHED))
         print(
-            f"27 scenarios: a start: median {np.median(seconds):.2f} s, longest {max(seconds):.2f} s; "
-            f"{int(np.isfinite(ends).sum())} of {len(ends)} converged, {reached} at the best"
+            f"27 scenarios: a start: median {np.median(seconds):.2f} s, "
+            f"longest {max(seconds):.2f} s; {int(np.isfinite(ends).sum())} of {len(ends)} converged, {reached} at the best"
         )
         began = time.perf_counter()
         found = search(problem, starts, 0)

@@ -136,7 +136,9 @@ def _required(
         return {}
     # What each of them comes to there; one that the others spare is not asked for more.
     values = {
-        lim.name: (lim, lim.measure(assessments[0])) for lim in problem.limits if lim.name in binding
+        lim.name: (lim, lim.measure(assessments[0]))
+        for lim in problem.limits
+        if lim.name in binding
     }
     return {name: value for name, (lim, value) in values.items() if lim.use(value) > 1.0}
 
@@ -150,7 +152,9 @@ def _binding(problem: Problem, solved: Solution) -> list[str]:
     (assessment,), _ = assess(problem, solved, Goal.SEA)
     uses = {lim.name: lim.use(lim.measure(assessment)) for lim in problem.limits if lim.drive}
     names = [name for name, use in uses.items() if use > 1.0 - _BINDING]
-    return sorted(names or [max(uses, key=lambda n: uses[n])], key=lambda n: -abs(solved.prices[0][n]))
+    return sorted(
+        names or [max(uses, key=lambda n: uses[n])], key=lambda n: -abs(solved.prices[0][n])
+    )
 
 
 def _begins(free: Tuning) -> list[FloatArray]:

@@ -68,10 +68,8 @@ def optimise_gains(
         values = list(tuning.parameters.values())
         problem = question.problem
         ends = [s.end for s in sorted(tuning.starts, key=lambda s: s.cost) if s.converged]
-        guesses = [values, *ends[:_RESUMED]]
-        again = tuning_of(
-            problem, search(problem, 1, seed, guesses, progress, only_guesses=True)
-        )
+        guesses = [values, *([float(v) for v in end] for end in ends[:_RESUMED])]
+        again = tuning_of(problem, search(problem, 1, seed, guesses, progress, only_guesses=True))
         if not again.ok and tuning.ok:
             again = tuning_of(problem, search(problem, starts, seed, [values], progress))
         tuning = replace(again, starts=tuning.starts, agreed=tuning.agreed)

@@ -49,10 +49,10 @@ class Dual:
     def __sub__(self, other: Any) -> Dual:
         if isinstance(other, Dual):
             return Dual(self.value - other.value, self.slope - other.slope)
-        return self + (-other)
+        return self.__add__(-other)
 
     def __rsub__(self, other: Any) -> Dual:
-        return (-self) + other
+        return (-self).__add__(other)
 
     def __mul__(self, other: Any) -> Dual:
         if isinstance(other, Dual):

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -67,9 +67,7 @@ class LoopBlocks:
     yu: ComplexArray
 
     @classmethod
-    def of(
-        cls, problem: Problem, response: PlantResponse, outputs: Sequence[str]
-    ) -> LoopBlocks:
+    def of(cls, problem: Problem, response: PlantResponse, outputs: Sequence[str]) -> LoopBlocks:
         """Return the blocks of a response for some outputs and the problem's disturbances."""
         z = [response.outputs.index(name) for name in outputs]
         w = [response.disturbances.index(d.name) for d in problem.disturbances]
@@ -275,9 +273,7 @@ class LoopResponses:
             ]
         )
         size = len(rows), -1
-        slope = 2.0 * (
-            self._command_slope.reshape(self.count, -1) @ adjoint.reshape(size).T
-        )
+        slope = 2.0 * (self._command_slope.reshape(self.count, -1) @ adjoint.reshape(size).T)
         return Dual(value, slope.real)
 
     def curvature(self, row: int, weights: FloatArray) -> FloatArray:
@@ -392,7 +388,7 @@ class LoopNumbers:
         found = []
         for i, d in enumerate(self.differences):
             at, _ = refine_minima(
-                lambda w, i=i: np.abs(value_of(fresh(w, False).difference(i))),
+                partial(_size, fresh, i),
                 self.omega,
                 np.abs(value_of(d)),
                 np.abs(value_of(d)) < _CLOSE * max(self.module_margin, _LEAST_MARGIN),
@@ -413,7 +409,7 @@ class LoopNumbers:
         for i, d in enumerate(self.differences):
             gain = value_of(d) - 1.0
             at = crossings(
-                lambda w, i=i: _gain(fresh(w, False), i).imag,
+                partial(_height, fresh, i),
                 self.omega,
                 gain.imag,
                 np.abs(gain) > _FAINT,
@@ -439,7 +435,7 @@ class LoopNumbers:
         found: list[Any] = []
         for i, d in enumerate(self.differences):
             size = np.abs(value_of(d) - 1.0) - 1.0
-            at = crossings(lambda w, i=i: np.abs(_gain(fresh(w, False), i)) - 1.0, self.omega, size)
+            at = crossings(partial(_excess, fresh, i), self.omega, size)
             loop = self._padded(fresh(at, isinstance(d, Dual)).difference(i) - 1.0)
             gain = value_of(loop)
             turn = np.mod(np.angle(-gain), 2.0 * np.pi)
@@ -466,8 +462,10 @@ class LoopNumbers:
         rows = [self._outputs.index(name) for name, _ in keys]
         every = self._cost.moments(rows, [self._weights[order] for _, order in keys])
         every = self._padded(every)
-        return {key: every[k : k + 1] if isinstance(every, Dual) else every[..., k : k + 1]
-                for k, key in enumerate(keys)}
+        return {
+            key: every[k : k + 1] if isinstance(every, Dual) else every[..., k : k + 1]
+            for k, key in enumerate(keys)
+        }
 
     def moment(self, output: str, order: int) -> Any:
         """Return the spectral moment m_order of `output`, (1,)."""
@@ -518,6 +516,21 @@ def _gain(loop: LoopResponses, index: int) -> ComplexArray:
     return np.asarray(value_of(loop.difference(index)) - 1.0)
 
 
+def _size(fresh: Fresh, index: int, omega: FloatArray) -> FloatArray:
+    """Return |1 + L|, (k,)."""
+    return np.abs(1.0 + _gain(fresh(omega, False), index))
+
+
+def _height(fresh: Fresh, index: int, omega: FloatArray) -> FloatArray:
+    """Return Im L, (k,)."""
+    return _gain(fresh(omega, False), index).imag
+
+
+def _excess(fresh: Fresh, index: int, omega: FloatArray) -> FloatArray:
+    """Return |L| - 1, (k,)."""
+    return np.abs(_gain(fresh(omega, False), index)) - 1.0
+
+
 def _rate(fresh: Fresh, omega: FloatArray, index: int) -> ComplexArray:
     """Return dL/d omega by central differences, (k,)."""
     ends = [_gain(fresh(omega * (1.0 + step), False), index) for step in (_SHIFT, -_SHIFT)]
@@ -537,8 +550,9 @@ def _times(a: ComplexArray, b: ComplexArray) -> ComplexArray:
 def _inverse(a: ComplexArray) -> ComplexArray:
     """Return the inverse of matrices on the first two axes."""
     if len(a) == 1:
-        return 1.0 / a
+        return np.asarray(1.0 / a)
     if len(a) == 2:
         determinant = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]
-        return np.array([[a[1, 1], -a[0, 1]], [-a[1, 0], a[0, 0]]]) / determinant
-    return np.moveaxis(np.linalg.inv(np.moveaxis(a, (0, 1), (-2, -1))), (-2, -1), (0, 1))
+        return np.asarray(np.array([[a[1, 1], -a[0, 1]], [-a[1, 0], a[0, 0]]]) / determinant)
+    found: ComplexArray = np.linalg.inv(np.moveaxis(a, (0, 1), (-2, -1))).astype(np.complex128)
+    return np.moveaxis(found, (-2, -1), (0, 1))

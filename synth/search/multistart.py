@@ -25,7 +25,10 @@ Progress = Callable[[str, int, int], None]
 
 AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
 _ENOUGH, _MOST = 4, 0.7  # starts, and share of all, that agree on the best answer: no more needed
-_NEAR, _BESIDE = 3e-3, 0.03  # of log cost and parameters, relative: descents on their way to one end
+_NEAR, _BESIDE = (
+    3e-3,
+    0.03,
+)  # of log cost and parameters, relative: descents on their way to one end
 _POLISHED = 6  # distinct answers that are polished at most
 _RESERVE = 16  # further starts for a search of which none arrived
 _VIOLATION = 3  # starts of the least violation

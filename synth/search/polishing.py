@@ -1,7 +1,7 @@
 """Descent to an optimum on nodes that follow the loop, and the assessment of where it ended.
 
-    start -> nodes for its poles -> descent -> nodes for the new poles -> ... -> Solution
-          -> margins where they are measured -> assessment -> excess over the limits
+start -> nodes for its poles -> descent -> nodes for the new poles -> ... -> Solution
+      -> margins where they are measured -> assessment -> excess over the limits
 """
 
 from __future__ import annotations
@@ -167,7 +167,10 @@ def polish(
         if sound:
             assessments, overs = _measured(family, found, goal, relaxed)
             excess = max([0.0, *overs.values()])
-            if best is None or (excess > KEPT, found.objective) < (best[2] > KEPT, best[0].objective):
+            if best is None or (excess > KEPT, found.objective) < (
+                best[2] > KEPT,
+                best[0].objective,
+            ):
                 best = found, assessments, excess
             if excess <= KEPT or excess > _HAIR:
                 break

@@ -166,12 +166,16 @@ class Programme:
 
     def _values(self, x: FloatArray) -> FloatArray:
         own = x[: self._unit.size]
-        return np.where(self._logarithmic, np.exp(np.where(self._logarithmic, own, 0.0)), own * self._unit)
+        return np.where(
+            self._logarithmic, np.exp(np.where(self._logarithmic, own, 0.0)), own * self._unit
+        )
 
     def _placed(self, values: Values) -> FloatArray:
         """Return parameters as the programme's vector has them."""
         given = np.asarray(values, dtype=np.float64)
-        return np.where(self._logarithmic, np.log(np.where(self._logarithmic, given, 1.0)), given / self._unit)
+        return np.where(
+            self._logarithmic, np.log(np.where(self._logarithmic, given, 1.0)), given / self._unit
+        )
 
     def _coefficients(self, x: FloatArray) -> tuple[float | None, ...]:
         every, drags = range(len(self.family.scenarios)), self._drag_at
@@ -209,9 +213,7 @@ class Programme:
     ) -> tuple[FloatArray, dict[tuple[int, str], float]]:
         """Return the log costs and the largest row of each limit at a vector; see `solve`."""
         costs, rows, _ = self._numbers(x, tighten, slopes=False)
-        worst = {
-            key: float(np.max(row, initial=-np.inf)) for key, row in rows if key[1] != _SLOW
-        }
+        worst = {key: float(np.max(row, initial=-np.inf)) for key, row in rows if key[1] != _SLOW}
         return np.array([cost.item() for cost in costs]), worst
 
     def solve(
@@ -235,7 +237,9 @@ class Programme:
             start,
             low,
             high,
-            logarithmic=np.append(self._logarithmic, np.ones(self.size - self._unit.size, np.bool_)),
+            logarithmic=np.append(
+                self._logarithmic, np.ones(self.size - self._unit.size, np.bool_)
+            ),
             tolerance=self._tolerance,
             most=self._most,
         )
@@ -522,9 +526,7 @@ def _point(values: FloatArray, log_drag: float | None, slopes: bool) -> Point:
     return Point(values=[float(v) for v in values], drag=drag, slopes=slopes)
 
 
-def _variable(
-    value: float | None, at: int, count: int, extra: float | None, slopes: bool
-) -> Any:
+def _variable(value: float | None, at: int, count: int, extra: float | None, slopes: bool) -> Any:
     """Return one of the variables that follow the parameters, with its own slope."""
     if value is None:
         return None

@@ -173,9 +173,7 @@ def descend(
             if weight >= _HEAVY or slack > _KEPT:
                 return _ended(x, at, prices, equation_prices, INFEASIBLE, k)
         merit = at.objective + weight * at.broken
-        ahead, share = _ahead(
-            evaluate, stable, x, step, merit, weight, promised, at, hessian, box
-        )
+        ahead, share = _ahead(evaluate, stable, x, step, merit, weight, promised, at, hessian, box)
         if ahead is None:
             room *= 0.2
             stalled += 1
@@ -239,7 +237,10 @@ def _quadratic(
     e = equations.size
     H = np.zeros((n + 1, n + 1))
     # In shares of the reach, so that the sizes of the variables do not matter.
-    H[:n, :n], H[n, n] = _convex(hessian * np.outer(reach, reach), at.curvature * np.outer(reach, reach)), _SLACK
+    H[:n, :n], H[n, n] = (
+        _convex(hessian * np.outer(reach, reach), at.curvature * np.outer(reach, reach)),
+        _SLACK,
+    )
     f = np.append(at.slope * reach, weight)
     A = np.zeros((near.size + 2 * e, n + 1))
     A[: near.size, :n] = at.jacobian[near] * reach

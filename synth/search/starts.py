@@ -195,7 +195,9 @@ def _merits(family: FamilyProblem, points: FloatArray) -> list[FloatArray]:
         weights = [moment_weights(family.scenarios[i].problem, nodes) for i in group]
         for begin in range(0, len(points), _AT_ONCE):
             some = slice(begin, begin + _AT_ONCE)
-            own = [column[:, None] for column in np.array([first.values(p) for p in points[some]]).T]
+            own = [
+                column[:, None] for column in np.array([first.values(p) for p in points[some]]).T
+            ]
             drag = None
             if problem.drag is not None:
                 drag = _consistent(problem, own, parts[0], weights[0])

@@ -31,9 +31,7 @@ def solved(request):
 def near(problem, answer: Solution, factors) -> Solution:
     with one_thread():
         values = answer.values * np.array(factors)
-        return settle(
-            problem, values, answer.coefficients, reference=answer.values, fine=True
-        )
+        return settle(problem, values, answer.coefficients, reference=answer.values, fine=True)
 
 
 @pytest.mark.parametrize("factors", [(1.002, 0.998, 1.0), (0.97, 1.03, 1.02)])
