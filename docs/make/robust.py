@@ -69,7 +69,8 @@ def minimax(starts: int, draws: int) -> None:
         reached = int(np.sum(np.array(ends) < min(ends) + REACHED))
         print(
             f"27 scenarios: a start: median {np.median(seconds):.2f} s, "
-            f"longest {max(seconds):.2f} s; {int(np.isfinite(ends).sum())} of {len(ends)} converged, {reached} at the best"
+            f"longest {max(seconds):.2f} s; {int(np.isfinite(ends).sum())} of {len(ends)} "
+            f"converged, {reached} at the best"
         )
         began = time.perf_counter()
         found = search(problem, starts, 0)

@@ -191,7 +191,8 @@ class LoopResponses:
     @cached_property
     def _command_slope(self) -> ComplexArray:
         """Slopes of the commands by each variable, (n, m, nw, k)."""
-        assert self._law_slope is not None and self._heard is not None
+        assert self._law_slope is not None
+        assert self._heard is not None
         m, points = len(self.inverse), self._heard.shape[-1]
         found = np.zeros((self.count, m, self._heard.shape[1], points), np.complex128)
         for a, parts in enumerate(self._law_slope):

@@ -30,6 +30,7 @@ _NEAR, _BESIDE = (
     0.03,
 )  # of log cost and parameters, relative: descents on their way to one end
 _POLISHED = 6  # distinct answers that are polished at most
+_MORE, _MOST_MORE = 2, 12  # times the starts, and at most, that are tried roughly beside them
 _RESERVE = 16  # further starts for a search of which none arrived
 _VIOLATION = 3  # starts of the least violation
 _BEST_STARTS = 6  # of the search for the best of one member alone
@@ -148,7 +149,8 @@ def search(
     begins = [guess for guess in kept if family.stable(guess)] if only_guesses else []
     if not begins:
         # The reserve is picked together with the starts, so that it lies apart from them.
-        begins = begin_points(family, starts + _RESERVE, seed, kept)
+        wanted = max(starts, len(kept)) + min(_MORE * starts, _MOST_MORE) + _RESERVE
+        begins = begin_points(family, wanted, seed, kept)
     if not begins:
         return Found(solved=None)
     reference = briskest(family, begins)
@@ -194,35 +196,68 @@ def _descents(
     guesses: int,
     tell: Progress,
 ) -> tuple[tuple[Start, ...], list[Solution]]:
-    """Return the records of the starts, and the answers of those that arrived."""
-    records: list[Start] = []
-    first: list[Solution] = []
-    rough: list[tuple[Solution, Solution]] = []  # where a descent came by, and where it ended
+    """Return the records of the starts, and the answers of those that arrived.
+
+    All of them go roughly where they lead, which is cheap; of the places where they come by, the
+    best few are gone to the end of.
+    """
     drags = start_coefficients(family)
-    count = min(starts, len(begins))
+    places: list[_Place] = []
+    count = min(max(starts, guesses) + min(_MORE * starts, _MOST_MORE), len(begins))
     for k, begin in enumerate(begins):
-        if k >= count and first:
+        if k >= count and any(place.arrived for place in places):
             break  # the reserve is for a search of which no start has arrived yet
-        best = min((s.objective for s in first), default=np.inf)
-        agreed = sum(1 for s in first if s.objective - best <= AGREE)
-        if agreed >= max(_ENOUGH, _MOST * len(first)) and k >= guesses:
+        if k >= guesses and _agreed(places):
             break
         tell("starts", min(k, count - 1), count)
         coarse = settle(family, begin, drags, reference=reference, rounds=1)
-        solved = next((end for came, end in rough if _same(family, came, coarse)), None)
-        if solved is None and np.isfinite(coarse.objective) and coarse.message != INFEASIBLE:
-            values, found = coarse.values, coarse.coefficients
-            solved = settle(family, values, found, reference=reference, exact=True)
-            rough.append((coarse, solved))
-        solved = solved or coarse
-        stable = bool(
-            np.isfinite(solved.objective) and family.stable(solved.values, solved.coefficients)
-        )
-        records.append(Start.of(begin, solved, stable=stable))
-        if stable and solved.converged:
-            first.append(solved)
-    tell("starts", count, count)
+        place = next((p for p in places if _same(family, p.coarse, coarse)), None)
+        if place is None:
+            place = _Place(coarse)
+            places.append(place)
+        place.begins.append(begin)
+    ranked = sorted(places, key=lambda p: (not p.arrived, p.coarse.objective))
+    for k, place in enumerate(ranked):
+        hopeless = place.coarse.message == INFEASIBLE or not np.isfinite(place.coarse.objective)
+        if hopeless or (k >= starts and any(p.solved is not None for p in ranked[:k])):
+            continue
+        tell("descents", k, min(starts, len(ranked)))
+        values, found = place.coarse.values, place.coarse.coefficients
+        end = settle(family, values, found, reference=reference, exact=True)
+        if end.converged and family.stable(end.values, end.coefficients):
+            place.solved = end
+    tell("descents", 1, 1)
+    records, first = [], []
+    for place in places:
+        end = place.solved or place.coarse
+        stable = bool(np.isfinite(end.objective) and family.stable(end.values, end.coefficients))
+        arrived = place.solved is not None
+        records += [Start.of(begin, end, stable=stable and arrived) for begin in place.begins]
+        first += [end] * (len(place.begins) if arrived else 0)
     return tuple(records), first
+
+
+class _Place:
+    """A place where descents come by: the rough answer, who came by, and where it leads."""
+
+    def __init__(self, coarse: Solution) -> None:
+        self.coarse = coarse
+        self.begins: list[FloatArray] = []
+        self.solved: Solution | None = None
+
+    @property
+    def arrived(self) -> bool:
+        return self.coarse.converged
+
+
+def _agreed(places: Sequence[_Place]) -> bool:
+    """Return whether so many descents agree on the best place that no more are needed."""
+    arrived = [place for place in places if place.arrived]
+    if not arrived:
+        return False
+    best = min(arrived, key=lambda p: p.coarse.objective)
+    total = sum(len(place.begins) for place in arrived)
+    return len(best.begins) >= max(_ENOUGH, _MOST * total)
 
 
 def _same(family: FamilyProblem, one: Solution, other: Solution) -> bool:

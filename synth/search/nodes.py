@@ -14,6 +14,7 @@ from ..question import Problem
 _SLOW_SIDE = 8  # nodes per decade below everything that moves
 _FAST_SIDE = 24  # ... and above it, where a loop may cross over narrowly with the wrong gains
 _INSIDE = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)  # nodes about the edge of a limit's band
+_AT_ZERO = 1e-9  # relative size of a pole at zero, which no panel need shrink towards
 _ON_AXIS = 1e-9  # relative distance of a pole from the axis below which no node can resolve it
 _COARSE, _FINE = (6, 3.0), (10, 4.0)  # nodes a panel and panels a decade: 1e-6, 1e-8 of an rms
 
@@ -25,6 +26,7 @@ def cost_nodes(problem: Problem, poles: ComplexArray, *, fine: bool = False) -> 
     that nothing needs to be evaluated to know them.
     """
     every = np.concatenate([poles, problem.plant.poles()])
+    every = every[np.abs(every) > _AT_ZERO * np.abs(every).max(initial=1.0)]
     low, high, half_line = integration_band(problem.disturbances, every)
     per_panel, per_decade = _FINE if fine else _COARSE
     return spectral_nodes(

@@ -25,6 +25,7 @@ _PER_DECADE, _FINE_PER_DECADE = 40, 60  # margin nodes
 _ROUNDS, _FINE_ROUNDS = 3, 4  # of a descent with new nodes
 _SETTLED, _FINE_SETTLED = 1e-4, 1e-6  # change of the log objective below which nodes are right
 _HAIR = 2e-2  # relative excess that tightening may still mend
+_NEARLY_ZERO = 1e-3  # of the lowest frequency
 _HAIRS = 3  # rounds of it
 
 
@@ -61,7 +62,10 @@ def stated(
         poles = scenario.problem.loop_poles(own, drag)
         if fine and any(shaken.plant.delays) and any(d.band is None for d in shaken.disturbances):
             # A delay ripples the spectrum of white noise far above all poles.
-            nodes.append(shaken.assess(own, drag).quadrature(shaken.outputs))
+            found = shaken.assess(own, drag).quadrature(shaken.outputs)
+            # The plant's blocks may have a pole at zero, where the closed loop has none.
+            least = _NEARLY_ZERO * float(found.omega[found.omega > 0.0].min())
+            nodes.append(replace(found, omega=np.maximum(found.omega, least)))
         else:
             nodes.append(cost_nodes(shaken, poles, fine=fine))
         per_decade = _FINE_PER_DECADE if fine else _PER_DECADE
