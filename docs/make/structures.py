@@ -28,7 +28,7 @@ from pathlib import Path
 from stored import docs_folder, read_rows, study_parser, write_rows
 
 from models import Case, PhysicsWarning, load_case
-from synth.design import StructureDesign, optimise_structure
+from synth.design import Design, optimise_gains
 
 DELAYS = (0.1, 0.05, 0.025, 0.0)
 LENGTHS = (2000.0, 1000.0, 300.0, 100.0)
@@ -131,7 +131,7 @@ def case_of(row: Row) -> Case:
     return load_case("thesis-1975-rope").replace({**changes, "rope.length": row.length})
 
 
-def filled(row: Row, design: StructureDesign, seconds: float) -> Row:
+def filled(row: Row, design: Design, seconds: float) -> Row:
     """Return a row with what a design says."""
     margins, torque = design.margins, design.limits.get("motor.torque.peak")
     checked = design.verification
@@ -222,7 +222,7 @@ def guesses(row: Row, rows: Mapping[tuple[str, str, str, float], Row]) -> list[d
 def answered(row: Row, near: Sequence[Mapping[str, float]], starts: int) -> Row:
     """Return a row filled by a search."""
     began = time.process_time()
-    design = optimise_structure(case_of(row), row.structure, starts=starts, guesses=near)
+    design = optimise_gains(case_of(row), row.structure, starts=starts, guesses=near)
     return filled(row, design, time.process_time() - began)
 
 

@@ -12,7 +12,14 @@ from ..basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .control import HEARD, Controller, Measurement, Recursion, holds_brake, recursion_of
     from .mru import Bias, MruModel, MruState, check_biases
-    from .plant import MEASURED, SAMPLE_TIME, sensed_plant, sensed_spectra, with_sensors
+    from .plant import (
+        MEASURED,
+        SAMPLE_TIME,
+        sensed_line_at,
+        sensed_plant,
+        sensed_spectra,
+        with_sensors,
+    )
     from .sensing import NOISE, SensorModel
     from .telemetry import Late, TelemetrySchedule, check_late
 else:

@@ -107,9 +107,10 @@ def case_argument(*, optional: bool = False) -> Declaration:
 
 def design_argument(parser: argparse._ActionsContainer) -> None:
     """Add the design, a file or gains; `commands.given_design` reads it."""
-    text("--design", "FILE", "a design that was written (design.yaml, combined.yaml)")(parser)
-    told = "or gains (default: those that the case has in use)"
+    text("--design", "FILE", "a design that was written (design.yaml)")(parser)
+    told = "or gains, or parameters by name (default: the gains that the case has in use)"
     text("--gains", "A=..,a=..,a1=..,a2=..", told)(parser)
+    text("--structure", "NAME", "whose parameters these are (default: payload-feedback)")(parser)
 
 
 CASE = case_argument()

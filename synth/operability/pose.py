@@ -11,13 +11,11 @@ from models.basics import InputError
 from models.case import Case
 from models.plant import LinearPlant, PlantData
 
-from ..design import GainDesign, StructureDesign
+from ..design import Design
 from ..loop import Disturbance, DragElement, LinearController
-from ..question import HOOK, PAYLOAD, pose, pose_structure
+from ..question import HOOK, PAYLOAD, pose
 from .criteria import STABILITY, Criterion, case_criteria, outputs_of
 from .systems import VELOCITY, HeldSystem, LoopSystem, PerfectSystem, System
-
-Design = GainDesign | StructureDesign
 
 _HELD = {PAYLOAD, VELOCITY, "rope.tension"}
 _WINCH = ("motor.torque", "motor.speed", "motor.current", "motor.voltage")
@@ -81,25 +79,18 @@ def pose_operability(
         changes["rope.length"] = length
     reported = case.variant(changes)
     same = reported.rope.length == case.rope.length
-    question = pose(reported, source.masses if same and not isinstance(source, Case) else None)
-    loop_plant: LinearPlant = question.plant
+    if isinstance(source, Case):
+        question = pose(reported)
+    elif source.margins is None:
+        raise InputError("operability: the design has no stabilising controller")
+    else:
+        question = pose(reported, source.structure, source.masses if same else None)
     noises: tuple[Disturbance, ...] = ()
     loop_parts: tuple[LinearPlant, LinearController, DragElement | None] | None = None
-    if isinstance(source, GainDesign):
-        if source.margins is None:
-            raise InputError("operability: the design has no stabilising gains")
-        assessment = question.assess(source.gains, 0.0)
-        loop_parts = (question.plant, assessment.controller, question.drag)
-    elif isinstance(source, StructureDesign):
-        if not source.parameters:
-            raise InputError("operability: the design has no controller")
-        posed = pose_structure(reported, source.structure, source.masses if same else None)
-        law = posed.law
-        controller = law.controller([source.parameters[p.name] for p in law.parameters])
-        problem = posed.problem(())
+    if not isinstance(source, Case):
+        controller, problem = question.controller(source.parameters), question.problem
         noises = tuple(d for d in problem.disturbances if d.name != HOOK)
-        loop_parts = (problem.plant, controller, problem.drag)
-        loop_plant = problem.plant
+        loop_parts = (question.plant, controller, question.drag)
     of_case = case_criteria(reported, question.plant)
     every = (STABILITY, *wanted, *of_case)
     held = tuple(c for c in every if set(c.outputs) <= _HELD)
@@ -134,7 +125,7 @@ def pose_operability(
         ),
         loop=loop,
         criteria={"held": held, "perfect": winch, "loop": every},
-        plant=loop_plant,
+        plant=question.plant,
     )
 
 

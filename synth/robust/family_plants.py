@@ -51,7 +51,6 @@ class FamilyPlants:
         self._questions: dict[Member, DesignQuestion] = {}
         self._scenarios: dict[Member, FamilyLoop] = {}
         self._plants: dict[tuple[object, ...], LinearPlant] = {}
-        self._sensed = structure != PAYLOAD_FEEDBACK
 
     @cached_property
     def nominal(self) -> DesignQuestion:
@@ -61,8 +60,6 @@ class FamilyPlants:
     @cached_property
     def law(self) -> ParametrisedController:
         """The controller's law, bound to the nominal plant."""
-        if not self._sensed:
-            return self.nominal.structure.bind(self.nominal.plant)
         structure = self.structure
         if isinstance(structure, str):
             structure = structure_named(structure, self.nominal.case)
@@ -72,7 +69,13 @@ class FamilyPlants:
     def guesses(self) -> list[list[float]]:
         """The gains in use, if the case has any that are this structure's."""
         gains = self.family.case.gains
-        return [] if self._sensed or gains is None else [[gains.a, gains.a1, gains.a2]]
+        thesis = self.structure == PAYLOAD_FEEDBACK
+        return [] if gains is None or not thesis else [[gains.a, gains.a1, gains.a2]]
+
+    @cached_property
+    def _sensed(self) -> bool:
+        """Whether more than the payload is heard, or more than the sea shakes what is heard."""
+        return self.structure != PAYLOAD_FEEDBACK or len(self.nominal.spectra) > 1
 
     @property
     def most_masses(self) -> int:
@@ -86,7 +89,7 @@ class FamilyPlants:
     def question(self, member: Member) -> DesignQuestion:
         """Return the question of a member."""
         if member not in self._questions:
-            self._questions[member] = pose(self.family.case_at(member), self.masses)
+            self._questions[member] = pose(self.family.case_at(member), masses=self.masses)
         return self._questions[member]
 
     def scenario(self, member: Member) -> FamilyLoop:

@@ -23,11 +23,12 @@ from models.basics import (
     FrequencyAxis,
     IndexArray,
     Quadrature,
+    White,
 )
 from models.plant import lump_rope
 from models.spread import Spread
 
-from ..design import GainDesign, StructureDesign
+from ..design import Design
 from ..question import SampledNoise
 from .chain import BLOCK, VELOCITY, ChainLoops, Shaken
 from .kernel import SpringLoops, spring_peaks
@@ -52,7 +53,6 @@ _DRAG_ROUNDS = 60
 _AGREES = 3e-13  # of the logarithm of C
 _CLOSE = 1e-10  # ... and what will do
 _STEP = 1.5  # of it, at most
-_SLOWEST = 0.1  # of the design's own poles, that variances with errors of slow sensors begin at
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -112,7 +112,7 @@ class DesignRows:
 
     def __init__(
         self,
-        design: GainDesign | StructureDesign,
+        design: Design,
         spread: Spread,
         metrics: Sequence[FrequencyMetric],
         *,
@@ -124,7 +124,7 @@ class DesignRows:
         self.design, self.spread, self.case = design, spread, case
         self.metrics = tuple(metrics)
         self.accuracy = accuracy
-        self.law = DesignLaw(design, case)
+        self.law = DesignLaw(design)
         self.lumps = lump_rope(design.masses, case.rope.lumping)
         self.sea = SeaRows(case, spread)
         self.given = None if nodes is None else SweepNodes.of(nodes, self.sea.density)
@@ -138,7 +138,7 @@ class DesignRows:
         )
         self._peaks = any(m.name == "max_sensitivity" for m in metrics)
         delayed = case.sensors.telemetry.delay > 0.0 or "sensors.telemetry.delay" in spread.paths
-        three = getattr(design, "structure", "payload-feedback") == "payload-feedback"
+        three = design.structure == "payload-feedback"
         self.spring = design.masses == 1 and three and not delayed and not self._noisy
 
     @property
@@ -231,7 +231,7 @@ class DesignRows:
         """What the controller hears with errors or noise, if they count."""
         sensors = self._pilots.numbers.sensors
         heard = [name for name in self.law.measurements if name in NOISE_OF]
-        return {y for y in heard if self.law.noisy and np.any(sensors[NOISE_OF[y]] > 0.0)}
+        return {y for y in heard if np.any(sensors[NOISE_OF[y]] > 0.0)}
 
     @cached_property
     def _panels(self) -> list[Panel]:
@@ -266,14 +266,8 @@ class DesignRows:
         low, high, splits = self.sea.frame()
         if not self._noisy:
             return FrequencyAxis(low, high, half_line=False), splits
-        endless = "mru.heave" in self._noisy
-        white = SampledNoise(intensity=1.0).band
-        if self._noisy - {"mru.heave"}:
-            low, high = min(low, white[0]), max(high, white[1])
-        if endless:
-            slow = min((abs(p) for p in self._poles if abs(p) > 1e-6), default=low)
-            low = min(low, _SLOWEST * slow)
-        return FrequencyAxis(low, high, half_line=endless), splits
+        noise = SampledNoise(spectrum=White().density).band
+        return FrequencyAxis(min(low, noise[0]), max(high, noise[1]), half_line=False), splits
 
     @cached_property
     def _poles(self) -> ComplexArray:
@@ -281,10 +275,7 @@ class DesignRows:
         design = self.design
         if design.margins is None:
             return np.zeros(0, dtype=np.complex128)
-        if isinstance(design, GainDesign):
-            return design.assessment.poles
-        values = [design.parameters[p.name] for p in design.posed.law.parameters]
-        return design.posed.problem(()).assess(values, design.drag).poles
+        return design.assessment.poles
 
     def _batch(self, rows: FloatArray) -> _Batch:
         numbers, quick = numbers_of(self.case, self.spread, rows)
@@ -294,7 +285,7 @@ class DesignRows:
     def _spring(self, batch: _Batch, drag: FloatArray) -> SpringLoops:
         return SpringLoops(
             batch.numbers,
-            np.stack(np.broadcast_arrays(*batch.law.values), axis=1),
+            self.law.amplifier * np.stack(np.broadcast_arrays(*batch.law.values), axis=1),
             np.where(np.isfinite(drag), drag, 0.0),
             mass_share=float(self.lumps.masses[0]),
             reference=_REFERENCE,
@@ -322,7 +313,7 @@ class DesignRows:
         Where noise goes on to infinity that of its rate may not be finite: it is then what the
         nodes of the variance make of it.
         """
-        return slice(0, 2 if output in self._second and not self._frame[0].half_line else 1)
+        return slice(0, 2 if output in self._second else 1)
 
     def _closely(self, batch: _Batch, drag: FloatArray) -> SweepNodes:
         """Return nodes for one row, its panels short near its own poles."""

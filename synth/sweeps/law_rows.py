@@ -14,12 +14,11 @@ from typing import Any
 import numpy as np
 
 from models.basics import ComplexArray, FloatArray, IndexArray, InputError
-from models.case import Case
-from models.plant import build_plant
 from models.spread import GAINS, Spread
 
-from ..design import GainDesign, StructureDesign
-from ..structures import ParametrisedController, PayloadFeedback
+from ..design import Design
+from ..question import GAINS as THESIS
+from ..structures import ParametrisedController
 from .numbers import at_rows
 
 _NUDGE = 1.01  # of a parameter, to see whether the controller's poles move with it
@@ -83,8 +82,8 @@ class DesignLaw:
 
     Parameters
     ----------
-    design, case
-        The design, and the case that its figures hold for.
+    design
+        The design.
 
     Raises
     ------
@@ -92,16 +91,12 @@ class DesignLaw:
         If the design has no controller.
     """
 
-    def __init__(self, design: GainDesign | StructureDesign, case: Case) -> None:
-        self.noisy = isinstance(design, StructureDesign)
-        self.law: ParametrisedController
-        if isinstance(design, StructureDesign):
-            if not design.parameters:
-                raise InputError(f"sweep: the design has no controller: {design.status}")
-            self.law, self._own = design.posed.law, dict(design.parameters)
-        else:
-            plant = build_plant(case, design.masses).linearise(drag=design.drag)
-            self.law, self._own = PayloadFeedback().bind(plant), dict(design.gains)
+    def __init__(self, design: Design) -> None:
+        if not design.parameters:
+            raise InputError(f"sweep: the design has no controller: {design.status}")
+        question = design.question
+        self.law, self.amplifier = question.law, question.amplifier or 1.0
+        self._own = dict(design.parameters)
         self.measurements = tuple(design.measurements)
         self._names = [p.name for p in self.law.parameters]
         poles = self._poles(self._row(self._own))
@@ -130,7 +125,8 @@ class DesignLaw:
 
     def _row(self, own: Mapping[str, Any]) -> list[Any]:
         """Return the law's parameters of named ones; the amplifier A multiplies every gain."""
-        return [own.get("A", 1.0) * own[name] for name in self._names]
+        scale = own.get("A", self.amplifier) / self.amplifier
+        return [scale * own[name] if name in THESIS else own[name] for name in self._names]
 
     def _poles(self, values: Sequence[float]) -> ComplexArray:
         A = self.law.controller([float(v) for v in values]).A

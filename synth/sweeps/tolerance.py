@@ -14,9 +14,7 @@ import numpy as np
 from models.basics import BoolArray, InputError, Share, check_range, share
 from models.spread import DRAG, GAINS, Samples, Spread, Uniform
 
-from ..design import GainDesign, StructureDesign
-from ..loop import with_drag
-from ..question import pose
+from ..design import Design
 from ..robust import GainRadius, gain_radius
 from .frequency import FrequencyEngine
 
@@ -69,7 +67,7 @@ class GainTolerance:
 
 
 def gain_tolerance(
-    design: GainDesign | StructureDesign,
+    design: Design,
     tolerance: float,
     *,
     samples: int = 2000,
@@ -119,7 +117,7 @@ def gain_tolerance(
     )
 
 
-def radius_of(design: GainDesign | StructureDesign) -> GainRadius:
+def radius_of(design: Design) -> GainRadius:
     """Return the exact radius of errors of a design's gains.
 
     Raises
@@ -129,28 +127,20 @@ def radius_of(design: GainDesign | StructureDesign) -> GainRadius:
     """
     if design.margins is None:
         raise InputError("gain tolerance: the design must be stable")
-    if isinstance(design, StructureDesign):
-        law, problem = design.posed.law, design.posed.problem(())
-        plant = problem.plant
-        if problem.drag is not None:
-            plant = with_drag(plant, problem.drag, design.drag)
-        return gain_radius(plant, law, [design.parameters[p.name] for p in law.parameters])
-    question = pose(design.sea_case, design.masses)
-    values = question.law_values(design.gains)
-    return gain_radius(design.assessment.plant, question.problem.law, values)
+    question, values = design.question, design.question.values(design.parameters)
+    return gain_radius(design.assessment.plant, question.law, values)
 
 
-def _held(design: GainDesign | StructureDesign, widths: dict[str, Uniform]) -> Spread:
+def _held(design: Design, widths: dict[str, Uniform]) -> Spread:
     """Return a spread of gains with the drag held at the design's, as the radius has it."""
-    case = getattr(design, "sea_case", design.case)
-    if case.payload.fixed_drag is None:
+    if design.sea_case.payload.fixed_drag is None:
         return Spread({**widths, DRAG: Samples([design.drag])})
     return Spread(widths)
 
 
-def _stable_at(design: GainDesign | StructureDesign, radius: GainRadius, times: float) -> bool:
+def _stable_at(design: Design, radius: GainRadius, times: float) -> bool:
     """Return whether gains `times` the way to the nearest unstable ones are stable."""
-    own = dict(design.gains if isinstance(design, GainDesign) else design.parameters)
+    own = dict(design.parameters)
     there: dict[str, float] = {
         name: own[name] + times * (radius.worst[name] * _scale(design) - own[name])
         for name in radius.names
@@ -162,10 +152,7 @@ def _stable_at(design: GainDesign | StructureDesign, radius: GainRadius, times: 
     return bool(found[0])
 
 
-def _scale(design: GainDesign | StructureDesign) -> float:
+def _scale(design: Design) -> float:
     """Return the design's unit of a gain over the law's: A may not be the question's."""
-    if isinstance(design, StructureDesign):
-        return 1.0
-    case = design.sea_case
-    amplifier = case.gains.A if case.gains is not None else 1.0
-    return float(amplifier / design.gains["A"])
+    own = design.question.amplifier
+    return 1.0 if own is None else float(own / design.parameters["A"])

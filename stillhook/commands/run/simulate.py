@@ -102,7 +102,7 @@ ARGUMENTS = (
     group(
         "the feedback's gains (default: those of the case)",
         one_of(
-            text("--design", "FILE", "the gains of a design, as in out/CASE/design.yaml"),
+            text("--design", "FILE", "a design that was written, as in out/CASE/design.yaml"),
             text("--gains", "A=..,a=..,a1=..,a2=..", "the gains"),
         ),
     ),
@@ -295,7 +295,7 @@ def _finish(
         "options": list(arguments.options),
         "hook": hook,
         "seeds": list(asked.seeds),
-        "gains": dict(design.gains) if design is not None else asked.gains,
+        "gains": dict(design.parameters) if design is not None else asked.gains,
         "command": again(arguments, case_words(arguments)),
     }
     target.finish(

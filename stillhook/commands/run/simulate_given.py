@@ -24,7 +24,7 @@ from ..given import (
 if TYPE_CHECKING:
     from models.operation import MotionSource, Scenario
     from models.simulation import SimulationOptions
-    from synth.design import GainDesign
+    from synth.design import Design
 
 _MANY = 10_000  # seeds: more than anybody wants on purpose
 _TIME = Quantity("time", 0.0, 1e8, open_low=True)
@@ -88,7 +88,7 @@ class SimulationRequest:
     seeds: range
     duration: float
     gains: Mapping[str, float] | None
-    design: GainDesign | None
+    design: Design | None
     sample_time: float | None
     how: SimulationOptions
 
@@ -220,7 +220,7 @@ def _fitting(lasting: float, hook: MotionSource | None, sample_time: float | Non
     return float(min(lasting, length - max(0.1, 2.0 * (sample_time or 0.0))))
 
 
-def _design(arguments: argparse.Namespace, case: Case) -> GainDesign | None:
+def _design(arguments: argparse.Namespace, case: Case) -> Design | None:
     if arguments.design is None:
         return None
     import sys

@@ -116,7 +116,7 @@ def test_winding_number_with_delay_is_that_of_one_loop_followed_alone() -> None:
     counts = count_unstable(loops)
     expected = []
     for row in rows:
-        question = pose(engine.spread.case_at(row), engine.design.masses)
+        question = pose(engine.spread.case_at(row), masses=engine.design.masses)
         view = question.assess({"A": 1.0, **engine.spread.gains(row)})
         law = LawMatrices.of(view.controller, view.plant)
 
