@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from models.basics import InputError
 from models.case import Case
 
 from ..loop import Assessment, LinearController, Margins
@@ -166,11 +167,6 @@ class Design:
         if not self.parameters:
             raise InputError(f"{self.structure}: the design has no controller: {self.status}")
         return self.parameters
-
-    @property
-    def controller(self) -> LinearController:
-        """The gains as a controller, u = +C y."""
-        return self.assessment.controller
 
     @property
     def measurements(self) -> tuple[str, ...]:
