@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -37,26 +36,6 @@ _QUANTITIES = {
     "store_step": _TIME,
     "lock_limit": _LENGTH,
 }
-# What `again` repeats: the option, and its default where that is not None.
-_REPEATED: tuple[tuple[str, object], ...] = (
-    ("controller", "feedback"),
-    ("scenario", "hold"),
-    ("seeds", 1),
-    ("first-seed", 0),
-    ("hours", None),
-    ("duration", None),
-    ("hook", None),
-    ("tip", None),
-    ("sine", None),
-    ("design", None),
-    ("gains", None),
-    ("sample-time", None),
-    ("step", None),
-    ("masses", None),
-    ("settle", None),
-    ("lock-limit", None),
-    ("store-step", None),
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,21 +142,6 @@ def parse_controllers(text: str) -> tuple[str, ...]:
     if len(set(names)) != len(names):
         raise InputError(f"--controller: each may be named once, got {text!r}")
     return names
-
-
-def again(arguments: argparse.Namespace, case: str, **changes: object) -> str:
-    """Return the command that does the same again, with changes; True adds an option."""
-    words = ["stillhook simulate", case]
-    for name, default in _REPEATED:
-        key = name.replace("-", "_")
-        value = changes.get(key, getattr(arguments, key))
-        if value is not None and value != default:
-            text = f"{value:g}" if isinstance(value, float) else str(value)
-            words.append(f"--{name} {shlex.quote(text)}")
-    words += [f"--option {shlex.quote(text)}" for text in arguments.options]
-    words += ["--no-compile"] * (not arguments.compiled)
-    words += [f"--{key}" for key, value in changes.items() if value is True]
-    return " ".join(words)
 
 
 def _quantity(arguments: argparse.Namespace, name: str) -> float | None:
