@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,7 @@ from models.plant import LinearPlant, PlantResponse
 
 from .claims import LimitClaim, SpectralSource
 from .demands import Demand
-from .nyquist import Curve, CurveMargins
+from .nyquist import CurveMargins, curve_margins
 from .recompute import LawMatrices, Loop, closed_matrices, moments
 from .verification import Check, agreement, failure
 from .winding import Winding, count_unstable, open_loop_poles
@@ -220,10 +220,8 @@ class CheckedLoop:
 
 def loop_margins(loop: Loop) -> CurveMargins:
     """Return the worst margins over all loops broken at an input."""
-    found = Curve(loop.broken(0), loop.marks).margins
-    for index in range(1, loop.inputs):
-        found = found.worse(Curve(loop.broken(index), loop.marks).margins)
-    return found
+    pieces = (curve_margins(loop.broken(i), loop.marks) for i in range(loop.inputs))
+    return reduce(CurveMargins.worse, pieces)
 
 
 def margin_checks(claimed: object | None, found: CurveMargins) -> list[Check]:

@@ -55,6 +55,7 @@ _RMS = 1e-6  # rms by another quadrature
 _TIME = 1e-3  # rms by a Lyapunov equation, with a Pade model for the delay
 _ROPE = 0.02  # what the distributed rope may differ by from the lumped one
 _MODAL_MASSES = 20  # of the rope on which a one-spring design is looked at for information
+_SEA_ORDER = 4  # of the sea in the time domain: a rough fit will do, as both sides see it
 _HELD_RMS = 1e-8  # of the integrals with the drum held
 _HELD_MODES = 40  # of the rope with the drum held
 _ROPE_PER_DECADE = 200  # first points of the contour on a rope with modes that no mark tells of
@@ -275,7 +276,7 @@ class _Winch:
         that of frequency and time domain, not that of the fit.
         """
         plant, law = self.coarse.plant, self.coarse.law
-        filtered = fit_shaping_filter(self.hook.density, self.hook.band)
+        filtered = fit_shaping_filter(self.hook.density, self.hook.band, _SEA_ORDER)
         rational = plant.without_delays(pade_order(plant))
         by_time = lyapunov_variances(rational, law, {HOOK: filtered})[PAYLOAD]
         source = Source(name=HOOK, density=filtered.density, band=None)
