@@ -21,7 +21,7 @@ from ..question import GAINS as THESIS
 from ..structures import ParametrisedController
 from .numbers import at_rows
 
-_NUDGE = 1.01  # of a parameter, to see whether the controller's poles move with it
+_NUDGE = 0.01  # of a parameter's size, to see whether the controller's poles move with it
 _SAME = 1e-9
 
 
@@ -56,6 +56,11 @@ class LawColumns:
             values=tuple(some(column) for column in self.values),
             poles=some(self.poles),
         )
+
+    @property
+    def swiftest(self) -> float:
+        """Size of the largest of the poles [1/s]."""
+        return float(np.abs(self.poles).max(initial=0.0))
 
     def response(self, rows: IndexArray, s: ComplexArray) -> dict[str, Any]:
         """Return C of each measurement of some rows at s, each (1 or m, 1 or k)."""
@@ -101,9 +106,9 @@ class DesignLaw:
         self._names = [p.name for p in self.law.parameters]
         poles = self._poles(self._row(self._own))
         self._fixed = {
-            name
-            for name in self._names
-            if poles.size == 0 or self._still(poles, {**self._own, name: _NUDGE * self._own[name]})
+            p.name
+            for p in self.law.parameters
+            if self._still(poles, p.name, self._own[p.name] + _NUDGE * p.scale)
         }
 
     def columns(self, spread: Spread, rows: FloatArray) -> LawColumns:
@@ -132,8 +137,8 @@ class DesignLaw:
         A = self.law.controller([float(v) for v in values]).A
         return np.asarray(np.linalg.eigvals(A), dtype=np.complex128)
 
-    def _still(self, poles: ComplexArray, own: Mapping[str, float]) -> bool:
-        """Return whether the controller has the same poles with other parameters."""
-        moved = self._poles(self._row(own))
-        gap = np.abs(moved[:, None] - poles).min(axis=1)
-        return bool(np.all(gap <= _SAME * np.maximum(np.abs(poles).max(), 1.0)))
+    def _still(self, poles: ComplexArray, name: str, value: float) -> bool:
+        """Return whether the controller has the same poles with another parameter."""
+        moved = self._poles(self._row({**self._own, name: value}))
+        gap = np.abs(moved[:, None] - poles).min(axis=1, initial=np.inf)
+        return bool(np.all(gap <= _SAME * max(np.abs(poles).max(initial=0.0), 1.0)))
