@@ -164,7 +164,7 @@ def test_the_makers_lines_are_those_of_the_sheet() -> None:
     r, n = case.drum_radius, case.winch.gearbox.ratio
     v = case.winch.speed_limit * r / n
     assert rows["motor.speed.peak"] == pytest.approx(v * T / math.pi, rel=1e-12)
-    static = asked.plant.static["motor.torque"]
+    static = pose(case).plant.static["motor.torque"]
     a = (case.winch.drive.torque_peak - static) * r / (n * case.winch.inertia)
     assert rows["motor.torque.peak"] == pytest.approx(a * T**2 / (2.0 * math.pi**2), rel=1e-12)
     b = math.sqrt(2.0 * (case.winch.drive.torque_continuous**2 - static**2)) * r
