@@ -39,7 +39,7 @@ from models import load_case
 from models.basics import PhysicsWarning, Quadrature, spectral_nodes
 from models.hook import HookMotion
 from models.spread import LogNormal, Normal, Spread, Uniform
-from synth import GainDesign, evaluate_gains
+from synth import Design, evaluate_gains
 from synth.question import pose
 from synth.sweeps import FrequencyEngine
 
@@ -110,7 +110,7 @@ def each_of(work: Callable[[FloatArray], object], rows: FloatArray) -> None:
         work(row)
 
 
-def two_hundred(design: GainDesign) -> Quadrature:
+def two_hundred(design: Design) -> Quadrature:
     """Return 200 nodes or a few more on the design's own sea."""
     hook = HookMotion.from_case(design.case)
     for per_panel in range(4, 24):
@@ -184,7 +184,7 @@ def disagreement(engine: FrequencyEngine, peer: PythonControl, rows: FloatArray)
     return worst
 
 
-def peak_memory(design: GainDesign, count: int) -> float:
+def peak_memory(design: Design, count: int) -> float:
     """Return the most memory of a sweep that keeps nothing but the chunk at hand [MB]."""
     engine = FrequencyEngine(design, SPRING, metrics=["payload_rms"])
     list(engine.chunks(samples=64))  # modules, caches
@@ -205,7 +205,7 @@ def run(quick: bool) -> tuple[list[Row], dict[str, float]]:
     rows = []
 
     def line(
-        what: str, design: GainDesign, spread: Spread, count: int, metrics: list[str], own: Any
+        what: str, design: Design, spread: Spread, count: int, metrics: list[str], own: Any
     ) -> FrequencyEngine:
         engine = FrequencyEngine(design, spread, metrics=metrics, nodes=own)
         table = engine.spread.sample(count)

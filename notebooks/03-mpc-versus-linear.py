@@ -42,7 +42,7 @@ from models.simulation import EASE
 from mpc.forecast import AdaptiveAR, PerfectPreview
 from mpc.linear import path_of_sea
 from stillhook.text import AFTER, BEFORE, DRUM, HOOK, REFERENCE
-from synth.question import pose_structure
+from synth.question import pose
 
 # %matplotlib inline
 plt.rcParams.update(
@@ -235,7 +235,7 @@ table(
 # * *feedback* with the gains that `sh.optimise_gains` finds within the drive's limits
 #   (`limits.drive: enforce`) for each sea; and, bolder, with those for seas of 0.8 and 1.0 m;
 # * feedback with a lower gain margin of 0.25, from the notebook before, and the thesis's gains;
-# * *combined*: feedback and feed-forward, `sh.optimise_structure` for 1.0 m within the limits.
+# * *combined*: feedback and feed-forward, `sh.optimise_gains` for 1.0 m within the limits.
 #
 # *Best linear* is the least of all of these, chosen afterwards, in hindsight and for each height:
 # more than anyone can have at sea. MPC has one set of weights for all heights.
@@ -252,7 +252,7 @@ WITHIN = {  # what `sh.optimise_gains` finds with limits.drive: enforce, by the 
     2.43: gains(0.54273, 0.24808, 0.25864),
     3.75: gains(0.36826, 0.18835, 0.25869),
 }
-COMBINED = {  # `sh.optimise_structure(..., "combined")`, the same, for 1.0 m
+COMBINED = {  # `sh.optimise_gains(..., "combined")`, the same, for 1.0 m
     "payload.acceleration_gain": 1.06790,
     "payload.velocity_gain": 0.800938,
     "payload.position_gain": 0.0936789,
@@ -264,7 +264,7 @@ COMBINED = {  # `sh.optimise_structure(..., "combined")`, the same, for 1.0 m
     "heave.lead": 7.0114e-07,
     "heave.bandwidth": 1.590743,
 }
-law = pose_structure(case, "combined").law
+law = pose(case, "combined").law
 combined = law.controller([COMBINED[p.name] for p in law.parameters])
 
 

@@ -44,11 +44,9 @@ if TYPE_CHECKING:
     from synth.bound import BestPossible, Bound, bound_for, exact_sensors
     from synth.controllers import BrakeOn, ConstantTension, LinearFeedback, VelocityFeedForward
     from synth.design import (
-        GainDesign,
-        StructureDesign,
+        Design,
         evaluate_gains,
         optimise_gains,
-        optimise_structure,
         tune,
     )
     from synth.operability import Operability, operability
@@ -58,7 +56,7 @@ if TYPE_CHECKING:
     from synth.sweeps import gain_tolerance
 
     from .comparison import Comparison, compare, write_comparison
-    from .designs import load_design, load_structure, save_design, save_structure, write_report
+    from .designs import load_design, save_design, write_report
     from .runs import Runs, simulate, write_runs
     from .sweeps import fault_spread, resume_sweep, sweep, usual_spread
 else:

@@ -7,7 +7,7 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from models.basics import SolverError, SynthesisError, White
 
-    from .design import GainDesign, LimitUse, Tuning, evaluate_gains, optimise_gains, tune
+    from .design import Design, LimitUse, Tuning, evaluate_gains, optimise_gains, tune
     from .limits import (
         Continuous,
         DelayMargin,

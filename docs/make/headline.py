@@ -77,7 +77,7 @@ def case_for(key: Row) -> sh.Case:
     return sh.load_case("thesis-1975-rope").replace(changes)
 
 
-def row_of(key: Row, design: sh.GainDesign) -> Row:
+def row_of(key: Row, design: sh.Design) -> Row:
     """Return the figures of a design, in SI units."""
     return {
         **key,
@@ -126,7 +126,7 @@ def products(gains: Mapping[str, float]) -> dict[str, float]:
     return {f"A {name}": gains["A"] * gains[name] for name in ("a", "a1", "a2")}
 
 
-def redesign(key: Row) -> sh.GainDesign:
+def redesign(key: Row) -> sh.Design:
     """Return the design of one row."""
     return sh.optimise_gains(case_for(key))
 
@@ -141,7 +141,7 @@ def study(
     rows: list[Row] = []
     seconds: list[float] = []
 
-    def timed(key: Row) -> sh.GainDesign:
+    def timed(key: Row) -> sh.Design:
         start = time.perf_counter()
         design = redesign(key)
         seconds.append(time.perf_counter() - start)

@@ -40,7 +40,7 @@ def main() -> None:
     images = docs_folder(quick) / "images"
     warnings.simplefilter("ignore", PhysicsWarning)
     case = sh.load_case("subsea-crane").replace(VESSEL)
-    design = sh.optimise_structure(case, "feed-forward" if quick else "combined", starts=1)
+    design = sh.optimise_gains(case, "feed-forward" if quick else "combined", starts=1)
     print(design)
     begun = time.perf_counter()
     study = operability(

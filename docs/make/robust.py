@@ -27,7 +27,7 @@ from stored import docs_folder, study_parser, write_rows
 from models import load_case
 from models.basics import PhysicsWarning, one_thread
 from synth.bound import aboard, bound_for
-from synth.design import optimise_structure
+from synth.design import optimise_gains
 from synth.question import FamilyProblem
 from synth.robust import Family, optimise_robust
 from synth.robust.family_plants import FamilyPlants
@@ -146,7 +146,7 @@ def bounds(starts: int) -> list[Row]:
     rows: list[Row] = []
     case = load_case("subsea-crane")
     for name in structure_names():
-        design = optimise_structure(case, name, starts=starts)
+        design = optimise_gains(case, name, starts=starts)
         if design.margins is None:
             print(f"{name}: {design.status}")
             continue

@@ -28,7 +28,8 @@ from pathlib import Path
 from stored import docs_folder, read_rows, study_parser, write_rows
 
 from models import Case, PhysicsWarning, load_case
-from synth.design import StructureDesign, optimise_structure
+from synth.design import Design, optimise_gains
+from synth.question import PAYLOAD
 
 DELAYS = (0.1, 0.05, 0.025, 0.0)
 LENGTHS = (2000.0, 1000.0, 300.0, 100.0)
@@ -131,16 +132,16 @@ def case_of(row: Row) -> Case:
     return load_case("thesis-1975-rope").replace({**changes, "rope.length": row.length})
 
 
-def filled(row: Row, design: StructureDesign, seconds: float) -> Row:
+def filled(row: Row, design: Design, seconds: float) -> Row:
     """Return a row with what a design says."""
     margins, torque = design.margins, design.limits.get("motor.torque.peak")
-    checked = design.verification
+    checked, parts = design.verification, design.shares.get(PAYLOAD, {})
     return replace(
         row,
         ok=design.ok,
         payload_rms=design.payload_rms,
-        from_sea=design.parts.get("hook.heave", 0.0),
-        from_reference_unit=design.parts.get("mru.error", 0.0),
+        from_sea=parts.get("hook.heave", 0.0),
+        from_reference_unit=parts.get("mru.error", 0.0),
         drum_held=design.payload_rms_before,
         hook_rms=design.hook_rms,
         max_sensitivity=margins.max_sensitivity if margins else float("nan"),
@@ -151,7 +152,7 @@ def filled(row: Row, design: StructureDesign, seconds: float) -> Row:
         binding=" ".join(design.binding),
         at_bounds=" ".join(design.at_bounds),
         masses=design.masses,
-        starts=design.starts,
+        starts=len(design.starts),
         agreed=design.agreed,
         seconds=seconds,
         parameters=design.parameters,
@@ -222,7 +223,7 @@ def guesses(row: Row, rows: Mapping[tuple[str, str, str, float], Row]) -> list[d
 def answered(row: Row, near: Sequence[Mapping[str, float]], starts: int) -> Row:
     """Return a row filled by a search."""
     began = time.process_time()
-    design = optimise_structure(case_of(row), row.structure, starts=starts, guesses=near)
+    design = optimise_gains(case_of(row), row.structure, starts=starts, guesses=near)
     return filled(row, design, time.process_time() - began)
 
 

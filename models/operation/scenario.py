@@ -21,7 +21,7 @@ import numpy.typing as npt
 from ..basics import FloatArray, InputError, check_range
 from ..case import Case
 from ..plant import Surroundings
-from ..sensing import Bias, Late, check_biases, check_late
+from ..sensing import BIAS, LATE, Bias, Late, check_intervals
 from .excitation import MotionSource
 from .profile import Period, Profile, check_periods
 
@@ -108,9 +108,9 @@ class Scenario:
         for name in ("brake_trips", "telemetry_outages", "sensor_failures", "mru_outages"):
             checked = check_periods(owner, name.replace("_", " "), getattr(self, name))
             object.__setattr__(self, name, checked)
-        late = check_late(owner, "telemetry delays", self.telemetry_delays)
+        late = check_intervals(owner, "telemetry delays", self.telemetry_delays, LATE)
         object.__setattr__(self, "telemetry_delays", late)
-        biases = check_biases(owner, "MRU biases", self.mru_biases)
+        biases = check_intervals(owner, "MRU biases", self.mru_biases, BIAS)
         object.__setattr__(self, "mru_biases", biases)
         changes: dict[float, Mapping[str, float | None]] = {}
         for time, values in self.parameter_changes.items():

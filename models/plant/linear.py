@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     import control
 
 _OWNER = "linear plant"
-_UNDAMPED = 1e-12  # damping ratio of a pole that has none but for rounding
 _HAIR = 1e-8  # relative distance at which 1/(s - pole) leaves a closed loop eight digits
 
 
@@ -200,16 +199,18 @@ class LinearPlant(StateSpace):
             outputs=self.outputs,
         )
 
+    def poles(self) -> ComplexArray:
+        """Return the eigenvalues of A, (n,) [1/s]; delays have none."""
+        return self.resolvent.poles
+
     def beside_poles(self, omega: FloatArray) -> FloatArray:
         """Return frequencies [rad/s], (k,), those at an undamped pole moved a hair off it.
 
         The responses have no value there, while those of a loop closed around the plant do,
         and next to it they are the same.
         """
-        poles = self.poles()
-        axis = poles.imag[(poles.imag > 0.0) & (np.abs(poles.real) <= _UNDAMPED * np.abs(poles))]
         moved = np.array(omega, dtype=np.float64)
-        for at in axis:
+        for at in self.resolvent.undamped:
             close = np.abs(moved - at) < _HAIR * at
             moved[close] = at * (1.0 + _HAIR * np.where(moved[close] < at, -1.0, 1.0))
         return moved

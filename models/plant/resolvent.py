@@ -28,6 +28,7 @@ _CHUNK = 512  # points solved at a time: keeps the stacked (n, k, columns) state
 # 1e-16 to 1e-15.
 _CONDITION, _RESIDUAL = 1e4, 1e-14
 _ROUNDING = 8.0 * float(np.finfo(float).eps)  # of an eigenvalue, relative to itself
+_UNDAMPED = 1e-12  # damping ratio of a pole that has none but for rounding
 _PROBES = 5  # points at which the residual is looked at
 
 
@@ -89,6 +90,20 @@ class Resolvent:
             return found * paths
 
         return transfer
+
+    @cached_property
+    def poles(self) -> ComplexArray:
+        """The eigenvalues of A, (n,)."""
+        found = np.asarray(np.linalg.eigvals(self.A), dtype=np.complex128)
+        found.setflags(write=False)
+        return found
+
+    @cached_property
+    def undamped(self) -> list[float]:
+        """Frequencies above zero of the poles on the imaginary axis."""
+        swinging = self.poles[self.poles.imag > 0.0]
+        on_axis = np.abs(swinging.real) <= _UNDAMPED * np.abs(swinging)
+        return [float(at) for at in swinging.imag[on_axis]]
 
     def _paths(self, C: FloatArray, B: FloatArray) -> BoolArray:
         """Tell which inputs reach which outputs at all, (rows, columns).

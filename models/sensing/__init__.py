@@ -11,9 +11,16 @@ from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .control import HEARD, Controller, Measurement, Recursion, holds_brake, recursion_of
-    from .mru import Bias, MruModel, MruState, check_biases
-    from .plant import MEASURED, SAMPLE_TIME, sensed_plant, sensed_spectra, with_sensors
+    from .mru import BIAS, Bias, MruModel, MruState
+    from .plant import (
+        MEASURED,
+        SAMPLE_TIME,
+        sensed_line_at,
+        sensed_plant,
+        sensed_spectra,
+        with_sensors,
+    )
     from .sensing import NOISE, SensorModel
-    from .telemetry import Late, TelemetrySchedule, check_late
+    from .telemetry import LATE, Late, TelemetrySchedule, check_intervals
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

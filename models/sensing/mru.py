@@ -37,9 +37,12 @@ from ..basics import (
 )
 from ..rig import MRU
 from .draws import MRU_ERROR, draw
-from .telemetry import Interval, check_intervals, during
+from .telemetry import Interval, Size, check_intervals, during
 
 Bias = tuple[float, float, float, float]
+
+BIAS: tuple[Size, ...] = (("heave", -100.0, 100.0, "m"), ("heave rate", -100.0, 100.0, "m/s"))
+"""What stands behind start and end of an interval in which the unit shows too much."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -147,7 +150,7 @@ class MruModel:
             frequency = self.heave_frequency
             check_range("MRU", "heave_frequency", frequency, low=0, unit="rad/s", open_low=True)
         object.__setattr__(self, "outages", check_intervals("MRU", "outages", self.outages))
-        object.__setattr__(self, "biases", check_biases("MRU", "biases", self.biases))
+        object.__setattr__(self, "biases", check_intervals("MRU", "biases", self.biases, BIAS))
 
     @property
     def delay(self) -> float:
@@ -345,23 +348,6 @@ class MruModel:
         pushes = draw(self.seed, MRU_ERROR, first, start + n - first, 2) @ root.T
         modes = mode_recursion(factor, mode, to_mode(pushes[:, 0], pushes[:, 1], pole))
         return modes if start == 0 else modes[1:]
-
-
-def check_biases(owner: str, name: str, biases: Sequence[Bias]) -> tuple[Bias, ...]:
-    """Return biases, each (start, end, heave, rate) in s, s, m and m/s.
-
-    Raises
-    ------
-    InputError
-        If one is no such row.
-    """
-    checked = []
-    for start, end, heave, rate in biases:
-        ((low, high),) = check_intervals(owner, name, [(start, end)])
-        check_range(owner, f"heave of {name}", heave, low=-100.0, high=100.0, unit="m")
-        check_range(owner, f"heave rate of {name}", rate, low=-100.0, high=100.0, unit="m/s")
-        checked.append((low, high, float(heave), float(rate)))
-    return tuple(checked)
 
 
 def _motions(displacement: npt.ArrayLike, velocity: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:

@@ -17,11 +17,19 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ..basics import White, check_range
 from ..case import Case
 from ..hook import HookMotion
-from ..plant import MEASUREMENTS, LinearPlant, PlantData, build_plant
+from ..plant import (
+    MEASUREMENTS,
+    LinearPlant,
+    PlantData,
+    PlantResponse,
+    build_plant,
+    line_response_at,
+)
 from ..rig import Sensors
 from .mru import MruModel
 
@@ -171,6 +179,64 @@ def with_sensors(plant: LinearPlant, sensors: Sensors | None) -> LinearPlant:
         delays=tuple(delays.get(name, 0.0) for name in MEASURED),
         rates={**plant.rates, "mru.error_rate": "mru.error"},
         units={**plant.units, **units},
+    )
+
+
+def sensed_line_at(case: Case, s: npt.ArrayLike, *, drag: float) -> PlantResponse:
+    """Return the exact response of a case's rope, drive and sensors, delays and all.
+
+    Parameters
+    ----------
+    case
+        The case.
+    s
+        Points [1/s], (k,), none of them a pole (s = 0 is one).
+    drag
+        Equivalent linear drag coefficient of the payload [N s/m].
+
+    Returns
+    -------
+    PlantResponse
+        With the names of `sensed_plant`, on the distributed rope (`models.plant.line_response_at`).
+    """
+    line, sensors = line_response_at(case, s, drag=drag), case.sensors
+    points = line.s
+    noises = tuple(name for name in NOISES if name != "mru.error_rate")
+    heave = line.disturbances.index("hook.heave")
+    yw = np.zeros((points.size, len(MEASURED), len(line.disturbances) + len(noises)), complex)
+    yu = np.zeros((points.size, len(MEASURED), len(line.inputs)), complex)
+    shown, late = np.ones_like(points), np.ones_like(points)
+    if (mru := sensors.mru) is not None:
+        late = np.exp(-points * mru.delay)
+        if mru.heave_filter_period is not None:
+            w = 2.0 * math.pi / mru.heave_filter_period
+            shown = points**2 / (points**2 + math.sqrt(2.0) * w * points + w**2)
+    cell = sensors.load_cell
+    pass_cell = 1.0 / (1.0 + points / cell.bandwidth) if cell is not None else 1.0
+    sent = np.exp(-points * sensors.telemetry.delay)
+    for k, name in enumerate(MEASURED):
+        if name.startswith("mru."):
+            rate = points if name == "mru.heave_rate" else 1.0
+            yw[:, k, heave] = rate * shown * late
+            yw[:, k, len(line.disturbances) + noises.index("mru.error")] = rate * late
+            continue
+        of_line = name not in MEASUREMENTS
+        row = (line.outputs if of_line else line.measurements).index(name)
+        w_row, u_row = (line.zw, line.zu) if of_line else (line.yw, line.yu)
+        through = pass_cell if name == "rope.tension" else 1.0
+        yw[:, k, : len(line.disturbances)] = np.multiply(through, w_row[:, row].T).T
+        yu[:, k] = np.multiply(through, u_row[:, row].T).T
+        if f"{name}_noise" in noises:
+            column = len(line.disturbances) + noises.index(f"{name}_noise")
+            yw[:, k, column] = 1.0 if of_line else sent
+    still = np.zeros((points.size, len(line.outputs), len(noises)))
+    return replace(
+        line,
+        zw=np.concatenate([line.zw, still], axis=2),
+        yw=yw,
+        yu=yu,
+        disturbances=(*line.disturbances, *noises),
+        measurements=MEASURED,
     )
 
 

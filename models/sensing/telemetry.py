@@ -15,6 +15,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +34,10 @@ from .draws import TELEMETRY, draw
 IntArray = npt.NDArray[np.int64]
 Interval = tuple[float, float]
 Late = tuple[float, float, float]
+Size = tuple[str, float, float, str]  # name, range and unit
+
+LATE: tuple[Size, ...] = (("extra delay", 0.0, 60.0, "s"),)
+"""What stands behind start and end of an interval in which messages are late."""
 
 _ROUNDING = 1e-6  # of a sample: 0.07 s is seven samples of 0.01 s, whatever the division says
 
@@ -112,7 +117,7 @@ class TelemetrySchedule:
         for name in ("outages", "broken"):
             checked = check_intervals("telemetry", name, getattr(self, name))
             object.__setattr__(self, name, checked)
-        object.__setattr__(self, "late", check_late("telemetry", "late", self.late))
+        object.__setattr__(self, "late", check_intervals("telemetry", "late", self.late, LATE))
 
     @cached_property
     def lags(self) -> range:
@@ -261,42 +266,34 @@ class TelemetrySchedule:
         return float(-self.lags.stop)
 
 
-def check_intervals(owner: str, name: str, intervals: Sequence[Interval]) -> tuple[Interval, ...]:
-    """Return intervals of time as pairs of floats, each with its start before its end.
+def check_intervals(
+    owner: str, name: str, intervals: Sequence[Sequence[float]], sizes: Sequence[Size] = ()
+) -> tuple[Any, ...]:
+    """Return intervals of time, each (start, end) [s] and the sizes of what is wrong in it.
 
     Raises
     ------
     InputError
-        If one is no such pair; the end may be infinite.
+        If one is no such row, does not start before its end, which may be infinite, or has a size
+        out of its range.
     """
     checked = []
     for interval in intervals:
         try:
-            start, end = (float(time) for time in interval)
+            start, end = (float(time) for time in interval[:2])
+            more = list(zip(interval[2:], sizes, strict=True))
         except (TypeError, ValueError):
-            start, end = math.nan, math.nan
+            start, end, more = math.nan, math.nan, []
         if not (math.isfinite(start) and start < end):
             raise InputError(
                 f"{owner}: {name} must be pairs (start, end) in s with start < end, "
                 f"got {interval!r}"
             )
-        checked.append((start, end))
-    return tuple(checked)
-
-
-def check_late(owner: str, name: str, late: Sequence[Late]) -> tuple[Late, ...]:
-    """Return intervals with an extra delay, each (start, end, extra) [s], extra at most 60 s.
-
-    Raises
-    ------
-    InputError
-        If one is no such triple.
-    """
-    checked = []
-    for start, end, extra in late:
-        ((low, high),) = check_intervals(owner, name, [(start, end)])
-        check_range(owner, f"extra delay of {name}", extra, low=0.0, high=60.0, unit="s")
-        checked.append((low, high, float(extra)))
+        found = [
+            check_range(owner, f"{size} of {name}", value, low=low, high=high, unit=unit)
+            for value, (size, low, high, unit) in more
+        ]
+        checked.append((start, end, *found))
     return tuple(checked)
 
 

@@ -88,6 +88,31 @@ def declared(parser: argparse._ActionsContainer, arguments: tuple[Declaration, .
         add(parser)
 
 
+def changed_words(
+    arguments: argparse.Namespace, declarations: tuple[Declaration, ...], **changes: object
+) -> list[str]:
+    """Return the options that are not at their defaults, as words of the same command again.
+
+    Parameters
+    ----------
+    arguments, declarations
+        What was given, and what the command takes.
+    changes
+        Other values than those given, by name; a default leaves an option out.
+    """
+    parser = argparse.ArgumentParser(add_help=False)
+    declared(parser, declarations)
+    words = []
+    for action in parser._actions:
+        value = changes.get(action.dest, getattr(arguments, action.dest))
+        if action.option_strings and value not in (None, action.default):
+            for one in value if isinstance(value, list) else [value]:
+                words.append(action.option_strings[0])
+                if action.nargs != 0:
+                    words.append(f"{one:g}" if isinstance(one, float) else str(one))
+    return words
+
+
 def case_argument(*, optional: bool = False) -> Declaration:
     """Declare the case and changes of it."""
     told = "a bundled case (see `stillhook cases`) or a case file (.yaml, .json, .toml)"
@@ -107,9 +132,10 @@ def case_argument(*, optional: bool = False) -> Declaration:
 
 def design_argument(parser: argparse._ActionsContainer) -> None:
     """Add the design, a file or gains; `commands.given_design` reads it."""
-    text("--design", "FILE", "a design that was written (design.yaml, combined.yaml)")(parser)
-    told = "or gains (default: those that the case has in use)"
+    text("--design", "FILE", "a design that was written (design.yaml)")(parser)
+    told = "or gains, or parameters by name (default: the gains that the case has in use)"
     text("--gains", "A=..,a=..,a1=..,a2=..", told)(parser)
+    text("--structure", "NAME", "whose parameters these are (default: payload-feedback)")(parser)
 
 
 CASE = case_argument()

@@ -117,13 +117,14 @@ def read_pairs(option: str, form: str, texts: Sequence[str]) -> dict[str, Any]:
     return {name: read_yaml(text, f"{option} {name}")[0] for name, text in pairs.items()}
 
 
-def parse_gains(text: str) -> dict[str, float]:
-    """Return gains by name from a text.
+def parse_gains(text: str, structure: str = "payload-feedback") -> dict[str, float]:
+    """Return gains, or the parameters of another structure, by name from a text.
 
     Raises
     ------
     InputError
-        If a gain is not a number, unknown, missing or given twice; `A` may be missing.
+        If one is not a finite number or given twice; if it is unknown or missing among the
+        gains of payload feedback, of which `A` may be missing.
 
     Examples
     --------
@@ -131,13 +132,12 @@ def parse_gains(text: str) -> dict[str, float]:
     {'A': 200.0, 'a': 50.0, 'a1': 100.0, 'a2': 100.0}
     """
     gains: dict[str, float] = {}
+    plain = structure == "payload-feedback"
+    form = "numbers for A, a, a1 and a2, as in A=1,a=0,a1=0,a2=0.5" if plain else "NAME=NUMBER,.."
     for part in text.split(","):
         name, sign, value = (piece.strip() for piece in part.partition("="))
-        if not sign or name not in _NAMES:
-            raise InputError(
-                f"--gains: must be numbers for A, a, a1 and a2, as in A=1,a=0,a1=0,a2=0.5; "
-                f"got {part.strip()!r}"
-            )
+        if not sign or (plain and name not in _NAMES):
+            raise InputError(f"--gains: must be {form}; got {part.strip()!r}")
         if name in gains:
             raise InputError(f"--gains: {name} is given twice")
         try:
@@ -146,7 +146,7 @@ def parse_gains(text: str) -> dict[str, float]:
             raise InputError(f"--gains: {name} must be a number, got {value!r}") from None
         if not math.isfinite(gains[name]):
             raise InputError(f"--gains: {name} must be a finite number, got {value!r}")
-    missing = [name for name in _NAMES[1:] if name not in gains]
+    missing = [name for name in _NAMES[1:] if plain and name not in gains]
     if missing:
         raise InputError(f"--gains: {' and '.join(missing)} must be given too, got {text!r}")
     return gains
@@ -172,7 +172,7 @@ def parse_options(texts: Sequence[str]) -> dict[str, Any]:
 
 def gains_text(gains: Mapping[str, float]) -> str:
     """Return gains as `parse_gains` reads them, to eight digits: enough to keep the limits."""
-    return ",".join(f"{name}={gains[name]:.8g}" for name in _NAMES)
+    return ",".join(f"{name}={value:.8g}" for name, value in gains.items())
 
 
 def case_words(arguments: argparse.Namespace, written: str | None = None) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from models.basics import InputError, pick
-from synth.design import GainDesign, Tuning
+from synth.design import Design, Tuning
 
 from .recipe import Make, Recipe, feedback, gains_in_use, recipe_of
 
@@ -96,23 +96,28 @@ _ALL = (
     ),
     _linear(
         "feedback",
-        "gains",
+        "payload-feedback",
         "three optimised gains on the payload's motion, within the drive's limits",
         _PAYLOAD,
     ),
     _linear(
         "feedback-half",
-        "gains-half",
+        "payload-feedback-half",
         "three optimised gains, within the drive's limits in a sea of half the height",
         _PAYLOAD,
     ),
     _linear(
         "feedback-eager",
-        "gains-eager",
+        "payload-feedback-eager",
         "three optimised gains, as if the drive had no limits",
         _PAYLOAD,
     ),
-    _linear("feedback-no-antiwindup", "gains-eager", "the eager one without anti-windup", _PAYLOAD),
+    _linear(
+        "feedback-no-antiwindup",
+        "payload-feedback-eager",
+        "the eager one without anti-windup",
+        _PAYLOAD,
+    ),
     _linear(
         "combined",
         "combined",
@@ -203,7 +208,7 @@ def _contender(wanted: object) -> Contender:
     if isinstance(wanted, str):
         pick("compare", "controller", tuple(CONTENDERS), (wanted,))
         return CONTENDERS[wanted]
-    if isinstance(wanted, GainDesign | Tuning):  # `feedback` is one that is designed anew
+    if isinstance(wanted, Design | Tuning):  # `feedback` is one that is designed anew
         wanted = ("design", wanted)
     own = recipe_of(wanted, "compare")
     if own.design is not None:

@@ -17,7 +17,7 @@ from models.case import Case
 from models.sensing import Controller
 
 if TYPE_CHECKING:
-    from synth.design import GainDesign, Tuning
+    from synth.design import Design, Tuning
 
 PROTOCOL = ("name", "sample_time", "reset", "step")
 """What a controller has."""
@@ -46,7 +46,7 @@ def controller_by_name(
     name: str,
     case: Case,
     *,
-    design: GainDesign | Tuning | None = None,
+    design: Design | Tuning | None = None,
     gains: Mapping[str, float] | None = None,
     sample_time: float | None = None,
 ) -> Controller:
@@ -90,10 +90,10 @@ def controller_by_name(
 
 
 def controller_of(
-    controller: str | GainDesign | Tuning | Controller,
+    controller: str | Design | Tuning | Controller,
     case: Case,
     *,
-    design: GainDesign | Tuning | None = None,
+    design: Design | Tuning | None = None,
     gains: Mapping[str, float] | None = None,
     sample_time: float | None = None,
 ) -> Controller:
@@ -105,7 +105,7 @@ def controller_of(
         If it is none of these, or what is given with it does not belong to it.
     """
     from synth.controllers import LinearFeedback
-    from synth.design import GainDesign, Tuning
+    from synth.design import Design, Tuning
 
     if isinstance(controller, str):
         return controller_by_name(
@@ -113,7 +113,7 @@ def controller_of(
         )
     if design is not None or gains is not None:
         raise InputError("simulate: design and gains are for a controller by its name")
-    if isinstance(controller, GainDesign | Tuning):
+    if isinstance(controller, Design | Tuning):
         own = _FEEDBACK_SAMPLE if sample_time is None else sample_time
         return LinearFeedback.from_design(controller, case=case, sample_time=own)
     lacking = [name for name in PROTOCOL if not hasattr(controller, name)]

@@ -22,7 +22,7 @@ from models.basics import InputError, pick
 from models.case import Case
 from models.sensing import Controller
 from synth.controllers import LinearFeedback
-from synth.design import GainDesign, StructureDesign, Tuning
+from synth.design import Design, Tuning
 
 from .named import PROTOCOL, controller_by_name, known_controllers
 from .stored_design import EAGER, StoredDesign, design_law
@@ -62,10 +62,8 @@ class Recipe:
 
     @property
     def gains(self) -> Mapping[str, float]:
-        """Gains by name, where it is a design of payload feedback; else empty."""
-        if self.design is None or self.design.kind != "gains":
-            return {}
-        return {name: float(value) for name, value in self.design.values.items()}
+        """The parameters by name of a design's structure; else nothing."""
+        return {} if self.design is None else self.design.parameters
 
     def controller(self, case: Case, design: StoredDesign | None = None) -> Controller:
         """Return the controller for a case, of its own design or of one that was found for it.
@@ -77,8 +75,8 @@ class Recipe:
         """
         return self.make(case, self.design if design is None else design)
 
-    def with_gains(self, gains: Mapping[str, float]) -> Recipe:
-        """Return the recipe with some of its gains changed.
+    def with_gains(self, case: Case, gains: Mapping[str, float]) -> Recipe:
+        """Return the recipe with some of its gains changed, for a case.
 
         Raises
         ------
@@ -86,8 +84,8 @@ class Recipe:
             If it has none.
         """
         if self.design is None or not self.gains:
-            raise InputError(f"{self.name}: gains can be varied of a design of payload feedback")
-        return replace(self, design=replace(self.design, values={**self.design.values, **gains}))
+            raise InputError(f"{self.name}: gains can be varied of a design of a winch")
+        return replace(self, design=self.design.on(case, gains))
 
     def follow(self, case: Case, starts: int) -> Controller:
         """Return the controller made for a case; a design is designed anew.
@@ -122,9 +120,9 @@ def recipe_of(wanted: object, owner: str) -> Recipe:
     Parameters
     ----------
     wanted
-        The name of a controller (`known_controllers`); a `GainDesign`, `StructureDesign` or
-        `Tuning`; a controller; or a pair of a name and a design, a controller or a function of the
-        case that returns a controller.
+        The name of a controller (`known_controllers`); a `Design` or a `Tuning`; a controller; or
+        a pair of a name and a design, a controller or a function of the case that returns a
+        controller.
     owner
         Who asks, for messages.
 
@@ -142,10 +140,9 @@ def recipe_of(wanted: object, owner: str) -> Recipe:
         name, wanted = wanted
         if isinstance(wanted, str):
             raise InputError(f"{owner}: {name}: must be a design, a controller or a function")
-    if isinstance(wanted, GainDesign):
-        return _of_design(name or "feedback", StoredDesign.of(wanted), "gains")
-    if isinstance(wanted, StructureDesign):
-        return _of_design(name or wanted.structure, StoredDesign.of(wanted), wanted.structure)
+    if isinstance(wanted, Design):
+        own = "feedback" if wanted.structure == "payload-feedback" else wanted.structure
+        return _of_design(name or own, StoredDesign.of(wanted), wanted.structure)
     if isinstance(wanted, Tuning):
         return _of_design(name or "tuning", StoredDesign.of(wanted), "")
     if all(hasattr(wanted, part) for part in PROTOCOL):

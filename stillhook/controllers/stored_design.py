@@ -1,6 +1,6 @@
 """Designs as plain data (`StoredDesign`), and those that are fair to linear laws.
 
-    case at one H_s --> optimise_gains, optimise_structure --> StoredDesign --> store, processes
+    case at one H_s --> optimise_gains --> StoredDesign --> store, processes
 
 A linear law can be designed to keep the drive's limits, or as if there were none: the first is
 slow in a sea that the drive could follow, the second falls off where it cannot.  In between is one
@@ -14,12 +14,13 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from models.case import Case
-from synth.design import GainDesign, StructureDesign, Tuning
+from synth.design import Design, Tuning
 from synth.loop import LinearController
+from synth.question import controller_for
 
 if TYPE_CHECKING:
     from ..text import Progress
@@ -37,9 +38,9 @@ class StoredDesign:
     Attributes
     ----------
     kind
-        "gains", "controller", or "none" where no stable law was found.
+        "controller", or "none" where no stable law was found.
     values
-        Gains by name, or the matrices A, B, C, D and the names of the measurements and inputs.
+        The matrices A, B, C, D and the names of the measurements and inputs.
     ok
         Whether it keeps every limit that it was designed for.
     drive
@@ -47,6 +48,8 @@ class StoredDesign:
         design was given.
     status
         The sentence of the design.
+    structure, parameters
+        The structure and its parameters by name; empty where there is no structure of a winch.
     """
 
     kind: str
@@ -54,6 +57,8 @@ class StoredDesign:
     ok: bool
     drive: str = ""
     status: str = ""
+    structure: str = ""
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def found(self) -> bool:
@@ -61,10 +66,8 @@ class StoredDesign:
         return self.kind != "none"
 
     @property
-    def law(self) -> Mapping[str, float] | LinearController:
-        """What `LinearFeedback` takes: gains, or a controller in state space."""
-        if self.kind == "gains":
-            return dict(self.values)
+    def law(self) -> LinearController:
+        """What `LinearFeedback` takes: a controller in state space."""
         ny, nu = len(self.values["measurements"]), len(self.values["inputs"])
         n = len(self.values["A"])
         import numpy as np
@@ -75,6 +78,12 @@ class StoredDesign:
             measurements=tuple(self.values["measurements"]),
             inputs=tuple(self.values["inputs"]),
         )
+
+    def on(self, case: Case, parameters: Mapping[str, float]) -> StoredDesign:
+        """Return the law with some of its parameters changed, for a case."""
+        every = {**self.parameters, **parameters}
+        controller = controller_for(case, self.structure, every)
+        return replace(self, values=_matrices(controller), parameters=every)
 
     @property
     def digest(self) -> str:
@@ -87,21 +96,24 @@ class StoredDesign:
         return asdict(self)
 
     @classmethod
-    def of(cls, design: GainDesign | StructureDesign | Tuning, drive: str = "") -> StoredDesign:
+    def of(cls, design: Design | Tuning, drive: str = "") -> StoredDesign:
         """Return the law of a design."""
         about: dict[str, Any] = {"ok": bool(design.ok), "drive": drive, "status": design.status}
-        if isinstance(design, GainDesign):
-            gains = {name: float(value) for name, value in design.gains.items()}
-            return cls(
-                kind="gains" if design.margins is not None else "none", values=gains, **about
-            )
-        found = design.margins is not None and bool(design.parameters)
-        controller = design.controller if found else None
+        controller = design.controller if design.margins is not None else None
         if controller is None:
             return cls(kind="none", values={}, **about)
-        values: dict[str, Any] = {k: getattr(controller, k).tolist() for k in ("A", "B", "C", "D")}
-        values |= {"measurements": list(controller.measurements), "inputs": list(controller.inputs)}
-        return cls(kind="controller", values=values, **about)
+        if isinstance(design, Design):
+            parameters = {name: float(value) for name, value in design.parameters.items()}
+            about |= {"structure": design.structure, "parameters": parameters}
+        return cls(kind="controller", values=_matrices(controller), **about)
+
+
+def _matrices(controller: LinearController) -> dict[str, Any]:
+    values: dict[str, Any] = {k: getattr(controller, k).tolist() for k in ("A", "B", "C", "D")}
+    return values | {
+        "measurements": list(controller.measurements),
+        "inputs": list(controller.inputs),
+    }
 
 
 def design_law(
@@ -112,7 +124,7 @@ def design_law(
     Parameters
     ----------
     needs
-        "gains" or the name of a structure, for a law within the drive's limits; followed by
+        The name of a structure, for a law within the drive's limits; followed by
         "-eager" for one that ignores them, or "-half" for one that keeps them in half the sea.
     case
         The case, in the sea that the law is for.
@@ -138,20 +150,14 @@ def design_law(
     strict = case.replace(changes)
     design = _design(needs, strict, starts, progress)
     law = StoredDesign.of(design, "enforced")
-    if isinstance(design, StructureDesign) and not design.drive_kept:
+    if not design.drive_kept:
         # What was found ignores the limits: that is the eager one, and takes part as such.
         status = f"no law within the drive's limits: {law.status}"
         return replace(law, kind="none", values={}, status=status)
     return law
 
 
-def _design(
-    needs: str, case: Case, starts: int, progress: Progress | None
-) -> GainDesign | StructureDesign:
-    if needs == "gains":
-        from synth.design import optimise_gains
+def _design(needs: str, case: Case, starts: int, progress: Progress | None) -> Design:
+    from synth.design import optimise_gains
 
-        return optimise_gains(case, starts=starts, progress=progress)
-    from synth.design import optimise_structure
-
-    return optimise_structure(case, needs, starts=starts, progress=progress)
+    return optimise_gains(case, needs, starts=starts, progress=progress)

@@ -14,11 +14,7 @@ if TYPE_CHECKING:
         design_data,
         design_text,
         load_design,
-        load_structure,
-        read_design,
         save_design,
-        save_structure,
-        structure_text,
     )
     from .report import design_report, write_report
     from .robust import robust_report, scenario_table, schedule_report

@@ -14,12 +14,12 @@ from synth.bound import BestPossible, exact_sensors
 from ..text import number
 
 if TYPE_CHECKING:
-    from synth.design import GainDesign, StructureDesign
+    from synth.design import Design
 
 _CLEAR = 3.0  # from so many times the bound on it is told as a multiple
 
 
-def bound_rows(design: GainDesign | StructureDesign) -> list[tuple[str, str]]:
+def bound_rows(design: Design) -> list[tuple[str, str]]:
     """Return how far a design is from the best possible, in words; nothing without a loop.
 
     That takes some ten seconds, for the best controller found within the M_s.
@@ -36,7 +36,7 @@ def bound_rows(design: GainDesign | StructureDesign) -> list[tuple[str, str]]:
     return [*rows, ("feedback", str(best.bode))] if str(best.bode or "") else rows
 
 
-def bound_cell(design: StructureDesign) -> str:
+def bound_cell(design: Design) -> str:
     """Return the design over the bound with its own sensors, for a table."""
     best = _meaningful(design)
     if best is None:
@@ -46,7 +46,7 @@ def bound_cell(design: StructureDesign) -> str:
     return f"{number(100.0 * (best.factor - 1.0), 2)} %"
 
 
-def bound_figure(design: StructureDesign) -> float:
+def bound_figure(design: Design) -> float:
     """Return the bound with its own sensors [m]; NaN where it means nothing."""
     best = _meaningful(design)
     return best.free.value if best is not None else math.nan
@@ -60,7 +60,7 @@ def bounds_note() -> str:
     )
 
 
-def _meaningful(design: StructureDesign) -> BestPossible | None:
+def _meaningful(design: Design) -> BestPossible | None:
     if not _has_loop(design) or exact_sensors(design.case, design.measurements):
         return None
     try:
@@ -70,5 +70,5 @@ def _meaningful(design: StructureDesign) -> BestPossible | None:
     return best if best.meaningful else None
 
 
-def _has_loop(design: GainDesign | StructureDesign) -> bool:
+def _has_loop(design: Design) -> bool:
     return design.margins is not None and math.isfinite(design.payload_rms)

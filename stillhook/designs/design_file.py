@@ -1,9 +1,10 @@
-"""Designs as YAML files that load again: the case, the gains, and every figure claimed.
+"""Designs as YAML files that load again: the case, the parameters, and every figure claimed.
 
-A file mirrors `GainDesign` or `StructureDesign`: one key for each field, dataclasses as sections,
-arrays as lists, and the case as it stands in a case file.  What a field may hold is read from its
-annotation, so the file follows the classes without a second description.  Reading is strict:
-what is missing, unknown or of another kind is named with file, line and path.
+A file mirrors `Design`: one key for each field, dataclasses as sections, arrays as lists, and the
+case as it stands in a case file.  What a field may hold is read from its annotation, so the file
+follows the class without a second description.  Reading is strict: what is missing, unknown or of
+another kind is named with file, line and path.  Files of format 1, of gains or of a structure, are
+read too: their figures are those that were claimed then, when gains counted no sensor noise.
 """
 
 from __future__ import annotations
@@ -21,19 +22,19 @@ import numpy as np
 from models.basics import InputError, write_text_atomically
 from models.case import Case
 from models.casefile import line_of, message_line, read_yaml, suggestion, yaml_text
-from synth.design import GainDesign, StructureDesign
+from synth.design import Design
+from synth.question import PAYLOAD, controller_for
 from synth.verify import Verification
 
-FORMAT = 1
+FORMAT = 2
 """Version of the file's format."""
 
 _KEY, _STRUCTURE = "stillhook_design", "stillhook_structure"
 _WRITER = "written_by"
-_GAINS = ("A", "a", "a1", "a2")
 Place = tuple[str | int, ...]
 
 
-def save_design(design: GainDesign, path: str | Path) -> Path:
+def save_design(design: Design, path: str | Path) -> Path:
     """Write a design to a YAML file, whole or not at all.
 
     Parameters
@@ -56,23 +57,32 @@ def save_design(design: GainDesign, path: str | Path) -> Path:
     return write_text_atomically(path, design_text(design))
 
 
-def design_text(design: GainDesign) -> str:
+def design_text(design: Design) -> str:
     """Return a design as the YAML text that `load_design` reads."""
-    heading = (
-        f"# A design by Stillhook for the case {design.case.name}, in SI units.\n"
+    from .._version import __version__
+
+    content = {_KEY: FORMAT, _WRITER: f"stillhook {__version__}", **_encoded(design)}
+    for other in content["alternatives"]:
+        del other["case"]  # the same
+    # The case comes last: it is the longest, and the one part that is not an answer.
+    content["case"] = content.pop("case")
+    return (
+        f"# {design.structure} by Stillhook for the case {design.case.name}, in SI units.\n"
         "# stillhook.load_design reads it; the section `case` is a case file of its own.\n"
+        f"{yaml_text(content)}"
     )
-    return heading + _content(_KEY, design)
 
 
-def design_data(design: GainDesign | StructureDesign) -> dict[str, Any]:
+def design_data(design: Design) -> dict[str, Any]:
     """Return a design as plain data, SI units: its fields by their names, but for the case."""
     data: dict[str, Any] = _encoded(design)
+    for other in data["alternatives"]:
+        del other["case"]
     return {name: value for name, value in data.items() if name != "case"}
 
 
-def load_design(path: str | Path) -> GainDesign:
-    """Read a design from a file that `save_design` wrote.
+def load_design(path: str | Path) -> Design:
+    """Read a design from a file that `save_design` wrote, of this version or an older one.
 
     Parameters
     ----------
@@ -81,7 +91,7 @@ def load_design(path: str | Path) -> GainDesign:
 
     Returns
     -------
-    GainDesign
+    Design
         Equal to the one saved, to the last digit; `verify` checks it anew.
 
     Raises
@@ -89,99 +99,49 @@ def load_design(path: str | Path) -> GainDesign:
     InputError
         If there is no such file, it is not a design, or a field is missing, unknown or wrong.
     """
-    content, reader = _opened(path, _KEY, "a design file")
-    design: GainDesign = reader.value(GainDesign, content, ())
-    for name in _GAINS:
-        if name not in design.gains:
-            raise reader.error(("gains", name), "is missing; it must be a number")
-    return design
-
-
-def save_structure(design: StructureDesign, path: str | Path) -> Path:
-    """Write a structure's design to a YAML file, whole or not at all.
-
-    Parameters
-    ----------
-    design
-        The design.
-    path
-        The file; its folder must exist.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
-    """
-    return write_text_atomically(path, structure_text(design))
-
-
-def structure_text(design: StructureDesign) -> str:
-    """Return a design as the YAML text that `load_structure` reads."""
-    heading = (
-        f"# The structure {design.structure} by Stillhook for the case {design.case.name}, in SI\n"
-        "# units. stillhook.load_structure reads it; `case` is a case file of its own.\n"
-    )
-    return heading + _content(_STRUCTURE, design)
-
-
-def load_structure(path: str | Path) -> StructureDesign:
-    """Read a design from a file that `save_structure` wrote.
-
-    Parameters
-    ----------
-    path
-        The file.
-
-    Returns
-    -------
-    StructureDesign
-        Equal to the one saved, to the last digit; `verify` checks it anew.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, it is not a structure's design, or a field is missing, unknown
-        or wrong.
-    """
-    content, reader = _opened(path, _STRUCTURE, "a structure's design")
-    design: StructureDesign = reader.value(StructureDesign, content, ())
-    return design
-
-
-def read_design(path: str | Path) -> GainDesign | StructureDesign:
-    """Read a design of either kind.
-
-    Raises
-    ------
-    InputError
-        As from `load_design` and `load_structure`.
-    """
-    data, _ = read_yaml(_text(Path(path)), str(path))
-    if isinstance(data, Mapping) and _STRUCTURE in data:
-        return load_structure(path)
-    return load_design(path)
-
-
-def _content(key: str, design: GainDesign | StructureDesign) -> str:
-    from .._version import __version__
-
-    content = {key: FORMAT, _WRITER: f"stillhook {__version__}", **_encoded(design)}
-    # The case comes last: it is the longest, and the one part that is not an answer.
-    content["case"] = content.pop("case")
-    return yaml_text(content)
-
-
-def _opened(path: str | Path, key: str, kind: str) -> tuple[dict[str, Any], _Reader]:
-    """Return the fields of a file of a kind, and what reads them."""
     source = str(path)
     data, lines = read_yaml(_text(Path(path)), source)
-    if not isinstance(data, Mapping) or key not in data:
-        raise InputError(f"{source}: is not {kind}: it has no key `{key}`")
-    if data[key] != FORMAT:
-        wanted = f"must be {FORMAT}, the format that this version reads, got {data[key]!r}"
+    key = next((k for k in (_KEY, _STRUCTURE) if isinstance(data, Mapping) and k in data), None)
+    if key is None:
+        raise InputError(f"{source}: is not a design file: it has no key `{_KEY}`")
+    formats = (1, FORMAT) if key == _KEY else (1,)
+    if data[key] not in formats:
+        wanted = f"must be {' or '.join(map(str, formats))}, the format that this version reads, "
+        wanted += f"got {data[key]!r}"
         raise InputError(message_line(source, line_of((key,), lines), (key,), wanted))
     fields = {name: value for name, value in data.items() if name not in (key, _WRITER)}
-    return fields, _Reader(source, lines)
+    reader = _Reader(source, lines)
+    if data[key] == 1:
+        fields = _of_format_1(fields, reader, structure=key == _STRUCTURE)
+    for other in fields.get("alternatives") or ():
+        if isinstance(other, dict):
+            other.setdefault("case", fields.get("case"))
+    design: Design = reader.value(Design, fields, ())
+    if design.parameters:
+        try:
+            controller_for(design.case, design.structure, design.parameters)
+        except KeyError as error:
+            where = ("gains" if "gains" in data else "parameters", str(error.args[0]))
+            raise reader.error(where, "is missing; it must be a number") from None
+    return design
+
+
+def _of_format_1(data: dict[str, Any], reader: _Reader, *, structure: bool) -> dict[str, Any]:
+    """Return the fields of an older file as this version has them."""
+    fields = dict(data)
+    case = reader.case(fields.get("case"), ("case",))
+    if not structure:
+        if "gains" not in fields:
+            raise reader.error(("gains",), "is missing")
+        fields["parameters"] = fields.pop("gains")
+        return {"structure": "payload-feedback", "units": {}, "shares": {}, **fields}
+    if fields.get("parameters") and str(fields.get("structure")).startswith("payload-feedback"):
+        own = case.gains.A if case.gains is not None else 1.0
+        fields["parameters"] = {"A": own, **fields["parameters"]}
+    fields["shares"] = {PAYLOAD: fields.pop("parts", {})}
+    fields["significant_height"] = case.sea.significant_height
+    # It kept the number of starts only.
+    return {**fields, "starts": [], "agreed": 0}
 
 
 def _text(path: Path) -> str:

@@ -1,6 +1,6 @@
 """The figures of a design: payload spectrum, responses, Nyquist curve, use of the limits.
 
-Each function takes a `GainDesign` and returns a matplotlib `Figure`; nothing is shown, saved or
+Each function takes a `Design` and returns a matplotlib `Figure`; nothing is shown, saved or
 kept.  Titles say what the figure found.  What an unstable loop does not have (a spectrum, a use
 of limits) is left out.
 
@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.basics import ComplexArray, FloatArray, InputError
-from synth.design import GainDesign
+from synth.design import Design
 
 from ..text import (
     AFTER,
@@ -45,7 +45,7 @@ from ..text import (
 from .motion import DRUM as DRUM_HAUL
 from .motion import HOOK as HOOK_HEAVE
 from .motion import PAYLOAD, MotionView, highest
-from .summary import about_of, has_gains, limit_table
+from .summary import about_of, has_loop, limit_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,7 +57,7 @@ _CUT = 2.0  # use of a limit at which its bar is cut off
 
 
 @drawn
-def payload_spectrum(design: GainDesign) -> Figure:
+def payload_spectrum(design: Design) -> Figure:
     """Return the spectra of hook and payload, with the drum held and with the gains.
 
     Parameters
@@ -100,7 +100,7 @@ def payload_spectrum(design: GainDesign) -> Figure:
 
 
 @drawn
-def responses(design: GainDesign) -> Figure:
+def responses(design: Design) -> Figure:
     """Return |P/Z| with the drum held and with the gains, and |X/Z|.
 
     Parameters
@@ -142,7 +142,7 @@ def responses(design: GainDesign) -> Figure:
 
 
 @drawn
-def limits(design: GainDesign) -> Figure:
+def limits(design: Design) -> Figure:
     """Return the use of each limit as a bar.
 
     Parameters
@@ -188,7 +188,7 @@ def limits(design: GainDesign) -> Figure:
     return headline(figure, _limits_finding(table), about_of(design))
 
 
-def _spectrum_finding(design: GainDesign) -> str:
+def _spectrum_finding(design: Design) -> str:
     if design.margins is None:
         return "The loop is unstable: no compensated payload to show"
     before, after = quantity(design.payload_rms_before, "m"), quantity(design.payload_rms, "m")
@@ -262,7 +262,7 @@ def _frame(view: MotionView, axes: Axes, label: str) -> None:
     axes.set_ylabel(label)
 
 
-def _mark_peak(design: GainDesign, axes: Axes, low: float, high: float) -> None:
+def _mark_peak(design: Design, axes: Axes, low: float, high: float) -> None:
     def height(omega: FloatArray) -> FloatArray:
         return np.abs(design.assessment.response(DRUM_HAUL, HOOK_HEAVE, omega))
 
@@ -273,7 +273,7 @@ def _mark_peak(design: GainDesign, axes: Axes, low: float, high: float) -> None:
         annotate(axes, text, (at, value), (-170.0, 8.0))
 
 
-def _slow_limit(design: GainDesign, axes: Axes, low: float) -> None:
+def _slow_limit(design: Design, axes: Axes, low: float) -> None:
     """Draw the corner under which |P/Z| has to stay at low frequency."""
     limit = design.case.limits.low_frequency
     if limit is None:
@@ -334,7 +334,7 @@ class PlaneWindow:
 
 
 @drawn
-def nyquist(design: GainDesign) -> Figure:
+def nyquist(design: Design) -> Figure:
     """Return the Nyquist curve of the loop gain L with the circle of M_s around -1.
 
     Parameters
@@ -352,7 +352,7 @@ def nyquist(design: GainDesign) -> Figure:
     InputError
         If all gains are zero: there is no loop.
     """
-    if not has_gains(design):
+    if not has_loop(design):
         raise InputError("nyquist: all gains are zero, so there is no loop")
     window = _window(design)
     gain = _smooth(design.assessment.loop_gain, design.assessment.grid, window)
@@ -382,7 +382,7 @@ def nyquist(design: GainDesign) -> Figure:
     return headline(figure, _finding(design), about_of(design))
 
 
-def _finding(design: GainDesign) -> str:
+def _finding(design: Design) -> str:
     margins = design.margins
     if margins is None:
         return "The loop is unstable"
@@ -392,7 +392,7 @@ def _finding(design: GainDesign) -> str:
     return text
 
 
-def _window(design: GainDesign) -> PlaneWindow:
+def _window(design: Design) -> PlaneWindow:
     half = _HALF
     if design.margins is not None and design.margins.gain_down > 0.0:
         # A curve that crosses the axis beyond -1 is shown there, if that is not too far away.
@@ -418,7 +418,7 @@ def _smooth(loop: LoopGain, grid: FloatArray, window: PlaneWindow) -> ComplexArr
     return gain
 
 
-def _circles(design: GainDesign, axes: Axes) -> None:
+def _circles(design: Design, axes: Axes) -> None:
     """Draw the circles that the curve may not and does not enter, 1/M_s around -1."""
     bound = design.case.limits.max_sensitivity
     turn = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 361))
@@ -452,7 +452,7 @@ def _arrows(axes: Axes, gain: ComplexArray, window: PlaneWindow) -> None:
             )
 
 
-def _remarks(design: GainDesign, axes: Axes, window: PlaneWindow) -> None:
+def _remarks(design: Design, axes: Axes, window: PlaneWindow) -> None:
     margins = design.margins
     if margins is None:
         return

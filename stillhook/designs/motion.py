@@ -1,6 +1,6 @@
 """The payload before and after compensation: spectra and statistics, ready to be shown.
 
-    GainDesign -> hook, payload with the drum held, payload with the gains -> figures, summary
+    Design -> hook, payload with the drum held, payload with the gains -> figures, summary
 
 Everything is in the sea that the design's figures hold for: the case's own, or the largest
 feasible one.
@@ -24,7 +24,7 @@ from models.basics import (
 )
 from models.case import Case
 from models.hook import HookMotion
-from synth.design import GainDesign
+from synth.design import Design
 from synth.question import locked_response
 
 PAYLOAD = "payload.displacement"
@@ -66,7 +66,7 @@ class MotionView:
         The design.
     """
 
-    design: GainDesign
+    design: Design
 
     @cached_property
     def hook(self) -> HookMotion:

@@ -1,6 +1,6 @@
 """The report of a design: motion, gains, margins, limits, and a folder with all of it.
 
-    GainDesign -> Report -> design.yaml, case.yaml, figures (SVG and PNG), summary.md
+    Design -> Report -> design.yaml, case.yaml, figures (SVG and PNG), summary.md
 
 Whoever opens the folder a year later finds the question beside the answer.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from synth.design import GainDesign
+from synth.design import Design
 
 from ..text import Drawing, OutputFolder, Report, ReportSection, markdown, pairs
 from .design_file import design_text
@@ -19,24 +19,27 @@ from .summary import (
     command_text,
     effect,
     facts,
-    gain_table,
-    has_gains,
+    has_loop,
     limit_table,
     margin_table,
     motion_table,
+    parameter_table,
     required_table,
+    share_table,
 )
 
 _FIGURES = ("payload_spectrum", "responses", "nyquist", "limits")
 _READ = "`design.yaml` holds all of this for `stillhook.load_design`, `case.yaml` the case."
 
 
-def design_report(design: GainDesign, *, bound: bool = True) -> Report:
+def design_report(design: Design, *, bound: bool = True) -> Report:
     """Return all there is to say about a design.
 
     `bound` says whether to compute the best that any linear controller could do, too.
     """
     needed, margins = required_table(design), margin_table(design)
+    named = "" if design.structure == "payload-feedback" else f"{design.structure}: "
+    status = f"{named}{design.status}"
     spectrum = "Spectra of the hook and of the payload"
     over = "Payload over hook and drum over hook"
     curve = "Nyquist curve of the loop, broken at the command"
@@ -52,11 +55,14 @@ def design_report(design: GainDesign, *, bound: bool = True) -> Report:
             ],
         ),
     ]
-    if has_gains(design):
-        sections.append(ReportSection("Gains", [f"`{command_text(design)}`", gain_table(design)]))
+    if (shares := share_table(design)) is not None:
+        sections.append(ReportSection("", [shares]))
+    if has_loop(design):
+        law = f"`{command_text(design)}`"
+        sections.append(ReportSection("Gains", [law, parameter_table(design)]))
     if margins is not None:
         sections.append(ReportSection("Margins", [margins]))
-    if has_gains(design):
+    if has_loop(design):
         sections.append(ReportSection("", [Drawing("nyquist", curve, lambda: nyquist(design))]))
     if design.limits:
         drawing = Drawing("limits", "Use of the limits", lambda: limits(design))
@@ -65,7 +71,7 @@ def design_report(design: GainDesign, *, bound: bool = True) -> Report:
     return Report(
         name=design.case.name,
         about=" ".join(design.case.description.split()),
-        status=design.status,
+        status=status,
         ok=design.ok,
         sections=sections,
     )
@@ -74,7 +80,7 @@ def design_report(design: GainDesign, *, bound: bool = True) -> Report:
 def write_report(
     folder: str | Path | OutputFolder,
     *,
-    design: GainDesign,
+    design: Design,
     bound: bool = True,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> list[Path]:

@@ -30,15 +30,13 @@ from ..text import (
     typeset,
 )
 from .bound_text import bound_cell, bound_figure, bounds_note
+from .summary import SHARES, share_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from synth.design import StructureDesign
-
-SHARES = {"sea": ("hook.heave",), "MRU": ("mru.error",), "noise": ()}
-"""Which disturbances make up a share of the payload's variance, by its name."""
+    from synth.design import Design
 
 _TORQUE = "motor.torque.peak"
 _COLOURS = {"sea": AFTER, "MRU": "#e69f00", "noise": "#cc79a7"}
@@ -48,7 +46,7 @@ _LABELS = {"sea": "from the sea", "MRU": "from the reference unit", "noise": "fr
 
 
 @drawn
-def structures(designs: Sequence[StructureDesign], *, bound: bool = True) -> Figure:
+def structures(designs: Sequence[Design], *, bound: bool = True) -> Figure:
     """Return the comparison of some structures on a case.
 
     Parameters
@@ -131,7 +129,7 @@ def structures(designs: Sequence[StructureDesign], *, bound: bool = True) -> Fig
     return headline(figure, finding)
 
 
-def structures_table(designs: Sequence[StructureDesign], *, bound: bool = True) -> Table:
+def structures_table(designs: Sequence[Design], *, bound: bool = True) -> Table:
     """Return the designs, one a row; `bound` asks for the bounds beside them too."""
     shares = "".join(f"; {name} [%]" for name in SHARES)
     heads = (
@@ -147,7 +145,7 @@ def structures_table(designs: Sequence[StructureDesign], *, bound: bool = True) 
     )
 
 
-def structures_report(designs: Sequence[StructureDesign], *, bound: bool = True) -> Report:
+def structures_report(designs: Sequence[Design], *, bound: bool = True) -> Report:
     """Return the comparison: a table, what limits each, and the figure."""
     first = designs[0]
     held, hook = (quantity(v, "m") for v in (first.payload_rms_before, first.hook_rms))
@@ -170,17 +168,7 @@ def structures_report(designs: Sequence[StructureDesign], *, bound: bool = True)
     )
 
 
-def share_of(design: StructureDesign, name: str) -> float:
-    """Return the share of the payload's variance from ``sea``, ``MRU`` or ``noise``."""
-    squares = {source: rms**2 for source, rms in design.parts.items()}
-    total = sum(squares.values())
-    known = [source for names in SHARES.values() for source in names]
-    chosen = SHARES[name] or [source for source in squares if source not in known]
-    part = sum(squares.get(source, 0.0) for source in chosen)
-    return part / total if total > 0.0 else 0.0
-
-
-def limited_by(design: StructureDesign) -> str:
+def limited_by(design: Design) -> str:
     """Return what binds, or why the design is not ok."""
     if not design.ok:
         return design.status.partition(":")[0].partition(";")[0]
@@ -189,14 +177,14 @@ def limited_by(design: StructureDesign) -> str:
         return binding
     if design.at_bounds:
         return f"bounds of {', '.join(design.at_bounds)}"
-    if not design.parts:
+    if not design.shares:
         return "nothing"
     # With no limit in the way it is what disturbs most that decides.
     largest = max(SHARES, key=lambda name: share_of(design, name))
     return {"sea": "the structure itself", "MRU": "the MRU's error", "noise": "noise"}[largest]
 
 
-def _row(design: StructureDesign, *, bound: bool) -> tuple[float | str, ...]:
+def _row(design: Design, *, bound: bool) -> tuple[float | str, ...]:
     margins, torque = design.margins, design.limits.get(_TORQUE)
     found = math.isfinite(design.payload_rms)
     return (
@@ -214,7 +202,7 @@ def _row(design: StructureDesign, *, bound: bool) -> tuple[float | str, ...]:
 def _frame(
     left: Axes,
     right: Axes,
-    designs: Sequence[StructureDesign],
+    designs: Sequence[Design],
     span: tuple[float, float],
 ) -> None:
     left.set_xscale("log")

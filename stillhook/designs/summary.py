@@ -1,6 +1,6 @@
 """Tables and sentences of a design: motion, gains, margins, limits, and what they rest on.
 
-GainDesign -> Tables -> `stillhook.designs.report`
+Design -> Tables -> `stillhook.designs.report`
 """
 
 from __future__ import annotations
@@ -9,7 +9,8 @@ import math
 from collections.abc import Mapping
 
 from models.rig import DCMotor
-from synth.design import GainDesign, LimitUse
+from synth.design import Design, LimitUse
+from synth.question import HOOK, PAYLOAD
 
 from ..text import (
     Bar,
@@ -47,10 +48,12 @@ LIMITS: Mapping[str, tuple[str, str]] = {
 }
 AT_LEAST = ("gain_margin_up", "delay_margin", "rope.tension.least")
 """Limits whose bound is the least value."""
+SHARES: Mapping[str, tuple[str, ...]] = {"sea": (HOOK,), "MRU": ("mru.error",), "noise": ()}
+"""Which disturbances make up a share of a signal's variance, by its name; noise is the rest."""
 _PRICED = 1e-5  # a price below this share of the payload's rms is noise of the solver
 
 
-def sea_text(design: GainDesign) -> str:
+def sea_text(design: Design) -> str:
     """Return the sea that the figures hold for."""
     sea = design.case.sea
     if sea.spectrum == "bretschneider-1975":
@@ -63,67 +66,89 @@ def sea_text(design: GainDesign) -> str:
     return f"{text}, {sea.spectrum}"
 
 
-def about_of(design: GainDesign) -> str:
+def about_of(design: Design) -> str:
     """Return the case and its sea, as they stand below the title of a figure."""
     return f"{design.case.name}: {sea_text(design)}"
 
 
-def motion_table(design: GainDesign) -> Table:
+def motion_table(design: Design) -> Table:
     """Return hook and payload motion, before and after."""
     view = MotionView(design)
     found = [("hook", view.hook_motion), ("payload, drum held", view.before)]
     if view.after is not None:
-        found.append(("payload, with these gains", view.after))
+        found.append(("payload, compensated", view.after))
     largest = f"largest in {duration(design.case.limits.exposure_time)}"
     heads = columns(f"motion=; rms [m]; significant height [m]; largest={largest} [m]")
     rows = [(name, m.rms, m.significant_height, m.largest) for name, m in found]
     return Table(columns=heads, rows=rows)
 
 
-def effect(design: GainDesign) -> str:
+def effect(design: Design) -> str:
     """Return what the gains do to the payload, in a sentence."""
     if design.margins is None:
         return "no stable loop: the payload's motion has no standard deviation"
     before, after = design.payload_rms_before, design.payload_rms
     if math.isinf(before):
         return f"the payload moves {quantity(after, 'm')} rms; with the drum held it resonates"
-    loss = decibels(before / after)
-    if after > before:
-        return (
-            f"the payload moves {percent(after / before - 1.0)} more than with the drum held "
-            f"({loss})"
-        )
-    return f"compensation takes away {percent(1.0 - after / before)} of the motion ({loss})"
+    told = []
+    for name, other in (("the hook", design.hook_rms), ("the payload with the drum held", before)):
+        loss = decibels(other / after)
+        if after > other:
+            told.append(f"{percent(after / other - 1.0)} more than {name} ({loss})")
+        else:
+            told.append(f"{percent(1.0 - after / other)} less than {name} ({loss})")
+    return f"the payload moves {' and '.join(told)}"
 
 
-def has_gains(design: GainDesign) -> bool:
+def has_loop(design: Design) -> bool:
     """Return whether there is a loop at all: any gain that is not zero."""
-    return any(design.gains[name] for name in ("a", "a1", "a2"))
+    gains = [value for name, value in design.gains.items() if name != "A"]
+    return any(gains) if gains else bool(design.parameters)
 
 
-def gain_table(design: GainDesign) -> Table:
-    """Return the gains, as the law u = -A (a P'' + a1 P' + a2 P) has them."""
-    amplifier = design.gains["A"]
-    rows = []
-    for name, acts_on, per in (
-        ("a", "acceleration", ("s2/m", "m/s2")),
-        ("a1", "velocity", ("s/m", "m/s")),
-        ("a2", "displacement", ("/m", "m")),
-    ):
-        value = design.gains[name]
-        rows.append((name, acts_on, value, amplifier * value, _gain_unit(design, *per)))
-    heads = "gain; acts_on=on the payload's <; value [4]; product=A times it [4]; unit=<"
-    return Table(columns=columns(heads), rows=rows)
+def parameter_table(design: Design) -> Table:
+    """Return the structure's parameters."""
+    rows = [(name, value, design.units.get(name, "")) for name, value in design.parameters.items()]
+    notes = [f"{name} stands at the end of its range" for name in design.at_bounds]
+    heads = columns("parameter; value [6]; unit=<")
+    return Table(columns=heads, rows=rows, notes=tuple(notes))
 
 
-def command_text(design: GainDesign) -> str:
-    """Return what the law commands."""
-    unit = _command_unit(design)
-    what = {"V": "armature voltage", "rad/s": "motor speed", "N m": "motor torque"}[unit]
-    return f"{what} [{unit}] = -A (a P'' + a1 P' + a2 P), A = {number(design.gains['A'], 4)}"
+def command_text(design: Design) -> str:
+    """Return what the structure commands, for payload feedback its law."""
+    motor = design.case.winch.motor
+    command = "motor speed [rad/s]" if getattr(motor, "speed_gain", 0.0) else "motor torque [N m]"
+    if isinstance(motor, DCMotor):
+        command = "armature voltage [V]"
+    if design.structure == "payload-feedback":
+        return f"{command} = -A (a P'' + a1 P' + a2 P)"
+    heard = ", ".join(name.replace(".", " ").replace("_", " ") for name in design.measurements)
+    return f"{command} by {heard}"
 
 
-def margin_table(design: GainDesign) -> Table | None:
+def share_table(design: Design) -> Table | None:
+    """Return what sea, reference unit and noise make of each signal; None for the sea alone."""
+    if all(len(parts) < 2 for parts in design.shares.values()):
+        return None
+    heads = columns("signal=share of the variance of" + "".join(f"; {n} [%]" for n in SHARES))
+    rows = [
+        (signal.replace(".", " ").replace("_", " "), *(share_of(design, n, signal) for n in SHARES))
+        for signal in design.shares
+    ]
+    return Table(columns=heads, rows=rows)
+
+
+def share_of(design: Design, name: str, signal: str = PAYLOAD) -> float:
+    """Return the share of a signal's variance from ``sea``, ``MRU`` or ``noise``."""
+    squares = {source: rms**2 for source, rms in design.shares.get(signal, {}).items()}
+    total = sum(squares.values())
+    known = [source for names in SHARES.values() for source in names]
+    chosen = SHARES[name] or [source for source in squares if source not in known]
+    part = sum(squares.get(source, 0.0) for source in chosen)
+    return part / total if total > 0.0 else 0.0
+
+
+def margin_table(design: Design) -> Table | None:
     """Return the margins: what, figure, and the same figure in other words; None without any."""
     margins = design.margins
     if margins is None:
@@ -157,7 +182,7 @@ def margin_table(design: GainDesign) -> Table | None:
     return remarks("", rows)
 
 
-def limit_table(design: GainDesign) -> Table:
+def limit_table(design: Design) -> Table:
     """Return the limits, those that bind the design first."""
     uses = sorted(design.limits.values(), key=lambda use: not use.enforced)
     rows = [_limit_row(design, use) for use in uses]
@@ -171,7 +196,7 @@ def limit_table(design: GainDesign) -> Table:
     return Table(columns=heads, rows=rows, notes=tuple(notes))
 
 
-def label_of(design: GainDesign, name: str) -> str:
+def label_of(design: Design, name: str) -> str:
     """Return what people call a limit."""
     slow = design.case.limits.low_frequency
     if name == "low_frequency" and slow is not None:
@@ -179,7 +204,7 @@ def label_of(design: GainDesign, name: str) -> str:
     return LIMITS[name][0] if name in LIMITS else name.replace(".", " ").replace("_", " ")
 
 
-def facts(design: GainDesign, *, bound: bool = True) -> list[tuple[str, str]]:
+def facts(design: Design, *, bound: bool = True) -> list[tuple[str, str]]:
     """Return what the figures rest on: sea, rope, drag, search, check, and the bound beside them.
 
     `bound` says whether to compute that too, which takes some ten seconds.
@@ -204,7 +229,7 @@ def facts(design: GainDesign, *, bound: bool = True) -> list[tuple[str, str]]:
     return [*rows, *(bound_rows(design) if bound else ())]
 
 
-def required_table(design: GainDesign) -> Table | None:
+def required_table(design: Design) -> Table | None:
     """Return what each limit that breaks is and would have to be in the sea asked for, if any."""
     if not design.required:
         return None
@@ -219,7 +244,7 @@ def required_table(design: GainDesign) -> Table | None:
     return Table(columns=heads, rows=rows, notes=(note,))
 
 
-def _limit_row(design: GainDesign, use: LimitUse) -> tuple[str, Written, Written, Bar, Written]:
+def _limit_row(design: Design, use: LimitUse) -> tuple[str, Written, Written, Bar, Written]:
     sign = "≥" if use.name in AT_LEAST else "≤"
     worth = use.price > _PRICED * design.payload_rms and use.enforced
     price = quantity(use.price, "m", 2) if worth else ""
@@ -242,17 +267,3 @@ def _measured(use: LimitUse, value: float, *, size: float | None = None) -> str:
     if size is not None and scale(unit, size)[0] > 1e3 * abs(value):
         size = None  # 3 W is not 0.000003 MW
     return quantity(value, unit, size=size)
-
-
-def _command_unit(design: GainDesign) -> str:
-    motor = design.case.winch.motor
-    if isinstance(motor, DCMotor):
-        return "V"
-    return "rad/s" if motor.speed_gain > 0.0 else "N m"
-
-
-def _gain_unit(design: GainDesign, per_volt: str, per: str) -> str:
-    unit = _command_unit(design)
-    if unit == "V":
-        return f"V{per_volt}" if per_volt.startswith("/") else f"V {per_volt}"
-    return f"{unit} per {per}"

@@ -29,7 +29,7 @@ from models.simulation import (
     prepare,
     run_simulation,
 )
-from synth.design import GainDesign, Tuning
+from synth.design import Design, Tuning
 
 from ..controllers import controller_of
 from .runs import Runs, keep_worst, stays
@@ -116,14 +116,14 @@ def _with_error_before_touchdown(run: Run) -> Run:
 
 def simulate(
     case: Case,
-    controller: str | GainDesign | Tuning | Controller = "feedback",
+    controller: str | Design | Tuning | Controller = "feedback",
     *,
     scenario: str | Scenario = "hold",
     options: Mapping[str, object] | None = None,
     hook: MotionSource | None = None,
     seeds: int | Sequence[int] = 1,
     duration: float | str | None = None,
-    design: GainDesign | Tuning | None = None,
+    design: Design | Tuning | None = None,
     gains: Mapping[str, float] | None = None,
     sample_time: float | None = None,
     step: float | None = None,

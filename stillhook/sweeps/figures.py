@@ -36,7 +36,7 @@ from ..text import (
 if TYPE_CHECKING:
     import xarray as xr
 
-    from synth.design import GainDesign, StructureDesign
+    from synth.design import Design
 
 
 _MEASURES = ("payload_rms", "torque_rms", "speed_rms", "max_sensitivity")
@@ -51,9 +51,7 @@ _PLAIN = ("mass", "length", "coefficient", "radius", "inertia", "ratio", "effici
 _DIGITS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)  # marks of a logarithmic axis
 
 
-def sweep_figures(
-    result: xr.Dataset, design: GainDesign | StructureDesign | None = None
-) -> dict[str, Figure]:
+def sweep_figures(result: xr.Dataset, design: Design | None = None) -> dict[str, Figure]:
     """Return every figure that a result has, by the name of its file.
 
     Parameters
@@ -75,7 +73,7 @@ def sweep_figures(
 @drawn
 def violins(
     result: xr.Dataset,
-    design: GainDesign | StructureDesign | None = None,
+    design: Design | None = None,
     names: Sequence[str] | None = None,
 ) -> Figure:
     """Return how far each number spreads among the stable cases, over its nominal value.
@@ -127,7 +125,7 @@ def cumulative_share(
     result: xr.Dataset,
     name: str = "payload_rms",
     *,
-    design: GainDesign | StructureDesign | None = None,
+    design: Design | None = None,
 ) -> Figure:
     """Return the share of all cases that stays below a value; unstable ones never do.
 
@@ -238,7 +236,7 @@ def scatter_matrix(result: xr.Dataset, names: Sequence[str] | None = None) -> Fi
 
 
 @drawn
-def nyquist_cloud(result: xr.Dataset, design: GainDesign | StructureDesign) -> Figure:
+def nyquist_cloud(result: xr.Dataset, design: Design) -> Figure:
     """Return the Nyquist curves of many cases around -1, the design's own on top.
 
     Parameters
@@ -310,9 +308,7 @@ def _violin(axes: Axes, at: int, values: FloatArray) -> None:
     axes.plot([at], [p50], marker="o", color="white", markeredgecolor=AFTER, markersize=6)
 
 
-def _nominal(
-    result: xr.Dataset, design: GainDesign | StructureDesign | None, names: Sequence[str]
-) -> dict[str, float]:
+def _nominal(result: xr.Dataset, design: Design | None, names: Sequence[str]) -> dict[str, float]:
     """Return the nominal case's own numbers, as the sweep computes them."""
     if design is None or result.attrs.get("mode") != "frequency":
         return {}

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from models.basics import InputError, check_range, check_seed, pick
 from models.case import Case
 from models.spread import METHODS, Spread
-from synth.design import GainDesign, StructureDesign
+from synth.design import Design
 
 from ..keeper import Pool
 from ..text import Progress
@@ -63,7 +63,7 @@ def sweep(
     Parameters
     ----------
     design
-        A `GainDesign` or `StructureDesign`; in time also the name of a controller (`mpc`,
+        A `Design`; in time also the name of a controller (`mpc`,
         `feed-forward`, ...), a controller, or a pair of a name and a function of the case that
         returns one.
     spread
@@ -143,15 +143,15 @@ def sweep(
 
         from .export import check_writable, write_result
 
-        if not isinstance(design, GainDesign | StructureDesign):
+        if not isinstance(design, Design):
             raise InputError(
-                "sweep: in the frequency domain a design is wanted (GainDesign, StructureDesign), "
-                f"got {design!r}; other controllers are swept with mode='time'"
+                f"sweep: in the frequency domain a design is wanted, got {design!r}; other "
+                "controllers are swept with mode='time'"
             )
         if store is not None:
             check_writable(store)
         found = frequency_sweep(
-            design if design.case is nominal else replace(design, case=nominal),
+            design if design.case is nominal else _on(design, nominal),
             given,
             samples=int(wanted),
             sampling=sampling,
@@ -268,3 +268,8 @@ def spread_of(
     if "vary" in given:
         return Spread.from_dict(given)
     return Spread(dict(given))
+
+
+def _on(design: Design, case: Case) -> Design:
+    """Return a design's parameters on another case, in its sea."""
+    return replace(design, case=case, significant_height=case.sea.significant_height)

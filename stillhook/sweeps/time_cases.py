@@ -206,7 +206,7 @@ class TimeBench:
         if question.design_follows:
             return recipe.follow(case, question.starts)
         if task.gains:
-            own = recipe.with_gains(task.gains).controller(question.case)
+            own = recipe.with_gains(question.case, task.gains).controller(question.case)
         else:
             if self._own is None:
                 self._own = recipe.controller(question.case)

@@ -190,12 +190,12 @@ def case_at(result: xr.Dataset, number: int, nominal: Case) -> Case:
         return case_of(result, number)
     values = {p: float(result[p].to_numpy()[there[0]]) for p in varied_paths(result)}
     law = json.loads(result.attrs[ATTRIBUTE])["controller"].get("law") or {}
-    gains = dict(law.get("values", {})) if law.get("kind") == "gains" else {}
+    gains = dict(law.get("parameters", {}))
     spread = Spread({path: Samples([value]) for path, value in values.items()})
     own = spread.on(nominal, gains or None)
     changes = {**own.changes(list(values.values()))}
     gains |= own.gains(list(values.values()))
-    if gains:
+    if law.get("structure") == "payload-feedback":
         changes["gains"] = gains
     changes["name"] = f"{nominal.name} ({number})"[:100]
     return nominal.variant(changes)

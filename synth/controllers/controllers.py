@@ -14,7 +14,7 @@ import casadi as ca
 from models.basics import InputError, pick
 from models.case import Case
 
-from ..design import GainDesign, Tuning
+from ..design import Design, Tuning
 from ..structures import RecursiveController
 from .constant_tension import ConstantTension
 from .feed_forward import VelocityFeedForward
@@ -64,7 +64,7 @@ class ControllerRequest:
     """
 
     case: Case
-    design: GainDesign | Tuning | None = None
+    design: Design | Tuning | None = None
     gains: Mapping[str, float] | None = None
     sample_time: float | None = None
 
@@ -124,7 +124,7 @@ def controller_named(
     name: str,
     case: Case,
     *,
-    design: GainDesign | Tuning | None = None,
+    design: Design | Tuning | None = None,
     gains: Mapping[str, float] | None = None,
     sample_time: float | None = None,
 ) -> RecursiveController:

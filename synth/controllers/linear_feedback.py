@@ -42,7 +42,7 @@ from models.basics import InputError, check_range, pick
 from models.case import Case
 from models.plant import MEAN_LOSSES, build_plant
 
-from ..design import GainDesign, Tuning
+from ..design import Design, Tuning
 from ..loop import LinearController
 from ..structures import (
     Matrices,
@@ -163,7 +163,7 @@ class LinearFeedback(RecursiveController):
     @classmethod
     def from_design(
         cls,
-        design: GainDesign | Tuning,
+        design: Design | Tuning,
         *,
         case: Case | None = None,
         **options: Any,
@@ -173,7 +173,7 @@ class LinearFeedback(RecursiveController):
         Parameters
         ----------
         design
-            A `GainDesign`, or a `Tuning` of any structure on the plant of a case.
+            A `Design`, or a `Tuning` of any structure on the plant of a case.
         case
             The case that it is to run on; by default the design's own.  A `Tuning` knows of
             none.
@@ -185,13 +185,11 @@ class LinearFeedback(RecursiveController):
         InputError
             If a `Tuning` comes without a case or has no controller; otherwise as the class.
         """
-        law: Mapping[str, float] | LinearController
-        if isinstance(design, GainDesign):
-            law, case = design.gains, design.case if case is None else case
-        else:
-            if design.controller is None:
-                raise InputError(f"{_OWNER}: the design has no controller: {design.status}")
-            law = design.controller
+        law = design.controller
+        if law is None:
+            raise InputError(f"{_OWNER}: the design has no controller: {design.status}")
+        if case is None and isinstance(design, Design):
+            case = design.case
         if case is None:
             raise InputError(f"{_OWNER}: a Tuning does not know its case: say case=...")
         return cls(case, law, **options)

@@ -1,8 +1,9 @@
-"""`GainDesign`: gains of the payload feedback for a case, with their figures and their check.
+"""`Design`: a controller structure with its parameters for a case, what it does, and its check.
 
-A design is plain numbers: the case, the gains, what they achieve and what they cost.  From
-case and gains alone everything else can be derived again: the plant, the closed loop, the
-spectra (`GainDesign.assessment`), and the independent check (`GainDesign.verify`).
+A design is plain numbers: the case, the structure's name, its parameters, what they achieve and
+what they cost.  From case and parameters alone everything else can be derived again: the plant, the
+closed loop, the spectra (`Design.assessment`), the controller as `LinearFeedback` takes it, and the
+independent check (`Design.verify`).
 """
 
 from __future__ import annotations
@@ -14,30 +15,36 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from models.basics import InputError
 from models.case import Case
-from models.plant import MEASUREMENTS
 
 from ..loop import Assessment, LinearController, Margins
-from ..question import assess_gains
+from ..question import GAINS, HOOK, DesignQuestion, controller_for, pose
 from ..search import Start
+from ..structures import structure_named
 from ..verify import Verification, verify_design
 from .tuning import LimitUse
 
 if TYPE_CHECKING:
     from ..bound import BestPossible
 
+#: What disturbances are called in reports; others by their own names.
+SOURCE_NAMES: Mapping[str, str] = {HOOK: "the sea", "mru.error": "the reference unit"}
+_PRICED = 1e-5  # a price below this share of the payload's rms is noise of the solver
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class GainDesign:
-    """Gains of the payload feedback for a case, and everything they do.
+class Design:
+    """A controller for a case, and everything it does.
 
     Attributes
     ----------
-    case
-        The case asked about.
-    gains
-        ``A, a, a1, a2`` of u = -A (a P'' + a1 P' + a2 P); with a DC motor u is a voltage [V],
-        with an AC motor a speed [rad/s] or a torque [N m].
+    case, structure
+        The case asked about, and the name of the structure (`synth.structures.structure_names`).
+    parameters, units
+        The structure's parameters and their units by name; of payload feedback the thesis's
+        ``A, a, a1, a2`` of u = -A (a P'' + a1 P' + a2 P), where with a DC motor u is a voltage
+        [V], with an AC motor a speed [rad/s] or a torque [N m].  Empty if none were found.
     ok
         Stable, every enforced limit kept in the sea asked for, and verified.
     status
@@ -45,33 +52,46 @@ class GainDesign:
     significant_height
         H_s that the figures hold for [m]: the case's own, or the largest feasible one.
     payload_rms, payload_rms_before
-        Standard deviation of the payload's motion with these gains and with the drum held [m].
+        Standard deviation of the payload's motion with this controller and with the drum held
+        [m].
     hook_rms
         Standard deviation of the hook's motion [m].
+    shares
+        By signal (the payload's motion and whatever the limits speak of), by disturbance (the sea
+        ``hook.heave``, the reference unit ``mru.error``, each sensor's ``.._noise``): the standard
+        deviation that this one alone makes; the squares add up to the signal's variance.
     margins
-        Stability margins of the loop; None if it is unstable.
+        Stability margins of the loop broken at the command; None if it is unstable.
     limits
-        Use of every limit by name.
+        Use and price of every limit by name.
     drag, drag_before
         Linear drag coefficient with and without compensation [N s/m].
     masses
         Rope masses of the design plant.
     starts, agreed
-        The search's starts, and how many agreed on the best answer; empty for given gains.
+        The search's starts, and how many agreed on the best answer; empty for given parameters.
     required
         What the limits that break would have to be in the sea asked for, by name.
+    drive_kept
+        Whether the limits of the drive were part of the search; else they cannot be kept in any
+        sea, and the figures are those of a drive that is large enough.
     verification
         The independent check made before the design was handed over.
+    alternatives
+        Designs of other structures that were looked at besides.
     """
 
     case: Case
-    gains: Mapping[str, float]
+    structure: str
+    parameters: Mapping[str, float]
+    units: Mapping[str, str]
     ok: bool
     status: str
     significant_height: float
     payload_rms: float
     payload_rms_before: float
     hook_rms: float
+    shares: Mapping[str, Mapping[str, float]]
     margins: Margins | None
     limits: Mapping[str, LimitUse]
     drag: float
@@ -80,7 +100,9 @@ class GainDesign:
     starts: tuple[Start, ...] = ()
     agreed: int = 0
     required: Mapping[str, float] = field(default_factory=dict)
+    drive_kept: bool = True
     verification: Verification | None = None
+    alternatives: tuple[Design, ...] = ()
 
     @property
     def feasible(self) -> bool:
@@ -93,9 +115,29 @@ class GainDesign:
         return 4.0 * self.payload_rms
 
     @property
+    def residual(self) -> float:
+        """Payload's motion over the hook's."""
+        return self.payload_rms / self.hook_rms
+
+    @property
+    def residual_held(self) -> float:
+        """Payload's motion over that with the drum held."""
+        return self.payload_rms / self.payload_rms_before
+
+    @property
     def compensation_db(self) -> float:
-        """Payload motion before over after [dB]."""
-        return float(20.0 * np.log10(self.payload_rms_before / self.payload_rms))
+        """Hook's motion over the payload's [dB]."""
+        return float(-20.0 * np.log10(self.residual))
+
+    @property
+    def compensation_held_db(self) -> float:
+        """Payload's motion with the drum held over that with this controller [dB]."""
+        return float(-20.0 * np.log10(self.residual_held))
+
+    @property
+    def gains(self) -> Mapping[str, float]:
+        """The gains ``A, a, a1, a2`` where the structure has them, else nothing."""
+        return {name: self.parameters[name] for name in GAINS if name in self.parameters}
 
     @property
     def sea_case(self) -> Case:
@@ -105,19 +147,42 @@ class GainDesign:
         return self.case.replace({"sea.significant_height": self.significant_height})
 
     @cached_property
-    def assessment(self) -> Assessment:
-        """The closed loop in numbers: spectra, responses, margins, poles."""
-        return assess_gains(self.sea_case, self.gains, masses=self.masses, drag=self.drag)
+    def question(self) -> DesignQuestion:
+        """The question in the sea that the figures hold for."""
+        return pose(self.sea_case, self.structure, self.masses)
+
+    @cached_property
+    def controller(self) -> LinearController:
+        """The controller in state space, u = +C y, as `LinearFeedback` takes it.
+
+        Raises
+        ------
+        InputError
+            If no controller was found.
+        """
+        return controller_for(self.case, self.structure, self._known)
 
     @property
-    def controller(self) -> LinearController:
-        """The gains as a controller, u = +C y."""
-        return self.assessment.controller
+    def _known(self) -> Mapping[str, float]:
+        if not self.parameters:
+            raise InputError(f"{self.structure}: the design has no controller: {self.status}")
+        return self.parameters
 
     @property
     def measurements(self) -> tuple[str, ...]:
-        """What the gains hear."""
-        return MEASUREMENTS
+        """What the structure hears."""
+        return structure_named(self.structure, self.case).measurements
+
+    @cached_property
+    def assessment(self) -> Assessment:
+        """The closed loop in numbers: spectra, responses, margins, poles.
+
+        Raises
+        ------
+        InputError
+            If no controller was found.
+        """
+        return self.question.assess(self._known, self.drag)
 
     @cached_property
     def bound(self) -> BestPossible:
@@ -134,31 +199,48 @@ class GainDesign:
 
         return bound_for(self)
 
+    @property
+    def binding(self) -> tuple[str, ...]:
+        """Names of the limits that have a price, dearest first."""
+        used = [u for u in self.limits.values() if u.price > _PRICED * self.payload_rms]
+        return tuple(u.name for u in sorted(used, key=lambda u: -u.price))
+
+    @property
+    def at_bounds(self) -> tuple[str, ...]:
+        """Names of the parameters that stand at a bound, where the answer would go on."""
+        found: list[str] = []
+        law = self.question.law
+        values = self.question.values(self.parameters) if self.parameters else ()
+        for p, value in zip(law.parameters if values else (), values, strict=True):
+            room = 1e-4 * (p.high - p.low) if np.isfinite(p.high - p.low) else 0.0
+            if p.low > 0.0 and np.isfinite(p.high):
+                at = min(value / p.low - 1.0, 1.0 - value / p.high) < 2e-3
+            else:
+                at = min(value - p.low, p.high - value) < room
+            found += [p.name] if at else []
+        return tuple(found)
+
     def verify(self) -> Verification:
         """Check everything that is claimed by code that the optimiser did not use."""
         return verify_design(self)
 
     def __str__(self) -> str:
         """Return the result as a small tree."""
-        gains = ", ".join(f"{name} = {value:.6g}" for name, value in self.gains.items())
         lines = [
-            f"GainDesign for {self.case.name}: {self.status}",
-            f"├ gains: {gains}",
-            f"├ H_s {self.significant_height:.3g} m: payload {1e3 * self.payload_rms:.3g} mm rms, "
-            f"{1e3 * self.payload_rms_before:.4g} mm before ({self.compensation_db:.1f} dB)",
+            f"Design {self.structure} for {self.case.name}: {self.status}",
+            f"├ H_s {self.significant_height:.3g} m: payload {1e3 * self.payload_rms:.4g} mm rms, "
+            f"hook {1e3 * self.hook_rms:.4g} mm ({self.compensation_db:.1f} dB), with the drum "
+            f"held {1e3 * self.payload_rms_before:.4g} mm ({self.compensation_held_db:.1f} dB)",
         ]
+        lines += [f"├ {k} = {v:.6g} {self.units.get(k, '')}" for k, v in self.parameters.items()]
         if self.margins is not None:
             m = self.margins
             lines.append(
                 f"├ M_s {m.max_sensitivity:.3g}, phase {np.degrees(m.phase):.1f} deg, "
                 f"gain x {m.gain_down:.3g} to x {m.gain:.3g}, delay {1e3 * m.delay:.1f} ms"
             )
-        names = list(self.limits)
-        for name in names:
-            u = self.limits[name]
-            mark = "└" if name == names[-1] else "├"
+        for u in self.limits.values():
             kind = "" if u.enforced else " (reported only)"
-            lines.append(
-                f"{mark} {name}: {100 * u.use:.1f} % of {u.bound:.4g} {u.unit}{kind}".rstrip()
-            )
-        return "\n".join(lines)
+            lines.append(f"├ {u.name}: {100 * u.use:.1f} % of {u.bound:.4g} {u.unit}{kind}")
+        lines[-1] = "└" + lines[-1][1:]
+        return "\n".join(line.rstrip() for line in lines)

@@ -31,7 +31,7 @@ class Shortfall:
     share
         Largest feasible significant height over the one asked for.
     values, coefficient
-        Gains ``a, a1, a2`` there, and their drag coefficient [N s/m].
+        Parameters there, and their drag coefficient [N s/m].
     breaks_first
         Name of the drive limit that binds there at the highest price.
     required

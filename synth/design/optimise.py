@@ -1,28 +1,31 @@
-"""Optimisation and evaluation of the gains of a case.
+"""Optimisation and evaluation of the parameters of any structure on a case.
 
-    Case -> DesignQuestion -> tune -> (too hard? largest sea, what it would take) -> GainDesign
+    Case, structure -> DesignQuestion -> simpler structures within -> search
+                    -> (too hard? largest sea, what it would take) -> Design -> verified
 
 A case that cannot be met is the norm, not the exception: then the design is the best one in
 the largest sea that can, and the status names the limit that breaks first and what it would
-have to be.
+have to be.  A design that fails its independent check is not ok, whatever the search said.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from models.basics import InputError, check_range, one_thread
 from models.case import Case
-from models.plant import masses_for_bandwidth
+from models.plant import MAX_MASSES, masses_for_bandwidth
 
 from ..loop import Assessment
-from ..question import PAYLOAD, DesignQuestion, pose, with_masses
+from ..question import GAINS, PAYLOAD, DesignQuestion, Problem, pose, with_masses
 from ..search import Progress, search
-from .design import GainDesign
+from .design import Design
 from .infeasible import Shortfall, shortfall
+from .nested import nested_starts, no_worse, starts_from
 from .tuning import LimitUse, Tuning, limit_uses, tuning_of
 
 _MODES = 5.0  # every rope mode below this many crossovers belongs in the design plant
@@ -32,72 +35,89 @@ _RESUMED = 5  # ends of a search that the next one, on more masses, begins from
 
 @one_thread()
 def optimise_gains(
-    case: Case, *, starts: int = 16, seed: int = 0, progress: Progress | None = None
-) -> GainDesign:
-    """Return the gains that minimise the payload's variance within the limits of a case.
+    case: Case,
+    structure: str = "payload-feedback",
+    *,
+    starts: int = 16,
+    seed: int = 0,
+    progress: Progress | None = None,
+    guesses: Sequence[Mapping[str, float]] = (),
+) -> Design:
+    """Return the controller of a structure that minimises the payload's variance within limits.
 
-    As in the thesis, it is the sea alone that shakes them: the noise of the payload's sensors is
-    not counted here, but by `optimise_structure` and by the bound (`GainDesign.bound`).
+    Where the limits cannot all be kept, it looks for the largest sea in which they can.
 
     Parameters
     ----------
     case
-        The case; its `gains.A` fixes the amplifier, as only the products A a, A a1, A a2 act.
+        The case; its `gains.A` fixes the amplifier of payload feedback, as only the products
+        A a, A a1, A a2 act.
+    structure
+        Name of the structure, see `synth.structures.structure_names`.
     starts, seed
         Size and seed of the multi-start search.
     progress
         Called as progress(stage, done, total).
+    guesses
+        Parameters by name of designs for similar cases or of simpler structures, which the search
+        begins with instead of looking for such itself; what they do not name does nothing.  The
+        answer is never worse than one of them that keeps the limits.
 
     Returns
     -------
-    GainDesign
+    Design
         `ok` only if it is stable, keeps every enforced limit in the sea asked for and passes
         the independent check.
 
     Raises
     ------
     InputError
-        If a limit lies below the static load, or the rope needs more masses than there are.
+        If there is no such structure, or a limit lies below the static load.
     """
-    question = pose(case)
-    guesses = _guesses(question)
-    tuning = tuning_of(question.problem, search(question.problem, starts, seed, guesses, progress))
+    check_range("optimise_gains", "starts", starts, low=1)
+    count = int(starts)
+    question = pose(case, structure)
+    known = starts_from(question, guesses) or nested_starts(question, count, seed, progress)
+    count += len(known)
+    known = [*known, *_in_use(question)]
+    tuning = _searched(question.problem, count, seed, known, progress)
     while (wanted := _masses_wanted(question, tuning)) > question.masses:
         # The rope turned out to need more masses: the ends of the search are the guesses.
-        question = with_masses(question, wanted)
-        values = list(tuning.parameters.values())
-        problem = question.problem
-        ends = [s.end for s in sorted(tuning.starts, key=lambda s: s.cost) if s.converged]
-        guesses = [values, *([float(v) for v in end] for end in ends[:_RESUMED])]
-        again = tuning_of(problem, search(problem, 1, seed, guesses, progress, only_guesses=True))
-        if not again.ok and tuning.ok:
-            again = tuning_of(problem, search(problem, starts, seed, [values], progress))
-        tuning = replace(again, starts=tuning.starts, agreed=tuning.agreed)
-    if tuning.ok:
-        return _verified(question, _design(question, tuning, tuning.status), progress)
-    if tuning.assessment is None or not any(limit.drive for limit in question.limits):
-        return _design(question, tuning, tuning.status)
-    return _best_possible(question, starts, seed, progress)
+        question, tuning = _on_more(question, wanted, tuning, count, seed, progress)
+    if not tuning.ok:
+        if tuning.assessment is None or not question.drive:
+            return design_of(question, tuning)
+        return _best_possible(question, count, seed, known, progress)
+    design = verified(design_of(question, tuning), progress)
+    most = 1 if question.data.lumping == "thesis" else MAX_MASSES
+    while tuning.ok and not design.ok and 2 * question.masses <= most:
+        # It stands on its own rope only: once more on twice the masses.
+        question, tuning = _on_more(question, 2 * question.masses, tuning, count, seed, progress)
+        design = verified(design_of(question, tuning), progress)
+    return design
 
 
 @one_thread()
-def evaluate_gains(case: Case, gains: Mapping[str, float]) -> GainDesign:
-    """Return what given gains do on a case, in the same form as an optimised design.
+def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback") -> Design:
+    """Return what given parameters do on a case, in the same form as an optimised design.
 
     Parameters
     ----------
     case
         The case.
     gains
-        ``A, a, a1, a2``; ``A`` may be left out for the case's own (1 if it has none).
+        The structure's parameters by name, for payload feedback ``A, a, a1, a2``; ``A`` may be
+        left out for the case's own (1 if it has none).  Or the section `gains` of a case.
+    structure
+        Name of the structure, see `synth.structures.structure_names`.
 
     Raises
     ------
     InputError
-        If a gain is missing, unknown or not finite.
+        If there is no such structure, or a parameter is missing, unknown or out of its range.
     """
-    complete = _complete(case, gains)
-    question = pose(case)
+    question = pose(case, structure)
+    complete = _complete(question, gains)
     growth = _growth(question, complete)
     if growth <= 0.0:
         masses = _masses_for(question, question.assess(complete))
@@ -105,53 +125,86 @@ def evaluate_gains(case: Case, gains: Mapping[str, float]) -> GainDesign:
             question = with_masses(question, masses)
             growth = _growth(question, complete)
     if growth > 0.0:
-        return _unstable(question, complete, growth)
+        status = f"unstable: grows by a factor e every {1.0 / growth:.3g} s"
+        return _record(question, complete, None, {}, ok=False, status=status)
     assessment = question.assess(complete)
     uses = _uses(question, assessment, {})
     broken = [u.name for u in uses.values() if u.enforced and not u.kept]
     status = "stable; " + (f"breaks {', '.join(broken)}" if broken else "keeps every limit")
-    design = _record(question, complete, assessment, uses, ok=not broken, status=status)
-    return _verified(question, design, None)
+    return verified(
+        _record(question, complete, assessment, uses, ok=not broken, status=status), None
+    )
+
+
+def _searched(
+    problem: Problem,
+    starts: int,
+    seed: int,
+    guesses: Sequence[Sequence[float]],
+    progress: Progress | None,
+) -> Tuning:
+    """Return the answer of a search, or a guess that is better and keeps the limits."""
+    found = search(problem, starts, seed, guesses, progress)
+    return tuning_of(problem, no_worse(problem, found, guesses))
+
+
+def _on_more(
+    question: DesignQuestion,
+    masses: int,
+    tuning: Tuning,
+    starts: int,
+    seed: int,
+    progress: Progress | None,
+) -> tuple[DesignQuestion, Tuning]:
+    """Return the question on more rope masses, and its answer from the ends of the search."""
+    question = with_masses(question, masses)
+    values, problem = list(tuning.parameters.values()), question.problem
+    ends = [s.end for s in sorted(tuning.starts, key=lambda s: s.cost) if s.converged]
+    known = [values, *([float(v) for v in end] for end in ends[:_RESUMED])]
+    again = tuning_of(problem, search(problem, 1, seed, known, progress, only_guesses=True))
+    if not again.ok and tuning.ok:
+        again = tuning_of(problem, search(problem, starts, seed, [values], progress))
+    return question, replace(again, starts=tuning.starts, agreed=tuning.agreed)
 
 
 def _best_possible(
-    question: DesignQuestion, starts: int, seed: int, progress: Progress | None
-) -> GainDesign:
+    question: DesignQuestion,
+    starts: int,
+    seed: int,
+    guesses: Sequence[Sequence[float]],
+    progress: Progress | None,
+) -> Design:
     """Return the best design in the largest feasible sea, for a drive that is too small."""
     case = question.case
-    loop_limits = tuple(limit for limit in question.limits if not limit.drive)
-    loop_only = question.problem_with(loop_limits)
-    free = tuning_of(loop_only, search(loop_only, starts, seed, _guesses(question), progress))
+    free = _searched(question.problem_with(question.loop), starts, seed, guesses, progress)
     if not free.ok:
-        return _design(question, free, f"whatever the drive: {free.status}")
-    found = shortfall(question, free, progress)
-    if found is None:
+        status = f"whatever the drive: {free.status}"
+        return design_of(question, replace(free, status=status), drive_kept=False)
+    short = shortfall(question, free, progress)
+    if short is None:
         status = "the drive's limits cannot be kept in any sea, however small"
-        return _design(question, free, status)
-    height = found.share * case.sea.significant_height
-    calmer = pose(case.replace({"sea.significant_height": height}), question.masses)
-    if found.share >= 1.0:
+        return design_of(question, replace(free, ok=False, status=status), drive_kept=False)
+    if short.share >= 1.0:
         # The sea asked for is feasible after all: the search missed it, so it starts from there.
-        values = [found.values[name] for name in ("a", "a1", "a2")]
+        values = list(short.values.values())
         tuning = tuning_of(question.problem, search(question.problem, 4, seed, [values], progress))
-        return _verified(question, _design(question, tuning, tuning.status), progress)
-    gains = {"A": question.amplifier, **found.values}
-    assessment = calmer.assess(gains, found.coefficient)
-    uses = _uses(calmer, assessment, {})
-    design = _record(
-        question, gains, assessment, uses, ok=False, status=_too_small(question, found, height)
+        return verified(design_of(question, tuning), progress)
+    height = short.share * case.sea.significant_height
+    calmer = pose(
+        case.replace({"sea.significant_height": height}), question.structure.name, question.masses
     )
+    parameters = calmer.named(list(short.values.values()))
+    assessment = calmer.assess(parameters, short.coefficient)
+    uses = _uses(calmer, assessment, {})
+    status = _too_small(question, short, height)
     design = replace(
-        design,
-        significant_height=height,
-        payload_rms_before=calmer.payload_rms_before,
-        drag_before=calmer.drag_before,
-        hook_rms=float(calmer.hook.displacement.rms),
-        required=found.required,
+        _record(calmer, parameters, assessment, uses, ok=False, status=status),
+        case=case,
+        required=short.required,
         starts=free.starts,
         agreed=free.agreed,
     )
-    return replace(_verified(question, design, progress), ok=False)
+    return replace(verified(design, progress), ok=False)
 
 
 def _too_small(question: DesignQuestion, found: Shortfall, height: float) -> str:
@@ -172,48 +225,69 @@ def _number(value: float) -> str:
     return f"{value:.4g}" if abs(value) < 1e4 else f"{value:,.0f}".replace(",", " ")
 
 
-def _design(question: DesignQuestion, tuning: Tuning, status: str) -> GainDesign:
+def design_of(question: DesignQuestion, tuning: Tuning, *, drive_kept: bool = True) -> Design:
+    """Return a tuning as a design, with the limits that it did not have to keep as reported."""
     if tuning.assessment is None:
-        return _unstable(question, {"A": question.amplifier, "a": 0.0, "a1": 0.0, "a2": 0.0}, 0.0)
-    gains = {"A": question.amplifier, **tuning.parameters}
-    prices = {name: use.price for name, use in tuning.limits.items()}
-    uses = _uses(question, tuning.assessment, prices)
-    design = _record(question, gains, tuning.assessment, uses, ok=tuning.ok, status=status)
-    return replace(design, starts=tuning.starts, agreed=tuning.agreed)
+        status = "no stabilising gains were found"
+        design = _record(question, {}, None, {}, ok=False, status=status)
+    else:
+        prices = {name: use.price for name, use in tuning.limits.items()}
+        uses = _uses(question, tuning.assessment, prices, drive_kept=drive_kept)
+        design = _record(
+            question,
+            question.named(list(tuning.parameters.values())),
+            tuning.assessment,
+            uses,
+            ok=tuning.ok,
+            status=tuning.status,
+        )
+    return replace(design, starts=tuning.starts, agreed=tuning.agreed, drive_kept=drive_kept)
 
 
 def _uses(
-    question: DesignQuestion, assessment: Assessment, prices: Mapping[str, float]
+    question: DesignQuestion,
+    assessment: Assessment,
+    prices: Mapping[str, float],
+    *,
+    drive_kept: bool = True,
 ) -> dict[str, LimitUse]:
+    enforced = question.limits if drive_kept else question.loop
+    reported = (*question.reported, *(() if drive_kept else question.drive))
     return {
-        **limit_uses(question.limits, assessment, prices),
-        **limit_uses(question.reported, assessment, prices, enforced=False),
+        **limit_uses(enforced, assessment, prices),
+        **limit_uses(reported, assessment, prices, enforced=False),
     }
 
 
 def _record(
     question: DesignQuestion,
-    gains: Mapping[str, float],
+    parameters: Mapping[str, float],
     assessment: Assessment | None,
     uses: Mapping[str, LimitUse],
     *,
     ok: bool,
     status: str,
-) -> GainDesign:
-    """Return a design in the sea asked for; `assessment` is None where the loop is unstable."""
-    drag = question.drag_before
+) -> Design:
+    """Return a design in the question's sea; `assessment` is None where the loop is unstable."""
+    drag, shares = question.drag_before, {}
     if assessment is not None:
         fixed = question.case.payload.fixed_drag
         drag = assessment.coefficient if question.drag is not None else float(fixed or 0.0)
-    return GainDesign(
+        limits = (*question.limits, *question.reported)
+        signals = dict.fromkeys([PAYLOAD, *(name for limit in limits for name in limit.outputs)])
+        shares = {name: assessment.shares(name) for name in signals}
+    return Design(
         case=question.case,
-        gains=dict(gains),
+        structure=question.structure.name,
+        parameters=dict(parameters),
+        units={p.name: p.unit for p in question.law.parameters},
         ok=ok,
         status=status,
         significant_height=question.case.sea.significant_height,
         payload_rms=assessment.sigma(PAYLOAD) if assessment is not None else np.inf,
         payload_rms_before=question.payload_rms_before,
         hook_rms=float(question.hook.displacement.rms),
+        shares=shares,
         margins=assessment.margins if assessment is not None else None,
         limits=uses,
         drag=drag,
@@ -222,23 +296,16 @@ def _record(
     )
 
 
-def _unstable(question: DesignQuestion, gains: Mapping[str, float], growth: float) -> GainDesign:
-    status = "no stabilising gains were found"
-    if growth > 0.0:
-        status = f"unstable: grows by a factor e every {1.0 / growth:.3g} s"
-    return _record(question, gains, None, {}, ok=False, status=status)
-
-
-def _verified(
-    question: DesignQuestion, design: GainDesign, progress: Progress | None
-) -> GainDesign:
+def verified(design: Design, progress: Progress | None) -> Design:
     """Return the design with its independent check; one that fails it is not ok."""
+    if design.margins is None:
+        return design
     if progress is not None:
         progress("verify", 0, 1)
     checked = design.verify()
     if progress is not None:
         progress("verify", 1, 1)
-    status = design.status + _in_small_motion(question, design.gains)
+    status = design.status + _in_small_motion(design.question, design.parameters)
     if design.payload_rms > design.payload_rms_before:
         status += "; with the drum held the payload moves less"
     if not checked.ok:
@@ -247,39 +314,57 @@ def _verified(
 
 
 def _growth(
-    question: DesignQuestion, gains: Mapping[str, float], drag: float | None = None
+    question: DesignQuestion, parameters: Mapping[str, float], drag: float | None = None
 ) -> float:
     """Return the largest growth rate of the loop [1/s], by default with the drag before."""
     coefficient = question.drag_before if drag is None else drag
-    return float(question.assess(gains, coefficient).poles.real.max())
+    return float(question.assess(parameters, coefficient).poles.real.max())
 
 
-def _in_small_motion(question: DesignQuestion, gains: Mapping[str, float]) -> str:
+def _in_small_motion(question: DesignQuestion, parameters: Mapping[str, float]) -> str:
     """Return a remark if the loop needs its drag to be stable, else nothing.
 
     Quadratic drag vanishes in small motion: such a loop swings by itself, at the amplitude
     that gives it drag enough.
     """
-    if question.drag is None or _growth(question, gains, 0.0) <= 0.0:
+    if question.drag is None or _growth(question, parameters, 0.0) <= 0.0:
         return ""
     return "; without drag, in small motion, the loop is unstable and swings by itself"
 
 
-def _guesses(question: DesignQuestion) -> Sequence[Sequence[float]]:
+def _in_use(question: DesignQuestion) -> list[list[float]]:
+    """Return the gains that the case has in use as a start, where the structure has such."""
     gains = question.case.gains
-    return [] if gains is None else [[gains.a, gains.a1, gains.a2]]
+    if gains is None or question.amplifier is None:
+        return []
+    return starts_from(question, [{"a": gains.a, "a1": gains.a1, "a2": gains.a2}])
 
 
-def _complete(case: Case, gains: Mapping[str, float]) -> dict[str, float]:
-    unknown = sorted(set(gains) - {"A", "a", "a1", "a2"})
-    missing = [name for name in ("a", "a1", "a2") if name not in gains]
+def _complete(question: DesignQuestion, gains: object) -> dict[str, float]:
+    """Return parameters by name, checked; the amplifier is the case's own if it is left out."""
+    given: dict[str, object] = {}
+    if isinstance(gains, Mapping):
+        given = dict(gains)
+    elif gains is not None:
+        given = {name: getattr(gains, name) for name in getattr(type(gains), "model_fields", ())}
+    law = {p.name: p for p in question.law.parameters}
+    own = {} if question.amplifier is None else {"A": question.amplifier}
+    unknown = [name for name in given if name not in {**law, **own}]
+    missing = [name for name in law if name not in given]
     if unknown or missing:
+        optional = " and optionally A" if own else ""
         raise InputError(
-            "gains: must be a, a1, a2 and optionally A, got " + (", ".join(gains) or "none")
+            f"gains: must be {', '.join(law)}{optional}, got {', '.join(given) or 'none'}"
         )
-    own = case.gains.A if case.gains is not None else 1.0
-    values = {"A": own, **gains}
-    return {name: check_range("gains", name, values[name]) for name in ("A", "a", "a1", "a2")}
+    every: dict[str, Any] = {**own, **given}
+    checked = {}
+    for name in (*own, *law):
+        # A gain may have either sign; a corner, a width, a bandwidth may not.
+        low = -np.inf if name in GAINS else law[name].low
+        checked[name] = check_range(
+            "gains", name, every[name], low=0.0 if low >= 0.0 else -np.inf, open_low=low > 0.0
+        )
+    return checked
 
 
 def _masses_wanted(question: DesignQuestion, tuning: Tuning) -> int:

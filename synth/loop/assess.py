@@ -67,6 +67,7 @@ class Assessment:
         self._drag = drag
         self._given = coefficient
         self._moments: dict[str, tuple[float, float]] = {}
+        self._shares: dict[str, dict[str, float]] = {}
 
     @cached_property
     def coefficient(self) -> float:
@@ -154,6 +155,14 @@ class Assessment:
         """Return the standard deviation of `output`."""
         return float(np.sqrt(self._moment(output)[0]))
 
+    def shares(self, output: str) -> dict[str, float]:
+        """Return the standard deviation that each disturbance alone makes of `output`, by name.
+
+        Their squares add up to the variance.
+        """
+        self._moment(output)
+        return dict(self._shares[output])
+
     def mean_period(self, output: str) -> float:
         """Return the mean zero-crossing period of `output` [s]."""
         m0, m2 = self._moment(output)
@@ -219,6 +228,7 @@ class Assessment:
             except SolverError:
                 # A pole so close to the axis that the variance has no digits: it has no bound.
                 self._moments[output] = np.inf, np.inf
+                self._shares[output] = dict.fromkeys((d.name for d in self.disturbances), np.inf)
         return self._moments[output]
 
     @property
@@ -230,8 +240,13 @@ class Assessment:
         nodes = self.quadrature(outputs)
         count, spectra = len(self.disturbances), self._spectra(outputs, nodes.omega)
         for i, output in enumerate(outputs):
-            density = np.sum(spectra[i * count : (i + 1) * count], axis=0)
+            parts = spectra[i * count : (i + 1) * count]
+            density = np.asarray(np.sum(parts, axis=0), dtype=np.float64)
             m0 = float(nodes.integrate(density))
+            self._shares[output] = {
+                d.name: float(np.sqrt(nodes.integrate(part)))
+                for d, part in zip(self.disturbances, parts, strict=True)
+            }
             self._moments[output] = m0, float(nodes.integrate(density * nodes.omega**2))
 
     def _responses(

@@ -17,7 +17,7 @@ from models.basics import BoolArray, ComplexArray, FloatArray
 LoopGain = Callable[[FloatArray], ComplexArray]
 
 _NOTHING = 1e-9  # |L| below which neither a peak nor a crossing matters to any margin
-_CLOSE, _MOST_STEPS = 4e-16, 60  # relative width of a bracket that is a point; steps towards it
+_CLOSE, _MOST_STEPS = 1e-14, 60  # relative width of a bracket that is a point; steps towards it
 _ZOOM = np.linspace(0.0, 1.0, 17)
 _ROUNDS = 7  # each zooms by a factor of eight: 8^7 is 2e6
 _FORETOLD = 1e-13  # relative error of a parabola that is as good as the function itself

@@ -5,19 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from models.basics import InputError
 from models.case import Case
-from models.plant import LinearPlant, PlantData
 
-from ..design import GainDesign, StructureDesign
-from ..loop import Disturbance, DragElement, LinearController
-from ..question import HOOK, PAYLOAD, pose, pose_structure
+from ..design import Design
+from ..question import HOOK, PAYLOAD, pose
 from .criteria import STABILITY, Criterion, case_criteria, outputs_of
 from .systems import VELOCITY, HeldSystem, LoopSystem, PerfectSystem, System
-
-Design = GainDesign | StructureDesign
 
 _HELD = {PAYLOAD, VELOCITY, "rope.tension"}
 _WINCH = ("motor.torque", "motor.speed", "motor.current", "motor.voltage")
@@ -37,8 +31,6 @@ class OperabilityQuestion:
         The design's loop; None where a case alone was asked about.
     criteria
         By name of the system, ``held``, ``perfect`` and ``loop``: stability first.
-    plant
-        The linear plant, for its static values.
     """
 
     case: Case
@@ -46,7 +38,6 @@ class OperabilityQuestion:
     perfect: PerfectSystem
     loop: LoopSystem | None
     criteria: dict[str, tuple[Criterion, ...]]
-    plant: LinearPlant
 
     @property
     def systems(self) -> dict[str, System]:
@@ -81,44 +72,30 @@ def pose_operability(
         changes["rope.length"] = length
     reported = case.variant(changes)
     same = reported.rope.length == case.rope.length
-    question = pose(reported, source.masses if same and not isinstance(source, Case) else None)
-    loop_plant: LinearPlant = question.plant
-    noises: tuple[Disturbance, ...] = ()
-    loop_parts: tuple[LinearPlant, LinearController, DragElement | None] | None = None
-    if isinstance(source, GainDesign):
-        if source.margins is None:
-            raise InputError("operability: the design has no stabilising gains")
-        assessment = question.assess(source.gains, 0.0)
-        loop_parts = (question.plant, assessment.controller, question.drag)
-    elif isinstance(source, StructureDesign):
-        if not source.parameters:
-            raise InputError("operability: the design has no controller")
-        posed = pose_structure(reported, source.structure, source.masses if same else None)
-        law = posed.law
-        controller = law.controller([source.parameters[p.name] for p in law.parameters])
-        problem = posed.problem(())
-        noises = tuple(d for d in problem.disturbances if d.name != HOOK)
-        loop_parts = (problem.plant, controller, problem.drag)
-        loop_plant = problem.plant
+    if isinstance(source, Case):
+        question = pose(reported)
+    elif source.margins is None:
+        raise InputError("operability: the design has no stabilising controller")
+    else:
+        question = pose(reported, source.structure, source.masses if same else None)
     of_case = case_criteria(reported, question.plant)
     every = (STABILITY, *wanted, *of_case)
     held = tuple(c for c in every if set(c.outputs) <= _HELD)
     winch = tuple(c for c in of_case if set(c.outputs) <= set(_WINCH))
-    fixed = reported.payload.fixed_drag
-    slope = 0.0 if fixed is not None else _slope(question.data)
-    reference = question.drag_before
+    drag = question.drag
+    slope = drag.slope if drag is not None else 0.0
     loop = None
-    if loop_parts is not None:
-        plant, controller, drag = loop_parts
+    if not isinstance(source, Case):
+        noises = tuple(d for d in question.problem.disturbances if d.name != HOOK)
         loop = LoopSystem(
             outputs=tuple(dict.fromkeys((PAYLOAD, VELOCITY, *outputs_of(every)))),
-            slope=drag.slope if drag is not None else 0.0,
-            reference=drag.reference if drag is not None else reference,
+            slope=slope,
+            reference=drag.reference if drag is not None else question.drag_before,
             noises=noises,
             mru=reported.sensors.mru if any(n.name == "mru.error" for n in noises) else None,
             mru_rms=float(question.hook.displacement.rms),
-            plant=plant,
-            controller=controller,
+            plant=question.plant,
+            controller=question.controller(source.parameters),
             drag=drag,
         )
     return OperabilityQuestion(
@@ -126,7 +103,7 @@ def pose_operability(
         held=HeldSystem(
             outputs=tuple(dict.fromkeys((PAYLOAD, VELOCITY, *outputs_of(held)))),
             slope=slope,
-            reference=reference,
+            reference=question.drag_before,
             data=question.data,
         ),
         perfect=PerfectSystem(
@@ -134,10 +111,4 @@ def pose_operability(
         ),
         loop=loop,
         criteria={"held": held, "perfect": winch, "loop": every},
-        plant=loop_plant,
     )
-
-
-def _slope(data: PlantData) -> float:
-    """Return the drag coefficient per rms speed, q sqrt(8/pi) [N s2/m2]."""
-    return float(data.quadratic_drag * np.sqrt(8.0 / np.pi))

@@ -17,12 +17,11 @@ import numpy as np
 from models.case import Case
 from models.plant import PlantData
 
-from ..design import GainDesign
+from ..design import Design
 from ..loop import Assessment
-from ..question import pose, pose_structure
+from ..question import pose
 from .columns import SeaColumn
 from .contour import Contour
-from .pose import Design
 
 _TOLERANCE = 1e-6
 
@@ -79,11 +78,7 @@ def evaluate_in(design: Design, case: Case, drag: float | None = None) -> Assess
     """
     case = case.variant({"limits.drive": "report"})
     masses = design.masses if case.rope.length == design.case.rope.length else None
-    if isinstance(design, GainDesign):
-        question = pose(case, masses)
-        return question.assess(design.gains, None if question.drag is None else drag)
-    posed = pose_structure(case, design.structure, masses)
-    return posed.problem(()).assess([design.parameters[p.name] for p in posed.law.parameters], drag)
+    return pose(case, design.structure, masses).assess(design.parameters, drag)
 
 
 def recheck(

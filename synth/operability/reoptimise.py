@@ -16,7 +16,7 @@ import numpy as np
 from models.basics import SolverError, one_thread
 from models.case import Case
 
-from ..design import GainDesign, shortfall, tuning_of
+from ..design import Design, shortfall, tuning_of
 from ..limits import Limit
 from ..question import pose
 from ..search import search
@@ -30,7 +30,7 @@ _STARTS = 3  # of each search, besides the design's own gains
 
 @one_thread()
 def reoptimised_contour(
-    design: GainDesign,
+    design: Design,
     question: OperabilityQuestion,
     columns: Sequence[SeaColumn],
     *,
@@ -69,7 +69,7 @@ def reoptimised_contour(
             one = replace(column, headings=None, cases=(case,), hooks=(column.hooks[h],))
             loop = replace(
                 question.loop,
-                controller=pose(case, design.masses).assess(gains, 0.0).controller,
+                controller=pose(case, design.structure, design.masses).controller(gains),
             )
             found = limiting_heights(SeaStates.of(loop, one), criteria, highest=highest)
             heights[:, h, p], drag[h, p] = found.heights[:, 0], found.drag[0]
@@ -84,19 +84,18 @@ def reoptimised_contour(
 
 
 def _best(
-    case: Case, design: GainDesign, drive: tuple[Limit, ...], seed: int
+    case: Case, design: Design, drive: tuple[Limit, ...], seed: int
 ) -> dict[str, float] | None:
-    """Return the gains of the largest sea that any gains can do, or None."""
-    question = pose(case, design.masses)
-    loop_limits = tuple(limit for limit in question.limits if not limit.drive)
-    problem = question.problem_with(loop_limits)
-    own = question.law_values(design.gains)
+    """Return the parameters of the largest sea that any can do, or None."""
+    question = pose(case, design.structure, design.masses)
+    problem = question.problem_with(question.loop)
+    own = question.values(design.parameters)
     free = tuning_of(problem, search(problem, _STARTS, seed, [own], None))
     if not free.ok:
         return None
-    limited = replace(question, limits=(*loop_limits, *drive), reported=())
+    limited = replace(question, drive=drive, reported=())
     try:
         found = shortfall(limited, free)
     except SolverError:
         found = None
-    return None if found is None else {"A": question.amplifier, **found.values}
+    return None if found is None else question.named(list(found.values.values()))

@@ -13,11 +13,11 @@ from models.basics import FloatArray, InputError
 from models.case import Case
 from models.sea import Scatter
 
+from ..design import Design
 from .contour import Contour
 from .criteria import Criterion
 from .dataset import dataset_of, table_text
 from .depths import STAGES, AtDepth
-from .pose import Design
 from .recheck import ContourCheck, recheck
 from .workable import Rule, rule_shares
 

@@ -25,7 +25,7 @@ from models.basics import (
 from models.case import Case
 from models.sea import Scatter, read_scatter
 
-from ..design import GainDesign
+from ..design import Design
 from ..loop import Assessment
 from ..search import Progress
 from .capability import capability
@@ -34,7 +34,7 @@ from .contour import Contour, contour_of
 from .criteria import payload_criteria
 from .depths import AtDepth, rope_state
 from .limiting import HIGHEST
-from .pose import Design, OperabilityQuestion, pose_operability
+from .pose import OperabilityQuestion, pose_operability
 from .reoptimise import reoptimised_contour
 from .result import Operability
 from .workable import workable
@@ -121,10 +121,10 @@ def operability(
     case = design if isinstance(design, Case) else design.case
     check_range("operability", "highest", highest, low=0.1, high=HIGHEST, unit="m")
     diagram = _diagram(scatter)
-    if reoptimise and not isinstance(design, GainDesign):
+    if reoptimise and not isinstance(design, Design):
         raise InputError(
-            "operability: reoptimise is for the gains of payload feedback (`optimise_gains`, "
-            "`evaluate_gains`); other structures keep their parameters"
+            "operability: reoptimise begins at a design (`optimise_gains`, `evaluate_gains`), got "
+            "a case alone"
         )
     if diagram is not None and not has_period(case):
         raise InputError(
@@ -167,7 +167,7 @@ def operability(
             name: contour_of(system, stage.criteria[name], seas, highest=highest, step=step)
             for name, system in stage.systems.items()
         }
-        if reoptimise and isinstance(design, GainDesign):
+        if reoptimise and not isinstance(design, Case):
             contours["reoptimised"] = reoptimised_contour(
                 design, stage, seas, highest=highest, seed=seed, step=step
             )

@@ -23,13 +23,15 @@ if TYPE_CHECKING:
     )
     from .problem import Goal, Problem, Values
     from .question import (
+        GAINS,
         DesignQuestion,
-        assess_gains,
+        SampledNoise,
+        controller_for,
+        heard_spectra,
         locked_response,
         pose,
         uncompensated,
         with_masses,
     )
-    from .structure_question import SampledNoise, StructureQuestion, pose_structure
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

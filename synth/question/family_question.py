@@ -22,7 +22,6 @@ from ..structures import ParametrisedController
 from .family_problem import FamilyLoop, FamilyProblem, Objective
 from .problem import Problem
 from .question import DesignQuestion, pose
-from .structure_question import pose_structure
 
 PAYLOAD_FEEDBACK = "payload-feedback"
 _MODES = 5.0  # every rope mode below this many crossovers belongs in the plant
@@ -145,10 +144,5 @@ def _named(changes: Mapping[str, Any]) -> str:
 
 def _posed(case: Case, structure: str, masses: int | None) -> tuple[DesignQuestion, Problem]:
     """Return the question of a case, and its problem with a structure."""
-    if structure == PAYLOAD_FEEDBACK:
-        question = pose(case, masses)
-        return question, question.problem
-    posed = pose_structure(case, structure, masses)
-    limits = (*posed.limits, *posed.drive)
-    question = replace(posed.question, plant=posed.plant, limits=limits, reported=posed.reported)
-    return question, posed.problem(limits)
+    question = pose(case, structure, masses)
+    return question, question.problem

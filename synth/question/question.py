@@ -1,21 +1,25 @@
-"""`DesignQuestion`: a case as plant, spectra and limits of a synthesis problem.
+"""`DesignQuestion`: a case and a structure as plant, spectra and limits of a synthesis problem.
 
-    Case -> hook motion, plant at N rope masses, drag, limits -> DesignQuestion -> Problem
+    Case, structure -> hook, plant at N rope masses with its sensors, noise, drag, limits
+                    -> DesignQuestion -> Problem
 
-Everything that synthesis takes from a case is taken here: which limits there are and whether
-they bind, what the drag is before compensation, how many rope masses the plant has.
+Everything that synthesis takes from a case is taken here: what the structure hears and what shakes
+it, which limits there are and whether they bind, what the drag is before compensation, how many
+rope masses the plant has.  The sea, the error of the reference unit and the noise of the sensors
+are disturbances in one cost, so that no gain grows without a price.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from models.basics import ComplexArray, FloatArray, adaptive_nodes
+from models.basics import ComplexArray, FloatArray, White, adaptive_nodes
 from models.case import Case
 from models.hook import HookMotion
 from models.plant import (
@@ -26,23 +30,88 @@ from models.plant import (
     rope_transfers,
     settled_drag,
 )
+from models.sensing import SAMPLE_TIME, sensed_plant, sensed_spectra, with_sensors
 
-from ..limits import HOOK, PAYLOAD, Limit, RollOff, drive_limits, loop_limits, modelled_bandwidth
-from ..loop import Assessment, DragElement, disturbances
-from ..structures import PayloadFeedback
+from ..limits import (
+    HOOK,
+    PAYLOAD,
+    Limit,
+    LowFrequency,
+    RollOff,
+    drive_limits,
+    loop_limits,
+    modelled_bandwidth,
+)
+from ..loop import Assessment, DragElement, LinearController, disturbances
+from ..structures import (
+    LowOrderFeedback,
+    ParametrisedController,
+    PayloadFeedback,
+    WinchStructure,
+    structure_named,
+)
 from .problem import Problem
+
+_LATE = 0.2  # delay beyond which the guard's model of it needs a higher order [s]
+_HIGH_ORDER = 12
+GAINS = ("A", "a", "a1", "a2")
+"""The thesis's gains; the amplifier A multiplies the others."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SampledNoise:
+    """Noise as samples carry it: its density up to pi/T [rad/s].
+
+    Its variance is that of the samples, so that what a direct gain makes of it has one too, and a
+    rate that goes with it.
+    """
+
+    spectrum: Callable[[Any], Any]
+    sample_time: float = SAMPLE_TIME
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Band that holds the variance [rad/s]."""
+        return 1e-5 / self.sample_time, np.pi / self.sample_time
+
+    @property
+    def splits(self) -> tuple[float, ...]:
+        """No kinks."""
+        return ()
+
+    def density(self, omega: Any) -> Any:
+        """Return the one-sided density per rad/s at `omega` [rad/s]."""
+        return self.spectrum(omega)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _LateProblem(Problem):
+    """A problem whose delay is so long that the guard of the search needs more of it."""
+
+    @cached_property
+    def rational(self) -> LinearPlant:
+        """The plant with Pade models of high order for its delays."""
+        return self.plant.without_delays(_HIGH_ORDER)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DesignQuestion:
-    """A case as synthesis sees it.
+    """A case and a structure as synthesis sees them.
 
     Attributes
     ----------
+    case, structure
+        The case, and the structure whose parameters are asked for.
+    data, hook
+        The plant's numbers and the hook's motion.
+    masses
+        Rope masses.
     plant
-        The linear plant at `masses` rope masses, its drag that before compensation.
-    limits, reported
-        Limits that bind the design, and those that are only reported.
+        The linear plant with what the structure hears, its drag that before compensation.
+    spectra
+        What shakes it, by name of the disturbance: the sea, the reference unit, the sensors.
+    loop, drive, reported
+        Limits of the loop, limits of the drive, and limits that are reported only.
     drag
         The quadratic drag to be linearised with the response, or None if C is given.
     drag_before, payload_rms_before
@@ -50,82 +119,116 @@ class DesignQuestion:
     """
 
     case: Case
+    structure: PayloadFeedback | WinchStructure | LowOrderFeedback
     data: PlantData
     hook: HookMotion
     masses: int
     plant: LinearPlant
-    structure: PayloadFeedback
-    limits: tuple[Limit, ...]
+    spectra: Mapping[str, Any]
+    loop: tuple[Limit, ...]
+    drive: tuple[Limit, ...]
     reported: tuple[Limit, ...]
     drag: DragElement | None
     drag_before: float
     payload_rms_before: float
 
     @property
-    def amplifier(self) -> float:
-        """The fixed gain A."""
-        return self.structure.amplifier
+    def limits(self) -> tuple[Limit, ...]:
+        """All limits that bind the design."""
+        return (*self.loop, *self.drive)
+
+    @cached_property
+    def law(self) -> ParametrisedController:
+        """The structure, bound to the plant."""
+        return self.structure.bind(self.plant)
+
+    @property
+    def amplifier(self) -> float | None:
+        """The fixed gain A of the thesis's feedback; None for a structure without."""
+        return _amplifier(self.structure, self.law)
 
     @cached_property
     def problem(self) -> Problem:
         """The problem with all limits that bind."""
         return self.problem_with(self.limits)
 
-    def problem_with(self, limits: tuple[Limit, ...]) -> Problem:
+    def problem_with(self, limits: Sequence[Limit]) -> Problem:
         """Return the problem with other limits."""
-        return Problem(
+        late = max(self.plant.delays, default=0.0) > _LATE
+        return (_LateProblem if late else Problem)(
             plant=self.plant,
-            law=self.structure.bind(self.plant),
-            disturbances=disturbances({HOOK: self.hook}, self.plant.independent_disturbances),
+            law=self.law,
+            disturbances=disturbances(self.spectra, self.plant.independent_disturbances),
             minimise={PAYLOAD: 1.0},
-            limits=limits,
+            limits=tuple(limits),
             drag=self.drag,
         )
 
-    def law_values(self, gains: Mapping[str, float]) -> list[float]:
-        """Return gains ``A, a, a1, a2`` as the law has them: with its own amplifier."""
-        scale = gains["A"] / self.amplifier
-        return [scale * gains[name] for name in ("a", "a1", "a2")]
+    def values(self, parameters: Mapping[str, float]) -> list[float]:
+        """Return parameters by name as the law has them: with its own amplifier."""
+        return _values(self.law, self.amplifier, parameters)
 
-    def assess(self, gains: Mapping[str, float], coefficient: float | None = None) -> Assessment:
-        """Return the closed loop of given gains ``A, a, a1, a2`` in numbers."""
-        return self.problem.assess(self.law_values(gains), coefficient)
+    def named(self, values: Sequence[float]) -> dict[str, float]:
+        """Return the law's parameters by name, the amplifier A with them where there is one."""
+        own = {} if self.amplifier is None else {"A": self.amplifier}
+        return {**own, **self.law.named(values)}
+
+    def controller(self, parameters: Mapping[str, float]) -> LinearController:
+        """Return the controller of given parameters."""
+        return self.law.controller(self.values(parameters))
+
+    def assess(
+        self, parameters: Mapping[str, float], coefficient: float | None = None
+    ) -> Assessment:
+        """Return the closed loop of given parameters in numbers."""
+        return self.problem.assess(self.values(parameters), coefficient)
 
 
-def pose(case: Case, masses: int | None = None) -> DesignQuestion:
-    """Return the question of a case.
+def pose(
+    case: Case, structure: str = "payload-feedback", masses: int | None = None
+) -> DesignQuestion:
+    """Return the question of a case and a structure.
+
+    A structure that does not hear the payload cannot do anything about its slow drift with the
+    ship: for it the limit on slow motion is reported only.
 
     Parameters
     ----------
     case
         The case.
+    structure
+        Name of the structure, see `synth.structures.structure_names`.
     masses
         Rope masses; by default the case's, or a number that suits a quick loop.
 
     Raises
     ------
     InputError
-        If the case lacks what a design needs.
+        If there is no such structure, or the case lacks what a design needs.
     """
+    named = structure_named(structure, case)
     data = PlantData.from_case(case)
     hook = HookMotion.from_case(case)
     model = build_plant(data, masses)
     drag_before, rms_before = uncompensated(case, data, hook)
-    plant = model.linearise(drag=drag_before)
+    sensed = with_sensors(model.linearise(drag=drag_before), case.sensors)
+    plant = sensed.select(measurements=named.measurements)
     stochastic = case.payload.fixed_drag is None and data.quadratic_drag > 0.0
-    binding = loop_limits(case, data, model.masses)
+    loop = loop_limits(case, data, model.masses)
+    slow = [lim for lim in loop if isinstance(lim, LowFrequency) and not named.hears_payload]
     drive = drive_limits(case, plant)
     enforced = case.limits.drive == "enforce"
-    amplifier = case.gains.A if case.gains is not None else 1.0
     return DesignQuestion(
         case=case,
+        structure=named,
         data=data,
         hook=hook,
         masses=model.masses,
         plant=plant,
-        structure=PayloadFeedback(amplifier=amplifier, bounds=_bounds(case, amplifier)),
-        limits=(*binding, *drive) if enforced else binding,
-        reported=() if enforced else drive,
+        spectra=heard_spectra(case, hook, named.measurements),
+        loop=tuple(limit for limit in loop if limit not in slow),
+        drive=drive if enforced else (),
+        reported=(*slow, *(() if enforced else drive)),
         drag=DragElement(quadratic=data.quadratic_drag, reference=drag_before)
         if stochastic
         else None,
@@ -134,21 +237,48 @@ def pose(case: Case, masses: int | None = None) -> DesignQuestion:
     )
 
 
-def assess_gains(
-    case: Case, gains: Mapping[str, float], *, masses: int | None = None, drag: float | None = None
-) -> Assessment:
-    """Return the closed loop of gains ``A, a, a1, a2`` on a case, in numbers.
+def controller_for(case: Case, structure: str, parameters: Mapping[str, float]) -> LinearController:
+    """Return the controller of a structure's parameters on a case.
 
-    Parameters
-    ----------
-    case, gains
-        The case and the gains.
-    masses
-        Rope masses of the plant.
-    drag
-        Linear drag coefficient [N s/m], if it is known already.
+    Raises
+    ------
+    InputError
+        If there is no such structure.
     """
-    return pose(case, masses).assess(gains, drag)
+    named = structure_named(structure, case)
+    plant = sensed_plant(case, drag=case.payload.fixed_drag or 0.0)
+    law = named.bind(plant.select(measurements=named.measurements))
+    return law.controller(_values(law, _amplifier(named, law), parameters))
+
+
+def _amplifier(
+    structure: PayloadFeedback | WinchStructure | LowOrderFeedback, law: ParametrisedController
+) -> float | None:
+    if any(p.name in GAINS for p in law.parameters):
+        return float(getattr(structure, "amplifier"))  # noqa: B009
+    return None
+
+
+def _values(
+    law: ParametrisedController, amplifier: float | None, parameters: Mapping[str, float]
+) -> list[float]:
+    own = amplifier or 1.0
+    scale = parameters.get("A", own) / own
+    return [float(parameters[p.name]) * (scale if p.name in GAINS else 1.0) for p in law.parameters]
+
+
+def heard_spectra(case: Case, hook: HookMotion, measurements: Sequence[str]) -> dict[str, Any]:
+    """Return the spectra of what shakes a loop that hears some measurements, by disturbance."""
+    heard = set(measurements)
+    return {
+        source: value
+        if source == HOOK
+        else SampledNoise(spectrum=value.density if isinstance(value, White) else value)
+        for source, value in sensed_spectra(case, hook).items()
+        if source == HOOK
+        or (source == "mru.error" and "mru.heave" in heard)
+        or source.removesuffix("_noise") in heard
+    }
 
 
 def uncompensated(case: Case, data: PlantData, hook: HookMotion) -> tuple[float, float]:
@@ -211,25 +341,15 @@ def _locked(data: PlantData, s: ComplexArray, drag: float) -> ComplexArray:
     return np.asarray(spring / (mass * s**2 + drag * s + spring))
 
 
-def _bounds(case: Case, amplifier: float) -> dict[str, tuple[float, float]]:
-    if case.gain_bounds is None:
-        return {}
-    given = {name: getattr(case.gain_bounds, name) for name in ("a", "a1", "a2")}
-    return {
-        name: (pair[0] / amplifier, pair[1] / amplifier)
-        for name, pair in given.items()
-        if pair is not None
-    }
-
-
 def with_masses(question: DesignQuestion, masses: int) -> DesignQuestion:
     """Return the question on another number of rope masses."""
     model = build_plant(question.data, masses)
+    sensed = with_sensors(model.linearise(drag=question.drag_before), question.case.sensors)
     return replace(
         question,
         masses=model.masses,
-        plant=model.linearise(drag=question.drag_before),
-        limits=tuple(_rescaled(lim, question.data, model.masses) for lim in question.limits),
+        plant=sensed.select(measurements=question.structure.measurements),
+        loop=tuple(_rescaled(lim, question.data, model.masses) for lim in question.loop),
     )
 
 

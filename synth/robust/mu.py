@@ -20,11 +20,9 @@ import numpy as np
 
 from models.basics import InputError, check_range, one_thread
 
-from ..design import GainDesign, StructureDesign
-from ..loop import LinearController, Margins, closed_loop_poles
-from ..question import pose
+from ..design import Design
+from ..loop import Margins, closed_loop_poles
 from ..search import Progress
-from ..structures import ParametrisedController
 from ..verify import LawMatrices, winding_of_plant
 from .mu_plant import UncertainLoop, UncertainNumber, uncertain_loop, uncertain_numbers
 from .mu_search import critical_point, furthest, grid_of, proved_bound
@@ -140,7 +138,7 @@ class Robustness:
 
 @one_thread()
 def robustness(
-    design: GainDesign | StructureDesign,
+    design: Design,
     uncertainty: Mapping[str, Any],
     *,
     masses: int | None = None,
@@ -181,8 +179,7 @@ def robustness(
     if design.margins is None:
         raise InputError("robustness: the design must be stable")
     tell = progress or (lambda stage, done, total: None)
-    case = getattr(design, "sea_case", design.case)
-    controller, law, values = _parts(design)
+    case, controller, question = design.sea_case, design.controller, design.question
     doubts = uncertain_numbers(case, design.drag, uncertainty)
     count = design.masses if masses is None else masses
     loop = uncertain_loop(case, controller, doubts, masses=count, drag=design.drag, seed=seed)
@@ -216,7 +213,7 @@ def robustness(
         if k % 50 == 49:
             tell("draws", k + 1, draws)
     try:
-        radius = gain_radius(nominal, law, values)
+        radius = gain_radius(nominal, question.law, question.values(design.parameters))
     except InputError:  # a structure that is not affine in its gains
         radius = None
     pairs = () if worst is None else zip(loop.doubts, worst.delta, strict=True)
@@ -235,18 +232,6 @@ def robustness(
         gain_radius=radius,
         margins=design.margins,
     )
-
-
-def _parts(
-    design: GainDesign | StructureDesign,
-) -> tuple[LinearController, ParametrisedController, Sequence[float]]:
-    """Return controller, law and parameters of a design."""
-    if isinstance(design, StructureDesign):
-        law = design.posed.law
-        return design.controller, law, [design.parameters[p.name] for p in law.parameters]
-    question = pose(design.sea_case, design.masses)
-    law, values = question.problem.law, question.law_values(design.gains)
-    return law.controller(values), law, values
 
 
 def _unstable(loop: UncertainLoop, delta: Sequence[float]) -> tuple[bool, float]:

@@ -122,7 +122,7 @@ class RobustDesign:
         """The gains as `synth.evaluate_gains` takes them, for payload feedback."""
         if self.structure != PAYLOAD_FEEDBACK:
             raise InputError(f"gains: a {self.structure} has parameters, see `parameters`")
-        return {"A": self.plants.nominal.amplifier, **self.parameters}
+        return self.plants.nominal.named(list(self.parameters.values()))
 
     @property
     def worst(self) -> ScenarioResult:

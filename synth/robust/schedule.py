@@ -371,7 +371,7 @@ class _ScheduleSearch:
             lengths=self.lengths[list(nodes)],
             gains=gains,
             names=tuple(p.name for p in self.plants.law.parameters),
-            amplifier=self.plants.nominal.amplifier,
+            amplifier=self.plants.nominal.amplifier or 1.0,
             ok=ok,
             status=status,
             points=tuple(points),

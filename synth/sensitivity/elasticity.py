@@ -26,7 +26,7 @@ import numpy as np
 from models.basics import FloatArray, InputError
 from models.plant import PlantData
 
-from ..design import GainDesign, StructureDesign
+from ..design import Design
 from ..loop import Assessment, Disturbance
 from ..question import PAYLOAD
 from ..search import Progress
@@ -44,7 +44,7 @@ _SECOND = 0.01  # share of a number for its second derivative
 
 
 def sensitivity(
-    design: GainDesign | StructureDesign, *, second: int = 0, progress: Progress | None = None
+    design: Design, *, second: int = 0, progress: Progress | None = None
 ) -> Sensitivity:
     """Return the elasticities of a design in every number of its case and in every gain.
 

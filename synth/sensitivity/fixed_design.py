@@ -1,6 +1,6 @@
-"""A fixed design on a case that changes, gains and every other structure alike: `FixedDesign`.
+"""A fixed design on a case that changes: `FixedDesign`.
 
-    GainDesign | StructureDesign -> FixedDesign -> closed loop on any case, with any gain moved
+    Design -> FixedDesign -> closed loop on any case, with any gain moved
 
 The controller is that of the design whatever the case becomes: sensitivity is about a world that
 differs from the one designed for.
@@ -14,15 +14,15 @@ from functools import cached_property
 
 import numpy as np
 
-from models.basics import ComplexArray, InputError, SolverError, White
+from models.basics import ComplexArray, InputError, SolverError
 from models.case import Case
 from models.hook import HookMotion
-from models.plant import PlantData, build_plant
-from models.sensing import sensed_plant, sensed_spectra
+from models.plant import PlantData
+from models.sensing import sensed_plant
 
-from ..design import GainDesign, StructureDesign
+from ..design import Design
 from ..loop import Assessment, Disturbance, DragElement, disturbances
-from ..question import HOOK, SampledNoise, pose
+from ..question import heard_spectra
 from ..structures import ParametrisedController
 from .differences import derivative
 from .fields import numbers_of
@@ -39,7 +39,7 @@ class FixedDesign:
     law, names, values, units
         The structure bound to its plant, its parameters' names, values and units.
     measurements
-        What it hears of the plant with all sensors; None for the bare plant's payload signals.
+        What it hears of the plant with all sensors.
     reference
         The drag before compensation [N s/m]: where a consistent drag is counted from.
     drag
@@ -52,7 +52,7 @@ class FixedDesign:
     names: tuple[str, ...]
     values: tuple[float, ...]
     units: Mapping[str, str]
-    measurements: tuple[str, ...] | None
+    measurements: tuple[str, ...]
     reference: float
     drag: float | None
 
@@ -70,8 +70,7 @@ class FixedDesign:
     @property
     def shaken_by(self) -> tuple[str, ...]:
         """Sections of the case that the disturbances' spectra depend on."""
-        sensors = () if self.measurements is None else ("sensors.",)
-        return ("sea.", "vessel.", *sensors)
+        return ("sea.", "vessel.", "sensors.")
 
     @cached_property
     def disturbances(self) -> tuple[Disturbance, ...]:
@@ -81,16 +80,7 @@ class FixedDesign:
     def disturbances_of(self, case: Case) -> tuple[Disturbance, ...]:
         """Return what shakes the plant of a changed case."""
         hook = HookMotion.from_case(case, warn=False)
-        if self.measurements is None:
-            return disturbances({HOOK: hook}, (HOOK,))
-        heard = set(self.measurements)
-        spectra = {
-            source: SampledNoise(intensity=value.intensity) if isinstance(value, White) else value
-            for source, value in sensed_spectra(case, hook).items()
-            if source == HOOK
-            or (source == "mru.error" and "mru.heave" in heard)
-            or source.removesuffix("_noise") in heard
-        }
+        spectra = heard_spectra(case, hook, self.measurements)
         return disturbances(spectra, tuple(spectra))
 
     def assessment(
@@ -107,13 +97,8 @@ class FixedDesign:
         quadratic = PlantData.from_case(here).quadratic_drag
         stochastic = here.payload.fixed_drag is None and quadratic > 0.0
         start = self.reference if stochastic else here.payload.fixed_drag or 0.0
-        plant = (
-            build_plant(here, self.masses).linearise(drag=start)
-            if self.measurements is None
-            else sensed_plant(here, masses=self.masses, drag=start).select(
-                measurements=self.measurements
-            )
-        )
+        plant = sensed_plant(here, masses=self.masses, drag=start)
+        plant = plant.select(measurements=self.measurements)
         drag = DragElement(quadratic=quadratic, reference=start) if stochastic else None
         assessment = Assessment(
             plant,
@@ -161,33 +146,17 @@ class FixedDesign:
         return np.asarray(derivative(response, self.values[at], common=True), np.complex128)
 
 
-def fixed_design(design: GainDesign | StructureDesign) -> FixedDesign:
+def fixed_design(design: Design) -> FixedDesign:
     """Return a design as sensitivity sees it."""
-    if isinstance(design, StructureDesign):
-        posed = design.posed
-        names = tuple(p.name for p in posed.law.parameters)
-        stochastic = posed.question.drag is not None
-        return FixedDesign(
-            case=design.case,
-            masses=design.masses,
-            law=posed.law,
-            names=names,
-            values=tuple(design.parameters[name] for name in names),
-            units=design.units,
-            measurements=tuple(posed.plant.measurements),
-            reference=posed.question.drag_before,
-            drag=design.drag if stochastic else None,
-        )
-    case = design.sea_case
-    question = pose(case, design.masses)
+    question = design.question
     return FixedDesign(
-        case=case,
+        case=design.sea_case,
         masses=design.masses,
-        law=question.structure.bind(question.plant),
-        names=("a", "a1", "a2"),
-        values=tuple(question.law_values(design.gains)),
-        units={},
-        measurements=None,
+        law=question.law,
+        names=tuple(p.name for p in question.law.parameters),
+        values=tuple(question.values(design.parameters)),
+        units=design.units,
+        measurements=design.measurements,
         reference=question.drag_before,
         drag=design.drag if question.drag is not None else None,
     )

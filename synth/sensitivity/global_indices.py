@@ -20,7 +20,7 @@ import numpy as np
 from models.basics import FloatArray, InputError, ReadOnlyArrays, check_range
 from models.spread import Spread
 
-from ..design import GainDesign, StructureDesign
+from ..design import Design
 from ..search import Progress
 
 Evaluate = Callable[[FloatArray], FloatArray]
@@ -29,7 +29,7 @@ _FEWEST = 32  # base points without which an index means nothing
 
 
 def evaluate_rows(
-    design: GainDesign | StructureDesign, spread: Spread, figure: str, progress: Progress | None
+    design: Design, spread: Spread, figure: str, progress: Progress | None
 ) -> tuple[Spread, Evaluate]:
     """Return the spread in plain numbers, and a function from rows to a figure.
 
@@ -122,7 +122,7 @@ class SobolIndices(ReadOnlyArrays):
 
 
 def sobol_indices(
-    design: GainDesign | StructureDesign,
+    design: Design,
     spread: Spread,
     *,
     samples: int = 1024,

@@ -13,7 +13,7 @@ import numpy as np
 
 from models.basics import InputError
 
-from ..design import GainDesign, StructureDesign
+from ..design import Design
 from ..question import PAYLOAD
 from .fields import numbers_of
 from .fixed_design import FixedDesign, fixed_design
@@ -95,7 +95,7 @@ class Sensitivity:
         of a thinner rope fits into a layer: they have no elasticity there.
     """
 
-    design: GainDesign | StructureDesign
+    design: Design
     payload_rms: float
     max_sensitivity: float
     torque_rms: float

@@ -18,7 +18,7 @@ import numpy as np
 from models.basics import FloatArray, ReadOnlyArrays, check_range
 from models.spread import Spread
 
-from ..design import GainDesign, StructureDesign
+from ..design import Design
 from ..search import Progress
 from .global_indices import Evaluate, evaluate_rows, on_ranges
 
@@ -65,7 +65,7 @@ class Screening(ReadOnlyArrays):
 
 
 def morris_screening(
-    design: GainDesign | StructureDesign,
+    design: Design,
     spread: Spread,
     *,
     trajectories: int = 32,

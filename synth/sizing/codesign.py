@@ -27,7 +27,7 @@ import numpy as np
 from models.basics import InputError, check_range, one_thread
 from models.case import Case
 
-from ..design import StructureDesign, optimise_structure
+from ..design import Design, optimise_gains
 from ..search import Progress
 from .follow import Answer, Posed, begin_from, designed, follow, least_between, slope
 
@@ -84,7 +84,7 @@ class CoDesign:
     slope: float
     points: tuple[CoPoint, ...]
     best_case: Case | None
-    design: StructureDesign | None
+    design: Design | None
 
     def to_csv(self) -> str:
         """Return the gears that were tried as CSV, SI units."""
@@ -172,7 +172,7 @@ def co_design(
     low, high = _range("gear", gear or (own / 2.5, own * 2.5), 0.1, 1e4, "")
     radii = None if radius is None else _range("radius", radius, 0.02, 25.0, "m")
     tell: Progress = progress or (lambda stage, done, total: None)
-    first = optimise_structure(case, structure, starts, seed, progress=progress)
+    first = optimise_gains(case, structure, starts=starts, seed=seed, progress=progress)
     if not first.parameters:
         raise InputError(f"co-design: {first.status}")
     search = _Gears(
@@ -207,9 +207,13 @@ def gear_changes(case: Case, gear: float, radius: float | None = None) -> dict[s
     return changes
 
 
-def _begin(first: StructureDesign) -> Answer | None:
+def _begin(first: Design) -> Answer | None:
     posed = Posed.of(first.case, first.structure, first.masses)
-    problem = posed.asked_by(first.case) if first.drive_kept else posed.problem(posed.loop)
+    problem = (
+        posed.asked_by(first.case)
+        if first.drive_kept and first.feasible
+        else posed.problem(posed.loop)
+    )
     coefficient = first.drag if problem.drag is not None else None
     return follow(problem, [begin_from(problem, first)], coefficient=coefficient)
 

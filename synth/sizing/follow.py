@@ -23,10 +23,10 @@ from scipy.optimize import minimize_scalar
 from models.basics import FloatArray
 from models.case import Case
 
-from ..design import StructureDesign, Tuning, design_of, tuning_of, verified
+from ..design import Design, Tuning, design_of, tuning_of, verified
 from ..limits import Limit, drive_limits
 from ..loop import Assessment
-from ..question import PAYLOAD, Goal, Problem, StructureQuestion, pose_structure
+from ..question import PAYLOAD, DesignQuestion, Goal, Problem, pose
 from ..search import (
     KEPT,
     Found,
@@ -52,12 +52,12 @@ class Posed:
     Attributes
     ----------
     question
-        As `synth.design.structure_search` sees it.
+        As `synth.design.optimise_gains` sees it.
     loop, drive
         Limits of the loop, and those of motor, drive and rope.
     """
 
-    question: StructureQuestion
+    question: DesignQuestion
     loop: tuple[Limit, ...]
     drive: tuple[Limit, ...]
 
@@ -66,18 +66,18 @@ class Posed:
         """Return a case posed for a structure on a number of rope masses."""
         # Posed as one that reports: a motor may be too small for the load at rest.
         reporting = case.variant({"limits.drive": "report"})
-        question = pose_structure(reporting, structure, masses)
+        question = pose(reporting, structure, masses)
         drive = drive_limits(reporting, question.plant)
-        return cls(question=question, loop=question.limits, drive=drive)
+        return cls(question=question, loop=question.loop, drive=drive)
 
     @property
     def masses(self) -> int:
         """Rope masses of the plant."""
-        return self.question.question.masses
+        return self.question.masses
 
     def problem(self, limits: Sequence[Limit]) -> Problem:
         """Return the problem with some limits."""
-        return self.question.problem(limits)
+        return self.question.problem_with(limits)
 
     def asked_by(self, case: Case) -> Problem:
         """Return the problem with the limits that a case enforces."""
@@ -153,7 +153,7 @@ def with_bound(problem: Problem, name: str, bound: float) -> Problem:
     return replace(problem, limits=limits)
 
 
-def begin_from(problem: Problem, design: StructureDesign) -> FloatArray:
+def begin_from(problem: Problem, design: Design) -> FloatArray:
     """Return a design's parameters as a start for a problem."""
     values = [design.parameters[p.name] for p in problem.law.parameters]
     return problem.law.clipped(np.array(values))
@@ -227,14 +227,13 @@ def _arrived(
 
 def designed(
     case: Case, structure: str, near: Answer, masses: int, tell: Progress
-) -> StructureDesign | None:
+) -> Design | None:
     """Return the best gains of a case close to a known answer, verified; None if none keep it."""
     problem = Posed.of(case, structure, masses).asked_by(case)
     answer = follow(problem, [near])
     if answer is None:
         return None
-    asked = pose_structure(case, structure, masses)
-    return verified(design_of(asked, answer.tuning, drive_kept=True), tell)
+    return verified(design_of(pose(case, structure, masses), answer.tuning), tell)
 
 
 def least_between(cost: Callable[[float], float], low: float, high: float, fine: float) -> float:

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from models.basics import InputError, one_thread
 from models.case import Case
 
-from ..design import StructureDesign, optimise_structure
+from ..design import Design, optimise_gains
 from ..limits import Limit
 from ..question import Problem
 from ..search import Progress
@@ -168,7 +168,7 @@ def _payload_items(case: Case, heard: Sequence[str]) -> list[Item]:
 def _mru_items(case: Case, posed: Posed) -> list[Item]:
     mru = case.sensors.mru
     assert mru is not None
-    heave = float(posed.question.question.hook.displacement.rms)
+    heave = float(posed.question.hook.displacement.rms)
     error = max(mru.noise_floor, mru.noise_fraction * heave)
     floor, share = mru.noise_floor, mru.noise_fraction
     items = []
@@ -279,7 +279,7 @@ class Worth:
 
 @one_thread()
 def worth(
-    case: Case | StructureDesign,
+    case: Case | Design,
     *,
     structure: str = "payload-feedback",
     starts: int = 4,
@@ -291,9 +291,9 @@ def worth(
     Parameters
     ----------
     case
-        A case, or a design of `optimise_structure`, whose structure counts then.
+        A case, or a design, whose structure counts then.
     structure
-        Controller structure, see `synth.structures.winch_structures.structure_names`.
+        Controller structure, see `synth.structures.structure_names`.
     starts, seed
         Size and seed of the search for the optimum.
     progress
@@ -304,10 +304,10 @@ def worth(
     InputError
         If there is no such structure.
     """
-    if isinstance(case, StructureDesign):
+    if isinstance(case, Design):
         design = case
     else:
-        design = optimise_structure(case, structure, starts, seed, progress=progress)
+        design = optimise_gains(case, structure, starts=starts, seed=seed, progress=progress)
     tell: Progress = progress or (lambda stage, done, total: None)
     result = Worth(
         case=design.case,
@@ -317,7 +317,7 @@ def worth(
         payload_rms=design.payload_rms,
         rows=(),
     )
-    if not design.parameters or not design.drive_kept:
+    if not (design.parameters and design.drive_kept and design.feasible):
         return result
     posed = Posed.of(design.case, design.structure, design.masses)
     problem = posed.asked_by(design.case)
@@ -327,7 +327,7 @@ def worth(
         return replace(result, status="the optimum could not be followed")
     items = [
         *limit_items(problem.limits),
-        *part_items(design.case, design.posed.structure.measurements, posed),
+        *part_items(design.case, design.measurements, posed),
     ]
     rows = []
     for k, item in enumerate(items):
@@ -338,7 +338,7 @@ def worth(
     return replace(result, status=_sentence(result))
 
 
-def _row(design: StructureDesign, here: Answer, item: Item) -> WorthRow:
+def _row(design: Design, here: Answer, item: Item) -> WorthRow:
     """Return what one figure is worth, by both routes."""
     price = _price(design, here, item)
     factor = 2.0 if item.better > 0 else 0.5
@@ -378,7 +378,7 @@ def _row(design: StructureDesign, here: Answer, item: Item) -> WorthRow:
     )
 
 
-def _price(design: StructureDesign, here: Answer, item: Item) -> float:
+def _price(design: Design, here: Answer, item: Item) -> float:
     """Return d log(rms) / d log(figure) by the envelope theorem; nan if the figure is zero."""
     if item.value == 0.0:
         return math.nan
@@ -388,9 +388,7 @@ def _price(design: StructureDesign, here: Answer, item: Item) -> float:
     return slope(here, changed, _SMALL) if changed is not None else math.nan
 
 
-def _again(
-    design: StructureDesign, here: Answer, item: Item, factor: float, near: Answer
-) -> Answer | None:
+def _again(design: Design, here: Answer, item: Item, factor: float, near: Answer) -> Answer | None:
     """Return the optimum with a figure times a factor."""
     problem = _changed(design, here, item, factor)
     if problem is None:
@@ -398,7 +396,7 @@ def _again(
     return follow(problem, list(dict.fromkeys((near, here))))
 
 
-def _changed(design: StructureDesign, here: Answer, item: Item, factor: float) -> Problem | None:
+def _changed(design: Design, here: Answer, item: Item, factor: float) -> Problem | None:
     if item.limit is not None:
         return with_bound(here.problem, item.limit, item.value * factor)
     case = item.case(design.case, factor)

@@ -24,7 +24,7 @@ from models.basics import FloatArray, InputError, check_range, one_thread
 from models.case import Case
 from models.plant import MAX_MASSES
 
-from ..design import SOURCE_NAMES, StructureDesign
+from ..design import SOURCE_NAMES, Design
 from ..loop import Assessment
 from ..question import HOOK, PAYLOAD
 from ..search import KEPT, Progress, search
@@ -76,7 +76,7 @@ class Sizing:
     points: tuple[SizePoint, ...]
     chosen: SizePoint | None
     sized_case: Case | None
-    design: StructureDesign | None
+    design: Design | None
     given_rms: float
     highest_height: float
     choice: ChosenMotor | None = None
@@ -219,7 +219,7 @@ def _sized(
     tell: Progress,
 ) -> tuple[Sizing, int, Answer | None]:
     posed = Posed.of(base, structure, masses)
-    hook = float(posed.question.question.hook.displacement.rms)
+    hook = float(posed.question.hook.displacement.rms)
     aim = target_of(target, hook)
     rope = [lim for lim in posed.drive if lim.name.startswith("rope.")]
     problem = posed.problem((*posed.loop, *rope))

@@ -14,7 +14,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -163,6 +163,8 @@ class PayloadFeedback(Structure):
         Bounds of ``a``, ``a1``, ``a2``, in their own units (command per measurement over A).
     """
 
+    name: ClassVar[str] = "payload-feedback"
+    hears_payload: ClassVar[bool] = True
     amplifier: float = 1.0
     measurements: tuple[str, str, str] = PAYLOAD_MEASUREMENTS
     bounds: Bounds = field(default_factory=dict)
@@ -201,9 +203,10 @@ class _GainLaw(ParametrisedController):
         self._factors = factors
         scales = gain_scales(plant, entries) / np.abs(factors)
         limits = [bounds.get(name, (-np.inf, np.inf)) for name in names]
+        units = [gain_unit(plant, plant.inputs[i], plant.measurements[j]) for i, j in self._entries]
         self.parameters = tuple(
-            Parameter(name=name, scale=float(scale), low=float(low), high=float(high))
-            for name, scale, (low, high) in zip(names, scales, limits, strict=True)
+            Parameter(name=name, scale=float(scale), low=float(low), high=float(high), unit=unit)
+            for name, scale, (low, high), unit in zip(names, scales, limits, units, strict=True)
         )
         self.dimensions = len(entries) + 1
 
@@ -286,6 +289,11 @@ def pace(plant: LinearPlant) -> float:
     sizes = np.abs(plant.poles())
     moving = sizes[sizes > 1e-9 * max(1.0, float(sizes.max(initial=1.0)))]
     return float(np.exp(np.mean(np.log(moving)))) if moving.size else 1.0
+
+
+def gain_unit(plant: LinearPlant, command: str, measurement: str) -> str:
+    """Return the unit of a gain from a measurement to a command."""
+    return f"({plant.units.get(command, '-')})/({plant.units.get(measurement, '-')})"
 
 
 def gain_scales(plant: LinearPlant, entries: Sequence[tuple[int, int]]) -> FloatArray:

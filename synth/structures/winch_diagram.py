@@ -48,6 +48,7 @@ from .structure import (
     ParametrisedController,
     Structure,
     gain_scales,
+    gain_unit,
 )
 
 SAMPLE_TIME = 0.01  # that the drum loop must leave room for [s]
@@ -147,7 +148,7 @@ class WinchStructure(Structure):
             columns = [plant.measurements.index(name) for name in PAYLOAD_MEASUREMENTS]
             scales = gain_scales(plant, [(0, j) for j in columns]) / self.amplifier
             for name, y, scale in zip(_GAINS, PAYLOAD_MEASUREMENTS, scales, strict=True):
-                unit = f"({command})/({plant.units.get(y, '-')})"
+                unit = gain_unit(plant, plant.inputs[0], y)
                 found.append(Parameter(name=name, scale=float(scale), unit=unit))
         if self.drum and not self.regulated:
             low, high = self.speed_gain(0.0), self.speed_gain(self.widest)

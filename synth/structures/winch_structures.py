@@ -1,6 +1,6 @@
 """The controller structures of a winch, by name.
 
-`structure_named` gives each of them for a case; `synth.design.structure_design` optimises it.  How
+`structure_named` gives each of them for a case; `synth.design.optimise_gains` optimises it.  How
 they are put together is said in `synth.structures.winch_diagram`.
 """
 
@@ -16,6 +16,7 @@ from models.plant import PlantData, fixed_top_modes
 from .blocks import FilterSection, Integral, LeadLag, Notch, RollOffFilter
 from .drum_speed import SteadyMotion
 from .low_order import LowOrderFeedback
+from .structure import PayloadFeedback
 from .winch_diagram import TRANSPARENT, WinchStructure
 
 #: What each structure is, for tables and help texts.
@@ -39,7 +40,7 @@ def structure_names() -> tuple[str, ...]:
     return tuple(DESCRIPTIONS)
 
 
-def structure_named(name: str, case: Case) -> WinchStructure | LowOrderFeedback:
+def structure_named(name: str, case: Case) -> PayloadFeedback | WinchStructure | LowOrderFeedback:
     """Return a structure for a case.
 
     Parameters
@@ -59,13 +60,15 @@ def structure_named(name: str, case: Case) -> WinchStructure | LowOrderFeedback:
     pick("structures", "structure", structure_names(), (name,))
     data = PlantData.from_case(case)
     amplifier = case.gains.A if case.gains is not None else 1.0
+    bounds = _bounds(case, amplifier)
+    if name == PayloadFeedback.name:
+        return PayloadFeedback(amplifier=amplifier, bounds=bounds)
     modes = fixed_top_modes(
         data.axial_stiffness, data.rope_length, data.mass_per_length, data.payload_mass, 2
     )
     feedback = name.removeprefix("payload-feedback") if name.startswith("payload") else None
     corner = (1.0, TRANSPARENT)
     sections: dict[str, tuple[FilterSection, ...]] = {
-        "": (),
         "-rolloff": (RollOffFilter(name="rolloff", corner=corner),),
         "-lead": (LeadLag(name="lead", zero=(0.05, 100.0), pole=(0.5, 200.0)),),
         "-notch": (
@@ -89,4 +92,17 @@ def structure_named(name: str, case: Case) -> WinchStructure | LowOrderFeedback:
         drum=feedback is None,
         heave=name in ("feed-forward", "combined"),
         tension=data.stiffness if name == "constant-tension" else None,
+        bounds={} if feedback is None else bounds,
     )
+
+
+def _bounds(case: Case, amplifier: float) -> dict[str, tuple[float, float]]:
+    """Return the bounds of a, a1, a2 that a case states, whose A is in them."""
+    if case.gain_bounds is None:
+        return {}
+    given = {name: getattr(case.gain_bounds, name) for name in ("a", "a1", "a2")}
+    return {
+        name: (pair[0] / amplifier, pair[1] / amplifier)
+        for name, pair in given.items()
+        if pair is not None
+    }

@@ -19,7 +19,7 @@ from models.case import Case
 from models.casefile import read_yaml
 from models.spread import Samples, Spread
 
-from ..design import GainDesign, StructureDesign
+from ..design import Design
 from .metrics import FrequencyMetric
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ _LISTED = 1000  # samples that are written into the attributes
 
 
 def dataset_of(
-    design: GainDesign | StructureDesign,
+    design: Design,
     spread: Spread,
     rows: FloatArray,
     columns: Mapping[str, npt.NDArray[Any]],
@@ -42,7 +42,7 @@ def dataset_of(
     """Return the dataset of evaluated rows, (n, d), whose first is case number `first`."""
     import xarray as xr
 
-    case = getattr(design, "sea_case", design.case)
+    case = design.sea_case
     coordinates: dict[str, Any] = {
         "case": ("case", np.arange(first, first + len(rows)), {"long_name": "number of the case"})
     }
@@ -60,7 +60,6 @@ def dataset_of(
     for m in metrics:
         about = {"units": m.unit or own.get(m.name, "1"), "long_name": m.long_name}
         variables[m.name] = ("case", columns[m.name], about)
-    gains = design.gains if isinstance(design, GainDesign) else design.parameters
     return xr.Dataset(
         variables,
         coords=coordinates,
@@ -70,8 +69,8 @@ def dataset_of(
             "case_yaml": case.to_yaml(),
             # Long lists of samples stand in the coordinates already.
             "spread_yaml": spread.to_yaml() if _short(spread) else "",
-            "structure": getattr(design, "structure", "payload-feedback"),
-            "gains": json.dumps(dict(gains)),
+            "structure": design.structure,
+            "gains": json.dumps(dict(design.parameters)),
             "drag": float(design.drag),
             "masses": int(design.masses),
             **notes,

@@ -3,8 +3,9 @@
     rows (n, d) -> numbers, controllers, densities -> loops -> drag, variances -> stability, M_s
                 -> metrics, (n,) each; NaN where a loop is unstable
 
-Everything goes through the rope's recursion (`synth.sweeps.chain`) but three gains on one spring
-without delay and noise, for which polynomials (`synth.sweeps.kernel`) are a hundred times faster.
+Everything goes through the rope's recursion (`synth.sweeps.chain`) but variances and stability of
+three gains on one spring without delay and noise, for which polynomials (`synth.sweeps.kernel`)
+are a hundred times faster.
 Rows whose variances two rules disagree on begin again on finer nodes.
 """
 
@@ -23,17 +24,18 @@ from models.basics import (
     FrequencyAxis,
     IndexArray,
     Quadrature,
+    White,
 )
 from models.plant import lump_rope
 from models.spread import Spread
 
-from ..design import GainDesign, StructureDesign
+from ..design import Design
 from ..question import SampledNoise
-from .chain import BLOCK, VELOCITY, ChainLoops, Shaken
-from .kernel import SpringLoops, spring_peaks
+from .chain import BLOCK, VELOCITY, Chain, ChainLoops, Shaken
+from .kernel import SpringLoops
 from .law_rows import DesignLaw, LawColumns
 from .metrics import FrequencyMetric, finished
-from .numbers import NOISE_OF, PlantNumbers, numbers_of
+from .numbers import NOISE_OF, PlantNumbers, at_rows, numbers_of
 from .sea_rows import SeaRows
 from .sweep_nodes import Panel, SweepNodes, halved, sweep_nodes, sweep_panels
 from .winding_count import calming_drag, light_poles, survey
@@ -52,7 +54,6 @@ _DRAG_ROUNDS = 60
 _AGREES = 3e-13  # of the logarithm of C
 _CLOSE = 1e-10  # ... and what will do
 _STEP = 1.5  # of it, at most
-_SLOWEST = 0.1  # of the design's own poles, that variances with errors of slow sensors begin at
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -112,7 +113,7 @@ class DesignRows:
 
     def __init__(
         self,
-        design: GainDesign | StructureDesign,
+        design: Design,
         spread: Spread,
         metrics: Sequence[FrequencyMetric],
         *,
@@ -124,21 +125,24 @@ class DesignRows:
         self.design, self.spread, self.case = design, spread, case
         self.metrics = tuple(metrics)
         self.accuracy = accuracy
-        self.law = DesignLaw(design, case)
+        self.law = DesignLaw(design)
         self.lumps = lump_rope(design.masses, case.rope.lumping)
         self.sea = SeaRows(case, spread)
         self.given = None if nodes is None else SweepNodes.of(nodes, self.sea.density)
         self._nodes: dict[int, SweepNodes] = {}  # by level
-        self.columns = True  # whether column arithmetic has sufficed so far
+        self.columns: bool | None = None  # whether column arithmetic suffices
         self.refined = 0  # rows that needed finer nodes
         self.unresolved = 0  # ... and those that none of them resolved
-        self._outputs = tuple(dict.fromkeys(m.output for m in metrics if m.output))
+        outputs = [m.output for m in metrics if m.output]
+        if np.isnan(self._pilots.numbers.fixed_drag).any():
+            outputs.append(VELOCITY)  # which the drag agrees with
+        self._outputs = tuple(dict.fromkeys(outputs))
         self._second = tuple(
             dict.fromkeys(m.output for m in metrics if m.kind in ("peak", "least", "period"))
         )
         self._peaks = any(m.name == "max_sensitivity" for m in metrics)
         delayed = case.sensors.telemetry.delay > 0.0 or "sensors.telemetry.delay" in spread.paths
-        three = getattr(design, "structure", "payload-feedback") == "payload-feedback"
+        three = design.structure == "payload-feedback"
         self.spring = design.masses == 1 and three and not delayed and not self._noisy
 
     @property
@@ -178,9 +182,9 @@ class DesignRows:
             found = self._solved(own, self._closely(own, solved.drag[one]))
             solved.put(one, found)
             self.unresolved += self._doubt(found, _LEVELS).size
-        if self.spring and self._peaks and solved.stable.any():
+        if self._peaks and self.spring and solved.stable.any():
             chosen = np.flatnonzero(solved.stable)
-            solved.peak[chosen] = spring_peaks(self._spring(batch, solved.drag), chosen)
+            solved.peak[chosen] = survey(self._chains(batch, solved.drag), chosen)[1]
         numbers = batch.numbers
         values = finished(
             self.metrics,
@@ -231,7 +235,7 @@ class DesignRows:
         """What the controller hears with errors or noise, if they count."""
         sensors = self._pilots.numbers.sensors
         heard = [name for name in self.law.measurements if name in NOISE_OF]
-        return {y for y in heard if self.law.noisy and np.any(sensors[NOISE_OF[y]] > 0.0)}
+        return {y for y in heard if np.any(sensors[NOISE_OF[y]] > 0.0)}
 
     @cached_property
     def _panels(self) -> list[Panel]:
@@ -242,11 +246,9 @@ class DesignRows:
             found = self._solved(self._pilots, self._nodes_on(panels, apart=True), alone=True)
             error = np.zeros(len(panels))
             for name, column in found.moments.items():
+                orders = column if name in self._second else column[:, :1]
                 with np.errstate(all="ignore"):
-                    share = (
-                        np.abs(column[:, self._orders(name), 1:])
-                        / column[:, self._orders(name), :1]
-                    )
+                    share = np.abs(orders[:, :, 1:]) / orders[:, :, :1]
                 error = np.maximum(error, np.nanmax(share, axis=(0, 1), initial=0.0))
             coarse = error > _SHARE * self.accuracy
             if not coarse.any():
@@ -266,35 +268,18 @@ class DesignRows:
         low, high, splits = self.sea.frame()
         if not self._noisy:
             return FrequencyAxis(low, high, half_line=False), splits
-        endless = "mru.heave" in self._noisy
-        white = SampledNoise(intensity=1.0).band
-        if self._noisy - {"mru.heave"}:
-            low, high = min(low, white[0]), max(high, white[1])
-        if endless:
-            slow = min((abs(p) for p in self._poles if abs(p) > 1e-6), default=low)
-            low = min(low, _SLOWEST * slow)
-        return FrequencyAxis(low, high, half_line=endless), splits
-
-    @cached_property
-    def _poles(self) -> ComplexArray:
-        """Poles of the design itself: most rows have something like them."""
-        design = self.design
-        if design.margins is None:
-            return np.zeros(0, dtype=np.complex128)
-        if isinstance(design, GainDesign):
-            return design.assessment.poles
-        values = [design.parameters[p.name] for p in design.posed.law.parameters]
-        return design.posed.problem(()).assess(values, design.drag).poles
+        noise = SampledNoise(spectrum=White().density).band
+        return FrequencyAxis(min(low, noise[0]), max(high, noise[1]), half_line=False), splits
 
     def _batch(self, rows: FloatArray) -> _Batch:
-        numbers, quick = numbers_of(self.case, self.spread, rows)
-        self.columns &= quick
+        made = numbers_of(self.case, self.spread, rows, columns=self.columns)
+        numbers, self.columns = made
         return _Batch(rows=rows, numbers=numbers, law=self.law.columns(self.spread, rows))
 
     def _spring(self, batch: _Batch, drag: FloatArray) -> SpringLoops:
         return SpringLoops(
             batch.numbers,
-            np.stack(np.broadcast_arrays(*batch.law.values), axis=1),
+            self.law.amplifier * np.stack(np.broadcast_arrays(*batch.law.values), axis=1),
             np.where(np.isfinite(drag), drag, 0.0),
             mass_share=float(self.lumps.masses[0]),
             reference=_REFERENCE,
@@ -309,27 +294,16 @@ class DesignRows:
         error = np.zeros(found.stable.size)
         for name, column in found.moments.items():
             if column.shape[2] > 1:
-                orders = column[:, self._orders(name)]
+                orders = column if name in self._second else column[:, :1]
                 with np.errstate(all="ignore"):
                     gap = np.abs(orders[:, :, 1] - orders[:, :, 0]) / orders[:, :, 0]
                 error = np.maximum(error, gap.max(axis=1))
         limit = self.accuracy if level < _LEVELS else max(self.accuracy, _LAST)
         return np.flatnonzero(found.stable & ~(error <= limit))
 
-    def _orders(self, output: str) -> slice:
-        """Return the moments of an output whose error is looked at.
-
-        Where noise goes on to infinity that of its rate may not be finite: it is then what the
-        nodes of the variance make of it.
-        """
-        return slice(0, 2 if output in self._second and not self._frame[0].half_line else 1)
-
     def _closely(self, batch: _Batch, drag: FloatArray) -> SweepNodes:
         """Return nodes for one row, its panels short near its own poles."""
-        if self.spring:
-            poles = self._spring(batch, drag).poles(np.zeros(1, dtype=np.intp))[0]
-        else:
-            poles = light_poles(self._chains(batch, drag), 0)
+        poles = light_poles(self._chains(batch, drag), 0)
         marks = [complex(p) for p in poles if p.real < 0.0 and p.imag >= 0.0]
         axis, splits = self._frame
         panels = sweep_panels(axis, splits, level=2, marks=marks, clearance=0.6)
@@ -387,18 +361,16 @@ class DesignRows:
         quadratic = np.broadcast_to(loops.numbers["quadratic_drag"], (len(loops),))
         for at in range(0, chosen.size, step):
             rows = chosen[at : at + step]
-            chain = loops.chain(rows, s)
+            chain = Chain(loops, rows, s)
             if free[rows].any():
-                velocity = _velocity_of(
-                    *loops.velocity_of_drag(rows, chain, nodes, shaken), edge[rows]
-                )
+                velocity = _velocity_of(chain.velocity_of_drag(nodes, shaken), edge[rows])
                 agreed = _agreeing_drag(quadratic[rows], start, velocity)
                 # At the very edge the motion that calms a loop is that of its own instability.
                 agreed = np.where(agreed <= _EDGE * edge[rows], np.inf, agreed)
                 found.drag[rows] = np.where(free[rows], agreed, found.drag[rows])
             if self._outputs:
                 drag = np.where(np.isfinite(found.drag[rows]), found.drag[rows], 0.0)
-                moments = loops.moments(rows, chain, self._outputs, nodes, shaken, drag)
+                moments = chain.moments(self._outputs, nodes, shaken, drag)
                 for name, column in moments.items():
                     found.moments[name][rows] = column
 
@@ -413,7 +385,7 @@ class DesignRows:
 
             def velocity(some: IndexArray, C: FloatArray) -> FloatArray:
                 loops = self._spring(own.part(some), C)
-                seen = _spring_moments(loops, [VELOCITY], nodes, shaken.part(free[some]))
+                seen = _spring_moments(loops, [VELOCITY], nodes, shaken, free[some])
                 return np.where(loops.stable, np.sqrt(seen[VELOCITY][:, 0]), np.inf)
 
             agreed = _agreeing_drag(quadratic, self.design.drag or 1.0, velocity)
@@ -423,7 +395,8 @@ class DesignRows:
         found.stable[:] = np.isfinite(found.drag) & loops.stable
         with np.errstate(all="ignore"):
             for order, outputs in enumerate((self._outputs, self._second)):
-                several = _spring_moments(loops, outputs, nodes, shaken, second=order == 1)
+                every = np.arange(len(batch))
+                several = _spring_moments(loops, outputs, nodes, shaken, every, second=order == 1)
                 for name, columns in several.items():
                     found.moments[name][:, order] = columns
 
@@ -433,33 +406,32 @@ def _spring_moments(
     outputs: Sequence[str],
     nodes: SweepNodes,
     shaken: Shaken,
+    rows: IndexArray,
     *,
     second: bool = False,
 ) -> dict[str, FloatArray]:
-    """Return moments of outputs by all rules, (n, rules) each."""
+    """Return moments of outputs by all rules, (n, rules) each, of loops shaken as `rows` are."""
     if not outputs:
         return {}
-    weights = nodes.sea if shaken.ratios is None else nodes.weights
-    found = loops.moments(outputs, nodes.omega, weights, shaken.ratios, second=second)
-    return {name: columns * shaken.factors[:, None] for name, columns in found.items()}
+    ratios = None if shaken.ratios is None else shaken.ratios[rows]
+    weights = nodes.sea if ratios is None else nodes.weights
+    found = loops.moments(outputs, nodes.omega, weights, ratios, second=second)
+    factors = at_rows(shaken.factors, rows)
+    return {name: columns * factors for name, columns in found.items()}
 
 
-def _velocity_of(
-    p0: FloatArray, p1: FloatArray, p2: FloatArray, driven: FloatArray, edge: FloatArray
-) -> Velocity:
-    """Return the rms velocity of loops: its variance is sum driven/(p0 + C p1 + C^2 p2)."""
+def _velocity_of(parts: Sequence[FloatArray], edge: FloatArray) -> Velocity:
+    """Return the rms velocity of loops by their drag, from `Chain.velocity_of_drag`."""
 
     def velocity(some: IndexArray, C: FloatArray) -> FloatArray:
-        every = some.size == len(p0)
-        a, b, c, w = (p if every else p[some] for p in (p0, p1, p2, driven))
-        slope = C[:, None]
-        total = c * slope
-        total += b
-        total *= slope
-        total += a
-        np.divide(w, total, out=total)
-        sigma = np.sqrt(total.sum(axis=1))
-        return np.where(edge[some] < C, sigma, np.inf)
+        every = some.size == edge.size
+        p0, p1, p2, driven = (p if every else p[some] for p in parts)
+        total = p2 * C[:, None]
+        total += p1
+        total *= C[:, None]
+        total += p0
+        np.divide(driven, total, out=total)
+        return np.where(edge[some] < C, np.sqrt(total.sum(axis=1)), np.inf)
 
     return velocity
 

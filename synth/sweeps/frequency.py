@@ -27,7 +27,7 @@ from models.case import Case
 from models.operation import PREFIX as FAULTS
 from models.spread import Spread
 
-from ..design import GainDesign, StructureDesign
+from ..design import Design
 from ..search import Progress
 from .dataset import dataset_of
 from .design_rows import DesignRows
@@ -35,8 +35,6 @@ from .metrics import chosen_metrics
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Design = GainDesign | StructureDesign
 
 ACCURACY = 1e-5  # difference of two rules from which a variance gets finer nodes
 _CHUNK = 65_536
@@ -76,22 +74,19 @@ class FrequencyEngine:
     ) -> None:
         check_range("sweep", "accuracy", accuracy, low=0.0, high=1.0, open_low=True)
         self.design = design
-        if isinstance(design, GainDesign):
-            case, gains = design.sea_case, dict(design.gains)
-        elif isinstance(design, StructureDesign):
-            case, gains = design.case, dict(design.parameters)
-        else:
+        if not isinstance(design, Design):
             raise InputError(
-                "sweep: in the frequency domain the design must be a GainDesign or a "
-                f"StructureDesign, got {type(design).__name__}"
+                "sweep: in the frequency domain the design must be a Design, got "
+                f"{type(design).__name__}"
             )
+        case = design.sea_case
         late = [path for path in spread.paths if path.startswith(FAULTS)]
         if late:
             raise InputError(f"sweep: {late[0]} happens in time; use mode 'time'")
         if "rope.masses" in spread.paths:
             raise InputError("sweep: rope.masses cannot vary; a design has one number of masses")
         self.case: Case = case
-        self.spread = spread.on(case, gains, design.drag)
+        self.spread = spread.on(case, design.parameters, design.drag)
         self.metrics = chosen_metrics(metrics, dc=case.winch.motor.type == "dc")
         self.rows = DesignRows(design, self.spread, self.metrics, accuracy=accuracy, nodes=nodes)
 

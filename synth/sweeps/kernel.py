@@ -1,4 +1,4 @@
-r"""Loops of fourth order, thousands at once: coefficients, stability, variances and peaks of |S|.
+r"""Loops of fourth order, thousands at once: coefficients, stability and variances.
 
 One spring, the payload feedback of three gains and no delay: then every response is a ratio of
 polynomials in s over one common denominator,
@@ -13,10 +13,6 @@ polynomials in s over one common denominator,
 1/\|Den\|^2 at every node of every loop; it is made in real arithmetic, in chunks that stay in the
 cache.  All variances then are its products with a few powers of the frequency, as every
 \|numerator\|^2 is a polynomial in omega^2: one matrix product for all outputs together.
-
-|1 + L| = |closed| / |open| is smooth but for wells at the poles of the closed loop and walls at
-those of the open one.  So it is looked at on a common grid and around the poles of both, and the
-lowest places of each loop are zoomed in on (`spring_peaks`).
 """
 
 from __future__ import annotations
@@ -25,20 +21,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.basics import BoolArray, ComplexArray, FloatArray, IndexArray
+from models.basics import BoolArray, FloatArray
 
-from .numbers import PlantNumbers, at_rows
+from .numbers import PlantNumbers
 
 Columns = list[FloatArray]  # coefficients of s^0, s^1, .., each (n,), or (1,) if all have the same
 
 CHUNK = 200  # loops at once: two arrays of 200 x 200 numbers stay in the second-level cache
-_COMMON = 64
-_STEP = 1024  # loops at once
-_NEAR = np.array([-3.0, -1.5, -0.7, -0.3, 0.0, 0.3, 0.7, 1.5, 3.0])
-_ZOOM = np.array([-0.75, -0.45, -0.2, 0.2, 0.45, 0.75])
-_ROUNDS = 9
-_SHRINK = 0.3
-_CANDIDATES = 3
 
 
 class SpringLoops:
@@ -88,7 +77,6 @@ class SpringLoops:
         heard = product(q, kappa)  # what the sensors' denominators leave of the feedback
         pull = product([load * d for d in D], product(kappa, product(e, sensors)))
         free = total(product(W, product(total(kappa, D), sensors)), [h * c for c in pull])
-        self.open = self._scaled(free)
         self.closed = self._scaled(total(free, [h * phi * c for c in heard]))
         moved = product(W, product(kappa, sensors))
         drum = total(pull, [phi * c for c in heard])
@@ -112,11 +100,6 @@ class SpringLoops:
 
     def __len__(self) -> int:
         return self._count
-
-    @property
-    def order(self) -> int:
-        """Degree of the characteristic polynomial."""
-        return len(self.closed) - 1
 
     @property
     def stable(self) -> BoolArray:
@@ -171,21 +154,6 @@ class SpringLoops:
             found[name] = columns * self.reference**2 if second else columns
         return found
 
-    def distance(self, rows: IndexArray, omega: FloatArray) -> FloatArray:
-        """Return |1 + L|^2 of some loops, each at its own frequencies [rad/s], (m, k)."""
-        return np.asarray(self._size(self.closed, rows, omega) / self._size(self.open, rows, omega))
-
-    def poles(self, rows: IndexArray, *, closed: bool = True) -> ComplexArray:
-        """Return poles of some loops, (m, order) [1/s], from their companion matrices."""
-        coefficients = self.closed if closed else self.open
-        c = self._table(coefficients)[rows]
-        degree = c.shape[1] - 1
-        matrix = np.zeros((rows.size, degree, degree))
-        matrix[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
-        matrix[:, :, -1] = -c[:, :-1] / c[:, -1:]
-        found = np.linalg.eigvals(matrix) * self.reference
-        return np.asarray(found, dtype=np.complex128)
-
     def _scaled(self, columns: Columns) -> Columns:
         return [c * self.reference**j for j, c in enumerate(columns)]
 
@@ -218,20 +186,6 @@ class SpringLoops:
         np.multiply(imaginary, imaginary, out=imaginary)
         np.add(real, imaginary, out=real)
         return np.reciprocal(real, out=real)
-
-    def _size(self, columns: Columns, rows: IndexArray, omega: FloatArray) -> FloatArray:
-        """Return |polynomial|^2, (m, k), by Horner's rule in -omega^2."""
-        y = omega / self.reference
-        x = -(y**2)
-        parts = []
-        for start in (0, 1):
-            half = columns[start::2]
-            value = np.broadcast_to(at_rows(half[-1], rows), y.shape).copy()
-            for c in half[-2::-1]:
-                value *= x
-                value += at_rows(c, rows)
-            parts.append(value)
-        return np.asarray(parts[0] ** 2 + (parts[1] * y) ** 2)
 
 
 def product(one: Columns, other: Columns) -> Columns:
@@ -308,57 +262,3 @@ def _there(column: FloatArray) -> bool:
 
 def _chunks(count: int) -> list[slice]:
     return [slice(at, min(at + CHUNK, count)) for at in range(0, count, CHUNK)]
-
-
-def spring_peaks(loops: SpringLoops, rows: IndexArray) -> FloatArray:
-    """Return M_s = max 1/|1 + L| of some loops, (m,)."""
-    found = np.empty(rows.size)
-    for at in range(0, rows.size, _STEP):
-        part = rows[at : at + _STEP]
-        found[at : at + _STEP] = _peaks(loops, part)
-    return found
-
-
-def _peaks(loops: SpringLoops, rows: IndexArray) -> FloatArray:
-    poles = [loops.poles(rows, closed=closed) for closed in (True, False)]
-    sizes = np.abs(np.concatenate(poles, axis=1))
-    sizes = np.where(sizes > 1e-9 * sizes.max(axis=1, keepdims=True), sizes, np.nan)
-    low, high = 0.05 * np.nanmin(sizes, axis=1), 20.0 * np.nanmax(sizes, axis=1)
-    share = np.linspace(0.0, 1.0, _COMMON)
-    ratio = np.log(high / low)[:, None]
-    common = low[:, None] * np.exp(ratio * share)
-    at = [common]
-    width = [common * ratio / (_COMMON - 1)]
-    for some in poles:
-        upper = _upper(some)
-        damping = np.minimum(np.abs(upper.real), 0.3 * np.abs(upper.imag)) + 1e-12
-        near = np.abs(upper.imag)[:, :, None] + damping[:, :, None] * _NEAR
-        at.append(np.maximum(near, 1e-9).reshape(rows.size, -1))
-        wide = np.broadcast_to(damping[:, :, None], near.shape)
-        width.append(wide.reshape(rows.size, -1))
-    omega, reach = np.concatenate(at, axis=1), np.concatenate(width, axis=1)
-    size = loops.distance(rows, omega)
-    chosen = np.argpartition(size, _CANDIDATES, axis=1)[:, :_CANDIDATES]
-    # The lowest of the common grid as well: a wide well may lie beside a narrow one.
-    chosen = np.concatenate([chosen, np.argmin(size[:, :_COMMON], axis=1)[:, None]], axis=1)
-    line = np.arange(rows.size)[:, None]
-    best, where, span = size[line, chosen], omega[line, chosen], reach[line, chosen]
-    pick = np.arange(chosen.size)
-    for _ in range(_ROUNDS):
-        around = np.maximum(where[:, :, None] + span[:, :, None] * _ZOOM, 1e-9)
-        seen = loops.distance(rows, around.reshape(rows.size, -1)).reshape(-1, _ZOOM.size)
-        k = np.argmin(seen, axis=1)
-        least = seen[pick, k].reshape(best.shape)
-        better = least < best
-        where = np.where(better, around.reshape(-1, _ZOOM.size)[pick, k].reshape(best.shape), where)
-        best = np.where(better, least, best)
-        span = _SHRINK * span
-    # Towards infinity |S| tends to one.
-    return np.asarray(np.maximum(1.0 / np.sqrt(best.min(axis=1)), 1.0))
-
-
-def _upper(poles: ComplexArray) -> ComplexArray:
-    """Return the half of the poles with the largest imaginary parts, pairs counted once."""
-    order = np.argsort(-poles.imag, axis=1)
-    half = (poles.shape[1] + 1) // 2
-    return np.take_along_axis(poles, order[:, :half], axis=1)

@@ -14,15 +14,14 @@ from typing import Any
 import numpy as np
 
 from models.basics import ComplexArray, FloatArray, IndexArray, InputError
-from models.case import Case
-from models.plant import build_plant
 from models.spread import GAINS, Spread
 
-from ..design import GainDesign, StructureDesign
-from ..structures import ParametrisedController, PayloadFeedback
+from ..design import Design
+from ..question import GAINS as THESIS
+from ..structures import ParametrisedController
 from .numbers import at_rows
 
-_NUDGE = 1.01  # of a parameter, to see whether the controller's poles move with it
+_NUDGE = 0.01  # of a parameter's size, to see whether the controller's poles move with it
 _SAME = 1e-9
 
 
@@ -58,6 +57,11 @@ class LawColumns:
             poles=some(self.poles),
         )
 
+    @property
+    def swiftest(self) -> float:
+        """Size of the largest of the poles [1/s]."""
+        return float(np.abs(self.poles).max(initial=0.0))
+
     def response(self, rows: IndexArray, s: ComplexArray) -> dict[str, Any]:
         """Return C of each measurement of some rows at s, each (1 or m, 1 or k)."""
         values = [at_rows(v, rows) if v.size > 1 else float(v[0]) for v in self.values]
@@ -83,8 +87,8 @@ class DesignLaw:
 
     Parameters
     ----------
-    design, case
-        The design, and the case that its figures hold for.
+    design
+        The design.
 
     Raises
     ------
@@ -92,23 +96,19 @@ class DesignLaw:
         If the design has no controller.
     """
 
-    def __init__(self, design: GainDesign | StructureDesign, case: Case) -> None:
-        self.noisy = isinstance(design, StructureDesign)
-        self.law: ParametrisedController
-        if isinstance(design, StructureDesign):
-            if not design.parameters:
-                raise InputError(f"sweep: the design has no controller: {design.status}")
-            self.law, self._own = design.posed.law, dict(design.parameters)
-        else:
-            plant = build_plant(case, design.masses).linearise(drag=design.drag)
-            self.law, self._own = PayloadFeedback().bind(plant), dict(design.gains)
+    def __init__(self, design: Design) -> None:
+        if not design.parameters:
+            raise InputError(f"sweep: the design has no controller: {design.status}")
+        question = design.question
+        self.law, self.amplifier = question.law, question.amplifier or 1.0
+        self._own = dict(design.parameters)
         self.measurements = tuple(design.measurements)
         self._names = [p.name for p in self.law.parameters]
         poles = self._poles(self._row(self._own))
         self._fixed = {
-            name
-            for name in self._names
-            if poles.size == 0 or self._still(poles, {**self._own, name: _NUDGE * self._own[name]})
+            p.name
+            for p in self.law.parameters
+            if self._still(poles, p.name, self._own[p.name] + _NUDGE * p.scale)
         }
 
     def columns(self, spread: Spread, rows: FloatArray) -> LawColumns:
@@ -130,14 +130,15 @@ class DesignLaw:
 
     def _row(self, own: Mapping[str, Any]) -> list[Any]:
         """Return the law's parameters of named ones; the amplifier A multiplies every gain."""
-        return [own.get("A", 1.0) * own[name] for name in self._names]
+        scale = own.get("A", self.amplifier) / self.amplifier
+        return [scale * own[name] if name in THESIS else own[name] for name in self._names]
 
     def _poles(self, values: Sequence[float]) -> ComplexArray:
         A = self.law.controller([float(v) for v in values]).A
         return np.asarray(np.linalg.eigvals(A), dtype=np.complex128)
 
-    def _still(self, poles: ComplexArray, own: Mapping[str, float]) -> bool:
-        """Return whether the controller has the same poles with other parameters."""
-        moved = self._poles(self._row(own))
-        gap = np.abs(moved[:, None] - poles).min(axis=1)
-        return bool(np.all(gap <= _SAME * np.maximum(np.abs(poles).max(), 1.0)))
+    def _still(self, poles: ComplexArray, name: str, value: float) -> bool:
+        """Return whether the controller has the same poles with another parameter."""
+        moved = self._poles(self._row({**self._own, name: value}))
+        gap = np.abs(moved[:, None] - poles).min(axis=1, initial=np.inf)
+        return bool(np.all(gap <= _SAME * max(np.abs(poles).max(initial=0.0), 1.0)))

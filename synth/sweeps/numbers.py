@@ -175,11 +175,11 @@ class PlantNumbers:
 
 
 def numbers_of(
-    case: Case, spread: Spread, rows: FloatArray, *, checked: int = 1
+    case: Case, spread: Spread, rows: FloatArray, *, columns: bool | None = None
 ) -> tuple[PlantNumbers, bool]:
     """Return the plants of a spread's rows, (n, d), and whether columns sufficed.
 
-    `checked` rows of them are compared with their checked cases.
+    `columns` tells whether they do; if left out all rows are compared with their checked cases.
 
     Raises
     ------
@@ -189,22 +189,24 @@ def numbers_of(
     paths = {p for p in spread.paths if p in _KNOWN or not p.startswith((DRAG, *_ELSEWHERE))}
     drag = rows[:, spread.paths.index(DRAG)] if DRAG in spread.paths else None
     like = PlantData.from_case(case)
-    count = len(rows)
-    if not paths <= _KNOWN or (case.payload.shape and "payload.water_density" in paths):
-        return _with_drag(_one_by_one(like, spread, rows), drag), False
-    quick = _columns(case, like, spread, rows)
-    for k in np.unique(np.linspace(0, count - 1, min(checked, count)).astype(int)):
-        exact = PlantData.from_case(_case_at(spread, rows[k]))
+    if columns is None:
+        shaped = bool(case.payload.shape) and "payload.water_density" in paths
+        columns = paths <= _KNOWN and not shaped
+        columns = columns and _agree(_columns(case, like, spread, rows), spread, rows)
+    made = _columns(case, like, spread, rows) if columns else _one_by_one(like, spread, rows)
+    return made if drag is None else replace(made, fixed_drag=drag), columns
+
+
+def _agree(quick: PlantNumbers, spread: Spread, rows: FloatArray) -> bool:
+    """Return whether plants by column arithmetic are those of their checked cases."""
+    for k, row in enumerate(rows):
+        exact = PlantData.from_case(_case_at(spread, row))
         for name in _PLAIN:
             value, own = getattr(exact, name), float(quick[name][k % quick[name].size])
             same = value == own or abs(value - own) <= _AGREE * abs(value)
             if not (same or (math.isnan(value) and math.isnan(own))):
-                return _with_drag(_one_by_one(like, spread, rows), drag), False
-    return _with_drag(quick, drag), True
-
-
-def _with_drag(numbers: PlantNumbers, drag: FloatArray | None) -> PlantNumbers:
-    return numbers if drag is None else replace(numbers, fixed_drag=drag)
+                return False
+    return True
 
 
 def _case_at(spread: Spread, row: FloatArray) -> Case:

@@ -11,12 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.basics import BoolArray, InputError, Share, check_range, share
+from models.basics import InputError, Share, check_range, share
 from models.spread import DRAG, GAINS, Samples, Spread, Uniform
 
-from ..design import GainDesign, StructureDesign
-from ..loop import with_drag
-from ..question import pose
+from ..design import Design
 from ..robust import GainRadius, gain_radius
 from .frequency import FrequencyEngine
 
@@ -69,7 +67,7 @@ class GainTolerance:
 
 
 def gain_tolerance(
-    design: GainDesign | StructureDesign,
+    design: Design,
     tolerance: float,
     *,
     samples: int = 2000,
@@ -94,7 +92,11 @@ def gain_tolerance(
     """
     check_range("gain tolerance", "tolerance", tolerance, low=0.0, high=1.0, open_low=True)
     check_range("gain tolerance", "samples", samples, low=1)
-    radius = radius_of(design)
+    if design.margins is None:
+        raise InputError("gain tolerance: the design must be stable")
+    question = design.question
+    values = question.values(design.parameters)
+    radius = gain_radius(design.assessment.plant, question.law, values)
     widths = {f"{GAINS}{name}": Uniform(f"{100.0 * tolerance:.12g} %") for name in radius.names}
     engine = FrequencyEngine(design, _held(design, widths), metrics=["payload_rms"])
     rows = engine.spread.sample(samples, seed=seed)
@@ -108,7 +110,7 @@ def gain_tolerance(
     rms = found["payload_rms"][stable]
     beyond = None
     if np.isfinite(radius.ball):
-        beyond = not _stable_at(design, radius, _OUTSIDE)
+        beyond = not _stable_at(engine, radius, _OUTSIDE)
     return GainTolerance(
         tolerance=tolerance,
         radius=radius,
@@ -119,53 +121,20 @@ def gain_tolerance(
     )
 
 
-def radius_of(design: GainDesign | StructureDesign) -> GainRadius:
-    """Return the exact radius of errors of a design's gains.
-
-    Raises
-    ------
-    InputError
-        If the design is unstable, or affine in no gain.
-    """
-    if design.margins is None:
-        raise InputError("gain tolerance: the design must be stable")
-    if isinstance(design, StructureDesign):
-        law, problem = design.posed.law, design.posed.problem(())
-        plant = problem.plant
-        if problem.drag is not None:
-            plant = with_drag(plant, problem.drag, design.drag)
-        return gain_radius(plant, law, [design.parameters[p.name] for p in law.parameters])
-    question = pose(design.sea_case, design.masses)
-    values = question.law_values(design.gains)
-    return gain_radius(design.assessment.plant, question.problem.law, values)
-
-
-def _held(design: GainDesign | StructureDesign, widths: dict[str, Uniform]) -> Spread:
+def _held(design: Design, widths: dict[str, Uniform]) -> Spread:
     """Return a spread of gains with the drag held at the design's, as the radius has it."""
-    case = getattr(design, "sea_case", design.case)
-    if case.payload.fixed_drag is None:
+    if design.sea_case.payload.fixed_drag is None:
         return Spread({**widths, DRAG: Samples([design.drag])})
     return Spread(widths)
 
 
-def _stable_at(design: GainDesign | StructureDesign, radius: GainRadius, times: float) -> bool:
+def _stable_at(engine: FrequencyEngine, radius: GainRadius, times: float) -> bool:
     """Return whether gains `times` the way to the nearest unstable ones are stable."""
-    own = dict(design.gains if isinstance(design, GainDesign) else design.parameters)
-    there: dict[str, float] = {
-        name: own[name] + times * (radius.worst[name] * _scale(design) - own[name])
-        for name in radius.names
-    }
-    spread = _held(design, {f"{GAINS}{name}": Uniform(v, v) for name, v in there.items()})
-    engine = FrequencyEngine(design, spread, metrics=["payload_rms"])
-    row = [float(d.ends[0]) for d in engine.spread.distributions.values()]
-    found: BoolArray = engine.evaluate(np.array([row]))["stable"].astype(bool)
-    return bool(found[0])
-
-
-def _scale(design: GainDesign | StructureDesign) -> float:
-    """Return the design's unit of a gain over the law's: A may not be the question's."""
-    if isinstance(design, StructureDesign):
-        return 1.0
-    case = design.sea_case
-    amplifier = case.gains.A if case.gains is not None else 1.0
-    return float(amplifier / design.gains["A"])
+    amplifier = engine.design.question.amplifier
+    # The law's gains go with its own A, which may not be the design's.
+    scale = 1.0 if amplifier is None else amplifier / engine.design.parameters["A"]
+    there = dict(engine.spread.nominal)
+    for name in radius.names:
+        own = there[f"{GAINS}{name}"]
+        there[f"{GAINS}{name}"] = own + times * (radius.worst[name] * scale - own)
+    return bool(engine.evaluate(np.array([[*there.values()]]))["stable"][0])

@@ -34,12 +34,12 @@ _TURN, _GROWTH = 0.5, np.exp(2.0)  # largest steps of phase [rad] and of the siz
 _PER_DECADE, _PER_MODE = 24, 8
 _LOW = 1e-4  # first frequency above zero [rad/s]
 _ZERO = 1e-12 + 0.0j  # just right of a pole at zero [1/s]
-_ARC = 49
+_ARC = 25
 _ROUNDS = 46  # of halving: then the interval is a rounding error wide
 _NARROW = 1e-12  # ... or where size alone cannot be followed
 _SMALL = 0.5  # loop gain on the arc
-_STEP = 512  # loops at once
-_GOLDEN = 0.5 * (3.0 - 5.0**0.5)
+_STEP = 256  # loops at once
+_VERTICES = 12  # of parabolas through the lowest points of a minimum
 _SOUGHT = 4  # light poles of one loop
 _NEAR = 1.5  # local minima up to so much above the least are looked into
 _CALMING_ROUNDS = 50  # of halving, where a pole is on the axis
@@ -49,13 +49,16 @@ class _Path(NamedTuple):
     """What following loops along points gave.
 
     `turn` is by how much the phase of `closed` changes for each loop, (m,) [rad], NaN where it
-    cannot be followed; `loop`, `s` and `size` are all points looked at, and |closed/open|^2 there.
+    cannot be followed; `loop`, `s` and `size` are all points looked at, and |closed/open|^2
+    there; `before` and `after` say which points are beside each.
     """
 
     turn: FloatArray
     loop: IndexArray
     s: ComplexArray
     size: FloatArray
+    before: IndexArray
+    after: IndexArray
 
 
 def count_unstable(loops: ChainLoops, rows: IndexArray | None = None) -> IndexArray:
@@ -133,11 +136,10 @@ def _surveyed(loops: ChainLoops, rows: IndexArray, peaks: bool) -> tuple[IndexAr
 
 def _radius(loops: ChainLoops, rows: IndexArray) -> float:
     """Return a radius on which, and beyond, the gains of some loops are small [1/s]."""
-    angle = np.exp(1j * np.linspace(0.0, 0.5 * np.pi, 13))
-    beyond = 1j * np.geomspace(1.0, 30.0, 25)[1:]
-    directions = np.append(angle, beyond)
+    directions = np.exp(1j * np.linspace(0.0, 0.5 * np.pi, 9))
+    directions = np.append(directions, 1j * np.geomspace(1.0, 30.0, 13)[1:])
     spacing = float(np.max(loops.mode_spacing))
-    radius = max(100.0, 2.0 * spacing * loops.masses, 2.0 * loops.swiftest)
+    radius = max(100.0, 2.0 * spacing * loops.masses, 2.0 * loops.law.swiftest)
     large = rows
     for _ in range(30):
         with np.errstate(over="ignore", invalid="ignore"):
@@ -176,7 +178,8 @@ def _follow(
 
     `around` halves intervals along an arc about the origin.
     """
-    seen = [(np.repeat(np.arange(rows.size), points.size), np.tile(points, rows.size))]
+    every = np.arange(rows.size * points.size)
+    seen = [(every // points.size, np.tile(points, rows.size), every - 1, every + 1)]
     marks = np.stack([_marks(v) for v in loops.responses(rows, points)], axis=1)
     sizes = [(marks[1, 0] / marks[1, 1]).ravel()]
     turn, smooth = _steps(marks[..., :-1], marks[..., 1:])
@@ -184,7 +187,9 @@ def _follow(
     # All intervals of all loops that are not smooth are halved in one call, until none is left.
     loop, k = np.nonzero(~(smooth[0] & smooth[1]) if both else ~smooth[0])
     due = ~smooth[0, loop, k]  # whether their turn is yet to be counted
+    ends = np.stack([loop * points.size + k, loop * points.size + k + 1])
     a, b, at_a, at_b = points[k], points[k + 1], marks[..., loop, k], marks[..., loop, k + 1]
+    beside, count = [], every.size
     for _ in range(_ROUNDS):
         if not loop.size:
             break
@@ -192,24 +197,29 @@ def _follow(
         if around:
             middle *= np.abs(a) / np.abs(middle)
         here = [_marks(v[:, 0]) for v in loops.responses(rows[loop], middle[:, None])]
-        at_middle = np.stack(here, axis=1)
-        seen.append((loop, middle))
+        at_middle, own = np.stack(here, axis=1), count + np.arange(loop.size)
+        count += loop.size
+        seen.append((loop, middle, *ends))
         sizes.append(at_middle[1, 0] / at_middle[1, 1])
         loop, due = np.concatenate([loop, loop]), np.concatenate([due, due])
         a, b = np.concatenate([a, middle]), np.concatenate([middle, b])
         at_a = np.concatenate([at_a, at_middle], axis=-1)
         at_b = np.concatenate([at_middle, at_b], axis=-1)
+        ends = np.stack([np.append(ends[0], own), np.append(own, ends[1])])
         turn, smooth = _steps(at_a, at_b)
         counted = due & smooth[0]
         np.add.at(total, loop[counted], turn[counted])
         due &= ~smooth[0]
         wide = np.abs(b - a) > _NARROW * np.abs(b)
         rest = due | (~smooth[1] & wide) if both else due
-        loop, due, a, b = loop[rest], due[rest], a[rest], b[rest]
+        beside.append(ends[:, ~rest])
+        loop, due, a, b, ends = loop[rest], due[rest], a[rest], b[rest], ends[:, rest]
         at_a, at_b = at_a[..., rest], at_b[..., rest]
     total[loop[due]] = np.nan
-    loop, s = (np.concatenate(column) for column in zip(*seen, strict=True))
-    return _Path(turn=total, loop=loop, s=s, size=np.concatenate(sizes))
+    loop, s, before, after = (np.concatenate(column) for column in zip(*seen, strict=True))
+    for one, other in [*beside, ends]:
+        after[one], before[other] = other, one
+    return _Path(total, loop, s, np.concatenate(sizes), before, after)
 
 
 def _marks(values: ComplexArray) -> FloatArray:
@@ -232,37 +242,39 @@ def _steps(one: FloatArray, other: FloatArray) -> tuple[FloatArray, BoolArray]:
 
 def _highest(loops: ChainLoops, rows: IndexArray, path: _Path) -> FloatArray:
     """Return 1/min|1 + L| of each loop from the points of a path, the lowest minima refined."""
+    omega = path.s.imag
     size = np.where(np.isfinite(path.size) & (path.s.real == 0.0), path.size, np.inf)
     best = np.full(rows.size, np.inf)
     np.minimum.at(best, path.loop, size)
-    order = np.lexsort((path.s.imag, path.loop))
-    loop, omega, size = path.loop[order], path.s.imag[order], size[order]
-    same = loop[1:] == loop[:-1]
-    lower_left = np.append(True, ~same | (size[1:] <= size[:-1]))
-    lower_right = np.append(~same | (size[:-1] <= size[1:]), True)
-    at = np.flatnonzero(lower_left & lower_right & (size <= _NEAR**2 * best[loop]))
-    left, right = np.maximum(at - 1, 0), np.minimum(at + 1, loop.size - 1)
-    low = np.where(loop[left] == loop[at], omega[left], omega[at])
-    high = np.where(loop[right] == loop[at], omega[right], omega[at])
-    owner = loop[at]
-
-    def value(w: FloatArray) -> FloatArray:
-        closed, free = loops.responses(rows[owner], _imaginary(w[:, None]))
+    inner = np.flatnonzero((omega > 0.0) & (size <= _NEAR**2 * best[path.loop]))
+    inner = inner[path.after[inner] < path.loop.size]
+    left, right = path.before[inner], path.after[inner]
+    least = (size[left] >= size[inner]) & (size[right] >= size[inner])
+    least &= (path.loop[left] == path.loop[right]) & (omega[left] > 0.0)
+    at, left, right = inner[least], left[least], right[least]
+    owner = path.loop[at]
+    a, b, c = (omega[k] for k in (left, at, right))
+    fa, fb, fc = (size[k] for k in (left, at, right))
+    # The vertex of the parabola through three points, on arrays: SciPy's would do them one by
+    # one.  Where there is none, and every third time, the longer side is halved.
+    for turn in range(_VERTICES):
         with np.errstate(all="ignore"):
-            found = (abs2(closed) / abs2(free))[:, 0]
-        return np.where(np.isfinite(found), found, np.inf)
-
-    # Golden section on arrays, a bracket for each minimum: SciPy's would do them one by one.
-    x1, x2 = low + _GOLDEN * (high - low), high - _GOLDEN * (high - low)
-    f1, f2 = value(x1), value(x2)
-    for _ in range(24):
-        down = f1 <= f2
-        high, low = np.where(down, x2, high), np.where(down, low, x1)
-        fresh = np.where(down, low + _GOLDEN * (high - low), high - _GOLDEN * (high - low))
-        seen = value(fresh)
-        x1, x2 = np.where(down, fresh, x2), np.where(down, x1, fresh)
-        f1, f2 = np.where(down, seen, f2), np.where(down, f1, seen)
-    np.minimum.at(best, owner, np.minimum(f1, f2))
+            one, other = (b - a) * (fb - fc), (b - c) * (fb - fa)
+            fresh = b - 0.5 * ((b - a) * one - (b - c) * other) / (one - other)
+            halves = np.where(c - b > b - a, 0.5 * (b + c), 0.5 * (a + b))
+            sound = (fresh > a) & (fresh < c) & (fresh != b) & (turn % 3 != 2)
+            fresh = np.where(sound, fresh, halves)
+            closed, free = loops.responses(rows[owner], _imaginary(fresh[:, None]))
+            seen = (abs2(closed) / abs2(free))[:, 0]
+        lower, below = seen < fb, fresh < b
+        # What lies higher becomes the end on its side of what lies lower.
+        low, high = np.where(lower, fresh, b), np.where(lower, b, fresh)
+        f_low, f_high = np.where(lower, seen, fb), np.where(lower, fb, seen)
+        below = below != lower
+        a, fa = np.where(below, high, a), np.where(below, f_high, fa)
+        c, fc = np.where(below, c, high), np.where(below, fc, f_high)
+        b, fb = low, f_low
+    np.minimum.at(best, owner, fb)
     return np.asarray(1.0 / np.sqrt(best))
 
 

@@ -15,6 +15,6 @@ if TYPE_CHECKING:
     from .recompute import LawMatrices, Loop, Source, closed_matrices, lyapunov_variances, moments
     from .tuning_check import verify_tuning
     from .verification import Check, Verification, agreement, bounded
-    from .verify import verify_design, verify_structure
+    from .verify import verify_design
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -91,6 +91,11 @@ class Demand:
         return self.kind in ("gain", "delay", "least")
 
     @property
+    def drive(self) -> bool:
+        """Whether it is about motor, drive or rope, and not about the loop."""
+        return self.kind in ("continuous", "peak", "least", "power")
+
+    @property
     def orders(self) -> dict[str, tuple[int, ...]]:
         """Orders of the spectral moments that it needs, by output."""
         if self.kind in (*_MARGINS, "low_frequency", "roll_off"):
@@ -130,6 +135,8 @@ class Demand:
             return math.hypot(self.static, sizes[0])
         peaks = [
             size * peak_factor(zero_crossing_period(*moments[name]), self.duration)
+            if math.isfinite(size)
+            else math.inf
             for size, name in zip(sizes, self.outputs, strict=True)
         ]
         if self.kind == "least":

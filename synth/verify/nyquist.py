@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +17,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from models.basics import ComplexArray, FloatArray, SolverError
 
-from .winding import Function, lively, trace
+from .winding import Function, axis_clusters, lively, trace
 
 _FLOOR = 1e-3  # |L| below which the curve's phase is not followed
 _VALLEYS = 6  # local extrema that are solved for, the most extreme first
@@ -56,8 +57,7 @@ class Curve:
     marks
         Poles [1/s] near which it turns quickly.
     low, high
-        Ends [rad/s]; 1e-4 or a hundredth of the slowest pole, and a hundred times the fastest
-        one, by default.
+        Ends [rad/s].
 
     Raises
     ------
@@ -65,17 +65,7 @@ class Curve:
         If its phase cannot be followed.
     """
 
-    def __init__(
-        self,
-        difference: Function,
-        marks: ComplexArray,
-        low: float | None = None,
-        high: float | None = None,
-    ) -> None:
-        sizes = np.abs(marks)
-        sizes = sizes[sizes > 1e-9 * sizes.max(initial=0.0)]
-        low = min(1e-4, 0.01 * float(sizes.min(initial=1.0))) if low is None else low
-        high = 100.0 * float(sizes.max(initial=1.0)) if high is None else high
+    def __init__(self, difference: Function, marks: ComplexArray, low: float, high: float) -> None:
         self._difference = difference
         found = trace(
             difference,
@@ -179,6 +169,30 @@ class Curve:
             values = np.concatenate([self.values, [self._at(x) for x in added]])
             order = np.argsort(t)
             self.t, self.values = t[order], values[order]
+
+
+def curve_margins(difference: Function, marks: ComplexArray) -> CurveMargins:
+    """Return the margins of a loop with 1 + L and marks as in `Curve`.
+
+    From 1e-4 rad/s, or a hundredth of the slowest mark, to a hundred times the fastest one; in
+    pieces between the undamped poles of the open loop, where the curve goes through infinity.
+
+    Raises
+    ------
+    SolverError
+        If its phase cannot be followed.
+    """
+    sizes = np.abs(marks)
+    sizes = sizes[sizes > 1e-9 * sizes.max(initial=0.0)]
+    ends = [min(1e-4, 0.01 * float(sizes.min(initial=1.0)))]
+    for at, size, _ in axis_clusters(marks):
+        ends += [at - size, at + size]
+    ends.append(100.0 * float(sizes.max(initial=1.0)))
+    pieces = [
+        Curve(difference, marks, low, high).margins
+        for low, high in zip(ends[::2], ends[1::2], strict=True)
+    ]
+    return reduce(CurveMargins.worse, pieces)
 
 
 def largest(

@@ -1,19 +1,22 @@
-"""Checks that a verified winch and a verified tuning share: stability and margins."""
+"""Checks that a verified winch and a verified tuning share: `CheckedLoop` and what it is asked."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, reduce
 
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import ComplexArray, StillhookError
-from models.plant import LinearPlant
+from models.basics import ComplexArray, SolverError, StillhookError
+from models.plant import LinearPlant, PlantResponse
 
+from .claims import LimitClaim, SpectralSource
 from .demands import Demand
-from .nyquist import Curve, CurveMargins
-from .recompute import LawMatrices, Loop, closed_matrices
+from .nyquist import CurveMargins, curve_margins
+from .recompute import LawMatrices, Loop, closed_matrices, moments
 from .verification import Check, agreement, failure
 from .winding import Winding, count_unstable, open_loop_poles
 
@@ -97,12 +100,128 @@ def closed_loop_marks(plant: LinearPlant, law: LawMatrices) -> ComplexArray:
     return np.asarray(found[np.abs(found) > 0.0], dtype=np.complex128)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CheckedLoop:
+    """A controller around a plant, put together again.
+
+    Attributes
+    ----------
+    plant
+        The plant, its drag in it.
+    law
+        The controller's matrices.
+    sources
+        What shakes it.
+    exact
+        Points s -> the plant's blocks, where they are not those of `plant` (a distributed rope).
+    marks
+        Further points [1/s] near which something happens.
+    """
+
+    plant: LinearPlant
+    law: LawMatrices
+    sources: Sequence[SpectralSource]
+    exact: Callable[[ComplexArray], PlantResponse] | None = None
+    marks: Sequence[complex] = ()
+
+    @cached_property
+    def loop(self) -> Loop:
+        """The closed loop by its responses."""
+        marks = closed_loop_marks(self.plant, self.law)
+        return Loop(
+            plant=self.exact or self.plant.response_at,
+            law=self.law,
+            marks=np.concatenate([marks, np.asarray(self.marks, dtype=np.complex128)]),
+            inputs=len(self.plant.inputs),
+        )
+
+    @cached_property
+    def margins(self) -> CurveMargins:
+        """Its margins, root by root."""
+        return loop_margins(self.loop)
+
+    def moments(
+        self, outputs: Sequence[str], orders: tuple[int, ...] = (0, 2)
+    ) -> dict[str, tuple[float, ...]]:
+        """Return spectral moments of outputs, by name."""
+        delay = max(self.plant.delays, default=0.0)
+        if all(source.band is not None for source in self.sources):
+            return moments(self.loop, outputs, self.sources, orders=orders, delay=delay)
+        found: dict[str, tuple[float, ...]] = {}
+        for name in outputs:  # to infinity, where one output may have no variance
+            try:
+                found |= moments(self.loop, [name], self.sources, orders=orders, delay=delay)
+            except SolverError:
+                found[name] = (math.inf,) * len(orders)
+        return found
+
+    def demanded(
+        self, demands: Iterable[Demand], variances: Iterable[str] = ()
+    ) -> dict[str, tuple[float, ...]]:
+        """Return the moments that demands ask for, and variances of further outputs.
+
+        None is of higher order than is needed: it might be infinite.
+        """
+        orders: dict[str, tuple[int, ...]] = dict.fromkeys(variances, (0,))
+        for demand in demands:
+            for name, own in demand.orders.items():
+                orders[name] = max(orders.get(name, ()), own, key=len)
+        found: dict[str, tuple[float, ...]] = {}
+        for wanted in sorted(set(orders.values())):
+            found |= self.moments(sorted(n for n, o in orders.items() if o == wanted), wanted)
+        return found
+
+    def limit_checks(
+        self,
+        demands: Mapping[str, Demand],
+        claims: Mapping[str, LimitClaim],
+        moments: Mapping[str, tuple[float, ...]],
+        *,
+        ok: bool,
+        by: str,
+        on: str,
+    ) -> list[Check]:
+        """Return a check of each limit that is stated, and of strangers.
+
+        Parameters
+        ----------
+        demands
+            What is stated, by name.
+        claims
+            What the answer says of it.
+        moments
+            What `demanded` makes of the demands.
+        ok
+            Whether the answer counts as good.
+        by, on
+            What the limits are stated by, and what the answer is called.
+        """
+        checks = []
+        for name, demand in demands.items():
+            use = claims.get(name)
+            if use is None:
+                note = f"the {by} states it, the {on} does not"
+                checks.append(failure(f"limits.{name}", note))
+                continue
+            value = demand.measured(self.loop, self.margins, moments)
+            check = limit_check(demand, use.value, value)
+            note = ""
+            if not math.isclose(use.bound, demand.bound, rel_tol=1e-9):
+                note = f"the bound is {use.bound:.6g} but the {by} says {demand.bound:.6g}"
+            elif use.enforced != demand.enforced:
+                note = f"the {by} says otherwise whether it is enforced"
+            elif ok and demand.enforced and not demand.kept(value, TIGHT):
+                note = f"the {on} counts as good but breaks the bound {demand.bound:.6g}"
+            checks.append(replace(check, ok=False, note=note) if note else check)
+        for name in sorted(set(claims) - set(demands)):
+            checks.append(failure(f"limits.{name}", f"the {by} has no such limit"))
+        return checks
+
+
 def loop_margins(loop: Loop) -> CurveMargins:
     """Return the worst margins over all loops broken at an input."""
-    found = Curve(loop.broken(0), loop.marks).margins
-    for index in range(1, loop.inputs):
-        found = found.worse(Curve(loop.broken(index), loop.marks).margins)
-    return found
+    pieces = (curve_margins(loop.broken(i), loop.marks) for i in range(loop.inputs))
+    return reduce(CurveMargins.worse, pieces)
 
 
 def margin_checks(claimed: object | None, found: CurveMargins) -> list[Check]:

@@ -8,7 +8,7 @@ every limit, the drag, and whether the parameters are those of the controller.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,20 +19,17 @@ from models.plant import LinearPlant
 
 from .claims import ControllerMatrices, TuningClaims
 from .demands import limit_demand
-from .nyquist import CurveMargins
 from .recheck import (
     PADE,
     TIGHT,
-    closed_loop_marks,
+    CheckedLoop,
     guarded,
-    limit_check,
-    loop_margins,
     margin_checks,
     pole_check,
     winding_check,
     winding_of_plant,
 )
-from .recompute import LawMatrices, Loop, imaginary, lyapunov_variances, moments
+from .recompute import LawMatrices, imaginary, lyapunov_variances
 from .verification import Check, Verification, agreement, failure
 
 _DECAY = 1e-10  # of a pole, over the size of the fastest one, to count as stable
@@ -96,22 +93,9 @@ class _TunedLoop:
         )
 
     @cached_property
-    def law(self) -> LawMatrices:
-        return LawMatrices.of(self.controller, self.plant)
-
-    @cached_property
-    def loop(self) -> Loop:
-        marks = closed_loop_marks(self.plant, self.law)
-        return Loop(
-            plant=self.plant.response_at,
-            law=self.law,
-            marks=marks,
-            inputs=len(self.plant.inputs),
-        )
-
-    @cached_property
-    def curve_margins(self) -> CurveMargins:
-        return loop_margins(self.loop)
+    def checked(self) -> CheckedLoop:
+        law = LawMatrices.of(self.controller, self.plant)
+        return CheckedLoop(plant=self.plant, law=law, sources=self.tuning.problem.disturbances)
 
     @cached_property
     def intensities(self) -> dict[str, float] | None:
@@ -125,17 +109,18 @@ class _TunedLoop:
         return found
 
     def stability(self) -> list[Check]:
-        fastest = float(np.abs(self.loop.marks).max(initial=1.0))
+        plant, law, marks = self.plant, self.checked.law, self.checked.loop.marks
+        fastest = float(np.abs(marks).max(initial=1.0))
         return [
-            winding_check(winding_of_plant(self.plant, self.law, self.loop.marks), "the plant"),
-            pole_check("poles", self.plant, self.law, "the plant", _DECAY * fastest),
+            winding_check(winding_of_plant(plant, law, marks), "the plant"),
+            pole_check("poles", plant, law, "the plant", _DECAY * fastest),
         ]
 
     def parameters(self) -> list[Check]:
         """Return the check that the parameters named make the controller handed over."""
         law = self.tuning.problem.law
         again = law.controller([self.tuning.parameters[p.name] for p in law.parameters])
-        sizes = np.abs(self.loop.marks)
+        sizes = np.abs(self.checked.loop.marks)
         s = imaginary(np.geomspace(0.1, 10.0, 7) * float(np.median(sizes)) if sizes.size else [1.0])
         pair = [LawMatrices.of(c, self.plant)(s) for c in (self.controller, again)]
         size = float(np.abs(pair[0]).max(initial=0.0))
@@ -152,11 +137,11 @@ class _TunedLoop:
         ]
 
     def margins(self) -> list[Check]:
-        return margin_checks(self.tuning.margins, self.curve_margins)
+        return margin_checks(self.tuning.margins, self.checked.margins)
 
     def cost(self) -> list[Check]:
         weights = self.tuning.problem.minimise
-        found = self._moments(list(weights), (0,))
+        found = self.checked.moments(list(weights), (0,))
         checks = [
             agreement(
                 "cost", self.tuning.cost, _cost(weights, found), _COST, "by quad_vec, exact delays"
@@ -166,7 +151,7 @@ class _TunedLoop:
             return checks
         late = any(self.plant.delays)
         rational = self.plant.without_delays(PADE, at="measurements")
-        variances = lyapunov_variances(rational, self.law, self.intensities)
+        variances = lyapunov_variances(rational, self.checked.law, self.intensities)
         by_time = _cost(weights, {name: (variances[name],) for name in weights})
         note = "by a Lyapunov equation" + (" with Pade delays" if late else "")
         tolerance = _PADE_COST if late else _COST
@@ -178,37 +163,17 @@ class _TunedLoop:
             return []
         if claimed is None:
             return [failure("coefficient", "there is drag but no coefficient is claimed")]
-        sigma = math.sqrt(self._moments([element.velocity], (0,))[element.velocity][0])
+        sigma = math.sqrt(self.checked.moments([element.velocity], (0,))[element.velocity][0])
         needed = element.quadratic * math.sqrt(8.0 / math.pi) * sigma
         return [agreement("coefficient", claimed, needed, TIGHT, "q sqrt(8/pi) sigma")]
 
     def limits(self) -> list[Check]:
-        checks = []
-        for limit in self.tuning.problem.limits:
-            use = self.tuning.limits.get(limit.name)
-            if use is None:
-                note = "the problem states it, the answer does not"
-                checks.append(failure(f"limits.{limit.name}", note))
-                continue
-            demand = limit_demand(limit)
-            found = {
-                output: self._moments([output], orders)[output]
-                for output, orders in demand.orders.items()
-            }
-            value = demand.measured(self.loop, self.curve_margins, found)
-            check = limit_check(demand, use.value, value)
-            if self.tuning.ok and not demand.kept(value, TIGHT):
-                note = f"the answer counts as good but breaks the bound {demand.bound:.6g}"
-                check = replace(check, ok=False, note=note)
-            checks.append(check)
-        return checks
-
-    def _moments(
-        self, outputs: Sequence[str], orders: tuple[int, ...]
-    ) -> dict[str, tuple[float, ...]]:
-        delay = max(self.plant.delays, default=0.0)
-        return moments(
-            self.loop, outputs, self.tuning.problem.disturbances, orders=orders, delay=delay
+        stated = self.tuning.problem.limits
+        demands = {limit.name: limit_demand(limit) for limit in stated}
+        found = self.checked.demanded(demands.values())
+        own = {name: use for name, use in self.tuning.limits.items() if name in demands}
+        return self.checked.limit_checks(
+            demands, own, found, ok=self.tuning.ok, by="problem", on="answer"
         )
 
 

@@ -1,6 +1,6 @@
 """`Verification` and its `Check`s: each claimed figure beside the one found.
 
-`synth.verify.verify` makes these; a `GainDesign` and a `Tuning` hand them to the user.
+`synth.verify.verify` makes these; a `Design` and a `Tuning` hand them to the user.
 """
 
 from __future__ import annotations

@@ -179,7 +179,7 @@ def count_unstable(
     smallest, largest = (float(sizes.min()), float(sizes.max())) if sizes.size else (1.0, 1.0)
     origin = _AT_ORIGIN * smallest
     inside = np.abs(poles) < origin
-    clusters = _axis_clusters(poles[~inside])
+    clusters = axis_clusters(poles[~inside])
     taken = [np.abs(poles - 1j * w) < r for w, r, _ in clusters]
     taken += [np.abs(poles + 1j * w) < r for w, r, _ in clusters]
     out = inside | (np.any(taken, axis=0) if taken else False)
@@ -274,7 +274,7 @@ def _smooth(values: ComplexArray) -> npt.NDArray[np.bool_]:
     return np.asarray((np.abs(step.imag) <= _TURN) & (np.abs(step.real) <= _GROWTH))
 
 
-def _axis_clusters(poles: ComplexArray) -> list[tuple[float, float, int]]:
+def axis_clusters(poles: ComplexArray) -> list[tuple[float, float, int]]:
     """Return centre [rad/s], radius and number of poles that lie on the axis above the origin."""
     on = poles[(np.abs(poles.real) < 0.5 * _INDENT * np.abs(poles)) & (poles.imag > 0.0)]
     clusters: list[tuple[float, float, int]] = []

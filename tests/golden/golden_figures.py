@@ -32,7 +32,6 @@ from models.vessel.convention import Convention
 from stillhook.controllers.named import controller_by_name
 from synth.loop.assess import Assessment
 from synth.question.question import pose
-from synth.question.structure_question import pose_structure
 
 HERE = Path(__file__).parent
 
@@ -149,7 +148,7 @@ def changed(name: str, **changes: object) -> sh.Case:
     return case(name).replace({path.replace("__", "."): v for path, v in changes.items()})
 
 
-def thesis_design() -> sh.GainDesign:
+def thesis_design() -> sh.Design:
     """Return the thesis's gains on its own model."""
     return sh.evaluate_gains(case("thesis-1975"), THESIS_GAINS)
 
@@ -391,17 +390,16 @@ def structure_case(name: str) -> sh.Case:
 def structures(found: Figures) -> None:
     """Every structure with parameters that stand here."""
     for (name, structure), parameters in STRUCTURES.items():
-        posed = pose_structure(structure_case(name), structure)
-        law = posed.law
-        controller = law.controller([parameters[p.name] for p in law.parameters])
-        problem = posed.problem(())
+        posed = pose(structure_case(name), structure)
+        controller = posed.controller(parameters)
+        problem = posed.problem
         view = Assessment(posed.plant, controller, problem.disturbances, drag=problem.drag)
         prefix = f"structures.{name}.{structure}"
         found.put(f"{prefix}.payload_rms", view.sigma(PAYLOAD))
         found.put(f"{prefix}.torque_rms", view.sigma("motor.torque"))
         found.put(f"{prefix}.max_sensitivity", view.max_sensitivity)
         found.put(f"{prefix}.delay_margin", view.margins.delay)
-        for limit in (*posed.limits, *posed.drive, *posed.reported):
+        for limit in (*posed.limits, *posed.reported):
             if limit.name != "max_sensitivity":
                 found.put(f"{prefix}.{limit.name}", limit.measure(view))
 
@@ -587,10 +585,10 @@ def optimum(found: Figures) -> None:
     found.put("optimum.thesis.payload_rms", design.payload_rms, "optimum")
     found.put("optimum.thesis.status", design.status, "text")
     late = case("thesis-1975").replace(_LATE_NOISY)
-    forward = sh.optimise_structure(late, "feed-forward", starts=2)
+    forward = sh.optimise_gains(late, "feed-forward", starts=2)
     found.put("optimum.feed_forward.payload_rms", forward.payload_rms, "optimum")
     found.put("optimum.feed_forward.status", forward.status, "text")
-    feedback = sh.optimise_structure(late, "payload-feedback", starts=2)
+    feedback = sh.optimise_gains(late, "payload-feedback", starts=2)
     found.put("optimum.payload_feedback.payload_rms", feedback.payload_rms, "optimum")
     one = case("thesis-1975")
     robust = sh.optimise_robust(
@@ -611,7 +609,7 @@ def optimum_crane(found: Figures) -> None:
         if use.price > 1e-6:
             found.put(f"optimum_crane.price.{name}", use.price, "optimum", tolerance=1e-3)
     late = case("thesis-1975").replace(_LATE_NOISY)
-    combined = sh.optimise_structure(late, "combined", starts=2)
+    combined = sh.optimise_gains(late, "combined", starts=2)
     found.put("optimum_crane.combined.payload_rms", combined.payload_rms, "optimum")
 
 
@@ -802,9 +800,7 @@ class Recorder:
 
 
 def _law(name: str, structure: str) -> Any:
-    posed = pose_structure(structure_case(name), structure)
-    values = [STRUCTURES[name, structure][p.name] for p in posed.law.parameters]
-    return posed.law.controller(values)
+    return pose(structure_case(name), structure).controller(STRUCTURES[name, structure])
 
 
 def _controllers(name: str) -> dict[str, tuple[sh.Case, Any]]:

@@ -12,7 +12,7 @@ import pytest
 
 from models.basics import one_thread
 from synth.loop import Assessment
-from synth.question import pose_structure
+from synth.question import pose
 from synth.verify import LawMatrices, winding_of_plant
 from synth.verify.recheck import closed_loop_marks
 
@@ -111,8 +111,8 @@ def test_the_issue_s_number_at_2000_m_and_50_ms(rows):
 )
 def test_a_stored_design_does_what_its_row_says(rows, key):
     row = rows[key]
-    posed = pose_structure(structures.case_of(row), row.structure, row.masses)
-    problem = posed.problem(posed.limits)
+    posed = pose(structures.case_of(row), row.structure, row.masses)
+    problem = posed.problem_with(posed.loop)
     controller = posed.law.controller([row.parameters[p.name] for p in posed.law.parameters])
     with one_thread():
         view = Assessment(problem.plant, controller, problem.disturbances, drag=problem.drag)

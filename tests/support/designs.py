@@ -8,35 +8,34 @@ from functools import cache
 
 from models import load_case
 from models.case import Case
-from synth import GainDesign, evaluate_gains
-from synth.design import LimitUse, StructureDesign
-from synth.question import pose_structure
+from synth import Design, evaluate_gains
+from synth.design import LimitUse
+from synth.question import pose
 
 THESIS_GAINS = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
 
 
 @cache
-def thesis_design() -> GainDesign:
+def thesis_design() -> Design:
     """The thesis's own gains on its own model: stable, M_s 5.15 against a limit of 2."""
     return evaluate_gains(load_case("thesis-1975"), THESIS_GAINS)
 
 
 @cache
-def unstable_design() -> GainDesign:
+def unstable_design() -> Design:
     """The same with the sign of the amplifier turned."""
     return evaluate_gains(load_case("thesis-1975"), {**THESIS_GAINS, "A": -200.0})
 
 
 @cache
-def loopless_design() -> GainDesign:
+def loopless_design() -> Design:
     """What a search that finds nothing stable hands over: no gains, no margins."""
     status = "no stabilising gains were found"
-    gains = {"A": 200.0, "a": 0.0, "a1": 0.0, "a2": 0.0}
-    return replace(unstable_design(), gains=gains, status=status, verification=None)
+    return replace(unstable_design(), parameters={}, status=status, verification=None)
 
 
 @cache
-def infeasible_design() -> GainDesign:
+def infeasible_design() -> Design:
     """A design for a calmer sea than asked for, with what the drive would have to be."""
     calm = load_case("thesis-1975").replace({"sea.significant_height": 0.5})
     design = evaluate_gains(calm, {"A": 200.0, "a": 21.908422, "a1": 12.003924, "a2": 68.339717})
@@ -58,26 +57,26 @@ def infeasible_design() -> GainDesign:
 
 def structure_design(
     case: Case, structure: str, parameters: Mapping[str, float], masses: int | None = None
-) -> StructureDesign:
+) -> Design:
     """Parameters of a structure as a design, found by nobody and not verified."""
-    posed = pose_structure(case, structure, masses)
-    problem, question = posed.problem(()), posed.question
-    view = problem.assess([parameters[p.name] for p in posed.law.parameters])
+    question = pose(case, structure, masses)
+    view = question.assess(parameters)
     fixed = float(case.payload.fixed_drag or 0.0)
-    return StructureDesign(
+    return Design(
         case=case,
         structure=structure,
+        parameters=dict(parameters),
+        units={p.name: p.unit for p in question.law.parameters},
         ok=True,
         status="given",
-        parameters=dict(parameters),
-        units={p.name: p.unit for p in posed.law.parameters},
+        significant_height=case.sea.significant_height,
         payload_rms=view.sigma("payload.displacement"),
         payload_rms_before=question.payload_rms_before,
         hook_rms=float(question.hook.displacement.rms),
-        parts={},
+        shares={},
         margins=view.margins if view.stable else None,
         limits={},
-        drag=view.coefficient if problem.drag is not None else fixed,
+        drag=view.coefficient if question.drag is not None else fixed,
         drag_before=question.drag_before,
         masses=question.masses,
     )

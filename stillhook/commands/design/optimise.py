@@ -13,10 +13,9 @@ from ...text import OutputFolder, number, progress
 from ..declare import CASE, NO_BOUND, results_folder, text, whole
 from ..given import case_words, gains_text, given_case
 from ..working import conclude, interruptible, kept_in, prepared
-from .structures import optimise_one
 
 if TYPE_CHECKING:
-    from synth.design import GainDesign
+    from synth.design import Design
 
 ARGUMENTS = (
     CASE,
@@ -26,8 +25,9 @@ ARGUMENTS = (
     text(
         "--structure",
         "NAME",
-        "another structure than the three gains of payload feedback, such as combined; "
-        "`stillhook structures CASE` compares them",
+        "controller structure, such as combined; `stillhook structures CASE` compares them "
+        "(default: payload-feedback)",
+        "payload-feedback",
     ),
     NO_BOUND,
 )
@@ -39,16 +39,17 @@ def run(arguments: argparse.Namespace) -> int:
 
     check_range("optimise", "--starts", arguments.starts, low=1, high=4096)
     check_range("optimise", "--seed", arguments.seed, low=0)
-    if arguments.structure is not None:
-        return optimise_one(arguments)
+    from synth.structures import structure_named
+
     case = given_case(arguments)
+    structure_named(arguments.structure, case)  # an unknown name ends here, before any file
     folder = prepared(arguments, case.name)
     folder.write("case.yaml", case.to_yaml())
     from synth import optimise_gains
 
     from ...designs import design_data, design_report, write_report
 
-    design: GainDesign | None = None
+    design: Design | None = None
     try:
         with progress(shown=not arguments.quiet) as tell:
             with interruptible() as check:
@@ -58,7 +59,9 @@ def run(arguments: argparse.Namespace) -> int:
                     tell(stage, done, total)
 
                 starts, seed = arguments.starts, arguments.seed
-                design = optimise_gains(case, starts=starts, seed=seed, progress=step)
+                design = optimise_gains(
+                    case, arguments.structure, starts=starts, seed=seed, progress=step
+                )
             # Outside, as a report that is interrupted leaves whole files.
             written = write_report(folder, design=design, bound=arguments.bound, progress=tell)
     except KeyboardInterrupt:
@@ -73,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
 
 
-def _kept(folder: OutputFolder, design: GainDesign | None) -> str:
+def _kept(folder: OutputFolder, design: Design | None) -> str:
     """Return what an interrupted run leaves behind: whole files, some of them perhaps old."""
     kept = kept_in(folder.path)
     names = ", ".join(kept)
@@ -84,17 +87,20 @@ def _kept(folder: OutputFolder, design: GainDesign | None) -> str:
 
 
 def _next(
-    design: GainDesign, arguments: argparse.Namespace, folder: OutputFolder
+    design: Design, arguments: argparse.Namespace, folder: OutputFolder
 ) -> list[tuple[str, str]]:
     """Return commands to go on with, each with what it does."""
-    case = case_words(arguments, str(folder.path / "case.yaml"))
+    words = case_words(arguments, str(folder.path / "case.yaml"))
+    plain = design.structure == "payload-feedback"
+    structure = "" if plain else f" --structure {design.structure}"
+    optimise = f"stillhook optimise {words}{structure}"
     rows = []
     if not design.feasible:
         height = _rounded(design.significant_height, math.floor)
         rows.append(
             (
                 f"the largest sea that is feasible, H_s {height} m",
-                f"stillhook optimise {case} --set sea.significant_height={height}",
+                f"{optimise} --set sea.significant_height={height}",
             )
         )
     if design.required:
@@ -102,23 +108,25 @@ def _next(
             f"--set {LIMITS[name][1]}={_rounded(value, math.ceil)}"
             for name, value in design.required.items()
         ]
-        rows.append(("a drive that can do it", f"stillhook optimise {case} {' '.join(sets)}"))
+        rows.append(("a drive that can do it", f"{optimise} {' '.join(sets)}"))
     dearest = max(design.limits.values(), key=lambda use: use.price, default=None)
     if dearest is not None and dearest.price > 0.0 and design.ok:
         bound = dearest.bound * (0.9 if dearest.name in AT_LEAST else 1.1)
         rows.append(
             (
                 "the dearest limit, a tenth looser",
-                f"stillhook optimise {case} --set {LIMITS[dearest.name][1]}={number(bound)} "
+                f"{optimise} --set {LIMITS[dearest.name][1]}={number(bound)} "
                 f"--out {shlex.quote(str(folder.path) + '-looser')}",
             )
         )
     if design.margins is not None:
-        gains = f"{case} --gains {gains_text(design.gains)}"
-        rows.append(("these gains again", f"stillhook evaluate {gains}"))
-        rows.append(("in which seas they can work", f"stillhook operability {gains}"))
-        rows.append(("where mass, stiffness and delay are off", f"stillhook sweep {gains}"))
-    rows.append(("what was read from the case", f"stillhook check {case}"))
+        given = f"--gains {gains_text(design.parameters)}"
+        if not plain:
+            given = f"--design {shlex.quote(str(folder.path / 'design.yaml'))}"
+        rows.append(("these gains again", f"stillhook evaluate {words} {given}"))
+        rows.append(("in which seas they can work", f"stillhook operability {words} {given}"))
+        rows.append(("where mass, stiffness and delay are off", f"stillhook sweep {words} {given}"))
+    rows.append(("what was read from the case", f"stillhook check {words}"))
     return rows
 
 

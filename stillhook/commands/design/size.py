@@ -18,7 +18,7 @@ from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
     from models import Case
-    from synth.design import StructureDesign
+    from synth.design import Design
     from synth.sizing import Sizing
 
 ARGUMENTS = (
@@ -92,13 +92,13 @@ def run(arguments: argparse.Namespace) -> int:
     )
 
 
-def _sized(folder: OutputFolder, case: Case | None, design: StructureDesign | None) -> list[Path]:
+def _sized(folder: OutputFolder, case: Case | None, design: Design | None) -> list[Path]:
     """Write the case with its new winch, and the design for it."""
-    from ...designs import structure_text
+    from ...designs import design_text
 
     written = [] if case is None else [folder.write("sized.yaml", case.to_yaml())]
     if design is not None:
-        written.append(folder.write("design.yaml", structure_text(design)))
+        written.append(folder.write("design.yaml", design_text(design)))
     return written
 
 

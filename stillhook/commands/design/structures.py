@@ -1,36 +1,21 @@
-"""`stillhook structures` and `stillhook optimise --structure`: controllers by their structure."""
+"""`stillhook structures`: the best controllers of some structures side by side."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...designs import (
-    bound_rows,
-    design_data,
-    structure_text,
-    structures_report,
-    structures_table,
-)
-from ...text import (
-    OutputFolder,
-    Progress,
-    ReportSection,
-    console,
-    markdown,
-    number,
-    pairs,
-)
+from ...designs import design_data, design_text, structures_report, structures_table
+from ...text import OutputFolder, Progress, console, markdown
 from ..declare import CASE, NO_BOUND, results_folder, text, whole
 from ..given import case_words, given_case
 from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
     from models import Case
-    from synth.design import StructureDesign
+    from synth.design import Design
 
 ARGUMENTS = (
     CASE,
@@ -61,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
         structure_named(name, case)  # an unknown name ends here, not after minutes
     folder = prepared(arguments, case.name)
     folder.write("case.yaml", case.to_yaml())
-    designs: list[StructureDesign] = []
+    designs: list[Design] = []
     with working(arguments) as tell:
         for k, name in enumerate(names):
             designs.append(_design(case, name, arguments, tell, f"{name} ({k + 1}/{len(names)})"))
@@ -87,30 +72,6 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if ok else 1
 
 
-def optimise_one(arguments: argparse.Namespace) -> int:
-    """Optimise one structure, show and save it; return 0 if it is ok, 1 if not."""
-    from synth.structures import structure_named
-
-    case = given_case(arguments)
-    structure_named(arguments.structure, case)
-    folder = prepared(arguments, case.name)
-    folder.write("case.yaml", case.to_yaml())
-    with working(arguments) as tell:
-        design = _design(case, arguments.structure, arguments, tell, arguments.structure)
-    written = folder.write(f"{design.structure}.yaml", structure_text(design))
-    report = structures_report([design], bound=arguments.bound and not arguments.quiet)
-    sections = list(report.sections)
-    if not arguments.quiet and arguments.bound and (rows := bound_rows(design)):
-        sections.append(ReportSection("", [pairs(rows)]))
-    if design.parameters:
-        units = design.units
-        rows = [(k, f"{number(v, 6)} {units.get(k, '')}") for k, v in design.parameters.items()]
-        sections.append(ReportSection("Parameters", [pairs(rows)]))
-    verdict = f"{design.structure}: {design.status}"
-    report = replace(report, about=report.status, status=verdict, ok=design.ok, sections=sections)
-    return conclude(report, arguments, written=[written], result=lambda: design_data(design))
-
-
 def _names(text: str) -> tuple[str, ...]:
     from models.basics import InputError
 
@@ -126,10 +87,10 @@ def _names(text: str) -> tuple[str, ...]:
 
 def _design(
     case: Case, name: str, arguments: argparse.Namespace, tell: Progress, stage: str
-) -> StructureDesign:
-    from synth.design import optimise_structure
+) -> Design:
+    from synth.design import optimise_gains
 
-    return optimise_structure(
+    return optimise_gains(
         case,
         name,
         starts=arguments.starts,
@@ -138,10 +99,10 @@ def _design(
     )
 
 
-def _write(folder: OutputFolder, designs: Sequence[StructureDesign], *, bound: bool) -> list[Path]:
+def _write(folder: OutputFolder, designs: Sequence[Design], *, bound: bool) -> list[Path]:
     """Write what there is so far: an interrupted comparison keeps what is done."""
     report, last = structures_report(designs, bound=bound), designs[-1]
-    folder.write(f"{last.structure}.yaml", structure_text(last))
+    folder.write(f"{last.structure}.yaml", design_text(last))
     text = markdown(structures_table(designs, bound=bound))
     return [
         folder.write("structures.md", f"# Structures for {last.case.name}\n\n{text}"),

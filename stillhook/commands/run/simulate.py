@@ -7,6 +7,7 @@ until then is written all the same.
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -30,6 +31,7 @@ from ...text import (
 )
 from ..declare import (
     CASE,
+    changed_words,
     choice,
     group,
     one_of,
@@ -42,7 +44,7 @@ from ..declare import (
 )
 from ..given import case_words
 from ..working import Stop, figure_kinds, kept_in, place_for, stoppable, tidy
-from .simulate_given import SimulationRequest, again, asked_of
+from .simulate_given import SimulationRequest, asked_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -102,7 +104,7 @@ ARGUMENTS = (
     group(
         "the feedback's gains (default: those of the case)",
         one_of(
-            text("--design", "FILE", "the gains of a design, as in out/CASE/design.yaml"),
+            text("--design", "FILE", "a design that was written, as in out/CASE/design.yaml"),
             text("--gains", "A=..,a=..,a1=..,a2=..", "the gains"),
         ),
     ),
@@ -295,8 +297,8 @@ def _finish(
         "options": list(arguments.options),
         "hook": hook,
         "seeds": list(asked.seeds),
-        "gains": dict(design.gains) if design is not None else asked.gains,
-        "command": again(arguments, case_words(arguments)),
+        "gains": dict(design.parameters) if design is not None else asked.gains,
+        "command": _again(arguments, case_words(arguments)),
     }
     target.finish(
         compared,
@@ -356,14 +358,21 @@ def _next(
     rows = []
     if len(asked.controllers) == 1:
         rows.append(
-            ("every controller in the same sea", again(arguments, words, controller="all", **own))
+            ("every controller in the same sea", _again(arguments, words, controller="all", **own))
         )
     if len(asked.seeds) < 10 and not found.compared[0][0].duration > 1e5:
-        rows.append(("ten seas", again(arguments, words, seeds=10, **own)))
+        rows.append(("ten seas", _again(arguments, words, seeds=10, **own)))
     if not arguments.animate:
-        rows.append(("a moving picture", again(arguments, words, animate=True, **own)))
+        rows.append(("a moving picture", _again(arguments, words, animate=True, **own)))
     rows.append(("other operations and controllers", "stillhook scenarios"))
     return rows
+
+
+def _again(arguments: argparse.Namespace, case: str, **changes: object) -> str:
+    """Return the command that does the same again, with changes."""
+    fresh: dict[str, object] = {"changes": [], "out": None, "traces": "csv", "animate": False}
+    words = changed_words(arguments, ARGUMENTS, **(fresh | changes))
+    return " ".join(["stillhook simulate", case, *map(shlex.quote, words)])
 
 
 def _kept(folder: OutputFolder) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -24,7 +23,7 @@ from ..given import (
 if TYPE_CHECKING:
     from models.operation import MotionSource, Scenario
     from models.simulation import SimulationOptions
-    from synth.design import GainDesign
+    from synth.design import Design
 
 _MANY = 10_000  # seeds: more than anybody wants on purpose
 _TIME = Quantity("time", 0.0, 1e8, open_low=True)
@@ -37,26 +36,6 @@ _QUANTITIES = {
     "store_step": _TIME,
     "lock_limit": _LENGTH,
 }
-# What `again` repeats: the option, and its default where that is not None.
-_REPEATED: tuple[tuple[str, object], ...] = (
-    ("controller", "feedback"),
-    ("scenario", "hold"),
-    ("seeds", 1),
-    ("first-seed", 0),
-    ("hours", None),
-    ("duration", None),
-    ("hook", None),
-    ("tip", None),
-    ("sine", None),
-    ("design", None),
-    ("gains", None),
-    ("sample-time", None),
-    ("step", None),
-    ("masses", None),
-    ("settle", None),
-    ("lock-limit", None),
-    ("store-step", None),
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +67,7 @@ class SimulationRequest:
     seeds: range
     duration: float
     gains: Mapping[str, float] | None
-    design: GainDesign | None
+    design: Design | None
     sample_time: float | None
     how: SimulationOptions
 
@@ -165,21 +144,6 @@ def parse_controllers(text: str) -> tuple[str, ...]:
     return names
 
 
-def again(arguments: argparse.Namespace, case: str, **changes: object) -> str:
-    """Return the command that does the same again, with changes; True adds an option."""
-    words = ["stillhook simulate", case]
-    for name, default in _REPEATED:
-        key = name.replace("-", "_")
-        value = changes.get(key, getattr(arguments, key))
-        if value is not None and value != default:
-            text = f"{value:g}" if isinstance(value, float) else str(value)
-            words.append(f"--{name} {shlex.quote(text)}")
-    words += [f"--option {shlex.quote(text)}" for text in arguments.options]
-    words += ["--no-compile"] * (not arguments.compiled)
-    words += [f"--{key}" for key, value in changes.items() if value is True]
-    return " ".join(words)
-
-
 def _quantity(arguments: argparse.Namespace, name: str) -> float | None:
     text, option = getattr(arguments, name), f"--{name.replace('_', '-')}"
     return None if text is None else read_quantity_of(option, "", text, _QUANTITIES[name])
@@ -220,7 +184,7 @@ def _fitting(lasting: float, hook: MotionSource | None, sample_time: float | Non
     return float(min(lasting, length - max(0.1, 2.0 * (sample_time or 0.0))))
 
 
-def _design(arguments: argparse.Namespace, case: Case) -> GainDesign | None:
+def _design(arguments: argparse.Namespace, case: Case) -> Design | None:
     if arguments.design is None:
         return None
     import sys

@@ -147,9 +147,9 @@ def _controllers(text: str | None) -> list[object] | None:
         if not name.endswith((".yaml", ".yml")):
             found.append(name)
             continue
-        from ...designs import read_design
+        from ...designs import load_design
 
-        found.append((Path(name).stem, read_design(name)))
+        found.append((Path(name).stem, load_design(name)))
     return found
 
 

@@ -17,12 +17,12 @@ from models.basics import InputError, parse_quantity
 from ...text import OutputFolder, Progress
 from ..declare import CASE, DESIGN, group, results_folder, switch, text
 from ..given import case_words, gains_text, given_case
-from ..given_design import given_design
+from ..given_design import design_words, given_design
 from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
     from models import Case
-    from synth.design import GainDesign, StructureDesign
+    from synth.design import Design
     from synth.operability import Operability
 
 _FINEST = 400  # points of an axis
@@ -159,9 +159,7 @@ def parse_axis(name: str, text: str, step: float | None) -> list[float]:
     return values
 
 
-def _design(
-    case: Case, arguments: argparse.Namespace, step: Progress
-) -> GainDesign | StructureDesign:
+def _design(case: Case, arguments: argparse.Namespace, step: Progress) -> Design:
     """Return the design that was asked for, or the best gains where the case has none."""
     if arguments.design is None and arguments.gains is None and case.gains is None:
         from synth import optimise_gains
@@ -173,14 +171,11 @@ def _design(
 def _next(
     study: Operability, arguments: argparse.Namespace, folder: OutputFolder
 ) -> list[tuple[str, str]]:
-    from synth.design import GainDesign as Gains
-
     words = case_words(arguments, str(folder.path / "case.yaml"))
-    design = ""
-    if arguments.design:
-        design = f" --design {shlex.quote(arguments.design)}"
-    elif isinstance(study.design, Gains):
-        design = f" --gains {shlex.quote(gains_text(study.design.gains))}"
+    given = design_words(arguments)
+    if study.design is not None and not given:
+        given = [f"--gains {shlex.quote(gains_text(study.design.parameters))}"]
+    design = "".join(f" {word}" for word in given)
     rows = []
     if not study.wanted:
         again = f"stillhook operability {words}{design} --payload-rms '50 mm'"

@@ -14,7 +14,7 @@ from ..given_design import design_words, given_design
 from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
-    from synth.design import GainDesign, StructureDesign
+    from synth.design import Design
 
     from ...designs import Wide
 
@@ -85,9 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
     return conclude(report, arguments, written=written, following=lambda: following)
 
 
-def _over_ranges(
-    design: GainDesign | StructureDesign, arguments: argparse.Namespace, step: Progress
-) -> Wide | None:
+def _over_ranges(design: Design, arguments: argparse.Namespace, step: Progress) -> Wide | None:
     """Return Sobol's indices and Morris's effects over the ranges given, if any are wanted."""
     if not (arguments.ranges or arguments.spread or arguments.vary):
         return None

@@ -43,11 +43,11 @@ ARGUMENTS = (
     group(
         "who is tried",
         one_of(
-            text("--design", "FILE", "a design that was written (design.yaml, combined.yaml)"),
+            text("--design", "FILE", "a design that was written (design.yaml)"),
             text(
                 "--gains",
                 "A=..,a=..,a1=..,a2=..",
-                "gains (default: those that the case has in use)",
+                "gains, or parameters by name (default: the gains that the case has in use)",
             ),
             text(
                 "--controller",
@@ -55,6 +55,7 @@ ARGUMENTS = (
                 "another controller, with --mode time, as in mpc (see `stillhook scenarios`)",
             ),
         ),
+        text("--structure", "NAME", "whose parameters --gains are (default: payload-feedback)"),
         switch(
             "--follow",
             "make the controller for each case, and design a design anew (default: it is made for "
@@ -355,9 +356,9 @@ def _concluded(swept: Swept, arguments: argparse.Namespace) -> int:
 
 def _figures(swept: Swept, kind: str) -> list[Path]:
     """Draw and write the figures; return their files."""
-    from synth.design import GainDesign, StructureDesign
+    from synth.design import Design
 
-    linear = isinstance(swept.design, GainDesign | StructureDesign)
+    linear = isinstance(swept.design, Design)
     in_time = swept.result.attrs.get("mode") == "time"
     design: Any = swept.design if linear and not in_time else None
     result = swept.result
@@ -402,4 +403,4 @@ def _controller_words(swept: Swept, arguments: argparse.Namespace) -> list[str]:
     header = json.loads(swept.result.attrs[ATTRIBUTE])["controller"]
     if header["kind"] == "name":
         return [] if header["name"] == "feedback" else [f"--controller {header['name']}"]
-    return [] if header["law"]["kind"] == "gains" else design_words(arguments)
+    return [] if header["law"]["structure"] == "payload-feedback" else design_words(arguments)

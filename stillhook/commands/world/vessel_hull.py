@@ -15,7 +15,7 @@ from models.vessel.readers import check_long_waves, write_raos
 
 from ...seas import hull_report
 from ...text import progress
-from ..declare import choice, declared, group, real, switch, text, whole
+from ..declare import changed_words, choice, group, real, switch, text, whole
 from ..given import split_numbers
 from ..vary import parse_range
 from ..working import conclude, prepared_table
@@ -102,6 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
         check_range("hull", "--threads", arguments.threads, low=1, high=1024)
     radii = _numbers("--radii", arguments.radii, 3) if arguments.radii else (None, None, None)
     hull = _hull(arguments)
+    made = changed_words(arguments, ARGUMENTS, out=None, threads=None, cache=True)
     # Made and tried before anything long begins.
     folder, table = prepared_table(arguments, hull.name, "raos.nc")
     with progress(shown=not arguments.quiet) as tell:
@@ -119,7 +120,7 @@ def run(arguments: argparse.Namespace) -> int:
             density=arguments.density,
             lid=arguments.lid,
             name=arguments.name,
-            command=_command(arguments),
+            command=shlex.join(["stillhook", "vessel", "hull", *made]),
             threads=arguments.threads or os.cpu_count(),
             cache=arguments.cache,
             progress=lambda done, of: tell(_STAGE, done, of),
@@ -176,20 +177,3 @@ def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
     if len(found) != count:
         raise InputError(f"hull: {option} must be {count} numbers with commas, got {text!r}")
     return found
-
-
-def _command(arguments: argparse.Namespace) -> str:
-    """Return the command that makes the same vessel again: what differs from the defaults."""
-    parser = argparse.ArgumentParser()
-    declared(parser, ARGUMENTS)
-    words = ["stillhook", "vessel", "hull"]
-    for action in parser._actions:
-        if action.dest in {"help", "out", "threads", "cache"}:
-            continue
-        value = getattr(arguments, action.dest)
-        if value == action.default or not action.option_strings:
-            continue
-        words.append(action.option_strings[0])
-        if action.nargs != 0:
-            words.append(f"{value:g}" if isinstance(value, float) else str(value))
-    return shlex.join(words)

@@ -35,8 +35,8 @@ def handed_over(monkeypatch):
 
     def hand(design):
         monkeypatch.setattr("stillhook.text.style.picture", lambda figure, kind: b"a picture")
-        monkeypatch.setattr("synth.optimise_gains", lambda case, **rest: design)
-        monkeypatch.setattr("synth.evaluate_gains", lambda case, gains: design)
+        monkeypatch.setattr("synth.optimise_gains", lambda case, *structure, **rest: design)
+        monkeypatch.setattr("synth.evaluate_gains", lambda case, gains, structure: design)
 
     return hand
 
@@ -445,7 +445,8 @@ WRONG_WORDS = {
     "no gains at all": (
         "evaluate subsea-crane",
         "subsea-crane: gains: the case has none in use; give them, as in "
-        "--gains A=1,a=0,a1=0,a2=0.5",
+        "--gains A=1,a=0,a1=0,a2=0.5, or --design with a design.yaml that `stillhook optimise` "
+        "wrote",
     ),
     "no starts": (
         "optimise thesis-1975 --starts 0",
@@ -516,7 +517,7 @@ def test_a_folder_that_may_not_be_written_to_is_found_out_first(run, monkeypatch
 
 
 def test_an_interrupted_search_keeps_the_case(run, monkeypatch):
-    def interrupted(case, *, starts, seed, progress):
+    def interrupted(case, structure, *, starts, seed, progress):
         progress("starts", 3, starts)
         raise KeyboardInterrupt
 
@@ -536,7 +537,7 @@ def test_an_interrupted_search_says_that_other_files_are_old(run, monkeypatch):
     sh.save_design(unstable_design(), "here/design.yaml")
     old = Path("here/design.yaml").read_bytes()
 
-    def interrupted(case, **rest):
+    def interrupted(case, structure, **rest):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("synth.optimise_gains", interrupted)
@@ -636,7 +637,7 @@ def test_ctrl_c_in_the_midst_of_the_search(tmp_path):
 def test_errors_of_our_own_are_one_line_unless_debug_asks_for_more(
     error, status, message, run, monkeypatch
 ):
-    def broken(case, gains):
+    def broken(case, gains, structure):
         raise error
 
     monkeypatch.setattr("synth.evaluate_gains", broken)

@@ -8,7 +8,7 @@ import pytest
 
 import stillhook as sh
 from stillhook.cli import main
-from stillhook.designs import load_structure
+from stillhook.designs import load_design
 
 pytestmark = pytest.mark.ci  # whole optimisations in fixtures
 
@@ -29,7 +29,7 @@ def test_size_writes_the_curve_the_case_and_the_design(
     assert {"size.csv", "size.svg", "size.png", "sized.yaml", "design.yaml"} <= names
     sized = sh.load_case(str(out / "sized.yaml"))
     assert sized.limits.drive == "enforce"
-    assert load_structure(out / "design.yaml").verify().ok
+    assert load_design(out / "design.yaml").verify().ok
     # A target that cannot be met leaves nothing of the earlier run behind.
     words[3] = "1 mm"
     assert main([*words, "--points", "3", "--starts", "2", "--out", str(out), "--quiet"]) == 1

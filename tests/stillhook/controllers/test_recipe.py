@@ -29,13 +29,30 @@ def answers(controller):
 def test_a_recipe_that_was_stored_makes_the_same_controller():
     own = recipe_of(thesis_design(), "sweep")
     again = recipe_from(json.loads(json.dumps(own.to_dict())))
-    assert (again.name, again.kind, again.needs) == ("feedback", "law", "gains")
+    assert (again.name, again.kind, again.needs) == ("feedback", "law", "payload-feedback")
     assert again.identity == own.identity
     one, other = own.controller(CASE), again.controller(CASE)
     assert answers(one) == answers(other)
-    changed = again.with_gains({"a2": 90.0}).controller(CASE)
+    changed = again.with_gains(CASE, {"a2": 90.0}).controller(CASE)
     assert answers(changed) == answers(LinearFeedback(CASE, {**own.gains, "a2": 90.0}))
     assert answers(changed) != answers(one)
+
+
+def test_a_parameter_of_any_structure_can_vary():
+    gains = {
+        "drum.speed_gain": 0.0533,
+        "drum.position_gain": 12.5,
+        "heave.gain": 0.97,
+        "heave.lead": 0.28,
+        "heave.bandwidth": 100.0,
+    }
+    design = sh.evaluate_gains(CASE, gains, "feed-forward")
+    own = recipe_of(design, "sweep")
+    assert (own.name, own.needs, own.gains) == ("feed-forward", "feed-forward", design.parameters)
+    changed = own.with_gains(CASE, {"heave.gain": 0.5}).controller(CASE)
+    other = sh.evaluate_gains(CASE, {**gains, "heave.gain": 0.5}, "feed-forward")
+    assert answers(changed) == answers(LinearFeedback.from_design(other))
+    assert answers(changed) != answers(own.controller(CASE))
 
 
 def test_a_function_of_a_module_goes_to_any_process_and_one_of_a_test_does_not():
@@ -65,8 +82,8 @@ def test_what_is_no_controller_is_refused_in_the_name_of_who_asked(wanted, messa
 
 def test_who_has_nothing_to_vary_or_to_follow_with_says_so():
     held = recipe_of("none", "sweep")
-    with pytest.raises(InputError, match="none: gains can be varied of a design of payload feed"):
-        held.with_gains({"a": 1.0})
+    with pytest.raises(InputError, match="none: gains can be varied of a design of a winch"):
+        held.with_gains(CASE, {"a": 1.0})
     with pytest.raises(InputError, match="as an object cannot follow the case"):
         recipe_of(LinearFeedback(CASE, thesis_design().gains), "sweep").follow(CASE, starts=1)
     with pytest.raises(InputError, match="void: the factory must return a controller with name"):
@@ -74,7 +91,7 @@ def test_who_has_nothing_to_vary_or_to_follow_with_says_so():
 
 
 def test_a_design_is_wanted_by_laws_that_are_designed_for_every_sea_alone():
-    assert CONTENDERS["feedback-half"].needs == "gains-half"
+    assert CONTENDERS["feedback-half"].needs == "payload-feedback-half"
     assert CONTENDERS["none"].needs == CONTENDERS["clairvoyant"].needs == ""
     (given,) = contenders_of([thesis_design()])
     assert (given.name, given.needs, given.group) == ("design", "", "linear")

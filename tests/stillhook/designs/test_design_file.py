@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -80,6 +81,37 @@ def test_starts_with_arrays_and_infinite_costs_come_back(tmp_path):
         back.starts[0].end[0] = 1.0
 
 
+def test_alternatives_come_back_on_the_same_case(tmp_path):
+    other = dataclasses.replace(thesis_design(), status="another")
+    design = dataclasses.replace(thesis_design(), alternatives=(other,))
+    path = sh.save_design(design, tmp_path / "d.yaml")
+    assert path.read_text(encoding="utf-8").count("winch:") == 1
+    assert differences(design, sh.load_design(path)) == []
+
+
+def test_a_file_of_gains_of_the_first_format_is_read():
+    back = sh.load_design(Path(__file__).parent / "format_1_gains.yaml")
+    new = thesis_design()
+    assert (back.structure, back.parameters) == (new.structure, new.parameters)
+    assert back.case == new.case
+    assert back.payload_rms == pytest.approx(new.payload_rms, rel=1e-9)
+    assert back.limits.keys() == new.limits.keys()
+    assert back.shares == {}
+    assert back.verify().ok
+
+
+def test_a_file_of_a_structure_of_the_first_format_is_read():
+    back = sh.load_design(Path(__file__).parent / "format_1_structure.yaml")
+    assert back.structure == "payload-feedback-rolloff"
+    assert back.parameters["A"] == 200.0
+    assert back.parameters["a"] == 13.83496938452475
+    assert back.feasible
+    assert back.shares == {"payload.displacement": {"hook.heave": back.payload_rms}}
+    assert back.case.sensors.telemetry.delay == 0.025
+    assert back.starts == ()
+    assert back.ok
+
+
 def test_the_comparison_used_here_sees_a_last_digit():
     design = thesis_design()
     other = dataclasses.replace(design, payload_rms=np.nextafter(design.payload_rms, 1.0))
@@ -116,12 +148,21 @@ def test_an_interrupted_save_leaves_the_old_file(tmp_path, monkeypatch):
 
 
 WRONG = {
-    "no gains": (r"(?ms)^gains:.*?(?=^ok)", "", r"d\.yaml:3: gains: is missing"),
-    "a gain missing": (r"(?m)^  a2: .*\n", "", r"d\.yaml:\d+: gains\.a2: is missing; it must be"),
+    "no gains": (r"(?ms)^parameters:.*?(?=^units)", "", r"d\.yaml:3: parameters: is missing"),
+    "a gain missing": (
+        r"(?m)^  a2: .*\n",
+        "",
+        r"d\.yaml:\d+: parameters\.a2: is missing; it must be",
+    ),
+    "another structure": (
+        r"(?m)^structure: .*$",
+        "structure: magic",
+        r"structures: there is no structure 'magic'",
+    ),
     "a gain that is text": (
         r"(?m)^  a1: .*$",
         "  a1: many",
-        r"d\.yaml:\d+: gains\.a1: must be a number, got 'many'",
+        r"d\.yaml:\d+: parameters\.a1: must be a number, got 'many'",
     ),
     "not a number": (
         r"(?m)^payload_rms: .*$",
@@ -169,9 +210,9 @@ WRONG = {
         r"d\.yaml:\d+: sea\.significant_height: must be a length in \(0, 30\] m, got -1",
     ),
     "another format": (
-        r"(?m)^stillhook_design: 1$",
-        "stillhook_design: 2",
-        r"d\.yaml:3: stillhook_design: must be 1, the format that this version reads, got 2",
+        r"(?m)^stillhook_design: 2$",
+        "stillhook_design: 3",
+        r"d\.yaml:3: stillhook_design: must be 1 or 2, the format that this version reads, got 3",
     ),
     "cut off": (r"(?s)\n  winch:.*", "\n", r"d\.yaml:\d+: winch: is missing"),
     "not YAML": (r"(?m)^ok: ", "ok: [", r"d\.yaml:\d+: is not YAML: "),

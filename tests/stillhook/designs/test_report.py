@@ -17,11 +17,12 @@ from stillhook.designs.summary import (
     command_text,
     effect,
     facts,
-    gain_table,
     limit_table,
     margin_table,
     motion_table,
+    parameter_table,
     required_table,
+    share_table,
 )
 from stillhook.text import json_data, markdown
 
@@ -173,31 +174,41 @@ def test_motions_are_four_sigma_and_most_probable_maxima():
 
 def test_the_effect_is_said_whichever_way_it_goes():
     design = thesis_design()
-    assert effect(design) == "compensation takes away 99.8 % of the motion (54.2 dB)"
+    assert effect(design) == (
+        "the payload moves 98.0 % less than the hook (34.1 dB) and 99.8 % less than the payload "
+        "with the drum held (54.2 dB)"
+    )
     worse = dataclasses.replace(design, payload_rms=1.1 * design.payload_rms_before)
-    text = "the payload moves 10.0 % more than with the drum held (-0.8 dB)"
-    assert effect(worse) == text
+    assert effect(worse).endswith("and 10.0 % more than the payload with the drum held (-0.8 dB)")
     undamped = dataclasses.replace(design, payload_rms_before=math.inf)
     assert effect(undamped) == "the payload moves 11.7 mm rms; with the drum held it resonates"
 
 
 def test_gains_carry_the_units_of_the_drive():
-    rows = texts_of(gain_table(thesis_design()))
-    assert [(row[0], *row[3:]) for row in rows] == [
-        ("a", "10000", "V s2/m"),
-        ("a1", "20000", "V s/m"),
-        ("a2", "20000", "V/m"),
+    assert texts_of(parameter_table(thesis_design())) == [
+        ["A", "200.000", ""],
+        ["a", "50.0000", "(V)/(m/s2)"],
+        ["a1", "100.000", "(V)/(m/s)"],
+        ["a2", "100.000", "(V)/(m)"],
     ]
     assert command_text(thesis_design()).startswith("armature voltage [V] = -A (a P''")
     crane = dataclasses.replace(thesis_design(), case=load_case("subsea-crane"))
-    assert [row[-1] for row in gain_table(crane).rows] == [
-        "rad/s per m/s2",
-        "rad/s per m/s",
-        "rad/s per m",
-    ]
     torque = crane.case.replace({"winch.motor.speed_gain": 0})
-    assert gain_table(dataclasses.replace(crane, case=torque)).rows[2][-1] == "N m per m"
+    other = dataclasses.replace(crane, case=torque)
+    assert command_text(other).startswith("motor torque [N m] = ")
     assert command_text(crane).startswith("motor speed [rad/s] = ")
+
+
+def test_shares_of_every_signal_are_told_where_more_than_the_sea_shakes_it():
+    assert share_table(thesis_design()) is None
+    crane = sh.evaluate_gains(load_case("subsea-crane"), {"a": 16.0, "a1": 44.0, "a2": 6.4})
+    rows = share_table(crane).rows
+    assert [row[0] for row in rows][:2] == ["payload displacement", "motor torque"]
+    for row in rows:
+        assert sum(row[1:]) == pytest.approx(1.0)
+    torque = rows[1]
+    assert torque[3] > 0.9  # the noise of the payload's velocity, amplified
+    assert torque[2] == 0.0  # the reference unit is not heard
 
 
 def test_margins_in_words():

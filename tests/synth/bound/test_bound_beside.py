@@ -21,12 +21,12 @@ from stillhook.designs.summary import facts
 from stillhook.text import markdown
 from synth.bound import BestPossible, HighOrder, aboard, bound_for, exact_sensors, verify_bound
 from synth.loop import Assessment, LinearController, Margins, closed_loop_poles
-from synth.question import pose_structure
+from synth.question import pose
 
 CRANE_GAINS = {"A": 1.0, "a": 16.03, "a1": 44.47, "a2": 6.410}
 NOISY_MRU = {"sensors.mru": {"noise_floor": "1 cm", "noise_fraction": 0.02}}
 
-# What `sh.optimise_structure` finds on subsea-crane, to a few digits: parameters, drag [N s/m].
+# What `sh.optimise_gains` finds on subsea-crane, to a few digits: parameters, drag [N s/m].
 CRANE: Mapping[str, tuple[Mapping[str, float], float]] = {
     "payload-feedback": ({"a": 15.948, "a1": 44.248, "a2": 6.4222}, 6579.0),
     "payload-feedback-rolloff": (
@@ -113,14 +113,14 @@ QUICK = ("payload-feedback", "combined")
 
 
 @cache
-def crane() -> sh.GainDesign:
+def crane() -> sh.Design:
     return sh.evaluate_gains(sh.load_case("subsea-crane"), CRANE_GAINS)
 
 
 @cache
-def forward() -> sh.StructureDesign:
+def forward() -> sh.Design:
     case = sh.load_case("thesis-1975").replace(NOISY_MRU)
-    return sh.optimise_structure(case, "feed-forward", starts=2)
+    return sh.optimise_gains(case, "feed-forward", starts=2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,13 +138,13 @@ class Known:
 def crane_design(name: str) -> Known:
     values, drag = CRANE[name]
     case = sh.load_case("subsea-crane")
-    posed = pose_structure(case, name)
-    view = posed.problem(posed.limits).assess([values[p.name] for p in posed.law.parameters], drag)
+    posed = pose(case, name)
+    view = posed.problem_with(posed.loop).assess(posed.values(values), drag)
     return Known(
         sea_case=case,
         controller=view.controller,
         margins=view.margins,
-        masses=posed.question.masses,
+        masses=posed.masses,
         drag=drag,
     )
 
@@ -261,7 +261,7 @@ def test_the_design_itself_where_nothing_better_was_found(monkeypatch: pytest.Mo
 @pytest.mark.parametrize("structure", ["payload-feedback-rolloff", "feed-forward", "combined"])
 def test_bound_is_below_the_thesis_winch_with_a_noisy_reference(name: str, structure: str) -> None:
     case = sh.load_case(name).replace({**NOISY_MRU, "limits.drive": "report"})
-    design = sh.optimise_structure(case, structure, starts=2)
+    design = sh.optimise_gains(case, structure, starts=2)
     holds(design.bound)
 
 

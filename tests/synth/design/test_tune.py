@@ -100,6 +100,7 @@ def test_gain_on_the_full_state_is_the_linear_quadratic_regulator(plant, minimis
     if len(plant.inputs) == 1:  # unique: one noise alone does not tell all gains apart
         assert gain_of(found) == pytest.approx(exact, rel=1e-3, abs=1e-3 * np.abs(exact).max())
     assert found.agreed >= 4
+    assert found.verify().ok
 
 
 @pytest.mark.parametrize(
@@ -132,6 +133,7 @@ def test_controller_of_the_plants_order_is_the_lqg_optimum(
     assert lyapunov_cost(plant, found.controller, spectrum, minimise) == pytest.approx(
         best, rel=1e-8
     )
+    assert found.verify().ok
     if lower is not None:
         less = tune(plant, LowOrder(lower), spectrum=spectrum, minimise=minimise, starts=6)
         assert less.ok

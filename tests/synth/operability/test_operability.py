@@ -16,8 +16,7 @@ from models import Case, InputError, load_case
 from models.basics import Quadrature, peak_factor
 from models.hook import HookMotion
 from models.plant import PlantData
-from synth import GainDesign, evaluate_gains
-from synth.design import StructureDesign
+from synth import Design, evaluate_gains
 from synth.loop import Assessment
 from synth.operability import Criterion, operability
 from synth.operability.capability import capability
@@ -44,7 +43,7 @@ def one_heading():
     return load_case("subsea-crane").replace({"vessel.heave_rao": table})
 
 
-def dragged() -> GainDesign:
+def dragged() -> Design:
     """The thesis's winch with drag that agrees with the motion, so not linear in H_s."""
     changes = {"payload.drag": {"method": "stochastic"}, "limits.drive": "report"}
     return evaluate_gains(load_case("thesis-1975").replace(changes), MILD)
@@ -63,7 +62,7 @@ def vessel_case() -> Case:
     )
 
 
-def bisected(design: GainDesign, criterion: Criterion, low: float, high: float) -> float:
+def bisected(design: Design, criterion: Criterion, low: float, high: float) -> float:
     """The H_s at T_p = 11 s at which single evaluations change sides, by halving."""
     limit = criterion.limit
     assert limit is not None
@@ -165,7 +164,7 @@ def test_the_makers_lines_are_those_of_the_sheet() -> None:
     r, n = case.drum_radius, case.winch.gearbox.ratio
     v = case.winch.speed_limit * r / n
     assert rows["motor.speed.peak"] == pytest.approx(v * T / math.pi, rel=1e-12)
-    static = asked.plant.static["motor.torque"]
+    static = pose(case).plant.static["motor.torque"]
     a = (case.winch.drive.torque_peak - static) * r / (n * case.winch.inertia)
     assert rows["motor.torque.peak"] == pytest.approx(a * T**2 / (2.0 * math.pi**2), rel=1e-12)
     b = math.sqrt(2.0 * (case.winch.drive.torque_continuous**2 - static**2)) * r
@@ -470,7 +469,7 @@ def test_errors_of_the_reference_unit_grow_with_the_sea() -> None:
         "heave.lead": 0.0263462,
         "heave.bandwidth": 7.56484,
     }
-    design = StructureDesign(
+    design = Design(
         case=case,
         structure="combined",
         ok=True,
@@ -519,7 +518,7 @@ def test_what_cannot_be_asked_is_refused() -> None:
         operability(case, payload_rms=0.0)
     with pytest.raises(InputError, match="periods must be strictly ascending"):
         operability(case, periods=[8.0, 7.0])
-    with pytest.raises(InputError, match="reoptimise is for"):
+    with pytest.raises(InputError, match="reoptimise begins at a design"):
         operability(case, reoptimise=True)
     with pytest.raises(InputError, match="less than the 9000 m paid out"):
         operability(one_heading(), periods=[8.0], depths=[9000.0])

@@ -311,4 +311,4 @@ def test_the_command_refuses_in_one_sentence(
     assert "no.csv" in capsys.readouterr().err
     unstable = "A=-200,a=50,a1=100,a2=100"
     assert main(["operability", "thesis-1975", "--gains", unstable, *out]) == 2
-    assert "no stabilising gains" in capsys.readouterr().err
+    assert "no stabilising controller" in capsys.readouterr().err

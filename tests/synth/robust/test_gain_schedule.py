@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from models import load_case
 from models.basics import InputError
 from synth.loop import closed_loop_poles
-from synth.question import assess_gains, pose
+from synth.question import pose
 from synth.robust import GainSchedule, schedule_gains
 from synth.robust.schedule import blend_of
 
@@ -42,7 +42,7 @@ def test_it_holds_at_lengths_that_it_was_not_made_for(schedule):
     assert schedule.ok, schedule.status
     case = load_case("thesis-1975")
     for length in (1234.5, 1500.0, 1777.0, 1999.0):
-        view = assess_gains(case.replace({"rope.length": length}), schedule.at(length))
+        view = pose(case.replace({"rope.length": length})).assess(schedule.at(length))
         assert view.poles.real.max() < 0.0
         assert view.margins.max_sensitivity <= 2.0 * (1.0 + 2e-3)
 

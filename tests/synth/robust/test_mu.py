@@ -29,7 +29,7 @@ RANGES = {"payload.mass": 0.3, "stiffness": 0.2, "drag": 0.5, "delay": 0.5}
 
 
 @cache
-def late_design() -> sh.GainDesign:
+def late_design() -> sh.Design:
     case = load_case("thesis-1975").replace({"sensors.telemetry.delay": 0.02})
     return sh.evaluate_gains(case, GAINS)
 
@@ -231,7 +231,7 @@ def test_delay_alone_reaches_the_delay_margin() -> None:
 @pytest.mark.slow
 def test_a_structure_is_analysed_as_gains_are() -> None:
     case = load_case("thesis-1975").replace({"sensors.telemetry.delay": 0.02})
-    design = sh.optimise_structure(case, "payload-feedback", starts=2)
+    design = sh.optimise_gains(case, "payload-feedback", starts=2)
     names = {"a": "a", "a1": "a1", "a2": "a2"}
     gains = {"A": case.gains.A, **{k: design.parameters[v] for k, v in names.items()}}
     ranges = {"payload.mass": 0.2, "drag": 0.5}

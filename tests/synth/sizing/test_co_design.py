@@ -22,7 +22,7 @@ def answer(case: sh.Case, near: Answer | None = None) -> Answer:
     drive = posed.drive if case.limits.drive == "enforce" else ()
     problem = posed.problem((*posed.loop, *drive))
     if near is None:
-        design = sh.optimise_structure(case, STRUCTURE, starts=2)
+        design = sh.optimise_gains(case, STRUCTURE, starts=2)
         found = follow(problem, [begin_from(problem, design)])
     else:
         found = follow(problem, [near])
@@ -47,7 +47,7 @@ def test_no_gear_of_a_grid_does_better(case: sh.Case, best: CoDesign) -> None:
     found = {}
     for gear in (32.2, best.gear, 33.5, 37.0):
         changed = case.replace({"winch.gearbox.ratio": gear})
-        design = sh.optimise_structure(changed, STRUCTURE, starts=2)
+        design = sh.optimise_gains(changed, STRUCTURE, starts=2)
         found[gear] = design.payload_rms if design.ok else math.inf
     assert min(found, key=lambda g: found[g]) == best.gear
     # The same figure by a search that knows nothing of its neighbours.

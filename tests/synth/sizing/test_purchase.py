@@ -30,14 +30,14 @@ def late() -> Worth:
 
 def test_prices_are_what_optimising_again_gives_where_the_optimum_is_smooth(late: Worth) -> None:
     case = sh.load_case("thesis-1975").replace(HARD)
-    design = sh.optimise_structure(case, "payload-feedback", starts=2)
+    design = sh.optimise_gains(case, "payload-feedback", starts=2)
     posed = Posed.of(case, "payload-feedback", design.masses)
     problem = posed.problem((*posed.loop, *posed.drive))
     here = follow(problem, [begin_from(problem, design)])
     assert here is not None
     items = [
         *limit_items(problem.limits),
-        *part_items(case, design.posed.structure.measurements, posed),
+        *part_items(case, design.question.structure.measurements, posed),
     ]
     step = 0.01
     for name in ("gear ratio", "motor, all of it", "motor.current.peak"):
@@ -69,12 +69,12 @@ def test_the_first_thing_to_buy_is_the_delay_and_no_margin(late: Worth) -> None:
 
 def test_twice_as_good_is_the_optimum_of_that_case(late: Worth) -> None:
     half = sh.load_case("thesis-1975").replace({"sensors.telemetry.delay": "25 ms"})
-    design = sh.optimise_structure(half, "payload-feedback", starts=8)
+    design = sh.optimise_gains(half, "payload-feedback", starts=8)
     assert late.first is not None
     assert late.first.twice_rms == pytest.approx(design.payload_rms, rel=1e-3)
     # 10 ms less: near the slope, with what the curve bends
     ten = sh.load_case("thesis-1975").replace({"sensors.telemetry.delay": "40 ms"})
-    less = sh.optimise_structure(ten, "payload-feedback", starts=8).payload_rms
+    less = sh.optimise_gains(ten, "payload-feedback", starts=8).payload_rms
     assert late.first.per_step == pytest.approx(less - late.payload_rms, rel=0.1)
 
 

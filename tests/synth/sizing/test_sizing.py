@@ -121,7 +121,7 @@ def test_the_smallest_motor_meets_the_target_and_a_smaller_one_does_not(
     calm = case.replace({"limits.drive": "report"})
     for share, does in ((1.02, True), (0.97, False)):
         near = with_motor(calm, sizing.chosen.scale * share, sizing.chosen.gear)
-        design = sh.optimise_structure(
+        design = sh.optimise_gains(
             near.replace({"limits.drive": "enforce"}), "payload-feedback", starts=2
         )
         assert (design.ok and design.payload_rms <= TARGET) is does, (share, design.status)
@@ -145,7 +145,7 @@ def test_the_winch_as_it_is_meets_the_target_up_to_its_highest_sea(
     assert 0.0 < height < 1.0
     for share, does in ((0.99, True), (1.03, False)):
         sea = {"sea.significant_height": height * share, "limits.drive": "enforce"}
-        design = sh.optimise_structure(case.replace(sea), "payload-feedback", starts=2)
+        design = sh.optimise_gains(case.replace(sea), "payload-feedback", starts=2)
         assert (design.ok and design.payload_rms <= TARGET) is does
     assert sizing.given_rms > TARGET
 

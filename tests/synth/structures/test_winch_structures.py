@@ -14,11 +14,10 @@ from models import Case, load_case
 from models.basics import InputError
 from models.plant import DriveLimits
 from models.simulation import SimulationOptions, prepare, run_simulation
-from synth import optimise_gains
 from synth.controllers import LinearFeedback
-from synth.design import StructureDesign, optimise_structure
+from synth.design import Design, optimise_gains
 from synth.loop import Phasor, closed_loop_matrix
-from synth.question import pose_structure
+from synth.question import PAYLOAD, pose
 from synth.search.starts import candidates
 from synth.structures import structure_named, structure_names
 from synth.verify import Check
@@ -26,7 +25,7 @@ from synth.verify import Check
 OMEGA = np.geomspace(0.05, 30.0, 11)
 DIAGRAMS = [name for name in structure_names() if not name.startswith("low-order")]
 
-# What `optimise_structure` finds for these, rounded.
+# What `optimise_gains` finds for these, rounded.
 CRANE = {
     "payload.acceleration_gain": 0.991,
     "payload.velocity_gain": 1.807,
@@ -51,15 +50,15 @@ def spring() -> Case:
 
 
 @pytest.fixture(scope="module")
-def followed(spring: Case) -> StructureDesign:
+def followed(spring: Case) -> Design:
     late = {"sensors.mru": {"noise_floor": 0.0, "noise_fraction": 0.02, "delay": 0.03}}
-    return optimise_structure(spring.replace(late), "feed-forward", starts=2)
+    return optimise_gains(spring.replace(late), "feed-forward", starts=2)
 
 
 def values_of(case: Case, name: str) -> list[float]:
-    law = pose_structure(case, name).law
+    law = pose(case, name).law
     points = qmc.Sobol(law.dimensions, seed=3).random_base2(3)
-    posed = pose_structure(case, name)
+    posed = pose(case, name)
     yu = posed.plant.response(OMEGA).yu
     return [float(v) for v in law.draw(points, OMEGA, yu)[5]]
 
@@ -68,7 +67,7 @@ def values_of(case: Case, name: str) -> list[float]:
 @pytest.mark.parametrize("bundled", ["subsea-crane", "thesis-1975"])
 def test_response_state_space_and_symbols_say_the_same(name: str, bundled: str) -> None:
     case = load_case(bundled)
-    law = pose_structure(case, name).law
+    law = pose(case, name).law
     values = values_of(case, name)
     numbers = law.response(values, 1j * OMEGA)[0]
     row = np.array([np.broadcast_to(entry, OMEGA.shape) for entry in numbers]).T
@@ -89,7 +88,7 @@ def test_response_state_space_and_symbols_say_the_same(name: str, bundled: str) 
 
 
 def test_combined_is_the_law_of_the_page(crane: Case) -> None:
-    law = pose_structure(crane, "combined").law
+    law = pose(crane, "combined").law
     motor = structure_named("combined", crane).motor  # type: ignore[union-attr]
     s = 1j * OMEGA
     p = CRANE
@@ -113,7 +112,7 @@ def test_combined_is_the_law_of_the_page(crane: Case) -> None:
 
 def test_a_torque_drive_gets_a_speed_gain_and_the_steady_command(spring: Case) -> None:
     structure = structure_named("feed-forward", spring)
-    law = pose_structure(spring, "feed-forward").law
+    law = pose(spring, "feed-forward").law
     found = dict(zip((p.name for p in law.parameters), values_of(spring, "feed-forward"), strict=1))
     found |= {"heave.lead": 0.0, "heave.bandwidth": 100.0, "heave.gain": 1.0}
     controller = law.controller([found[p.name] for p in law.parameters])
@@ -128,7 +127,7 @@ def test_a_torque_drive_gets_a_speed_gain_and_the_steady_command(spring: Case) -
 
 @pytest.mark.parametrize("name", ["combined", "feed-forward", "drum-feedback", "constant-tension"])
 def test_guard_sees_every_unstable_pole_of_the_loop(name: str, crane: Case) -> None:
-    posed = pose_structure(crane, name)
+    posed = pose(crane, name)
     plant = posed.plant.without_delays(4)
     law = posed.law
     yu = posed.plant.response(OMEGA).yu
@@ -144,8 +143,8 @@ def test_guard_sees_every_unstable_pole_of_the_loop(name: str, crane: Case) -> N
 
 @pytest.mark.parametrize("name", DIAGRAMS)
 def test_candidates_keep_their_bounds_and_some_are_stable(name: str, crane: Case) -> None:
-    posed = pose_structure(crane, name)
-    problem = posed.problem(posed.limits)
+    posed = pose(crane, name)
+    problem = posed.problem_with(posed.loop)
     points = candidates(problem, 32, 0)
     for parameter, column in zip(posed.law.parameters, points.T, strict=True):
         assert np.all(column >= parameter.low), parameter.name
@@ -162,25 +161,25 @@ def test_unknown_structure_is_refused(crane: Case) -> None:
 
 
 def test_without_the_payload_slow_motion_is_reported_only(crane: Case) -> None:
-    forward, both = (pose_structure(crane, name) for name in ("feed-forward", "combined"))
+    forward, both = (pose(crane, name) for name in ("feed-forward", "combined"))
     assert "low_frequency" in {limit.name for limit in forward.reported}
     assert "low_frequency" in {limit.name for limit in both.limits}
     assert set(forward.spectra) == {"hook.heave", "mru.error"}
     noises = {f"payload.{name}_noise" for name in ("acceleration", "velocity", "displacement")}
-    assert set(pose_structure(crane, "payload-feedback").spectra) == {"hook.heave", *noises}
-    assert set(pose_structure(crane, "constant-tension").spectra) == {
+    assert set(pose(crane, "payload-feedback").spectra) == {"hook.heave", *noises}
+    assert set(pose(crane, "constant-tension").spectra) == {
         "hook.heave",
         "rope.tension_noise",
     }
 
 
 def test_payload_feedback_is_what_optimise_gains_finds(spring: Case) -> None:
-    design = optimise_structure(spring, "payload-feedback", starts=4)
-    gains = optimise_gains(spring, starts=4)
+    design = optimise_gains(spring, starts=4)
     assert design.ok
-    assert gains.ok
-    assert design.payload_rms == pytest.approx(gains.payload_rms, rel=1e-4)
-    assert design.parts == {"hook.heave": pytest.approx(design.payload_rms, rel=1e-6)}
+    assert design.structure == "payload-feedback"
+    assert tuple(design.parameters) == ("A", "a", "a1", "a2")
+    assert design.gains == design.parameters
+    assert design.shares[PAYLOAD] == {"hook.heave": pytest.approx(design.payload_rms, rel=1e-6)}
     assert design.binding
     assert "V" in design.units["a"]
 
@@ -188,26 +187,29 @@ def test_payload_feedback_is_what_optimise_gains_finds(spring: Case) -> None:
 @pytest.mark.ci
 def test_a_roll_off_only_helps(spring: Case) -> None:
     plain, filtered = (
-        optimise_structure(spring, name, starts=4).payload_rms
+        optimise_gains(spring, name, starts=4).payload_rms
         for name in ("payload-feedback", "payload-feedback-rolloff")
     )
     assert filtered <= 1.02 * plain  # the widest corner is late by 0.8 ms and more
 
 
-def test_feed_forward_design_is_verified_and_its_parts_add_up(followed: StructureDesign) -> None:
+def test_feed_forward_design_is_verified_and_its_parts_add_up(followed: Design) -> None:
     assert followed.ok, followed.status
     assert followed.verification is not None
     assert followed.verification.ok
-    assert set(followed.parts) == {"hook.heave", "mru.error"}
-    total = math.sqrt(sum(rms**2 for rms in followed.parts.values()))
-    assert total == pytest.approx(followed.payload_rms, rel=1e-6)
+    assert {PAYLOAD, "motor.torque", "motor.speed"} < set(followed.shares)
+    for signal, parts in followed.shares.items():
+        assert set(parts) == {"hook.heave", "mru.error"}
+        total = math.sqrt(sum(rms**2 for rms in parts.values()))
+        assert total == pytest.approx(followed.assessment.sigma(signal), rel=1e-6)
+    assert followed.assessment.sigma(PAYLOAD) == pytest.approx(followed.payload_rms, rel=1e-6)
     assert followed.payload_rms < 0.2 * followed.payload_rms_before
     assert followed.controller.measurements[:2] == ("mru.heave", "mru.heave_rate")
 
 
-def test_more_noise_costs_gain(followed: StructureDesign) -> None:
+def test_more_noise_costs_gain(followed: Design) -> None:
     noisy = followed.case.replace({"sensors.mru.noise_fraction": 0.5})
-    design = optimise_structure(noisy, "feed-forward", starts=2)
+    design = optimise_gains(noisy, "feed-forward", starts=2)
     assert design.payload_rms > followed.payload_rms
     assert design.parameters["heave.gain"] < followed.parameters["heave.gain"]
 
@@ -217,20 +219,20 @@ def test_more_noise_costs_gain(followed: StructureDesign) -> None:
     [
         ("payload_rms", lambda d: 0.99 * d.payload_rms),
         ("drag", lambda d: 1.01 * d.drag),
-        ("parts", lambda d: {**d.parts, "mru.error": 0.0}),
+        ("shares", lambda d: {**d.shares, PAYLOAD: {**d.shares[PAYLOAD], "mru.error": 0.0}}),
         ("hook_rms", lambda d: 1.01 * d.hook_rms),
         ("parameters", lambda d: {**d.parameters, "heave.gain": 0.9}),
     ],
 )
-def test_a_false_claim_is_found(field: str, change: object, followed: StructureDesign) -> None:
+def test_a_false_claim_is_found(field: str, change: object, followed: Design) -> None:
     false = replace(followed, **{field: change(followed)})  # type: ignore[operator]
     assert not false.verify().ok
 
 
 def test_an_unstable_design_is_found(crane: Case) -> None:
-    posed = pose_structure(crane, "combined")
+    posed = pose(crane, "combined")
     wild = {**CRANE, "payload.position_gain": 60.0}
-    design = StructureDesign(
+    design = Design(
         case=crane,
         structure="combined",
         ok=True,
@@ -240,12 +242,13 @@ def test_an_unstable_design_is_found(crane: Case) -> None:
         payload_rms=0.02,
         payload_rms_before=0.6,
         hook_rms=0.46,
-        parts={},
+        shares={},
+        significant_height=crane.sea.significant_height,
         margins=None,
         limits={},
-        drag=posed.question.drag_before,
-        drag_before=posed.question.drag_before,
-        masses=posed.question.masses,
+        drag=posed.drag_before,
+        drag_before=posed.drag_before,
+        masses=posed.masses,
     )
     checked = design.verify()
     assert not checked.ok
@@ -257,7 +260,7 @@ def _named(checks: tuple[Check, ...], name: str) -> Check:
 
 
 def test_simulated_combined_structure_has_the_predicted_rms(crane: Case) -> None:
-    posed = pose_structure(crane, "combined")
+    posed = pose(crane, "combined")
     controller = posed.law.controller([CRANE[p.name] for p in posed.law.parameters])
     drag, omega = 3000.0, np.geomspace(1e-3, 60.0, 30_001)
     T = 0.01

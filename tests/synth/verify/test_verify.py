@@ -15,8 +15,8 @@ import synth
 from models import load_case
 from models.plant import LinearPlant
 from synth import (
+    Design,
     DragElement,
-    GainDesign,
     LimitUse,
     LowOrder,
     MaxSensitivity,
@@ -35,13 +35,13 @@ SHALLOW = {"rope.length": "300 m", "limits.drive": "report"}
 
 
 @pytest.fixture(scope="module")
-def thesis() -> GainDesign:
+def thesis() -> Design:
     """Return the 1975 gains on the one spring."""
     return evaluate_gains(load_case("thesis-1975"), THESIS)
 
 
 @pytest.fixture(scope="module")
-def shallow() -> GainDesign:
+def shallow() -> Design:
     """Return gains for M_s = 2 on 300 m of rope with its modes and consistent drag."""
     case = load_case("thesis-1975-rope").replace(SHALLOW)
     return evaluate_gains(case, {"A": 200.0, "a": 3.234, "a1": 1.066, "a2": 25.76})
@@ -65,7 +65,7 @@ def oscillator() -> Tuning:
     return tune(plant, StaticGain(), spectrum=noise, minimise=weights, limits=limits, starts=2)
 
 
-def test_thesis_loop_on_one_spring_is_verified(thesis: GainDesign) -> None:
+def test_thesis_loop_on_one_spring_is_verified(thesis: Design) -> None:
     found = thesis.verify()
     assert found.ok, str(found)
     assert found.failed == ()
@@ -82,7 +82,7 @@ def test_thesis_loop_on_one_spring_is_verified(thesis: GainDesign) -> None:
     assert found["payload_rms.time"].found == pytest.approx(thesis.payload_rms, rel=0.01)
 
 
-def test_one_spring_design_says_what_rope_modes_do_to_it(thesis: GainDesign) -> None:
+def test_one_spring_design_says_what_rope_modes_do_to_it(thesis: Design) -> None:
     found = verify_design(thesis)
     modes = found["rope modes"]
     assert not modes.ok
@@ -93,7 +93,7 @@ def test_one_spring_design_says_what_rope_modes_do_to_it(thesis: GainDesign) -> 
 
 
 @pytest.mark.parametrize(("delay", "unstable"), [(0.025, 0), (0.0256, 0), (0.0258, 2), (0.03, 2)])
-def test_thesis_loop_with_delay(thesis: GainDesign, delay: float, unstable: int) -> None:
+def test_thesis_loop_with_delay(thesis: Design, delay: float, unstable: int) -> None:
     # The delay margin is 25.66 ms; the other claims of the design are stale and not looked at.
     case = thesis.case.replace({"sensors.telemetry.delay": delay})
     found = verify_design(replace(thesis, case=case))
@@ -103,7 +103,7 @@ def test_thesis_loop_with_delay(thesis: GainDesign, delay: float, unstable: int)
     assert not found.ok
 
 
-def test_thesis_loop_on_the_rope_is_unstable(thesis: GainDesign) -> None:
+def test_thesis_loop_on_the_rope_is_unstable(thesis: Design) -> None:
     given = {"payload.drag": {"method": "given", "coefficient": 1187.2}}
     case = load_case("thesis-1975-rope").replace(given)
     found = verify_design(replace(thesis, case=case, masses=10))
@@ -114,7 +114,7 @@ def test_thesis_loop_on_the_rope_is_unstable(thesis: GainDesign) -> None:
     assert set(found.failed) == {"winding number", "poles", "poles.design"}
 
 
-def test_rope_design_is_verified_on_the_distributed_rope(shallow: GainDesign) -> None:
+def test_rope_design_is_verified_on_the_distributed_rope(shallow: Design) -> None:
     found = shallow.verify()
     assert found.ok, str(found)
     assert "distributed rope" in found["winding number"].note
@@ -127,18 +127,18 @@ def test_rope_design_is_verified_on_the_distributed_rope(shallow: GainDesign) ->
     assert found["drag"].found == pytest.approx(shallow.drag, rel=1e-5)
 
 
-def test_undamped_rope_is_verified_on_twice_the_masses(shallow: GainDesign) -> None:
+def test_undamped_rope_is_verified_on_twice_the_masses(shallow: Design) -> None:
     case = shallow.case.replace({"rope.damping_ratio": 0.0})
     found = verify_design(replace(shallow, case=case))
     assert f"{2 * shallow.masses} masses (undamped" in found["winding number"].note
     assert found["winding number"].found is not None
 
 
-def flipped(design: GainDesign) -> GainDesign:
-    return replace(design, gains={**design.gains, "A": -design.gains["A"]})
+def flipped(design: Design) -> Design:
+    return replace(design, parameters={**design.gains, "A": -design.gains["A"]})
 
 
-def changed_use(design: GainDesign, name: str, **changes: Any) -> GainDesign:
+def changed_use(design: Design, name: str, **changes: Any) -> Design:
     use = replace(design.limits[name], **changes)
     return replace(design, limits={**design.limits, name: use})
 
@@ -155,11 +155,11 @@ CORRUPTIONS: dict[str, tuple[Any, str]] = {
     "drag before": (lambda d: replace(d, drag_before=0.98 * d.drag_before), "drag_before"),
     "signs": (flipped, "winding number"),
     "one gain": (
-        lambda d: replace(d, gains={**d.gains, "a1": 1.01 * d.gains["a1"]}),
+        lambda d: replace(d, parameters={**d.gains, "a1": 1.01 * d.gains["a1"]}),
         "margins.max_sensitivity",
     ),
     "no displacement gain": (
-        lambda d: replace(d, gains={**d.gains, "a2": 0.0}),
+        lambda d: replace(d, parameters={**d.gains, "a2": 0.0}),
         "winding number",
     ),
     "not a number": (lambda d: replace(d, payload_rms=float("nan")), "payload_rms"),
@@ -205,7 +205,7 @@ ON_THE_ROPE = ("rms", "before", "drag", "drag before", "signs", "a lost limit")
     [("thesis", what) for what in CORRUPTIONS] + [("shallow", what) for what in ON_THE_ROPE],
 )
 def test_a_corrupted_claim_is_caught(which: str, what: str, request: pytest.FixtureRequest) -> None:
-    design: GainDesign = request.getfixturevalue(which)
+    design: Design = request.getfixturevalue(which)
     corrupt, named = CORRUPTIONS[what]
     found = verify_design(corrupt(design))
     assert not found.ok
@@ -214,7 +214,7 @@ def test_a_corrupted_claim_is_caught(which: str, what: str, request: pytest.Fixt
 
 
 @pytest.mark.parametrize("name", ["max_sensitivity", "gain", "gain_down", "phase", "delay", "disk"])
-def test_a_corrupted_margin_is_caught(thesis: GainDesign, name: str) -> None:
+def test_a_corrupted_margin_is_caught(thesis: Design, name: str) -> None:
     value = getattr(thesis.margins, name)
     wrong = 20.0 if np.isinf(value) else 1.002 * value
     assert thesis.margins is not None
@@ -223,7 +223,7 @@ def test_a_corrupted_margin_is_caught(thesis: GainDesign, name: str) -> None:
     assert found.status.startswith(f"the check of margins.{name} failed: claimed {wrong:.6g}")
 
 
-def test_a_good_word_for_a_broken_limit_is_caught(thesis: GainDesign) -> None:
+def test_a_good_word_for_a_broken_limit_is_caught(thesis: Design) -> None:
     # M_s is 5.15 against 2: honest as long as the design does not count as good.
     assert not thesis.ok
     found = verify_design(replace(thesis, ok=True))
@@ -411,7 +411,7 @@ def test_the_check_shares_no_code_with_the_optimiser() -> None:
                 assert "synth" not in ast.unparse(node), (path.name, ast.unparse(node))
 
 
-def test_verifying_warns_of_nothing(thesis: GainDesign) -> None:
+def test_verifying_warns_of_nothing(thesis: Design) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert verify_design(thesis).ok

@@ -8,7 +8,7 @@ import pytest
 from models import load_case
 from models.plant import LinearPlant, PlantData, build_plant, line_response_at
 from synth.verify import LawMatrices, Loop, closed_matrices, winding_of_plant
-from synth.verify.nyquist import Curve, largest
+from synth.verify.nyquist import curve_margins, largest
 from synth.verify.recheck import closed_loop_marks
 from synth.verify.winding import count_unstable, lively, open_loop_poles, trace
 
@@ -187,8 +187,7 @@ def test_lively_has_points_inside_every_resonance() -> None:
 
 def test_margins_of_a_textbook_loop() -> None:
     # L = 1/(s (s + 1)^2): phase -180 deg at 1 rad/s, where |L| = 1/2.
-    curve = Curve(lambda s: 1 + 1 / (s * (s + 1) ** 2), np.array([-1.0 + 0j]))
-    margins = curve.margins
+    margins = curve_margins(lambda s: 1 + 1 / (s * (s + 1) ** 2), np.array([-1.0 + 0j]))
     assert margins.gain == pytest.approx(2.0, rel=1e-9)
     assert margins.gain_down == 0.0
     # |L| = 1 where w (1 + w^2) = 1
@@ -204,7 +203,7 @@ def test_margins_of_a_textbook_loop() -> None:
 
 def test_margins_of_a_conditionally_stable_loop() -> None:
     # k (s + 1)^2/s^3 closes to s^3 + k (s + 1)^2, stable for k > 1/2: lower gain margin 1/(2k).
-    margins = Curve(lambda s: 1 + 3 * (s + 1) ** 2 / s**3, np.array([-1.0 + 0j])).margins
+    margins = curve_margins(lambda s: 1 + 3 * (s + 1) ** 2 / s**3, np.array([-1.0 + 0j]))
     assert margins.gain == np.inf
     assert margins.gain_down == pytest.approx(1 / 6, rel=1e-9)
 
@@ -218,8 +217,27 @@ def test_a_resonance_that_just_crosses_unity_is_seen() -> None:
 
     poles = np.array([complex(-width, 1.0)])
     # |L| is above one in the hair's breadth around its peak of 1.0000001, where L is +1.
-    assert Curve(difference, poles).margins.phase == pytest.approx(np.pi, abs=2e-3)
-    assert Curve(lambda s: 1 + (difference(s) - 1) * 0.9999, poles).margins.phase == np.inf
+    assert curve_margins(difference, poles).phase == pytest.approx(np.pi, abs=2e-3)
+    assert curve_margins(lambda s: 1 + (difference(s) - 1) * 0.9999, poles).phase == np.inf
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.1])
+def test_curve_goes_through_infinity_at_undamped_poles(delay: float) -> None:
+    """A spring and a damper around a mass on a spring: |S| = |4 - w^2| over the closed loop's."""
+
+    def law(s):  # type: ignore[no-untyped-def]
+        return (1.5 + 0.8 * s) * np.exp(-s * delay)
+
+    poles = np.array([2.0j, -2.0j, -0.4 + 2.3j, -0.4 - 2.3j])
+    margins = curve_margins(lambda s: 1 + law(s) / (s**2 + 4.0), poles)
+    omega = np.linspace(0.01, 20.0, 400001)
+    s = 1j * omega
+    sensitivity = np.abs((4.0 - omega**2) / (4.0 - omega**2 + law(s)))
+    assert margins.max_sensitivity == pytest.approx(sensitivity.max(), rel=1e-8)
+    at = omega[:-1][np.diff(np.sign(np.abs(law(s)) - np.abs(4.0 - omega**2))) != 0.0]
+    turn = np.angle(-law(1j * at) / (4.0 - at**2))
+    assert margins.phase == pytest.approx(np.abs(turn).min(), abs=1e-4)
+    assert margins.gain_down < 1e-6
 
 
 def test_largest_finds_a_resonance_peak() -> None:

@@ -1,6 +1,6 @@
 """Nested starts of a structure's search: the best of the simpler structures within it.
 
-    StructureQuestion -> simpler structures, searched -> the same controllers as its own parameters
+    DesignQuestion -> simpler structures, searched -> the same controllers as its own parameters
 
 A structure that contains another has at least its optimum, but its search has more dimensions to
 get lost in.  So it begins at the simpler one's answer, and `no_worse` holds it to that.  Contained
@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..question import Problem, StructureQuestion, pose_structure
+from ..question import GAINS, DesignQuestion, Problem, pose
 from ..search import KEPT, Found, Progress, Solution, polish, search
 from ..structures import TRANSPARENT, LowOrderFeedback, ParametrisedController, WinchLaw
 from .tuning import Tuning, tuning_of
@@ -50,38 +50,38 @@ _NEUTRAL: Mapping[str, float] = {
 
 
 def nested_starts(
-    posed: StructureQuestion, starts: int, seed: int, progress: Progress | None = None
+    question: DesignQuestion, starts: int, seed: int, progress: Progress | None = None
 ) -> list[list[float]]:
     """Return parameter vectors to begin with: the best of each structure within this one.
 
     Parameters
     ----------
-    posed
+    question
         The question; a free controller's parameters get the sizes that go with the answer.
     starts, seed
         Starts of the search in question, of which the structures within get a few.
     progress
         Called as progress(stage, done, total).
     """
-    structure = posed.structure
+    structure = question.structure
     within = _WITHIN.get(structure.name, ())
     if isinstance(structure, LowOrderFeedback) and structure.order >= 2:
         within = (_ROLLED,)
     found: list[list[float]] = []
     for name in within:
-        inner = pose_structure(posed.question.case, name, posed.question.masses)
+        inner = pose(question.case, name, question.masses)
         tuning = _answer(inner, min(starts, _FEW), seed, progress)
         if tuning.controller is None:
             continue
         if isinstance(structure, LowOrderFeedback):
-            found.append(structure.start(posed.law, tuning.parameters, tuning.controller))
+            found.append(structure.start(question.law, tuning.parameters, tuning.controller))
             continue
-        found += starts_from(posed, [tuning.parameters])
+        found += starts_from(question, [tuning.parameters])
     return found
 
 
 def starts_from(
-    posed: StructureQuestion, guesses: Sequence[Mapping[str, float]]
+    question: DesignQuestion, guesses: Sequence[Mapping[str, float]]
 ) -> list[list[float]]:
     """Return parameter vectors of designs that are known by the names of their parameters.
 
@@ -90,17 +90,21 @@ def starts_from(
     """
     found = []
     for guess in guesses:
-        values = as_values(posed.law, guess)
+        own = question.amplifier
+        if own is not None and "A" in guess:
+            scale = guess["A"] / own
+            guess = {**guess, **{n: scale * guess[n] for n in GAINS[1:] if n in guess}}
+        values = as_values(question.law, guess)
         found.append(values)
-        if isinstance(posed.law, WinchLaw) and "heave.gain" not in guess:
-            found += posed.law.fed(values, posed.problem(posed.limits))
+        if isinstance(question.law, WinchLaw) and "heave.gain" not in guess:
+            found += question.law.fed(values, question.problem_with(question.loop))
     return found
 
 
-def _answer(posed: StructureQuestion, starts: int, seed: int, progress: Progress | None) -> Tuning:
+def _answer(question: DesignQuestion, starts: int, seed: int, progress: Progress | None) -> Tuning:
     """Return the answer of a structure within another."""
-    guesses = nested_starts(posed, starts, seed, progress)
-    problem = posed.problem(posed.limits)
+    guesses = nested_starts(question, starts, seed, progress)
+    problem = question.problem_with(question.loop)
     return tuning_of(problem, search(problem, starts + len(guesses), seed, guesses, progress))
 
 

@@ -9,13 +9,13 @@ import pytest
 
 from models import Case, load_case
 from models.basics import one_thread
-from synth.design import optimise_structure
-from synth.design.structure_starts import as_values, nested_starts, no_worse, starts_from
-from synth.question import pose_structure
+from synth.design import optimise_gains
+from synth.design.nested import as_values, nested_starts, no_worse, starts_from
+from synth.question import pose
 from synth.search import search
 
 OMEGA = np.geomspace(0.05, 30.0, 13)
-# About what `optimise_structure` finds on one spring at 50 ms.
+# About what `optimise_gains` finds on one spring at 50 ms.
 DRUM = {
     "payload.acceleration_gain": 15.3,
     "payload.velocity_gain": 44.4,
@@ -46,7 +46,7 @@ def late() -> Case:
     [("combined", "drum-feedback", DRUM), ("combined", "feed-forward", FORWARD)],
 )
 def test_the_simpler_structure_is_the_same_controller(late, outer, inner, known):
-    whole, part = pose_structure(late, outer).law, pose_structure(late, inner).law
+    whole, part = pose(late, outer).law, pose(late, inner).law
     wide = whole.controller(as_values(whole, known))
     narrow = part.controller([known[p.name] for p in part.parameters])
     found = wide.response_at(1j * OMEGA)[:, 0]
@@ -61,20 +61,20 @@ def test_the_simpler_structure_is_the_same_controller(late, outer, inner, known)
 
 def test_a_notch_that_does_nothing_is_a_roll_off(late):
     known = {"a": 5.0, "a1": 3.0, "a2": 8.0, "rolloff.corner": 60.0, "rolloff.damping": 0.8}
-    notch = pose_structure(late, "payload-feedback-notch").law
-    plain = pose_structure(late, "payload-feedback-rolloff").law
+    notch = pose(late, "payload-feedback-notch").law
+    plain = pose(late, "payload-feedback-rolloff").law
     found = notch.controller(as_values(notch, known)).response_at(1j * OMEGA)
     wanted = plain.controller([known[p.name] for p in plain.parameters]).response_at(1j * OMEGA)
     assert found == pytest.approx(wanted, rel=1e-9)
 
 
 def test_drum_feedback_within_combined_gets_the_feed_forward_that_suits_it(late):
-    posed = pose_structure(late, "combined")
+    posed = pose(late, "combined")
     plain, fed = starts_from(posed, [DRUM])
     gain = posed.law.index("heave.gain")  # type: ignore[attr-defined]
     assert plain[gain] == 0.0
     assert fed[gain] > 0.1
-    problem = posed.problem(posed.limits)
+    problem = posed.problem_with(posed.loop)
     with one_thread():
         costs = [search_cost(problem, values) for values in (plain, fed)]
     assert costs[1] < costs[0]
@@ -90,8 +90,8 @@ def search_cost(problem, values) -> float:
 
 @pytest.mark.ci
 def test_a_better_point_that_is_known_is_not_lost(late):
-    posed = pose_structure(late, "drum-feedback")
-    problem = posed.problem(posed.limits)
+    posed = pose(late, "drum-feedback")
+    problem = posed.problem_with(posed.loop)
     with one_thread():
         found = search(problem, 1, 0, [as_values(posed.law, DRUM)])
         assert found.solved is not None
@@ -105,7 +105,7 @@ def test_a_better_point_that_is_known_is_not_lost(late):
 
 
 def test_a_guess_makes_the_answer_no_worse(late):
-    design = optimise_structure(late, "drum-feedback", starts=1, guesses=[DRUM])
+    design = optimise_gains(late, "drum-feedback", starts=1, guesses=[DRUM])
     assert design.ok, design.status
     assert design.payload_rms < 1.35e-3  # found by 40 starts: 1.31 mm
 
@@ -113,11 +113,11 @@ def test_a_guess_makes_the_answer_no_worse(late):
 @pytest.mark.slow
 def test_combined_is_never_worse_than_its_parts(late):
     case = late.replace({"sensors.mru": {"noise_floor": 0.0, "noise_fraction": 0.02}})
-    whole = optimise_structure(case, "combined", starts=1)
+    whole = optimise_gains(case, "combined", starts=1)
     assert whole.ok, whole.status
-    assert len(nested_starts(pose_structure(case, "combined"), 1, 0)) == 3
+    assert len(nested_starts(pose(case, "combined"), 1, 0)) == 3
     for name in ("feed-forward", "drum-feedback"):
-        part = optimise_structure(case, name, starts=1)
+        part = optimise_gains(case, name, starts=1)
         assert whole.payload_rms <= part.payload_rms * (1.0 + 1e-4), name
 
 
@@ -125,7 +125,7 @@ def test_combined_is_never_worse_than_its_parts(late):
 def test_three_starts_find_the_good_basin_of_drum_feedback(late):
     # With candidates of small gains only they ended at 11.1 mm, behind those of twice the delay.
     rms = [
-        optimise_structure(
+        optimise_gains(
             late.replace({"sensors.telemetry.delay": delay}), "drum-feedback", starts=3
         ).payload_rms
         for delay in (0.05, 0.1)
