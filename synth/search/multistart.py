@@ -2,7 +2,7 @@
 
     Family -> starts -> descent from each -> distinct answers -> polished -> Found
 
-A single plant is a family of one.  The descents stop once three starts agree on the best answer.
+A single plant is a family of one.  The descents stop once eight starts, and most, agree on the best place.
 """
 
 from __future__ import annotations
@@ -18,13 +18,12 @@ from ..loop import Assessment
 from ..question import FamilyLoop, FamilyProblem, Goal, Problem, Values
 from .polishing import KEPT, assess, polish, settle, stated
 from .programme import Solution
-from .sqp import INFEASIBLE
 from .starts import begin_points, briskest, start_coefficients
 
 Progress = Callable[[str, int, int], None]
 
 AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
-_ENOUGH, _MOST = 4, 0.7  # starts, and share of all, that agree on the best answer: no more needed
+_ENOUGH, _MOST = 8, 0.7  # starts, and share of all, that agree on the best answer: no more needed
 _NEAR, _BESIDE = (
     3e-3,
     0.03,
@@ -216,13 +215,13 @@ def _descents(
             place = _Place(coarse)
             places.append(place)
         place.begins.append(begin)
-    ranked = sorted(places, key=lambda p: (not p.arrived, p.coarse.objective))
+    ranked = sorted(places, key=lambda p: (not p.arrived, p.coarse.objective))[: max(1, starts)]
     for k, place in enumerate(ranked):
-        hopeless = place.coarse.message == INFEASIBLE or not np.isfinite(place.coarse.objective)
-        if hopeless or (k >= starts and any(p.solved is not None for p in ranked[:k])):
-            continue
-        tell("descents", k, min(starts, len(ranked)))
-        values, found = place.coarse.values, place.coarse.coefficients
+        tell("descents", k, len(ranked))
+        # Discs may lead far off from a start that breaks its limits widely.
+        near = place.coarse.converged
+        values = place.coarse.values if near else place.begins[0]
+        found = place.coarse.coefficients if near else drags
         end = settle(family, values, found, reference=reference, exact=True)
         if end.converged and family.stable(end.values, end.coefficients):
             place.solved = end

@@ -37,6 +37,7 @@ _HALVINGS = 8
 _SOUND = 1e-4  # share of the reduction promised that a step must keep
 _STIFF = 1.5  # weight of the rows over the sum of their multipliers
 _HEAVY = 1e4  # of the penalty: if rows are broken still, nothing near mends them
+_HOPELESS = 0.999  # share of what rows are broken by that is left where nothing near mends them
 INFEASIBLE = "the limits exclude each other"
 _KEPT = 1e-8  # row that counts as kept
 _SKIPPED = 1e-6  # an update along less than this share of a step is left out
@@ -160,7 +161,7 @@ def descend(
             if weight < _HEAVY:
                 weight *= 10.0
                 continue
-            if np.all(np.abs(step) < 0.5 * reach):
+            if slack > _HOPELESS * at.broken and np.all(np.abs(step) < 0.5 * reach):
                 return _ended(x, at, prices, equation_prices, INFEASIBLE, k)
         prices, equation_prices = new_prices, new_equation_prices
         if slack <= _KEPT and weight < _STIFF * total:
