@@ -111,7 +111,7 @@ def rows_of(name: str, count: int, seed: int = 1) -> tuple[list[Row], int]:
         rows = []
         for k, begin in enumerate(begins):
             began = time.process_time()
-            solved = settle(problem, begin, drags, reference=reference)
+            solved = settle(problem, begin, drags, reference=reference, exact=True)
             stable = problem.stable(solved.values, solved.coefficient)
             accepted = bool(solved.converged and stable)
             rows.append(

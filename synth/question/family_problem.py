@@ -1,6 +1,6 @@
 """Several loops with one set of parameters: the problem of robust and of scheduled design.
 
-    plants x seas -> FamilyLoop, FamilyLoop, ... -> FamilyProblem -> FamilyProgramme -> search
+    plants x seas -> FamilyLoop, FamilyLoop, ... -> FamilyProblem -> search
 
 A scenario is a `Problem` of its own, with its occurrence and, for the regret, the best cost
 that gains of its own would reach.  The parameters that are searched for are the same for all;
