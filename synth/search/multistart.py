@@ -24,12 +24,10 @@ Progress = Callable[[str, int, int], None]
 
 AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
 _ENOUGH, _MOST = 8, 0.7  # starts, and share of all, that agree on the best answer: no more needed
-_NEAR, _BESIDE = (
-    3e-3,
-    0.03,
-)  # of log cost and parameters, relative: descents on their way to one end
+_NEAR, _BESIDE = 1e-2, 0.15  # of log cost and parameters, relative: descents on their way to one end
 _POLISHED = 6  # distinct answers that are polished at most
 _MORE, _MOST_MORE = 2, 12  # times the starts, and at most, that are tried roughly beside them
+_BEHIND = 0.2  # of the log cost, that a rough answer may lie behind the best one
 _RESERVE = 16  # further starts for a search of which none arrived
 _VIOLATION = 3  # starts of the least violation
 _BEST_STARTS = 6  # of the search for the best of one member alone
@@ -209,7 +207,9 @@ def _descents(
         if k >= guesses and _agreed(places):
             break
         tell("starts", min(k, count - 1), count)
-        coarse = settle(family, begin, drags, reference=reference, rounds=1)
+        # By discs and by true margins in turns: each of them finds basins that the other misses.
+        exact = k % 2 == 1
+        coarse = settle(family, begin, drags, reference=reference, rounds=1, exact=exact)
         place = next((p for p in places if _same(family, p.coarse, coarse)), None)
         if place is None:
             place = _Place(coarse)
@@ -217,6 +217,9 @@ def _descents(
         place.begins.append(begin)
     ranked = sorted(places, key=lambda p: (not p.arrived, p.coarse.objective))[: max(1, starts)]
     for k, place in enumerate(ranked):
+        best = min((p.solved.objective for p in ranked if p.solved is not None), default=np.inf)
+        if place.coarse.objective > best + _BEHIND:
+            break
         tell("descents", k, len(ranked))
         # Discs may lead far off from a start that breaks its limits widely.
         near = place.coarse.converged
