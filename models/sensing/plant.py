@@ -42,6 +42,8 @@ MEASURED = (
     "motor.speed",
     "rope.tension",
 )
+#: What the drive's own encoder shows.
+ENCODER = ("drum.haul", "motor.speed")
 #: What disturbs the sensors, besides the plant's own disturbances.
 NOISES = (
     "mru.error",
@@ -180,6 +182,17 @@ def with_sensors(plant: LinearPlant, sensors: Sensors | None) -> LinearPlant:
         rates={**plant.rates, "mru.error_rate": "mru.error"},
         units={**plant.units, **units},
     )
+
+
+def aboard(case: Case) -> tuple[str, ...]:
+    """Return what is measured aboard, of `MEASURED`: what the case names, and the encoder."""
+    sensors = case.sensors
+    missing = {
+        "mru.heave": sensors.mru is None,
+        "mru.heave_rate": sensors.mru is None,
+        "rope.tension": sensors.load_cell is None,
+    }
+    return tuple(name for name in MEASURED if not missing.get(name, False))
 
 
 def sensed_line_at(case: Case, s: npt.ArrayLike, *, drag: float) -> PlantResponse:

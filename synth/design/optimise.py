@@ -24,7 +24,9 @@ from ..limits import Limit
 from ..loop import Assessment
 from ..question import GAINS, PAYLOAD, DesignQuestion, Problem, pose, with_masses
 from ..search import Progress, begin_points, briskest, least_violation, resume, search
+from ..structures import LowOrderFeedback
 from .design import Design
+from .high_order import high_order_gains
 from .infeasible import Shortfall, shortfall
 from .nested import nested_starts, no_worse, starts_from
 from .tuning import LimitUse, Tuning, limit_uses, tuning_of
@@ -82,6 +84,9 @@ def optimise_gains(
     check_range("optimise_gains", "starts", starts, low=1)
     count = int(starts)
     question = pose(case, structure)
+    if isinstance(named := question.structure, LowOrderFeedback) and named.family == "high-order":
+        question, parameters = high_order_gains(case, named.order or None, progress)
+        return verified(_evaluated(question, parameters), progress)
     known = starts_from(question, guesses) or nested_starts(question, count, seed, progress)
     count += len(known)
     known = [*known, *_in_use(question)]
@@ -124,6 +129,11 @@ def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback
     question = pose(case, structure)
     complete = _complete(question, gains)
     growth = _growth(question, complete)
+    if growth > 0.0 and question.masses < _MOST_MASSES and question.data.masses is None:
+        # Few masses do not have their modes where the rope does: made on it, a loop may hold there.
+        finer = with_masses(question, _MOST_MASSES)
+        if (there := _growth(finer, complete)) <= 0.0:
+            question, growth = finer, there
     if growth <= 0.0:
         masses = _masses_for(question, question.assess(complete))
         if masses > question.masses:
@@ -132,13 +142,16 @@ def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback
     if growth > 0.0:
         status = f"unstable: grows by a factor e every {1.0 / growth:.3g} s"
         return _record(question, complete, None, {}, ok=False, status=status)
-    assessment = question.assess(complete)
+    return verified(_evaluated(question, complete), None)
+
+
+def _evaluated(question: DesignQuestion, parameters: Mapping[str, float]) -> Design:
+    """Return what parameters of a stable loop do."""
+    assessment = question.assess(parameters)
     uses = _uses(question, assessment, {})
     broken = [u.name for u in uses.values() if u.enforced and not u.kept]
     status = "stable; " + (f"breaks {', '.join(broken)}" if broken else "keeps every limit")
-    return verified(
-        _record(question, complete, assessment, uses, ok=not broken, status=status), None
-    )
+    return _record(question, parameters, assessment, uses, ok=not broken, status=status)
 
 
 def _searched(

@@ -13,13 +13,13 @@ import stillhook as sh
 from models.basics import InputError, SolverError, SynthesisError
 from models.case import Case
 from models.plant import MEASUREMENTS, line_response
-from models.sensing import MEASURED, sensed_plant
+from models.sensing import MEASURED, aboard, sensed_plant
 from stillhook.designs import bound_rows, structures_table
 from stillhook.designs.bound_text import bound_cell, bound_figure, bounds_note
 from stillhook.designs.structures import structures
 from stillhook.designs.summary import facts
 from stillhook.text import markdown
-from synth.bound import BestPossible, HighOrder, aboard, bound_for, exact_sensors, verify_bound
+from synth.bound import BestPossible, HighOrder, bound_for, exact_sensors, verify_bound
 from synth.loop import Assessment, LinearController, Margins, closed_loop_poles
 from synth.question import pose
 
