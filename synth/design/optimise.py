@@ -86,7 +86,7 @@ def optimise_gains(
     question = pose(case, structure)
     if isinstance(named := question.structure, LowOrderFeedback) and named.family == "high-order":
         question, parameters = high_order_gains(case, named.order or None, progress)
-        return verified(_evaluated(question, parameters), progress)
+        return verified(_evaluated(question, parameters), progress, question)
     known = starts_from(question, guesses) or nested_starts(question, count, seed, progress)
     count += len(known)
     known = [*known, *_in_use(question)]
@@ -98,12 +98,12 @@ def optimise_gains(
         if tuning.assessment is None or not question.drive:
             return design_of(question, tuning)
         return _best_possible(question, free, count, seed, progress)
-    design = verified(design_of(question, tuning), progress)
+    design = verified(design_of(question, tuning), progress, question)
     most = 1 if question.data.lumping == "thesis" else MAX_MASSES
     while tuning.ok and not design.ok and 2 * question.masses <= most:
         # It stands on its own rope only: once more on twice the masses.
         question, tuning = _on_more(question, 2 * question.masses, tuning, count, seed, progress)
-        design = verified(design_of(question, tuning), progress)
+        design = verified(design_of(question, tuning), progress, question)
     return design
 
 
@@ -142,7 +142,7 @@ def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback
     if growth > 0.0:
         status = f"unstable: grows by a factor e every {1.0 / growth:.3g} s"
         return _record(question, complete, None, {}, ok=False, status=status)
-    return verified(_evaluated(question, complete), None)
+    return verified(_evaluated(question, complete), None, question)
 
 
 def _evaluated(question: DesignQuestion, parameters: Mapping[str, float]) -> Design:
@@ -258,7 +258,7 @@ def _best_possible(
         # The sea asked for is feasible after all: the search missed it, so it starts from there.
         values = list(short.values.values())
         tuning = tuning_of(question.problem, search(question.problem, 4, seed, [values], progress))
-        return verified(design_of(question, tuning), progress)
+        return verified(design_of(question, tuning), progress, question)
     height = short.share * case.sea.significant_height
     calmer = pose(
         case.replace({"sea.significant_height": height}), question.structure.name, question.masses
@@ -366,8 +366,13 @@ def _record(
     )
 
 
-def verified(design: Design, progress: Progress | None) -> Design:
-    """Return the design with its independent check; one that fails it is not ok."""
+def verified(
+    design: Design, progress: Progress | None, question: DesignQuestion | None = None
+) -> Design:
+    """Return the design with its independent check; one that fails it is not ok.
+
+    `question` is the design's own, where it is at hand: it need not be posed again.
+    """
     if design.margins is None:
         return design
     if progress is not None:
@@ -375,7 +380,7 @@ def verified(design: Design, progress: Progress | None) -> Design:
     checked = design.verify()
     if progress is not None:
         progress("verify", 1, 1)
-    status = design.status + _in_small_motion(design.question, design.parameters)
+    status = design.status + _in_small_motion(question or design.question, design.parameters)
     if design.payload_rms > design.payload_rms_before:
         status += "; with the drum held the payload moves less"
     if not checked.ok:

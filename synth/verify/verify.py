@@ -255,7 +255,7 @@ class _Winch:
             drag = self.data.quadratic_drag * math.sqrt(8.0 / math.pi) * sigma
             note = "[N s/m], q sqrt(8/pi) sigma of the payload's velocity"
         return [
-            agreement("payload_rms", self.design.payload_rms, rms, _RMS, "[m] by quad_vec"),
+            agreement("payload_rms", self.design.payload_rms, rms, _RMS, "[m] by other quadrature"),
             agreement("drag", self.design.drag, drag, TIGHT, note),
         ]
 
