@@ -195,7 +195,9 @@ def aboard(case: Case) -> tuple[str, ...]:
     return tuple(name for name in MEASURED if not missing.get(name, False))
 
 
-def sensed_line_at(case: Case, s: npt.ArrayLike, *, drag: float) -> PlantResponse:
+def sensed_line_at(
+    case: Case, s: npt.ArrayLike, *, drag: float, data: PlantData | None = None
+) -> PlantResponse:
     """Return the exact response of a case's rope, drive and sensors, delays and all.
 
     Parameters
@@ -206,13 +208,15 @@ def sensed_line_at(case: Case, s: npt.ArrayLike, *, drag: float) -> PlantRespons
         Points [1/s], (k,), none of them a pole (s = 0 is one).
     drag
         Equivalent linear drag coefficient of the payload [N s/m].
+    data
+        The case's numbers, where they are at hand.
 
     Returns
     -------
     PlantResponse
         With the names of `sensed_plant`, on the distributed rope (`models.plant.line_response_at`).
     """
-    line, sensors = line_response_at(case, s, drag=drag), case.sensors
+    line, sensors = line_response_at(data or case, s, drag=drag), case.sensors
     points = line.s
     noises = tuple(name for name in NOISES if name != "mru.error_rate")
     heave = line.disturbances.index("hook.heave")

@@ -153,7 +153,7 @@ class _Winch:
         return plant.select(measurements=self.design.controller.measurements)
 
     def _line(self, s: ComplexArray) -> PlantResponse:
-        line = sensed_line_at(self.design.case, s, drag=self.design.drag)
+        line = sensed_line_at(self.design.case, s, drag=self.design.drag, data=self.data)
         return line.select(measurements=self.design.controller.measurements)
 
     @cached_property
