@@ -63,6 +63,10 @@ from .whitened import whitened
 _PADE = 4  # of the delays, in the designs that candidates are made of
 _SIDE = 12  # so many regulators times so many filters
 
+_NEAR = 1e-6  # poles closer than this, relatively, are pulled apart
+_NOTHING = 1e-14  # of the matrix's size, is a pole at zero
+_FAINT = 1e-6  # least share of a mode that a fixed row must hear
+
 
 @dataclass(frozen=True)
 class LowOrder(Structure):
@@ -342,11 +346,6 @@ class LowOrderFeedback(Structure):
             replace(p, scale=scale) for p, scale in zip(law.parameters, sizes, strict=True)
         )
         return [float(v) for v in law.values(controller)]
-
-
-_NEAR = 1e-6  # poles closer than this, relatively, are pulled apart
-_NOTHING = 1e-14  # of the matrix's size, is a pole at zero
-_FAINT = 1e-6  # least share of a mode that a fixed row must hear
 
 
 @dataclass(frozen=True, kw_only=True)
