@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from models.basics import InputError, check_range, one_thread
 from models.case import Case
@@ -35,6 +36,8 @@ _MODES = 5.0  # every rope mode below this many crossovers belongs in the design
 _MOST_MASSES = 40
 _HARDLY = 1e-2  # largest row of a limit that a search may still mend
 _ROUNDS = 3  # of a search that did not arrive
+_HAIR = 1e-4  # relative excess over a limit in the largest sea
+_CALMER = 3.0  # logarithm of what the largest sea may have to be calmer by, for the sensors' noise
 _ENDS = 4  # ends of a search that the next one begins from
 
 
@@ -259,22 +262,43 @@ def _best_possible(
         values = list(short.values.values())
         tuning = tuning_of(question.problem, search(question.problem, 4, seed, [values], progress))
         return verified(design_of(question, tuning), progress, question)
+    parameters = question.named(list(short.values.values()))
     height = short.share * case.sea.significant_height
-    calmer = pose(
-        case.replace({"sea.significant_height": height}), question.structure.name, question.masses
-    )
-    parameters = calmer.named(list(short.values.values()))
-    assessment = calmer.assess(parameters, short.coefficient)
-    uses = _uses(calmer, assessment, {})
-    status = _too_small(question, short, height)
+    calm = _kept_in(question, parameters, height)
+    status = _too_small(question, short, calm.significant_height)
     design = replace(
-        _record(calmer, parameters, assessment, uses, ok=False, status=status),
+        calm,
+        status=status,
         case=case,
         required=short.required,
         starts=free.starts,
         agreed=free.agreed,
     )
     return replace(verified(design, progress), ok=False)
+
+
+def _kept_in(question: DesignQuestion, parameters: Mapping[str, float], height: float) -> Design:
+    """Return given parameters in the sea near a height [m] in which they keep the drive's limits.
+
+    The shortfall makes everything smaller that shakes the loop; but the noise of sensors does not
+    shrink with the sea, so that the sea may have to be calmer still.
+    """
+
+    def at(log_height: float) -> Design:
+        sea = {"sea.significant_height": float(np.exp(log_height))}
+        calmer = pose(question.case.replace(sea), question.structure.name, question.masses)
+        assessment = calmer.assess(parameters)
+        uses = _uses(calmer, assessment, {})
+        return _record(calmer, parameters, assessment, uses, ok=False, status="")
+
+    def over(log_height: float) -> float:
+        limits = at(log_height).limits
+        return max(limits[limit.name].use for limit in question.drive) - 1.0
+
+    top = float(np.log(height))
+    if over(top) > _HAIR > over(top - _CALMER):
+        top = brentq(lambda x: over(x) - 0.5 * _HAIR, top - _CALMER, top, xtol=0.1 * _HAIR)
+    return at(top)
 
 
 def _too_small(question: DesignQuestion, found: Shortfall, height: float) -> str:
