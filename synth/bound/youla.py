@@ -46,7 +46,7 @@ from models.basics import (
 )
 from models.plant import LinearPlant
 
-from ..loop import LinearController
+from ..loop import LinearController, frequency_grid
 from .bound import Bound
 from .truth import densities, filter_plant, frequencies, lqg_poles
 
@@ -54,8 +54,8 @@ cp: Any = cvxpy  # its functions come through a star import that mypy does not f
 _SLOWEST = 0.4  # of the functions' poles, over the mean frequency of the sea
 _FASTEST = 2.5  # ... over the bandwidth of the LQG loop
 _WORKS = 0.5  # |T| of a loop that does something
-_DENSE, _EVERY = 1500, 10  # frequencies at which M_s is looked at; each tenth holds it at first
-_LOWEST, _TOP = 1e-4, 3e3  # ... [rad/s]
+_LOWEST, _TOP = 1e-4, 3e3  # frequencies at which M_s is looked at [rad/s]
+_EVERY = 10  # of them hold it at first
 _EXCHANGES = 8
 _SLOW = 60  # frequencies of a limit on a slow response
 _INSIDE = 0.998  # of a limit between them
@@ -372,11 +372,8 @@ def youla_design(
 
 def margin_grid(poles: ComplexArray) -> FloatArray:
     """Return frequencies [rad/s] that see every lightly damped pole [1/s]."""
-    light = poles[(poles.imag > 0.0) & (np.abs(poles.real) < 0.3 * poles.imag)]
-    steps = np.linspace(-4.0, 4.0, 17)
-    near = light.imag + np.maximum(np.abs(light.real), 1e-4 * light.imag) * steps[:, None]
-    grid = np.unique(np.concatenate([np.geomspace(_LOWEST, _TOP, _DENSE), near.ravel()]))
-    return np.asarray(grid[(grid >= _LOWEST) & (grid <= _TOP)])
+    grid = frequency_grid(poles)
+    return grid[grid <= _TOP]
 
 
 def _variances(bound: Bound, loop: AffineLoop) -> dict[str, tuple[FloatArray, FloatArray]]:
