@@ -142,7 +142,8 @@ CASE = case_argument()
 DESIGN: Declaration = design_argument
 NO_BOUND = switch(
     "--no-bound",
-    "do not compare with the best that any linear controller could do (2 s each, 15 s of one alone)",
+    "do not compare with the best that any linear controller could do (2 s each, 15 s of one "
+    "alone)",
 )
 STRUCTURE = text(
     "--structure", "NAME", "controller structure (default: payload-feedback)", "payload-feedback"
