@@ -26,7 +26,8 @@ from stored import docs_folder, study_parser, write_rows
 
 from models import load_case
 from models.basics import PhysicsWarning, one_thread
-from synth.bound import aboard, bound_for
+from models.sensing import aboard
+from synth.bound import bound_for
 from synth.design import optimise_gains
 from synth.question import FamilyProblem
 from synth.robust import Family, optimise_robust

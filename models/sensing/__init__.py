@@ -13,8 +13,10 @@ if TYPE_CHECKING:
     from .control import HEARD, Controller, Measurement, Recursion, holds_brake, recursion_of
     from .mru import BIAS, Bias, MruModel, MruState
     from .plant import (
+        ENCODER,
         MEASURED,
         SAMPLE_TIME,
+        aboard,
         sensed_line_at,
         sensed_plant,
         sensed_spectra,

@@ -42,6 +42,8 @@ MEASURED = (
     "motor.speed",
     "rope.tension",
 )
+#: What the drive's own encoder shows.
+ENCODER = ("drum.haul", "motor.speed")
 #: What disturbs the sensors, besides the plant's own disturbances.
 NOISES = (
     "mru.error",
@@ -182,7 +184,20 @@ def with_sensors(plant: LinearPlant, sensors: Sensors | None) -> LinearPlant:
     )
 
 
-def sensed_line_at(case: Case, s: npt.ArrayLike, *, drag: float) -> PlantResponse:
+def aboard(case: Case) -> tuple[str, ...]:
+    """Return what is measured aboard, of `MEASURED`: what the case names, and the encoder."""
+    sensors = case.sensors
+    missing = {
+        "mru.heave": sensors.mru is None,
+        "mru.heave_rate": sensors.mru is None,
+        "rope.tension": sensors.load_cell is None,
+    }
+    return tuple(name for name in MEASURED if not missing.get(name, False))
+
+
+def sensed_line_at(
+    case: Case, s: npt.ArrayLike, *, drag: float, data: PlantData | None = None
+) -> PlantResponse:
     """Return the exact response of a case's rope, drive and sensors, delays and all.
 
     Parameters
@@ -193,13 +208,15 @@ def sensed_line_at(case: Case, s: npt.ArrayLike, *, drag: float) -> PlantRespons
         Points [1/s], (k,), none of them a pole (s = 0 is one).
     drag
         Equivalent linear drag coefficient of the payload [N s/m].
+    data
+        The case's numbers, where they are at hand.
 
     Returns
     -------
     PlantResponse
         With the names of `sensed_plant`, on the distributed rope (`models.plant.line_response_at`).
     """
-    line, sensors = line_response_at(case, s, drag=drag), case.sensors
+    line, sensors = line_response_at(data or case, s, drag=drag), case.sensors
     points = line.s
     noises = tuple(name for name in NOISES if name != "mru.error_rate")
     heave = line.disturbances.index("hook.heave")

@@ -53,6 +53,17 @@ _LARGEST = 1e3  # [m], [m/s]: what is larger is no measurement
 _WORKED_OFF = 4  # samples of a gap that one new sample makes up for
 _DONE: Final = object()
 
+IndexArray = npt.NDArray[np.int64]
+
+_RECENT = (0.1, 0.2, 0.35, 0.5)  # spacings ago: what averages the noise of the newest sample
+_SMOOTHED = 0.6  # [s] before and after a target, over which a quartic is fitted
+_RATE_WEIGHT = 0.1  # [s] of the rate against the heave in that fit: its noise is the larger
+_RIDGE = 1e-7  # of the mean diagonal: as if the unit had noise of 0.03 % of the motion
+_DIRECT = 6  # heave and rate at the three knots that are regressed directly
+_LEAST_SAMPLES, _SAMPLES_PER_LAG = 24.0, 5.0  # a spacing apart, for a model and for its order
+_BELIEF = 20.0  # errors of real forecasts that the model's own variances count as
+_SOONER = 1.0 / 3.0  # of the memory: a new sea shows in the errors before it is learnt
+
 
 class AdaptiveAR:
     """Vector autoregression of heave and heave rate with forgetting.
@@ -236,18 +247,6 @@ class AdaptiveAR:
             return np.asarray(self._record[self._row] * math.exp(-self.sample_time / _FADING))
         knots = model @ self._record[self._row - self._lags].ravel()
         return np.asarray(self._next_sample @ knots)
-
-
-IndexArray = npt.NDArray[np.int64]
-
-_RECENT = (0.1, 0.2, 0.35, 0.5)  # spacings ago: what averages the noise of the newest sample
-_SMOOTHED = 0.6  # [s] before and after a target, over which a quartic is fitted
-_RATE_WEIGHT = 0.1  # [s] of the rate against the heave in that fit: its noise is the larger
-_RIDGE = 1e-7  # of the mean diagonal: as if the unit had noise of 0.03 % of the motion
-_DIRECT = 6  # heave and rate at the three knots that are regressed directly
-_LEAST_SAMPLES, _SAMPLES_PER_LAG = 24.0, 5.0  # a spacing apart, for a model and for its order
-_BELIEF = 20.0  # errors of real forecasts that the model's own variances count as
-_SOONER = 1.0 / 3.0  # of the memory: a new sea shows in the errors before it is learnt
 
 
 class KnotRegression:

@@ -62,6 +62,11 @@ _LEAST = 0.1  # of the static tension, that is to stay in the rope
 _UNIT, _TORQUE = HEARD.index("mru.valid"), HEARD.index("motor.torque")
 _HEAVE, _RATE = HEARD.index("mru.heave"), HEARD.index("mru.heave_rate")
 
+_EDGE = 1e-7  # of a move that is at its bound
+_MOST = 0.2  # of the peak: half of what the torque may fall by over a sample
+_MORE = 0.2  # of the fall, so that the drive stays at its peak though the plan is off
+_STATIC = 1.2  # of the static torque: never less, whatever the temperature
+
 
 class WinchOptions(TypedDict, total=False):
     """What linear and nonlinear predictive control are both asked; `LinearMPC` explains it."""
@@ -330,12 +335,6 @@ def _predictor(
     raise InputError(
         f"{_OWNER}: predictor must be one of kalman, ar, preview or a Predictor, got {given!r}"
     )
-
-
-_EDGE = 1e-7  # of a move that is at its bound
-_MOST = 0.2  # of the peak: half of what the torque may fall by over a sample
-_MORE = 0.2  # of the fall, so that the drive stays at its peak though the plan is off
-_STATIC = 1.2  # of the static torque: never less, whatever the temperature
 
 
 class DriveWindow:

@@ -44,6 +44,10 @@ _NEWTON = 50  # iterations for the forces of one sample
 _EXACT = 1e-12  # of those forces, over the static tension
 _NOTHING = np.zeros(0)
 
+_SMOOTH = 0.002  # eps of a tension, over that at rest
+_TURN = 2.0  # motor speed over which gear's losses and friction change sides [rad/s]
+_VELOCITY, _SPEED, _ANGLE = "payload.velocity", "motor.speed", "motor.angle"
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stage(ReadOnlyArrays):
@@ -267,11 +271,6 @@ def _sampled(winch: SampledWinch, law: ForceLaw, drift: Drift, M: int) -> dict[s
         "C_constants": C_constants,
         "own": own,
     }
-
-
-_SMOOTH = 0.002  # eps of a tension, over that at rest
-_TURN = 2.0  # motor speed over which gear's losses and friction change sides [rad/s]
-_VELOCITY, _SPEED, _ANGLE = "payload.velocity", "motor.speed", "motor.angle"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .condensed import Condensed, condense
+    from .condensed import Condensed, Horizon, condense, default_blocking, free_outputs
     from .holds import hermite_hold, hermite_within, noisy_hold, root_of
-    from .horizon import Horizon, default_blocking, free_outputs
     from .kalman import corrected, end_of_record, kalman_gain, prediction_covariance
     from .qp import QPSolution, SoftQP, kkt_residual
     from .regulator import LQRegulator, lq_regulator

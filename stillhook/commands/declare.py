@@ -141,7 +141,9 @@ def design_argument(parser: argparse._ActionsContainer) -> None:
 CASE = case_argument()
 DESIGN: Declaration = design_argument
 NO_BOUND = switch(
-    "--no-bound", "do not compare with the best that any linear controller could do (2 s a design)"
+    "--no-bound",
+    "do not compare with the best that any linear controller could do (2 s each, 15 s of one "
+    "alone)",
 )
 STRUCTURE = text(
     "--structure", "NAME", "controller structure (default: payload-feedback)", "payload-feedback"

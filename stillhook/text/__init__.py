@@ -50,6 +50,6 @@ if TYPE_CHECKING:
         pairs,
         remarks,
     )
-    from .terminal import Progress, commands, console, progress, show, terminal_text, told_once
+    from .terminal import Progress, commands, console, progress, show, told_once
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

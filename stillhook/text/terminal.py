@@ -8,7 +8,6 @@ takes care of that, and of `NO_COLOR`.  It is imported where it is used, as it s
 from __future__ import annotations
 
 import contextlib
-import io
 import re
 import sys
 import warnings
@@ -83,16 +82,6 @@ def show(item: Report | Table, out: Console) -> None:
     out.print(Padding(grid, indent, expand=False))
     for note in item.notes:
         out.print(Padding(Text(note), indent, expand=False))
-
-
-def terminal_text(item: Report | Table, width: int = 80) -> str:
-    """Return what `show` writes, without colour."""
-    from rich.console import Console
-
-    target = io.StringIO()
-    plain = {"markup": False, "highlight": False, "emoji": False, "no_color": True}
-    show(item, Console(file=target, width=width, **plain))  # type: ignore[arg-type]
-    return target.getvalue()
 
 
 def _show_report(report: Report, out: Console) -> None:

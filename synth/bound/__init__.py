@@ -12,7 +12,7 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .bound import Bound
-    from .case import BestPossible, aboard, bound_for, exact_sensors
+    from .case import BestPossible, bound_for, exact_sensors, high_order_for
     from .check import verify_bound, weighted_rms
     from .high_order import HighOrder
 else:

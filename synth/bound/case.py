@@ -38,10 +38,10 @@ from models.basics import (
 )
 from models.case import Case
 from models.hook import HookMotion
-from models.plant import MAX_MASSES, MEASUREMENTS, LinearPlant, PlantData, line_response
-from models.sensing import MEASURED, sensed_plant, sensed_spectra
+from models.plant import MAX_MASSES, LinearPlant, PlantData
+from models.sensing import ENCODER, MEASURED, aboard, sensed_line_at, sensed_plant, sensed_spectra
 
-from ..limits import Continuous, Limit, Minimum, Peak, Rms
+from ..limits import Continuous, Limit, LowFrequency, Minimum, Peak, Rms, RollOff
 from ..loop import (
     Assessment,
     Disturbance,
@@ -58,7 +58,7 @@ from .bound import Bound, lqg_bound
 from .dual import with_input_outputs
 from .high_order import SPARE, HighOrder, high_order
 from .truth import banded
-from .youla import AffineLoop, Truth, margin_grid, youla_design
+from .youla import AffineLoop, SlowMotion, Truth, gain_disk, margin_grid, youla_design
 
 _FAINT = 1e-3  # noise of an exact sensor, see `bound_for`
 _LONGER = 2.0  # T_z of any signal over that of the hook, at most
@@ -69,9 +69,9 @@ _SIGNALS = ("acceleration", "velocity", "displacement")
 _SAMPLE = 0.01  # of the faint noise [s]
 _SHAKEN = "payload.force"
 _FORCE = 0.1  # of the faint noise, on the payload
-_ENCODER = ("drum.haul", "motor.speed")
 _MRU = ("mru.heave", "mru.heave_rate")
 _FINE = 24  # rope masses on which the best found is made, if the bound has no more
+_TIGHTER = 0.98  # of a disk of S, for what the truncation moves
 _NUMBERS, _FEWEST, _MOST = 120, 12, 24  # free numbers of Q, and its functions a measurement
 
 
@@ -168,7 +168,7 @@ class BestPossible:
         if self.rms is not None and self.controller is not None and self.margins is not None:
             own = HighOrder(rms=self.rms, controller=self.controller, margins=self.margins)
         try:
-            made = self._made()
+            made = _high_order(self.terms, self.max_sensitivity, begin=self.free.multipliers)
         except (SynthesisError, SolverError) as error:
             return own or str(error)
         return own if own is not None and own.rms <= made.rms else made
@@ -178,22 +178,6 @@ class BestPossible:
         """Whether the best found is the design itself."""
         found = self.found
         return isinstance(found, HighOrder) and found.controller is self.controller
-
-    def _made(self) -> HighOrder:
-        terms, most = self.terms, self.max_sensitivity
-        modal = self.case.rope.lumping != "thesis"
-        fine = max(_FINE, terms.masses) if modal else terms.masses
-        bound = terms.bound(fine, refits=0, begin=self.free.multipliers)
-        plant = terms.plant(MAX_MASSES) if modal else bound.plant
-        truth = Truth(plant=plant, line=terms.line if modal else None)
-        heard = len(bound.plant.measurements)
-        design = youla_design(
-            bound,
-            max_sensitivity=1.0 + SPARE * (most - 1.0),
-            functions=int(np.clip(_NUMBERS // heard, _FEWEST, _MOST)),
-            truth=truth,
-        )
-        return high_order(design, most, truth)
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -283,14 +267,8 @@ class _Terms:
 
     def line(self, omega: FloatArray) -> ComplexArray:
         """Return what is heard of the command on the distributed rope, (k, ny)."""
-        found = line_response(self.case, omega, drag=self.drag)
-        heard = dict(zip(found.measurements, found.yu[:, :, 0].T, strict=True))
-        for name in (*_ENCODER, "rope.tension"):
-            heard[name] = found.zu[:, found.outputs.index(name), 0]
-        if (cell := self.case.sensors.load_cell) is not None:
-            heard["rope.tension"] = heard["rope.tension"] / (1.0 + 1j * omega / cell.bandwidth)
-        still = np.zeros_like(found.zu[:, 0, 0])
-        return np.stack([heard.get(name, still) for name in self.heard], axis=1)
+        found = sensed_line_at(self.case, 1j * omega, drag=self.drag)
+        return found.select(measurements=self.heard).yu[:, :, 0]
 
     def shaken(self, masses: int) -> tuple[LinearPlant, dict[str, Any], tuple[str, ...]]:
         """Return the plant with its faint noise, the spectra, and what is faint."""
@@ -360,7 +338,7 @@ def bound_for(
     controller = design.controller if design is not None else None
     heard = measurements
     if heard is None:
-        heard = aboard(case) if controller is None else (*controller.measurements, *_ENCODER)
+        heard = aboard(case) if controller is None else (*controller.measurements, *ENCODER)
     terms = _terms(question, heard, question.drag_before if design is None else design.drag, faint)
     rms = None
     if controller is not None:
@@ -387,15 +365,88 @@ def bound_for(
     )
 
 
-def aboard(case: Case) -> tuple[str, ...]:
-    """Return what is measured aboard: what the case names, and the drive's own encoder."""
-    named = {
-        **dict.fromkeys(MEASUREMENTS, True),
-        **dict.fromkeys(_MRU, case.sensors.mru is not None),
-        **dict.fromkeys(_ENCODER, True),
-        "rope.tension": case.sensors.load_cell is not None,
-    }
-    return tuple(name for name in MEASURED if named[name])
+@one_thread()
+def high_order_for(
+    case: Case,
+    *,
+    measurements: Sequence[str],
+    drag: float | None = None,
+    rooms: Mapping[str, float] | None = None,
+    states: int | None = None,
+) -> HighOrder:
+    """Return a controller of high order within the limits of a case.
+
+    M_s and gain margins hold as a disk of S that is no larger than they ask for; limits on slow
+    motion and on roll-off as they are; those on peaks as limits on an rms.  Those on power and on
+    the delay margin are left out.
+
+    Parameters
+    ----------
+    case
+        The case.
+    measurements
+        What it hears.
+    drag
+        Linear drag coefficient [N s/m]; by default that with the drum held.
+    rooms
+        Limits on the rms of signals, where they are to be tighter than the case's, by name.
+    states
+        At most; by default as many as it takes.
+
+    Raises
+    ------
+    SynthesisError
+        If none is found.
+    """
+    question = pose(case)
+    terms = _terms(question, measurements, question.drag_before if drag is None else drag, _FAINT)
+    given = rooms or {}
+    room = {n: min(limit, given.get(n, math.inf)) for n, limit in terms.limits.items()}
+    limits, slow, roll_off = case.limits, None, None
+    for limit in question.limits:
+        if isinstance(limit, LowFrequency):
+            slow = SlowMotion(
+                output=limit.output,
+                disturbance=limit.disturbance,
+                bound=limit.bound,
+                below=limit.below,
+            )
+        if isinstance(limit, RollOff):
+            roll_off = limit.bound, limit.above
+    disk = gain_disk(limits.max_sensitivity, limits.gain_margin_up, limits.gain_margin_down)
+    return _high_order(
+        replace(terms, limits=room),
+        limits.max_sensitivity,
+        states=states,
+        disk=(disk[0], _TIGHTER * disk[1]),
+        slow=slow,
+        roll_off=roll_off,
+    )
+
+
+def _high_order(
+    terms: _Terms,
+    most: float,
+    *,
+    begin: Mapping[str, float] | None = None,
+    states: int | None = None,
+    **limits: Any,
+) -> HighOrder:
+    """Return the best found within an M_s, on a rope that is fine enough to hold on the line."""
+    modal = terms.case.rope.lumping != "thesis"
+    fine = max(_FINE, terms.masses) if modal else terms.masses
+    bound = terms.bound(fine, refits=0, begin=begin)
+    plant = terms.plant(MAX_MASSES) if modal else bound.plant
+    truth = Truth(plant=plant, line=terms.line if modal else None)
+    heard = len(bound.plant.measurements)
+    design = youla_design(
+        bound,
+        max_sensitivity=1.0 + SPARE * (most - 1.0),
+        functions=int(np.clip(_NUMBERS // heard, _FEWEST, _MOST)),
+        truth=truth,
+        **limits,
+    )
+    return high_order(design, most, truth, states=states)
 
 
 def exact_sensors(case: Case, measurements: Sequence[str] | None = None) -> tuple[str, ...]:

@@ -1,7 +1,8 @@
 """Recomputation of a bound, `verify_bound`, and other controllers on its terms, `weighted_rms`.
 
 The value came from Riccati equations and Gauss quadrature; here the controller's loop goes
-through a Lyapunov equation, its true spectra through `quad_vec`, and a rival has to stay above.
+through a Lyapunov equation, its true spectra through another quadrature, and a rival has to stay
+above.
 """
 
 from __future__ import annotations

@@ -121,7 +121,11 @@ def truncated(
 
 @one_thread()
 def high_order(
-    design: YoulaDesign, max_sensitivity: float, truth: Truth | None = None
+    design: YoulaDesign,
+    max_sensitivity: float,
+    truth: Truth | None = None,
+    *,
+    states: int | None = None,
 ) -> HighOrder:
     """Return a design's controller on the fewest states that lose little.
 
@@ -136,6 +140,8 @@ def high_order(
         M_s that it may have.
     truth
         As of `youla_design`.
+    states
+        At most; by default as many as it takes.
 
     Raises
     ------
@@ -150,8 +156,8 @@ def high_order(
     yu = true.yu(grid)
     names = list(dict.fromkeys([*bound.minimise, *bound.limits]))
     found = roots(design)
-    least = len(design.controller.A)
-    for order in range(_LEAST, least + 1):
+    most = len(design.controller.A) if states is None else states
+    for order in range(min(_LEAST, most), most + 1):
         controller = truncated(design, order, found)
         if len(controller.A) < order:
             break
@@ -172,7 +178,7 @@ def high_order(
         margins = loop_margins(loop_gain, grid, gain)
         if margins.max_sensitivity <= _EXCESS * max_sensitivity:
             return HighOrder(rms=rms, controller=controller, margins=margins)
-    raise SynthesisError(f"Youla: no truncation of {least} states keeps M_s {max_sensitivity:.3g}")
+    raise SynthesisError(f"Youla: no truncation to {most} states keeps M_s {max_sensitivity:.3g}")
 
 
 def _response(controller: LinearController, omega: FloatArray) -> ComplexArray:

@@ -46,7 +46,7 @@ from models.basics import (
 )
 from models.plant import LinearPlant
 
-from ..loop import LinearController
+from ..loop import LinearController, frequency_grid
 from .bound import Bound
 from .truth import densities, filter_plant, frequencies, lqg_poles
 
@@ -54,9 +54,10 @@ cp: Any = cvxpy  # its functions come through a star import that mypy does not f
 _SLOWEST = 0.4  # of the functions' poles, over the mean frequency of the sea
 _FASTEST = 2.5  # ... over the bandwidth of the LQG loop
 _WORKS = 0.5  # |T| of a loop that does something
-_DENSE, _EVERY = 1500, 10  # frequencies at which M_s is looked at; each tenth holds it at first
-_LOWEST, _TOP = 1e-4, 3e3  # ... [rad/s]
+_LOWEST, _TOP = 1e-4, 3e3  # frequencies at which M_s is looked at [rad/s]
+_EVERY = 10  # of them hold it at first
 _EXCHANGES = 8
+_SLOW = 60  # frequencies of a limit on a slow response
 _INSIDE = 0.998  # of a limit between them
 
 
@@ -241,12 +242,35 @@ class Truth:
         return self.plant.response(omega).yu[:, :, 0] if self.line is None else self.line(omega)
 
 
+@dataclass(frozen=True, kw_only=True)
+class SlowMotion:
+    """A limit on |output / disturbance|, at most `bound` up to the frequency `below` [rad/s]."""
+
+    output: str
+    disturbance: str
+    bound: float
+    below: float
+
+
+def gain_disk(max_sensitivity: float, up: float | None, down: float | None) -> tuple[float, float]:
+    """Return centre and radius of a disk of S in which M_s and the gain margins hold.
+
+    With S in the disk the curve of L keeps off the real axis from -1/down to -1/up, as
+    S = 1/(1 + L) is -down/(1 - down) at the one end and up/(up - 1) at the other.
+    """
+    high = min(max_sensitivity, up / (up - 1.0) if up is not None else max_sensitivity)
+    low = -min(max_sensitivity, down / (1.0 - down) if down else max_sensitivity)
+    return 0.5 * (high + low), 0.5 * (high - low)
+
+
 @one_thread()
 def youla_design(
     bound: Bound,
     *,
     max_sensitivity: float = math.inf,
     roll_off: tuple[float, float] | None = None,
+    disk: tuple[float, float] | None = None,
+    slow: SlowMotion | None = None,
     functions: int = 16,
     truth: Truth | None = None,
 ) -> YoulaDesign:
@@ -260,6 +284,11 @@ def youla_design(
         Limit on M_s of the loop, broken at the input.
     roll_off
         (bound, above): |L| at most `bound` from the frequency `above` on [rad/s].
+    disk
+        (centre, radius): S within this disk at every frequency, as gain margins ask for
+        (`gain_disk`).
+    slow
+        A limit on a slow response.
     functions
         Functions of each measurement.
     truth
@@ -302,13 +331,19 @@ def youla_design(
         base, moved = _affine(blocks, blocks.yu, scale)
         # |L| <= b wherever |T| <= b/(1 + b), and T = 1 - S is affine.
         limits.append(_size(base, moved, q) <= _INSIDE * level / (1.0 + level))
+    if slow is not None:
+        limits.append(_slow(bound, loop, slow, scale, q))
     dense = margin_grid(np.concatenate([loop.marks, true.plant.poles()]))
     blocks = loop.at(dense)
     base, moved = _affine(blocks, blocks.yu, scale)
     off, shifted = _affine(blocks, true.yu(dense) - blocks.yu, scale)
-    base, moved = (1.0 + base) / max_sensitivity, moved / max_sensitivity
+    # |S~ - c D| <= r |D| with D = 1 - X (P - P~), if |S~ - c|/r + (1 + |c|/r) |X (P - P~)| <= 1.
+    centre, radius = (0.0, max_sensitivity) if disk is None else disk
+    more = 1.0 + abs(centre) / radius
+    base, moved = (1.0 + base - centre) / radius, moved / radius
+    off, shifted = more * off, more * shifted
     chosen = np.zeros(dense.size, dtype=np.bool_)
-    chosen[::_EVERY] = math.isfinite(max_sensitivity)
+    chosen[::_EVERY] = math.isfinite(radius)
     # On all of the dense grid these would be thousands of cones: the peaks of those that are
     # broken join in turn.
     for _ in range(_EXCHANGES):
@@ -337,11 +372,8 @@ def youla_design(
 
 def margin_grid(poles: ComplexArray) -> FloatArray:
     """Return frequencies [rad/s] that see every lightly damped pole [1/s]."""
-    light = poles[(poles.imag > 0.0) & (np.abs(poles.real) < 0.3 * poles.imag)]
-    steps = np.linspace(-4.0, 4.0, 17)
-    near = light.imag + np.maximum(np.abs(light.real), 1e-4 * light.imag) * steps[:, None]
-    grid = np.unique(np.concatenate([np.geomspace(_LOWEST, _TOP, _DENSE), near.ravel()]))
-    return np.asarray(grid[(grid >= _LOWEST) & (grid <= _TOP)])
+    grid = frequency_grid(poles)
+    return grid[grid <= _TOP]
 
 
 def _variances(bound: Bound, loop: AffineLoop) -> dict[str, tuple[FloatArray, FloatArray]]:
@@ -363,6 +395,19 @@ def _variances(bound: Bound, loop: AffineLoop) -> dict[str, tuple[FloatArray, Fl
         triangle = upper_triangle(whole)
         found[name] = triangle[:, :-1], triangle[:, -1]
     return found
+
+
+def _slow(bound: Bound, loop: AffineLoop, limit: SlowMotion, scale: FloatArray, q: Any) -> Any:
+    """Return the limit on a slow response as cones."""
+    omega = np.geomspace(_LOWEST, limit.below, _SLOW)
+    plant = bound.plant.response(omega).select(
+        outputs=[limit.output], disturbances=[limit.disturbance]
+    )
+    blocks = loop.at(omega)
+    base, moved = _affine(blocks, plant.yw[:, :, 0], scale)
+    pushed = plant.zu[:, 0, 0]
+    base, moved = plant.zw[:, 0, 0] + pushed * base, pushed[:, None] * moved
+    return _size(base, moved, q) <= _INSIDE * limit.bound
 
 
 def upper_triangle(rows: ComplexArray | FloatArray) -> FloatArray:

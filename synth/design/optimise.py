@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from models.basics import InputError, check_range, one_thread
 from models.case import Case
@@ -23,7 +24,9 @@ from models.plant import MAX_MASSES, masses_for_bandwidth
 from ..loop import Assessment
 from ..question import GAINS, PAYLOAD, DesignQuestion, Problem, pose, with_masses
 from ..search import Progress, search
+from ..structures import LowOrderFeedback
 from .design import Design
+from .high_order import high_order_gains
 from .infeasible import Shortfall, shortfall
 from .nested import nested_starts, no_worse, starts_from
 from .tuning import LimitUse, Tuning, limit_uses, tuning_of
@@ -31,6 +34,8 @@ from .tuning import LimitUse, Tuning, limit_uses, tuning_of
 _MODES = 5.0  # every rope mode below this many crossovers belongs in the design plant
 _MOST_MASSES = 40
 _RESUMED = 5  # ends of a search that the next one, on more masses, begins from
+_HAIR = 1e-4  # relative excess over a limit in the largest sea
+_CALMER = 3.0  # logarithm of what the largest sea may have to be calmer by, for the sensors' noise
 
 
 @one_thread()
@@ -77,6 +82,9 @@ def optimise_gains(
     check_range("optimise_gains", "starts", starts, low=1)
     count = int(starts)
     question = pose(case, structure)
+    if isinstance(named := question.structure, LowOrderFeedback) and named.family == "high-order":
+        question, parameters = high_order_gains(case, named.order or None, progress)
+        return verified(_evaluated(question, parameters), progress, question)
     known = starts_from(question, guesses) or nested_starts(question, count, seed, progress)
     count += len(known)
     known = [*known, *_in_use(question)]
@@ -88,12 +96,12 @@ def optimise_gains(
         if tuning.assessment is None or not question.drive:
             return design_of(question, tuning)
         return _best_possible(question, count, seed, known, progress)
-    design = verified(design_of(question, tuning), progress)
+    design = verified(design_of(question, tuning), progress, question)
     most = 1 if question.data.lumping == "thesis" else MAX_MASSES
     while tuning.ok and not design.ok and 2 * question.masses <= most:
         # It stands on its own rope only: once more on twice the masses.
         question, tuning = _on_more(question, 2 * question.masses, tuning, count, seed, progress)
-        design = verified(design_of(question, tuning), progress)
+        design = verified(design_of(question, tuning), progress, question)
     return design
 
 
@@ -119,6 +127,11 @@ def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback
     question = pose(case, structure)
     complete = _complete(question, gains)
     growth = _growth(question, complete)
+    if growth > 0.0 and question.masses < _MOST_MASSES and question.data.masses is None:
+        # Few masses do not have their modes where the rope does: made on it, a loop may hold there.
+        finer = with_masses(question, _MOST_MASSES)
+        if (there := _growth(finer, complete)) <= 0.0:
+            question, growth = finer, there
     if growth <= 0.0:
         masses = _masses_for(question, question.assess(complete))
         if masses > question.masses:
@@ -127,13 +140,16 @@ def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback
     if growth > 0.0:
         status = f"unstable: grows by a factor e every {1.0 / growth:.3g} s"
         return _record(question, complete, None, {}, ok=False, status=status)
-    assessment = question.assess(complete)
+    return verified(_evaluated(question, complete), None, question)
+
+
+def _evaluated(question: DesignQuestion, parameters: Mapping[str, float]) -> Design:
+    """Return what parameters of a stable loop do."""
+    assessment = question.assess(parameters)
     uses = _uses(question, assessment, {})
     broken = [u.name for u in uses.values() if u.enforced and not u.kept]
     status = "stable; " + (f"breaks {', '.join(broken)}" if broken else "keeps every limit")
-    return verified(
-        _record(question, complete, assessment, uses, ok=not broken, status=status), None
-    )
+    return _record(question, parameters, assessment, uses, ok=not broken, status=status)
 
 
 def _searched(
@@ -188,23 +204,44 @@ def _best_possible(
         # The sea asked for is feasible after all: the search missed it, so it starts from there.
         values = list(short.values.values())
         tuning = tuning_of(question.problem, search(question.problem, 4, seed, [values], progress))
-        return verified(design_of(question, tuning), progress)
+        return verified(design_of(question, tuning), progress, question)
+    parameters = question.named(list(short.values.values()))
     height = short.share * case.sea.significant_height
-    calmer = pose(
-        case.replace({"sea.significant_height": height}), question.structure.name, question.masses
-    )
-    parameters = calmer.named(list(short.values.values()))
-    assessment = calmer.assess(parameters, short.coefficient)
-    uses = _uses(calmer, assessment, {})
-    status = _too_small(question, short, height)
+    calm = _kept_in(question, parameters, height)
+    status = _too_small(question, short, calm.significant_height)
     design = replace(
-        _record(calmer, parameters, assessment, uses, ok=False, status=status),
+        calm,
+        status=status,
         case=case,
         required=short.required,
         starts=free.starts,
         agreed=free.agreed,
     )
     return replace(verified(design, progress), ok=False)
+
+
+def _kept_in(question: DesignQuestion, parameters: Mapping[str, float], height: float) -> Design:
+    """Return given parameters in the sea near a height [m] in which they keep the drive's limits.
+
+    The shortfall makes everything smaller that shakes the loop; but the noise of sensors does not
+    shrink with the sea, so that the sea may have to be calmer still.
+    """
+
+    def at(log_height: float) -> Design:
+        sea = {"sea.significant_height": float(np.exp(log_height))}
+        calmer = pose(question.case.replace(sea), question.structure.name, question.masses)
+        assessment = calmer.assess(parameters)
+        uses = _uses(calmer, assessment, {})
+        return _record(calmer, parameters, assessment, uses, ok=False, status="")
+
+    def over(log_height: float) -> float:
+        limits = at(log_height).limits
+        return max(limits[limit.name].use for limit in question.drive) - 1.0
+
+    top = float(np.log(height))
+    if over(top) > _HAIR > over(top - _CALMER):
+        top = brentq(lambda x: over(x) - 0.5 * _HAIR, top - _CALMER, top, xtol=0.1 * _HAIR)
+    return at(top)
 
 
 def _too_small(question: DesignQuestion, found: Shortfall, height: float) -> str:
@@ -296,8 +333,13 @@ def _record(
     )
 
 
-def verified(design: Design, progress: Progress | None) -> Design:
-    """Return the design with its independent check; one that fails it is not ok."""
+def verified(
+    design: Design, progress: Progress | None, question: DesignQuestion | None = None
+) -> Design:
+    """Return the design with its independent check; one that fails it is not ok.
+
+    `question` is the design's own, where it is at hand: it need not be posed again.
+    """
     if design.margins is None:
         return design
     if progress is not None:
@@ -305,7 +347,7 @@ def verified(design: Design, progress: Progress | None) -> Design:
     checked = design.verify()
     if progress is not None:
         progress("verify", 1, 1)
-    status = design.status + _in_small_motion(design.question, design.parameters)
+    status = design.status + _in_small_motion(question or design.question, design.parameters)
     if design.payload_rms > design.payload_rms_before:
         status += "; with the drum held the payload moves less"
     if not checked.ok:

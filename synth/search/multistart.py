@@ -24,7 +24,7 @@ Progress = Callable[[str, int, int], None]
 
 AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
 _ENOUGH, _MOST = 8, 0.7  # starts, and share of all, that agree on the best answer: no more needed
-_NEAR, _BESIDE = 1e-2, 0.15  # of log cost and parameters, relative: descents on their way to one end
+_NEAR, _BESIDE = 1e-2, 0.15  # of log cost and parameters, relative: on the way to one end
 _POLISHED = 6  # distinct answers that are polished at most
 _MORE, _MOST_MORE = 2, 12  # times the starts, and at most, that are tried roughly beside them
 _BEHIND = 0.2  # of the log cost, that a rough answer may lie behind the best one

@@ -11,7 +11,7 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .drum_speed import DrumSpeedLoop, SteadyMotion
-    from .low_order import LowOrder, LowOrderFeedback
+    from .low_order import LowOrder, LowOrderFeedback, LowOrderLaw
     from .lqg import LqgEstimator, LqgRegulator, reduced, weighing
     from .recursive import RecursiveController, Signals, checked_sample_time, make_recursion
     from .sampled_controller import Matrices, low_pass_matrices, sampled, tracking_gain

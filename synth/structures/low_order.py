@@ -63,6 +63,10 @@ from .whitened import whitened
 _PADE = 4  # of the delays, in the designs that candidates are made of
 _SIDE = 12  # so many regulators times so many filters
 
+_NEAR = 1e-6  # poles closer than this, relatively, are pulled apart
+_NOTHING = 1e-14  # of the matrix's size, is a pole at zero
+_FAINT = 1e-6  # least share of a mode that a fixed row must hear
+
 
 @dataclass(frozen=True)
 class LowOrder(Structure):
@@ -283,29 +287,34 @@ class LowOrderLaw(ParametrisedController):
 
 @dataclass(frozen=True, kw_only=True)
 class LowOrderFeedback(Structure):
-    """`LowOrder` on the payload's motion.
+    """`LowOrder` on the payload's motion, or on all that is aboard.
 
     Attributes
     ----------
     order
-        Number of states.
+        Number of states; 0 as long as it is not known how many it takes.
+    family
+        What it is called, but for the order.
+    measurements
+        Names of what it hears.
     """
 
     order: int
+    family: str = "low-order"
+    measurements: tuple[str, ...] = PAYLOAD_MEASUREMENTS
     hears_payload: bool = True
 
     @property
     def name(self) -> str:
         """What it is called."""
-        return f"low-order-{self.order}"
-
-    @property
-    def measurements(self) -> tuple[str, ...]:
-        """Names of what it hears."""
-        return PAYLOAD_MEASUREMENTS
+        return f"{self.family}-{self.order}" if self.order else self.family
 
     def bind(self, plant: LinearPlant) -> ParametrisedController:
         """Return the law; see `Structure.bind`."""
+        if not self.order:
+            raise InputError(
+                f"{self.family}: its order must be told with its parameters, as in {self.family}-28"
+            )
         return LowOrder(self.order).bind(plant)
 
     @staticmethod
@@ -337,10 +346,6 @@ class LowOrderFeedback(Structure):
             replace(p, scale=scale) for p, scale in zip(law.parameters, sizes, strict=True)
         )
         return [float(v) for v in law.values(controller)]
-
-
-_NEAR = 1e-6  # poles closer than this, relatively, are pulled apart
-_FAINT = 1e-6  # least share of a mode that a fixed row must hear
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -466,8 +471,10 @@ def _modes(
         # A repeated pole has no modes of its own: pull it apart by an uneven nudge.
         uneven = np.diag(np.linspace(-1.0, 1.0, len(A)) if len(A) > 1 else [1.0])
         poles, vectors = np.linalg.eig(A + nudge * size * uneven)
-        gaps = np.abs(poles[:, None] - poles) + size * np.eye(len(A))
-        if gaps.min() > _NEAR * size and np.linalg.cond(vectors) < 1e10:
+        # Relative to themselves: slow modes beside a fast one are no repeated ones.
+        sizes = np.maximum(np.abs(poles[:, None]), np.abs(poles)) + _NOTHING * size
+        gaps = np.abs(poles[:, None] - poles) / sizes + np.eye(len(A))
+        if gaps.min() > _NEAR and np.linalg.cond(vectors) < 1e10:
             break
     poles = poles.astype(np.complex128)
     order = np.lexsort((-poles.imag, np.abs(poles.imag), poles.real))

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from models.basics import pick
 from models.case import Case
 from models.plant import PlantData, fixed_top_modes
+from models.sensing import aboard
 
 from .blocks import FilterSection, Integral, LeadLag, Notch, RollOffFilter
 from .drum_speed import SteadyMotion
@@ -33,6 +34,7 @@ DESCRIPTIONS: Mapping[str, str] = {
     "low-order-4": "a free controller of the payload's motion, of order 4 (or any)",
 }
 _LOW_ORDER = re.compile(r"low-order-([1-9]\d?)$")
+_HIGH_ORDER = re.compile(r"high-order(?:-([1-9]\d?))?$")
 
 
 def structure_names() -> tuple[str, ...]:
@@ -46,7 +48,8 @@ def structure_named(name: str, case: Case) -> PayloadFeedback | WinchStructure |
     Parameters
     ----------
     name
-        One of `structure_names`; ``low-order-n`` has any order n from 1 to 99.
+        One of `structure_names`; ``low-order-n`` has any order n from 1 to 99, and
+        ``high-order`` hears all that is aboard, with as many states as it takes.
     case
         The case: its motor, drum, rope and gains.
 
@@ -57,6 +60,10 @@ def structure_named(name: str, case: Case) -> PayloadFeedback | WinchStructure |
     """
     if (order := _LOW_ORDER.match(name)) is not None:
         return LowOrderFeedback(order=int(order[1]))
+    if (order := _HIGH_ORDER.match(name)) is not None:
+        return LowOrderFeedback(
+            order=int(order[1] or 0), family="high-order", measurements=aboard(case)
+        )
     pick("structures", "structure", structure_names(), (name,))
     data = PlantData.from_case(case)
     amplifier = case.gains.A if case.gains is not None else 1.0

@@ -149,9 +149,7 @@ class ChainLoops:
             return closed, free
         chain = Chain(self, rows, s)
         y, f = chain.ends(at_rows(self.drag, rows))
-        free = chain.W * y + chain.pull * f
-        heard = (chain.D * y + chain.E * f + chain.G) * chain.drive
-        return self._regular(rows, s, free + heard, free)
+        return self._regular(rows, s, chain.closed(y, f), chain.W * y + chain.pull * f)
 
     def of_drag(self, rows: IndexArray, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Return c0 and c1 of the closed characteristic function c0 + C c1, (m, k) each."""
@@ -194,6 +192,7 @@ class Chain:
         self.D = -(heard.get("drum.haul", zero) + heard.get("motor.speed", zero) * s / h)
         self.E = -heard.get("rope.tension", zero) * self._load_cell()
         self.G, self.H = -self._payload(), self._hook()
+        self._of_y, self._of_f = self.W + self.drive * self.D, self.pull + self.drive * self.E
         self._rope()
 
     def _own(self, name: str) -> Any:
@@ -280,12 +279,14 @@ class Chain:
         force = self._at_rest + self._per_drag * drag
         return self._y[0] + force * self._y[1], self._f[0] + force * self._f[1]
 
+    def closed(self, y: ComplexArray, f: ComplexArray) -> Any:
+        """Return the closed characteristic function."""
+        return self._of_y * y + self._of_f * f + self.drive * self.G
+
     def closed_of_drag(self) -> tuple[ComplexArray, ComplexArray]:
         """Return c0 and c1 of the closed characteristic function c0 + C c1."""
-        of_y, of_f = self.W + self.drive * self.D, self.pull + self.drive * self.E
-        y, f = self.ends(np.zeros((1, 1)))
-        fixed = of_y * y + of_f * f + self.drive * self.G
-        return fixed, self._per_drag * (of_y * self._y[1] + of_f * self._f[1])
+        slope = self._of_y * self._y[1] + self._of_f * self._f[1]
+        return self.closed(*self.ends(np.zeros((1, 1)))), self._per_drag * slope
 
     def moments(
         self, outputs: Sequence[str], nodes: SweepNodes, shaken: Shaken, drag: FloatArray
@@ -300,8 +301,7 @@ class Chain:
             Their drag coefficients, (m,) [N s/m].
         """
         y, f = self.ends(drag[:, None])
-        of_y, of_f = self.W + self.drive * self.D, self.pull + self.drive * self.E
-        inverse = 1.0 / abs2(of_y * y + of_f * f + self.drive * self.G)
+        inverse = 1.0 / abs2(self.closed(y, f))
         right = _both(nodes.sea if shaken.ratios is None else nodes.weights, nodes.omega)
         heave = inverse if shaken.ratios is None else inverse * shaken.ratios[self.rows]
         factors = at_rows(shaken.factors, self.rows)

@@ -148,7 +148,7 @@ class DesignRows:
     @property
     def block(self) -> int:
         """Rows that are best looked at together: their columns stay in the cache."""
-        return 8192 if self.spring else 2048
+        return 16_384 if self.spring else 2048
 
     def evaluate(self, rows: FloatArray) -> dict[str, FloatArray | BoolArray]:
         """Return ``stable`` and the metrics of rows, (n,) each.

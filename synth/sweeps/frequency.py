@@ -107,13 +107,16 @@ class FrequencyEngine:
         Raises
         ------
         InputError
-            If rows do not fit the spread, or one is no valid case.
+            If rows do not fit the spread, or a value is out of its range.
         """
         table = np.atleast_2d(np.asarray(rows, dtype=np.float64))
         if table.shape[1] != len(self.spread.paths):
             raise InputError(
                 f"sweep: rows must have {len(self.spread.paths)} columns, got {table.shape[1]}"
             )
+        for field, column in zip(self.spread.fields, table.T, strict=True):
+            for value in (column.min(), column.max()) if len(table) else ():
+                check_range("sweep", field.path, value, low=field.low, high=field.high)
         found: dict[str, Any] = {
             "stable": np.zeros(len(table), dtype=bool),
             **{m.name: np.full(len(table), np.nan) for m in self.metrics},

@@ -27,7 +27,7 @@ from .numbers import PlantNumbers
 
 Columns = list[FloatArray]  # coefficients of s^0, s^1, .., each (n,), or (1,) if all have the same
 
-CHUNK = 200  # loops at once: two arrays of 200 x 200 numbers stay in the second-level cache
+CHUNK = 33_000  # numbers of an array at once: two stay in the second-level cache
 
 
 class SpringLoops:
@@ -139,7 +139,9 @@ class SpringLoops:
         right = (weights[:, None, :] * powers[None]).reshape(-1, omega.size).T.copy()
         sums = np.empty((len(self), right.shape[1]))
         even, odd, y = self._halves(self.closed, omega)
-        for part in _chunks(len(self)):
+        step = max(1, CHUNK // omega.size)
+        for at in range(0, len(self), step):
+            part = slice(at, at + step)
             inverse = self._inverse(even[part], odd[part], y)
             if density is not None:
                 inverse *= density[part]
@@ -258,7 +260,3 @@ def _trimmed(columns: Columns) -> Columns:
 
 def _there(column: FloatArray) -> bool:
     return column.size > 1 or bool(column[0] != 0.0)
-
-
-def _chunks(count: int) -> list[slice]:
-    return [slice(at, min(at + CHUNK, count)) for at in range(0, count, CHUNK)]

@@ -141,6 +141,8 @@ class Curve:
         loop = self.values - 1.0
         change = self._changes(loop.imag)
         change = change[np.maximum(np.abs(loop[change]), np.abs(loop[change + 1])) > _FLOOR]
+        # The curve turns by little between points: right of zero at both, right of it between.
+        change = change[np.minimum(loop[change].real, loop[change + 1].real) < 0.0]
         roots = [self._root(lambda t: self._at(t).imag, int(i)) for i in change]
         found = [self._at(t).real - 1.0 for t in roots]
         # A finite gain at rest begins on the axis, a direct path ends there.

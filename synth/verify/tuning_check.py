@@ -144,7 +144,11 @@ class _TunedLoop:
         found = self.checked.moments(list(weights), (0,))
         checks = [
             agreement(
-                "cost", self.tuning.cost, _cost(weights, found), _COST, "by quad_vec, exact delays"
+                "cost",
+                self.tuning.cost,
+                _cost(weights, found),
+                _COST,
+                "by other quadrature, exact delays",
             )
         ]
         if self.intensities is None:

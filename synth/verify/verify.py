@@ -153,7 +153,7 @@ class _Winch:
         return plant.select(measurements=self.design.controller.measurements)
 
     def _line(self, s: ComplexArray) -> PlantResponse:
-        line = sensed_line_at(self.design.case, s, drag=self.design.drag)
+        line = sensed_line_at(self.design.case, s, drag=self.design.drag, data=self.data)
         return line.select(measurements=self.design.controller.measurements)
 
     @cached_property
@@ -255,7 +255,7 @@ class _Winch:
             drag = self.data.quadratic_drag * math.sqrt(8.0 / math.pi) * sigma
             note = "[N s/m], q sqrt(8/pi) sigma of the payload's velocity"
         return [
-            agreement("payload_rms", self.design.payload_rms, rms, _RMS, "[m] by quad_vec"),
+            agreement("payload_rms", self.design.payload_rms, rms, _RMS, "[m] by other quadrature"),
             agreement("drag", self.design.drag, drag, TIGHT, note),
         ]
 

@@ -57,6 +57,12 @@ Progress = Callable[[int, int], None]
 
 _NAMES = tuple(mode.capitalize() for mode in MODES)
 
+KEPT = 64
+"""Computations kept; the ones longest unused go first."""
+
+_ARRAYS = ("omega", "heading", "added_mass", "damping", "excitation")
+_FORMAT = 3  # goes up when what is computed from the same inputs changes
+
 
 def capytaine() -> Any:
     """Return the imported package.
@@ -356,13 +362,6 @@ def _limited(threads: int | None) -> Iterator[None]:
 
     with threadpool_limits(limits=threads):
         yield
-
-
-KEPT = 64
-"""Computations kept; the ones longest unused go first."""
-
-_ARRAYS = ("omega", "heading", "added_mass", "damping", "excitation")
-_FORMAT = 3  # goes up when what is computed from the same inputs changes
 
 
 def cached_hydrodynamics(

@@ -23,7 +23,8 @@ ARGUMENTS = (
         "--structures",
         "A,B,..",
         "which (default: all): payload-feedback, payload-feedback-rolloff, -lead, -notch, "
-        "-integral, drum-feedback, feed-forward, combined, constant-tension, low-order-N",
+        "-integral, drum-feedback, feed-forward, combined, constant-tension, low-order-N; on "
+        "request high-order, the best found of any order",
     ),
     results_folder("out/<name of the case>"),
     whole("--starts", "starts of each search", 8),

@@ -11,6 +11,7 @@ import signal
 import numpy as np
 import pytest
 from designs import thesis_design
+from shown import terminal_text
 
 import stillhook as sh
 from models.sensing import HEARD, Measurement
@@ -23,7 +24,6 @@ from stillhook.comparison.figures import heights, worst_moment
 from stillhook.comparison.mismatch import Mismatch
 from stillhook.comparison.store import STORE
 from stillhook.controllers import CONTENDERS, DEFAULTS, StoredDesign, contenders_of
-from stillhook.text import terminal_text
 from synth.controllers import LinearFeedback
 
 CASE = sh.load_case("thesis-1975").replace({"sea.significant_height": 0.5})

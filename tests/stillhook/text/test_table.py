@@ -8,6 +8,7 @@ import json
 import math
 
 import pytest
+from shown import terminal_text
 
 from models import InputError
 from stillhook.text import (
@@ -23,7 +24,6 @@ from stillhook.text import (
     json_data,
     json_text,
     markdown,
-    terminal_text,
 )
 
 TABLE = Table(

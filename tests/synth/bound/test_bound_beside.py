@@ -13,13 +13,13 @@ import stillhook as sh
 from models.basics import InputError, SolverError, SynthesisError
 from models.case import Case
 from models.plant import MEASUREMENTS, line_response
-from models.sensing import MEASURED, sensed_plant
+from models.sensing import MEASURED, aboard, sensed_plant
 from stillhook.designs import bound_rows, structures_table
 from stillhook.designs.bound_text import bound_cell, bound_figure, bounds_note
 from stillhook.designs.structures import structures
 from stillhook.designs.summary import facts
 from stillhook.text import markdown
-from synth.bound import BestPossible, HighOrder, aboard, bound_for, exact_sensors, verify_bound
+from synth.bound import BestPossible, HighOrder, bound_for, exact_sensors, verify_bound
 from synth.loop import Assessment, LinearController, Margins, closed_loop_poles
 from synth.question import pose
 
@@ -97,17 +97,6 @@ CRANE: Mapping[str, tuple[Mapping[str, float], float]] = {
     ),
     "constant-tension": ({"drum.position_gain": 0.0052164, "tension.gain": 8.3954e-06}, 7011.0),
 }
-RMS = {  # what it says they leave [mm]
-    "payload-feedback": 373.1,
-    "payload-feedback-rolloff": 119.1,
-    "payload-feedback-lead": 111.8,
-    "payload-feedback-notch": 102.4,
-    "payload-feedback-integral": 119.3,
-    "drum-feedback": 110.7,
-    "feed-forward": 123.5,
-    "combined": 20.86,
-    "constant-tension": 411.5,
-}
 TIGHT = {"winch.drive.torque_continuous": "6.4 kN m", "winch.drive.torque_peak": "7 kN m"}
 QUICK = ("payload-feedback", "combined")
 
@@ -132,6 +121,7 @@ class Known:
     margins: Margins
     masses: int
     drag: float
+    payload_rms: float
 
 
 @cache
@@ -146,6 +136,7 @@ def crane_design(name: str) -> Known:
         margins=view.margins,
         masses=posed.masses,
         drag=drag,
+        payload_rms=view.sigma("payload.displacement"),
     )
 
 
@@ -170,7 +161,8 @@ def test_bound_is_below_every_structure_of_the_crane(name: str) -> None:
         "motor.speed",
     }
     assert found.rms is not None
-    assert 1e3 * found.rms == pytest.approx(RMS[name], rel=3e-3)
+    # By the quadrature of the search, without what is faint.
+    assert found.rms == pytest.approx(design.payload_rms, rel=1e-3)
     # More sensors, with the same limits: the controller beside the one bound may hear all of them
     # and ignore most, so its motion, with what it uses beyond the limits at their price, is above.
     every = bound_for(design, measurements=aboard(design.sea_case)).free
@@ -226,10 +218,14 @@ def test_best_found_stands_on_the_exact_rope(name: str) -> None:
 
 @pytest.mark.ci
 def test_lqg_beside_the_bound_has_the_sensitivity_that_is_told() -> None:
-    free = bound_for(crane_design("combined"))
-    view = Assessment(free.free.plant, free.free.controller, free.free.sources)
-    assert free.free_sensitivity == pytest.approx(view.max_sensitivity, rel=1e-3)
-    assert free.free_sensitivity > 4.0
+    late = sh.load_case("subsea-crane").replace({"sensors.telemetry.delay": "0.25 s"})
+    for best in (
+        bound_for(crane_design("combined")),
+        bound_for(late, measurements=MEASUREMENTS),
+    ):
+        view = Assessment(best.free.plant, best.free.controller, best.free.sources)
+        assert best.free_sensitivity == pytest.approx(view.max_sensitivity, rel=1e-3)
+        assert best.free_sensitivity > 4.0
 
 
 @pytest.mark.ci

@@ -378,6 +378,14 @@ def test_rows_of_another_width_are_refused() -> None:
         engine.evaluate(np.ones((2, 3)))
 
 
+def test_rows_that_are_no_case_are_refused() -> None:
+    engine = FrequencyEngine(thesis_design(), Spread({"payload.mass": "5 %", "gains.a": "5 %"}))
+    mass, gain = (engine.spread.nominal[path] for path in engine.spread.paths)
+    assert engine.evaluate(np.array([[mass, -gain]]))["stable"].size == 1
+    with pytest.raises(InputError, match=r"payload\.mass must be"):
+        engine.evaluate(np.array([[mass, gain], [-mass, gain]]))
+
+
 def test_progress_ends_with_all_cases() -> None:
     told: list[tuple[str, int, int]] = []
 

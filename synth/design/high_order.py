@@ -1,0 +1,93 @@
+"""High-order controllers of a case as parameters of a structure: `high_order_gains`.
+
+    case -> `synth.bound.high_order_for` -> drag and limits on signals as they are in that loop
+      -> once more with those -> DesignQuestion and parameters
+
+The convex programme behind knows one drag, peaks by a period that is guessed, and no power.  So
+what its loop makes of them is measured, and asked of the next one, until all limits are kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from models.case import Case
+from models.plant import MAX_MASSES
+
+from ..bound import high_order_for
+from ..limits import Continuous, Minimum, Peak, Power
+from ..loop import Assessment
+from ..question import DesignQuestion, pose
+from ..search import Progress
+from ..structures import LowOrderLaw
+
+_ROUNDS = 6
+_SPARE = 0.98  # of the rms that would just keep a limit
+
+
+def high_order_gains(
+    case: Case, order: int | None = None, progress: Progress | None = None
+) -> tuple[DesignQuestion, Mapping[str, float]]:
+    """Return the question of a controller of high order, and its parameters.
+
+    It may break a limit, as one on power or on the delay, that no round could mend.
+
+    Parameters
+    ----------
+    case
+        The case.
+    order
+        States at most; by default as many as it takes.
+    progress
+        Called as progress(stage, done, total).
+
+    Raises
+    ------
+    SynthesisError
+        If no such controller is found.
+    """
+    masses = 1 if case.rope.lumping == "thesis" else MAX_MASSES
+    question = pose(case, "high-order", masses)
+    rooms: dict[str, float] = {}
+    drag = question.drag_before
+    for done in range(_ROUNDS):
+        if progress is not None:
+            progress("high order", done, _ROUNDS)
+        found = high_order_for(
+            case,
+            measurements=question.structure.measurements,
+            drag=drag,
+            rooms=rooms,
+            states=order,
+        )
+        question = pose(case, f"high-order-{found.order}", masses)
+        assert isinstance(question.law, LowOrderLaw)
+        parameters = question.named([float(v) for v in question.law.values(found.controller)])
+        view = question.assess(parameters)
+        drag = view.coefficient if question.drag is not None else drag
+        if all(limit.use(limit.measure(view)) <= 1.0 for limit in question.limits):
+            break
+        rooms |= _rooms(question, view)
+    return question, parameters
+
+
+def _rooms(question: DesignQuestion, view: Assessment) -> dict[str, float]:
+    """Return the rms at which each limit on a signal that is broken would just be kept."""
+    found: dict[str, float] = {}
+    for limit in question.limits:
+        if not isinstance(limit, Peak | Continuous | Minimum | Power):
+            continue
+        value, static = limit.measure(view), abs(limit.static)
+        if limit.use(value) <= 1.0:
+            continue
+        if isinstance(limit, Power):
+            # The speed is that of the hook, so it is the torque that has to give.
+            fast = view.peak(limit.speed, limit.duration)
+            name, share = limit.torque, (limit.bound / fast - static) / (value / fast - static)
+        elif isinstance(limit, Continuous):
+            name = limit.output
+            share = ((limit.bound**2 - static**2) / (value**2 - static**2)) ** 0.5
+        else:
+            name, share = limit.output, (limit.bound - limit.static) / (value - limit.static)
+        found[name] = min(found.get(name, 1.0), max(share, 0.1))
+    return {name: _SPARE * share * view.sigma(name) for name, share in found.items()}

@@ -1,0 +1,90 @@
+"""Designs of a case: parameters given as a mapping or a section, and a drive that is too small."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from designs import THESIS_GAINS, thesis_design
+
+from models import InputError, load_case
+from synth.design import evaluate_gains, optimise_gains
+from synth.question import PAYLOAD
+
+FED = {
+    "drum.speed_gain": 0.0533,
+    "drum.position_gain": 12.5,
+    "heave.gain": 0.97,
+    "heave.lead": 0.28,
+    "heave.bandwidth": 100.0,
+}
+
+
+def test_the_section_of_a_case_is_a_set_of_gains() -> None:
+    case = load_case("thesis-1975")
+    design = evaluate_gains(case, case.gains)
+    assert design.parameters == THESIS_GAINS
+    assert design.payload_rms == thesis_design().payload_rms
+
+
+def test_compensation_is_told_against_the_hook_and_the_drum_held() -> None:
+    design = thesis_design()
+    assert design.residual == design.payload_rms / design.hook_rms
+    assert design.residual_held == design.payload_rms / design.payload_rms_before
+    assert design.compensation_db == pytest.approx(-20.0 * np.log10(design.residual))
+    assert design.compensation_held_db == pytest.approx(-20.0 * np.log10(design.residual_held))
+
+
+def test_an_amplifier_of_its_own_multiplies_the_gains() -> None:
+    case = load_case("thesis-1975")
+    gains = {"A": 100.0, "a": 100.0, "a1": 200.0, "a2": 200.0}
+    design = evaluate_gains(case, gains)
+    assert design.parameters == gains
+    assert design.payload_rms == pytest.approx(thesis_design().payload_rms, rel=1e-12)
+    assert design.verification is not None
+    assert design.verification.ok
+
+
+def test_parameters_of_any_structure_are_evaluated() -> None:
+    design = evaluate_gains(load_case("thesis-1975"), FED, "feed-forward")
+    assert design.parameters == FED
+    assert design.gains == {}
+    assert design.verification is not None
+    assert design.verification.ok, design.verification.status
+    assert not design.limits["low_frequency"].enforced  # it does not hear the payload
+    assert set(design.shares[PAYLOAD]) == {"hook.heave"}
+
+
+@pytest.mark.parametrize(
+    ("gains", "structure", "message"),
+    [
+        (None, "payload-feedback", "must be a, a1, a2 and optionally A, got none"),
+        ({"a": 1.0}, "payload-feedback", "must be a, a1, a2 and optionally A, got a$"),
+        ({**FED, "A": 2.0}, "feed-forward", "must be drum.speed_gain, .*, got "),
+        ({**FED, "heave.bandwidth": 0.0}, "feed-forward", "heave.bandwidth must be above 0, got"),
+        ({**FED, "heave.gain": -1.0}, "feed-forward", "heave.gain must be at least 0, got"),
+        ({**FED, "heave.gain": "much"}, "feed-forward", "heave.gain must be .*, got 'much'"),
+        (FED, "feedforward", "there is no structure 'feedforward'"),
+    ],
+)
+def test_what_cannot_be_evaluated_is_refused(gains: object, structure: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        evaluate_gains(load_case("thesis-1975"), gains, structure)
+
+
+def test_noise_does_not_shrink_with_the_largest_sea() -> None:
+    noisy = load_case("thesis-1975").replace(
+        {
+            "limits.drive": "enforce",
+            "sensors.payload.velocity_noise": 0.03,
+            "sea.significant_height": 4.0,
+        }
+    )
+    design = optimise_gains(noisy, starts=2)
+    assert not design.ok
+    assert not design.feasible
+    assert design.verification is not None
+    assert design.verification.ok
+    used = [use.use for name, use in design.limits.items() if name.startswith("motor")]
+    assert max(used) == pytest.approx(1.0, abs=3e-4)
+    noise = design.shares["motor.voltage"]["payload.velocity_noise"]
+    assert noise > 0.02 * design.assessment.sigma("motor.voltage")
