@@ -2,7 +2,8 @@
 
     Family -> starts -> descent from each -> distinct answers -> polished -> Found
 
-A single plant is a family of one.  The descents stop once eight starts, and most, agree on the best place.
+A single plant is a family of one.  The descents stop once eight starts, and most of them, agree on
+the best place.
 """
 
 from __future__ import annotations
@@ -146,8 +147,7 @@ def search(
     begins = [guess for guess in kept if family.stable(guess)] if only_guesses else []
     if not begins:
         # The reserve is picked together with the starts, so that it lies apart from them.
-        wanted = max(starts, len(kept)) + min(_MORE * starts, _MOST_MORE) + _RESERVE
-        begins = begin_points(family, wanted, seed, kept)
+        begins = begin_points(family, _rough(starts, len(kept)) + _RESERVE, seed, kept)
     if not begins:
         return Found(solved=None)
     reference = briskest(family, begins)
@@ -200,7 +200,7 @@ def _descents(
     """
     drags = start_coefficients(family)
     places: list[_Place] = []
-    count = min(max(starts, guesses) + min(_MORE * starts, _MOST_MORE), len(begins))
+    count = min(_rough(starts, guesses), len(begins))
     for k, begin in enumerate(begins):
         if k >= count and any(place.arrived for place in places):
             break  # the reserve is for a search of which no start has arrived yet
@@ -215,6 +215,7 @@ def _descents(
             place = _Place(coarse)
             places.append(place)
         place.begins.append(begin)
+    tell("starts", count, count)
     ranked = sorted(places, key=lambda p: (not p.arrived, p.coarse.objective))[: max(1, starts)]
     for k, place in enumerate(ranked):
         best = min((p.solved.objective for p in ranked if p.solved is not None), default=np.inf)
@@ -228,7 +229,7 @@ def _descents(
         end = settle(family, values, found, reference=reference, exact=True)
         if end.converged and family.stable(end.values, end.coefficients):
             place.solved = end
-    tell("descents", 1, 1)
+    tell("descents", len(ranked), len(ranked))
     records, first = [], []
     for place in places:
         end = place.solved or place.coarse
@@ -237,6 +238,12 @@ def _descents(
         records += [Start.of(begin, end, stable=stable and arrived) for begin in place.begins]
         first += [end] * (len(place.begins) if arrived else 0)
     return tuple(records), first
+
+
+def _rough(starts: int, guesses: int) -> int:
+    """Return how many starts go roughly where they lead."""
+    drawn = max(0, starts - guesses)
+    return guesses + drawn + min(_MORE * drawn, _MOST_MORE)
 
 
 class _Place:

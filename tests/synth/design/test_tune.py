@@ -636,7 +636,10 @@ def test_progress_is_told_in_order() -> None:
         starts=3,
         progress=lambda stage, done, total: told.append((stage, done, total)),
     )
-    assert [t for t in told if t[0] == "starts"] == [("starts", k, 3) for k in range(4)]
+    starts = [t for t in told if t[0] == "starts"]
+    total, steps = starts[0][2], len(starts) - 1
+    assert total >= steps >= 3  # more go a part of the way; and none once most of them agree
+    assert starts == [("starts", k, total) for k in (*range(steps), total)]
     assert all(0 <= done <= total for _, done, total in told)
 
 

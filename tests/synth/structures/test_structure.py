@@ -14,7 +14,7 @@ from scipy.stats import qmc
 from models.basics import InputError, White
 from models.plant import LinearPlant
 from synth.loop import Phasor, closed_loop_matrix, disturbances
-from synth.question import Problem
+from synth.question import FamilyProblem, Problem
 from synth.search.starts import candidates, crossover_grid, pick_spread, stabilise
 from synth.structures import ParametrisedController, PayloadFeedback, StaticGain
 from synth.structures.structure import gain_scales
@@ -173,7 +173,8 @@ def test_least_unstable_candidates_are_made_stable() -> None:
     question = problem(plant, law, {"x": 1.0})
     wrong = np.array([[1.0, 1.0], [3.0, -1.0], [-1.0, 0.5]])
     assert not any(question.stable(values) for values in wrong)
-    found = stabilise(question, wrong, np.array([question.abscissa(v) for v in wrong]), 3)
+    growths = np.array([question.abscissa(v) for v in wrong])
+    found = stabilise(FamilyProblem.of(question), wrong, growths, 3)
     assert len(found) == 3
     assert all(question.stable(values) for values in found)
 
@@ -183,7 +184,8 @@ def test_nothing_is_made_stable_that_cannot_be() -> None:
     plant = double_integrator()
     law = StaticGain().bind(plant)
     question = problem(plant, law, {"x": 1.0})
-    assert stabilise(question, np.array([[1.0], [-1.0]]), np.array([0.5, 0.0]), 2) == []
+    family, points = FamilyProblem.of(question), np.array([[1.0], [-1.0]])
+    assert stabilise(family, points, np.array([0.5, 0.0]), 2) == []
 
 
 def test_starts_are_spread_best_first() -> None:
