@@ -153,69 +153,6 @@ class Brake(Section):
     """Time from the order to close until the brake holds."""
 
 
-class Winch(Section):
-    """Drum, gearbox, motor and drive."""
-
-    drum: Drum
-    """Radius of the drum with its layers of rope, and its inertia."""
-    gearbox: Gearbox
-    """The gear between motor and drum."""
-    motor: Motor
-    """The motor: `type: dc` or `type: ac`."""
-    drive: Drive
-    """Limits of motor and inverter."""
-    brake: Brake | None = None
-    """The holding brake; by default one that holds whatever comes."""
-
-    def _faults(self) -> Iterator[tuple[str, str]]:
-        motor, drive = self.motor, self.drive
-        if isinstance(motor, DCMotor):
-            if drive.speed is None:
-                yield ("drive.speed", "is missing: a DC motor needs its highest speed")
-        else:
-            if drive.speed is not None and drive.speed > motor.maximum_speed:
-                text = (
-                    f"must be at most the motor's maximum_speed, {motor.maximum_speed:g} rad/s, "
-                    f"got {drive.speed:g} rad/s"
-                )
-                yield ("drive.speed", text)
-            for name in ("voltage", "current_continuous", "current_peak"):
-                if getattr(drive, name) is not None:
-                    yield (f"drive.{name}", "is for a DC motor only; an AC motor has none")
-
-    @property
-    def inertia(self) -> float:
-        """Moment of inertia at the motor's shaft, I = I_M + I_G + I_D/n^2 [kg m2]."""
-        n = self.gearbox.ratio
-        return self.motor.inertia + self.gearbox.inertia + self.drum.inertia / n**2
-
-    @property
-    def viscous_friction(self) -> float:
-        """Viscous friction B at the motor's shaft [N m s/rad]."""
-        return self.motor.viscous_friction
-
-    @property
-    def speed_limit(self) -> float:
-        """Highest speed of the motor [rad/s]."""
-        if self.drive.speed is not None:
-            return self.drive.speed
-        return self.motor.maximum_speed if isinstance(self.motor, ACMotor) else math.inf
-
-    @property
-    def power_limit(self) -> float:
-        """Highest shaft power [W]; infinite for a DC motor without a stated one."""
-        if self.drive.power is not None:
-            return self.drive.power
-        if isinstance(self.motor, ACMotor):
-            return self.drive.torque_peak * self.motor.base_speed
-        return math.inf
-
-    @property
-    def torque_constant(self) -> float:
-        """Motor torque per current [N m/A]; one for an AC motor, whose current is its torque."""
-        return self.motor.torque_constant if isinstance(self.motor, DCMotor) else 1.0
-
-
 class DrumLayer(Section):
     """One layer of rope on the drum."""
 
@@ -372,3 +309,66 @@ class Drum(Section):
 
     def _table(self, rope_diameter: float) -> tuple[DrumLayer, ...]:
         return self.layers or (self.geometry.table(rope_diameter) if self.geometry else ())
+
+
+class Winch(Section):
+    """Drum, gearbox, motor and drive."""
+
+    drum: Drum
+    """Radius of the drum with its layers of rope, and its inertia."""
+    gearbox: Gearbox
+    """The gear between motor and drum."""
+    motor: Motor
+    """The motor: `type: dc` or `type: ac`."""
+    drive: Drive
+    """Limits of motor and inverter."""
+    brake: Brake | None = None
+    """The holding brake; by default one that holds whatever comes."""
+
+    def _faults(self) -> Iterator[tuple[str, str]]:
+        motor, drive = self.motor, self.drive
+        if isinstance(motor, DCMotor):
+            if drive.speed is None:
+                yield ("drive.speed", "is missing: a DC motor needs its highest speed")
+        else:
+            if drive.speed is not None and drive.speed > motor.maximum_speed:
+                text = (
+                    f"must be at most the motor's maximum_speed, {motor.maximum_speed:g} rad/s, "
+                    f"got {drive.speed:g} rad/s"
+                )
+                yield ("drive.speed", text)
+            for name in ("voltage", "current_continuous", "current_peak"):
+                if getattr(drive, name) is not None:
+                    yield (f"drive.{name}", "is for a DC motor only; an AC motor has none")
+
+    @property
+    def inertia(self) -> float:
+        """Moment of inertia at the motor's shaft, I = I_M + I_G + I_D/n^2 [kg m2]."""
+        n = self.gearbox.ratio
+        return self.motor.inertia + self.gearbox.inertia + self.drum.inertia / n**2
+
+    @property
+    def viscous_friction(self) -> float:
+        """Viscous friction B at the motor's shaft [N m s/rad]."""
+        return self.motor.viscous_friction
+
+    @property
+    def speed_limit(self) -> float:
+        """Highest speed of the motor [rad/s]."""
+        if self.drive.speed is not None:
+            return self.drive.speed
+        return self.motor.maximum_speed if isinstance(self.motor, ACMotor) else math.inf
+
+    @property
+    def power_limit(self) -> float:
+        """Highest shaft power [W]; infinite for a DC motor without a stated one."""
+        if self.drive.power is not None:
+            return self.drive.power
+        if isinstance(self.motor, ACMotor):
+            return self.drive.torque_peak * self.motor.base_speed
+        return math.inf
+
+    @property
+    def torque_constant(self) -> float:
+        """Motor torque per current [N m/A]; one for an AC motor, whose current is its torque."""
+        return self.motor.torque_constant if isinstance(self.motor, DCMotor) else 1.0

@@ -375,7 +375,9 @@ def _next(swept: Swept, worst: list[int], arguments: argparse.Namespace) -> list
     found = []
     if worst:
         file = shlex.quote(str(folder / "worst.yaml"))
-        found.append(("what the worst case would take", f"stillhook optimise {file}"))
+        structure = getattr(swept.design, "structure", "payload-feedback")
+        other = "" if structure == "payload-feedback" else f" --structure {structure}"
+        found.append(("what the worst case would take", f"stillhook optimise {file}{other}"))
         if swept.result.attrs.get("mode") == "time":
             at = place_of(swept.result, worst[0])
             seed = int(swept.result["seed"].to_numpy()[at])

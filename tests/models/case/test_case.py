@@ -348,3 +348,8 @@ def toml_text(tree, prefix=""):
         else:
             own.append(f"{key} = {json.dumps(value)}")
     return "\n".join([*own, *below])
+
+
+def test_a_field_of_the_drum_is_changed_by_its_path():
+    crane = load_case("subsea-crane").variant({"winch.drum.geometry.core_diameter": 2.01})
+    assert crane.winch.drum.geometry.core_diameter == 2.01

@@ -371,7 +371,7 @@ def test_gains_stay_when_the_rope_gets_longer() -> None:
 
 @pytest.mark.ci
 def test_an_unstable_loop_works_in_no_sea() -> None:
-    with pytest.raises(InputError, match="no stabilising gains"):
+    with pytest.raises(InputError, match="no stabilising controller"):
         operability(unstable_design(), periods=[8.0])
     asked = pose_operability(dragged(), payload_criteria(dragged().case, rms=1.0))
     assert asked.loop is not None

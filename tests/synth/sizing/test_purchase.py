@@ -99,7 +99,7 @@ def test_a_drive_that_is_too_small_is_said_before_anything_is_priced() -> None:
     result = sh.worth(sh.load_case("thesis-1975").replace(small), starts=1)
     assert not result.ok
     assert result.rows == ()
-    assert "drive" in result.status
+    assert "motor.torque.peak breaks first" in result.status
 
 
 def test_nothing_that_is_sold_is_worth_it_where_only_margins_bind(late: Worth) -> None:
