@@ -382,8 +382,10 @@ def _best(
     problem = question.problem_with(question.loop)
     own = question.values(design.parameters)
     free = tuning_of(problem, search(problem, _STARTS, seed, [own], None))
-    if not free.ok:
+    if free.assessment is None:
         return None
+    if not free.ok:  # few starts did not arrive: the design's own parameters are a start as good
+        free = replace(free, parameters=problem.law.named(own))
     limited = replace(question, drive=drive, reported=())
     try:
         found = shortfall(limited, free)
