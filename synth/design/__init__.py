@@ -11,6 +11,7 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .design import SOURCE_NAMES, Design
     from .infeasible import shortfall
+    from .nested import gains_in_use
     from .optimise import design_of, evaluate_gains, optimise_gains, verified
     from .tuning import LimitUse, Tuning, limit_uses, tune, tuning_of
 else:

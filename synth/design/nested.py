@@ -108,6 +108,14 @@ def _answer(question: DesignQuestion, starts: int, seed: int, progress: Progress
     return tuning_of(problem, search(problem, starts + len(guesses), seed, guesses, progress))
 
 
+def gains_in_use(question: DesignQuestion) -> list[list[float]]:
+    """Return the gains that the case has in use as a start, where the structure has such."""
+    gains = question.case.gains
+    if gains is None or question.amplifier is None:
+        return []
+    return starts_from(question, [{"a": gains.a, "a1": gains.a1, "a2": gains.a2}])
+
+
 def as_values(law: ParametrisedController, known: Mapping[str, float]) -> list[float]:
     """Return a law's parameters where some are known by name and the others do nothing."""
     full = {**_NEUTRAL, **known}

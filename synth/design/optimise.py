@@ -28,7 +28,7 @@ from ..structures import LowOrderFeedback
 from .design import Design
 from .high_order import high_order_gains
 from .infeasible import Shortfall, shortfall
-from .nested import nested_starts, no_worse, starts_from
+from .nested import gains_in_use, nested_starts, no_worse, starts_from
 from .tuning import LimitUse, Tuning, limit_uses, tuning_of
 
 _MODES = 5.0  # every rope mode below this many crossovers belongs in the design plant
@@ -87,7 +87,7 @@ def optimise_gains(
         return verified(_evaluated(question, parameters), progress, question)
     known = starts_from(question, guesses) or nested_starts(question, count, seed, progress)
     count += len(known)
-    known = [*known, *_in_use(question)]
+    known = [*known, *gains_in_use(question)]
     tuning = _searched(question.problem, count, seed, known, progress)
     while (wanted := _masses_wanted(question, tuning)) > question.masses:
         # The rope turned out to need more masses: the ends of the search are the guesses.
@@ -372,14 +372,6 @@ def _in_small_motion(question: DesignQuestion, parameters: Mapping[str, float]) 
     if question.drag is None or _growth(question, parameters, 0.0) <= 0.0:
         return ""
     return "; without drag, in small motion, the loop is unstable and swings by itself"
-
-
-def _in_use(question: DesignQuestion) -> list[list[float]]:
-    """Return the gains that the case has in use as a start, where the structure has such."""
-    gains = question.case.gains
-    if gains is None or question.amplifier is None:
-        return []
-    return starts_from(question, [{"a": gains.a, "a1": gains.a1, "a2": gains.a2}])
 
 
 def _complete(question: DesignQuestion, gains: object) -> dict[str, float]:

@@ -27,7 +27,8 @@ AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
 _ENOUGH, _MOST = 8, 0.7  # starts, and share of all, that agree on the best answer: no more needed
 _NEAR, _BESIDE = 1e-2, 0.15  # of log cost and parameters, relative: on the way to one end
 _POLISHED = 6  # distinct answers that are polished at most
-_MORE, _MOST_MORE = 2, 12  # times the starts, and at most, that are tried roughly beside them
+_MORE, _LEAST_MORE = 2, 6  # times the starts, and at least, that are tried roughly beside them
+_MOST_MORE = 108  # ... and at most, over the number of parameters
 _BEHIND = 0.2  # of the log cost, that a rough answer may lie behind the best one
 _RESERVE = 16  # further starts for a search of which none arrived
 _VIOLATION = 3  # starts of the least violation
@@ -147,7 +148,7 @@ def search(
     begins = [guess for guess in kept if family.stable(guess)] if only_guesses else []
     if not begins:
         # The reserve is picked together with the starts, so that it lies apart from them.
-        begins = begin_points(family, _rough(starts, len(kept)) + _RESERVE, seed, kept)
+        begins = begin_points(family, _rough(family, starts, len(kept)) + _RESERVE, seed, kept)
     if not begins:
         return Found(solved=None)
     reference = briskest(family, begins)
@@ -200,7 +201,7 @@ def _descents(
     """
     drags = start_coefficients(family)
     places: list[_Place] = []
-    count = min(_rough(starts, guesses), len(begins))
+    count = min(_rough(family, starts, guesses), len(begins))
     for k, begin in enumerate(begins):
         if k >= count and any(place.arrived for place in places):
             break  # the reserve is for a search of which no start has arrived yet
@@ -240,10 +241,11 @@ def _descents(
     return tuple(records), first
 
 
-def _rough(starts: int, guesses: int) -> int:
-    """Return how many starts go roughly where they lead."""
+def _rough(family: FamilyProblem, starts: int, guesses: int) -> int:
+    """Return how many starts go roughly where they lead: more where there are few parameters."""
     drawn = max(0, starts - guesses)
-    return guesses + drawn + min(_MORE * drawn, _MOST_MORE)
+    most = _MOST_MORE // max(1, len(family.parameters))
+    return guesses + drawn + min(max(_LEAST_MORE, _MORE * drawn), most)
 
 
 class _Place:

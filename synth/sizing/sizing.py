@@ -24,7 +24,7 @@ from models.basics import FloatArray, InputError, check_range, one_thread
 from models.case import Case
 from models.plant import MAX_MASSES
 
-from ..design import SOURCE_NAMES, Design
+from ..design import SOURCE_NAMES, Design, gains_in_use
 from ..loop import Assessment
 from ..question import HOOK, PAYLOAD
 from ..search import KEPT, Progress, search
@@ -223,7 +223,7 @@ def _sized(
     aim = target_of(target, hook)
     rope = [lim for lim in posed.drive if lim.name.startswith("rope.")]
     problem = posed.problem((*posed.loop, *rope))
-    found = search(problem, starts, seed, [], tell)
+    found = search(problem, starts, seed, gains_in_use(posed.question), tell)
     free = Answer.of(problem, found)
     empty = Sizing(
         case=base,
