@@ -11,8 +11,12 @@ if TYPE_CHECKING:
     from .limits import (
         Continuous,
         DelayMargin,
+        DiskMargin,
         GainMargin,
         GainMarginDown,
+        HighestFrequency,
+        LeastDamping,
+        LeastDecay,
         Limit,
         LowFrequency,
         MaxSensitivity,
@@ -21,6 +25,7 @@ if TYPE_CHECKING:
         Power,
         Rms,
         RollOff,
+        WeightedResponse,
     )
     from .loop import Assessment, DragElement, LinearController, Margins, closed_loop_poles
     from .structures import LowOrder, PayloadFeedback, StaticGain, Structure

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .bound import Bound
+    from .bound import Bound, lqg_bound
     from .case import BestPossible, bound_for, exact_sensors, high_order_for
     from .check import verify_bound, weighted_rms
     from .high_order import HighOrder

@@ -10,18 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from models.basics import InputError, check_range, one_thread
+from models.basics import InputError, SolverError, White, check_range, one_thread
 from models.plant import LinearPlant
 
-from ..limits import Limit
+from ..bound import lqg_bound
+from ..limits import Limit, Rms
 from ..loop import Assessment, DragElement, LinearController, Margins, disturbances
 from ..question import Problem
 from ..search import KEPT, Found, Progress, Start, search
-from ..structures import Structure
+from ..structures import Fixed, Structure
 from ..verify import Verification, verify_tuning
 
 
@@ -56,6 +58,17 @@ class LimitUse:
         return self.use <= 1.0 + KEPT
 
 
+_FEW = 4  # starts that reached an answer to be relied on
+
+
+@dataclass(frozen=True, kw_only=True)
+class LqgFigure:
+    """The best possible cost of a question, and why it is not known where it is None."""
+
+    cost: float | None
+    note: str = ""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tuning:
     """The answer of `tune`, with the question it answers.
@@ -69,7 +82,7 @@ class Tuning:
     cost
         Square root of the weighted variance, in the unit of the outputs.
     parameters
-        Free parameters of the structure by name.
+        Parameters of the structure by name, those that were fixed among them.
     controller
         The controller in state space, u = +C y.
     margins
@@ -102,6 +115,31 @@ class Tuning:
     assessment: Assessment | None = field(repr=False)
     found: Found = field(repr=False)
 
+    @cached_property
+    def lqg(self) -> LqgFigure:
+        """The best possible with this plant, these spectra and measurements (`synth.bound`).
+
+        No linear controller of any order costs less, whatever its margins: of the limits those on
+        an rms count.  Drag is that of the answer.  It is worked out when first asked for, and
+        stands in `str` from then on.
+        """
+        problem, view = self.problem, self.assessment
+        if view is None:
+            return LqgFigure(cost=None, note="no stabilising controller is known")
+        # A spectrum that is white is told by where its density comes from.
+        origins = {d.name: (getattr(d.density, "__self__", None), d) for d in problem.disturbances}
+        spectra = {
+            name: origin if isinstance(origin, White) else d for name, (origin, d) in origins.items()
+        }
+        limits = {limit.output: limit.bound for limit in problem.limits if isinstance(limit, Rms)}
+        try:
+            found = lqg_bound(view.plant, spectra, problem.minimise, limits)
+        except (InputError, SolverError) as reason:
+            return LqgFigure(cost=None, note=str(reason))
+        if not found.feasible:
+            return LqgFigure(cost=None, note="no linear controller keeps the limits")
+        return LqgFigure(cost=found.value)
+
     def verify(self) -> Verification:
         """Check everything that is claimed by code that the optimiser did not use."""
         return verify_tuning(self)
@@ -109,6 +147,9 @@ class Tuning:
     def __str__(self) -> str:
         """Return a small tree."""
         lines = [f"Tuning: {self.status}", f"├ cost {self.cost:.6g}"]
+        if (lqg := vars(self).get("lqg")) is not None:  # known already
+            best = f"{lqg.cost:.6g}" if lqg.cost is not None else f"not known: {lqg.note}"
+            lines.append(f"├ best possible, whatever the margins: {best}")
         lines += [f"├ {name} = {value:.6g}" for name, value in self.parameters.items()]
         lines += [f"├ {u.name}: {100 * u.use:.1f} % of {u.bound:g}" for u in self.limits.values()]
         if self.margins is not None:
@@ -129,6 +170,7 @@ def tune(
     seed: int = 0,
     drag: DragElement | None = None,
     guesses: Sequence[Sequence[float]] = (),
+    fixed: Mapping[str, float] | None = None,
     progress: Progress | None = None,
 ) -> Tuning:
     """Return the controller of a structure that minimises a weighted variance within limits.
@@ -138,7 +180,7 @@ def tune(
     plant
         Any linear plant with named signals; delays of its measurements are taken exactly.
     structure
-        `StaticGain`, `PayloadFeedback`, `LowOrder` or a structure of your own.
+        `StaticGain`, `PayloadFeedback`, `LowOrder` or a structure of your own (`Structure`).
     spectrum
         One-sided spectra of disturbances by name: a callable of omega [rad/s], a table
         (omega, density), an object with ``density`` and ``band``, or `White`.
@@ -153,7 +195,9 @@ def tune(
     drag
         A quadratic drag to be linearised consistently with the response.
     guesses
-        Parameter vectors to start from, before any that are drawn.
+        Vectors of the free parameters to start from, before any that are drawn.
+    fixed
+        Parameters of the structure that are held, by name; the others are searched.
     progress
         Called as progress(stage, done, total).
 
@@ -166,8 +210,10 @@ def tune(
     Raises
     ------
     InputError
-        If a name is unknown, a weight is negative or there is nothing to minimise.
+        If a name is unknown, a weight is negative or there is nothing to minimise or to search.
     """
+    if fixed:
+        structure = Fixed(structure=structure, values=fixed)
     problem = _problem(plant, structure, spectrum, minimise, limits, drag)
     check_range("tune", "starts", starts, low=1)
     with one_thread():
@@ -222,7 +268,7 @@ def tuning_of(problem: Problem, found: Found) -> Tuning:
     return Tuning(
         problem=problem,
         ok=ok,
-        status=_status(ok, assessment, uses, cost),
+        status=_status(ok, assessment, uses, cost) + _few(ok, found),
         cost=cost,
         parameters=problem.law.named([float(v) for v in solved.values]),
         controller=problem.law.controller([float(v) for v in solved.values]),
@@ -251,6 +297,13 @@ def _status(ok: bool, assessment: Assessment, uses: Mapping[str, LimitUse], cost
     return f"the limits cannot all be kept; the least violation leaves {' and '.join(values)}"
 
 
+def _few(ok: bool, found: Found) -> str:
+    """Return a remark on an answer that few starts reached."""
+    if not ok or found.agreed >= _FEW or not found.starts:
+        return ""
+    return f"; only {found.agreed} of {len(found.starts)} starts reached it"
+
+
 def _problem(
     plant: LinearPlant,
     structure: Structure,
@@ -273,12 +326,18 @@ def _problem(
         if names.count(name) > 1:
             raise InputError(f"tune: limits must have different names, got {name!r} twice")
     for limit in limits:
-        for output in {*limit.outputs, getattr(limit, "output", None)} - {None}:
+        for output in (*limit.outputs, *limit.signals):
             if output not in plant.outputs:
                 raise InputError(
                     f"tune: limit {limit.name}: there is no output {output!r}; there are: "
                     f"{', '.join(plant.outputs) or 'none'}"
                 )
+        known = plant.independent_disturbances
+        if limit.channel is not None and limit.channel[1] not in known:
+            raise InputError(
+                f"tune: limit {limit.name}: there is no disturbance {limit.channel[1]!r}; there "
+                f"are: {', '.join(known) or 'none'}"
+            )
     return Problem(
         plant=plant,
         law=structure.bind(plant),

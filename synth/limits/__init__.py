@@ -10,15 +10,16 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .case_limits import HOOK, PAYLOAD, drive_limits, loop_limits, modelled_bandwidth
-    from .limits import Limit, Symbols
-    from .margin_limits import (
-        DelayMargin,
-        GainMargin,
-        GainMarginDown,
+    from .frequency_limits import (
+        DiskMargin,
         LowFrequency,
         MaxSensitivity,
         RollOff,
+        WeightedResponse,
     )
+    from .limits import Limit, Size, Symbols
+    from .margin_limits import DelayMargin, GainMargin, GainMarginDown
+    from .pole_limits import HighestFrequency, LeastDamping, LeastDecay
     from .signal_limits import Continuous, Minimum, Peak, Power, Rms
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

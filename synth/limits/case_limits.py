@@ -11,15 +11,9 @@ from models.basics import InputError
 from models.case import Case
 from models.plant import LinearPlant, PlantData, fixed_top_modes, lump_rope, lumped_modes
 
+from .frequency_limits import LowFrequency, MaxSensitivity, RollOff
 from .limits import Limit
-from .margin_limits import (
-    DelayMargin,
-    GainMargin,
-    GainMarginDown,
-    LowFrequency,
-    MaxSensitivity,
-    RollOff,
-)
+from .margin_limits import DelayMargin, GainMargin, GainMarginDown
 from .signal_limits import Continuous, Minimum, Peak, Power
 
 PAYLOAD = "payload.displacement"

@@ -2,26 +2,29 @@
 
 Each limit says the same thing twice: `rows` for the optimiser (at most zero when it is kept,
 of dual numbers so that their slopes come along), and
-`measure` for the report (numbers on refined frequencies, `synth.loop.assess`).  `critical` gives
-the frequencies at which a design presses against it, for the exchange of nodes.
+`measure` for the report (numbers on refined frequencies, `synth.loop.assess`).
 
-Two kinds: on the loop (`synth.limits.margin_limits`), and on signals
+On the loop: stability margins (`synth.limits.margin_limits`), sizes at every frequency
+(`synth.limits.frequency_limits`) and poles (`synth.limits.pole_limits`); and on signals
 (`synth.limits.signal_limits`).
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
-from models.basics import FloatArray
+from models.basics import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from ..loop import Assessment
+
+#: From frequencies [rad/s] and what a curve is there to what is to be small, (k,) each.
+Size = Callable[[FloatArray, Any], FloatArray]
 
 
 class Symbols(Protocol):
@@ -34,9 +37,29 @@ class Symbols(Protocol):
     def differences(self) -> Sequence[Any]:
         """1 + L of every loop at the margin frequencies, (k,) each."""
 
+    def curves(
+        self, size: Size, above: float, channel: tuple[str, str] | None = None
+    ) -> Sequence[tuple[FloatArray, Any]]:
+        """Return curves at the margin frequencies, and where a size has its peaks between them.
+
+        Parameters
+        ----------
+        size, above
+            Peaks above this are followed, where margins are held as they are measured; none are
+            on a grid.
+        channel
+            Output and disturbance of the closed-loop response that is asked for; 1 + L of every
+            loop without.
+
+        Returns
+        -------
+        sequence
+            Frequencies [rad/s] and values of pieces of the curves, (k,) each.
+        """
+
     @property
-    def nearest(self) -> Sequence[Any]:
-        """1 + L of every loop where it comes nearest to zero between those; none on a grid."""
+    def poles(self) -> tuple[Any, BoolArray, BoolArray]:
+        """The closed loop's poles [1/s], (n,), and which count for damping and for frequency."""
 
     @property
     def on_axis(self) -> Any | None:
@@ -53,9 +76,6 @@ class Symbols(Protocol):
     @property
     def module_margin(self) -> float:
         """Radius of the disc about -1 that a limit on the sensitivity keeps clear; 0 without."""
-
-    def response(self, output: str, disturbance: str) -> Any:
-        """Return the closed-loop response at the margin frequencies, (k,)."""
 
     def moment(self, output: str, order: int) -> Any:
         """Return the spectral moment m_order of `output`, (1,)."""
@@ -89,9 +109,14 @@ class Limit(ABC):
         return (getattr(self, "output"),) if self.drive else ()  # noqa: B009
 
     @property
+    def channel(self) -> tuple[str, str] | None:
+        """Output and disturbance of the closed-loop response that the limit is on, if any."""
+        return None
+
+    @property
     def signals(self) -> tuple[str, ...]:
         """The outputs that the limit speaks of."""
-        return self.outputs
+        return self.outputs if self.channel is None else (self.channel[0],)
 
     @abstractmethod
     def rows(self, symbols: Symbols, bound: Any) -> Any:
@@ -101,20 +126,10 @@ class Limit(ABC):
     def measure(self, loop: Assessment) -> float:
         """Return the value that is compared with the bound."""
 
-    def critical(self, loop: Assessment) -> FloatArray:
-        """Return frequencies [rad/s] at which the rows should have nodes."""
-        del loop
-        return np.zeros(0)
-
     @property
     def edges(self) -> tuple[float, ...]:
         """Frequencies [rad/s] at which the limit begins or ends to hold."""
         return ()
-
-    def worst(self, loop: Assessment) -> FloatArray:
-        """Return the frequencies [rad/s] at which the limit is broken, for good."""
-        del loop
-        return np.zeros(0)
 
     def use(self, value: float) -> float:
         """Return the share of the limit that `value` uses; above 1 it is broken."""

@@ -1,4 +1,4 @@
-"""Limits on the loop: stability margins, roll-off and low-frequency error."""
+"""Limits on what gain and delay may change by until a loop is unstable."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from typing_extensions import override
 
-from models.basics import FloatArray, check_range
+from models.basics import check_range
 
 from ..loop import imag, joined, log, real, sqrt, squared, value_of, where
 from .limits import Limit, Symbols
@@ -22,35 +22,6 @@ _FAR = 1e3  # a loop gain beyond which a gain margin of zero asks for nothing
 _OVERLAP = 0.2  # of neighbouring discs, in their widths
 _THICK = 0.03  # half the width of the band about the arc that a delay margin forbids
 _TINY = 1e-12
-_ABOUT = np.array([-0.05, -0.02, -0.01, -0.004, 0.0, 0.004, 0.01, 0.02, 0.05])
-
-
-@dataclass(frozen=True, kw_only=True)
-class MaxSensitivity(Limit):
-    """|S| = 1/|1 + L| at most `bound` at every frequency (module margin 1/bound)."""
-
-    name: str = "max_sensitivity"
-
-    def __post_init__(self) -> None:
-        check_range("MaxSensitivity", "bound", self.bound, low=1.0, open_low=True)
-
-    @override
-    def rows(self, symbols: Symbols, bound: Any) -> Any:
-        # The logarithm keeps |L| of 1e6 at low frequency from dwarfing what matters.
-        places = [*symbols.differences, *symbols.nearest]
-        return joined([-log(squared(d) * bound**2) for d in places])
-
-    @override
-    def measure(self, loop: Assessment) -> float:
-        return loop.max_sensitivity
-
-    @override
-    def critical(self, loop: Assessment) -> FloatArray:
-        return loop.sensitivity_region(0.8 * self.bound)
-
-    @override
-    def worst(self, loop: Assessment) -> FloatArray:
-        return loop.sensitivity_peaks(self.bound)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,10 +48,6 @@ class GainMargin(Limit):
     @override
     def measure(self, loop: Assessment) -> float:
         return loop.margins.gain
-
-    @override
-    def critical(self, loop: Assessment) -> FloatArray:
-        return _around(loop.margins.real_axis_crossings)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,10 +78,6 @@ class GainMarginDown(Limit):
     @override
     def measure(self, loop: Assessment) -> float:
         return loop.margins.gain_down
-
-    @override
-    def critical(self, loop: Assessment) -> FloatArray:
-        return _around(loop.margins.real_axis_crossings)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,81 +121,6 @@ class DelayMargin(Limit):
     @override
     def measure(self, loop: Assessment) -> float:
         return loop.margins.delay
-
-    @override
-    def critical(self, loop: Assessment) -> FloatArray:
-        return _around(loop.margins.crossovers)
-
-
-@dataclass(frozen=True, kw_only=True)
-class RollOff(Limit):
-    """|L| at most `bound` from the frequency `above` [rad/s] on."""
-
-    above: float
-    name: str = "roll_off"
-
-    @property
-    @override
-    def edges(self) -> tuple[float, ...]:
-        return (self.above,)
-
-    @override
-    def rows(self, symbols: Symbols, bound: Any) -> Any:
-        at = np.flatnonzero(symbols.omega >= self.above)
-        return joined(
-            [log(squared(d[..., at] - 1.0) / bound**2 + 1e-6) for d in symbols.differences]
-        )
-
-    @override
-    def measure(self, loop: Assessment) -> float:
-        return loop.largest_loop_gain(self.above)[0]
-
-    @override
-    def critical(self, loop: Assessment) -> FloatArray:
-        return np.array([self.above, loop.largest_loop_gain(self.above)[1]])
-
-
-@dataclass(frozen=True, kw_only=True)
-class LowFrequency(Limit):
-    """|output / disturbance| at most `bound` up to the frequency `below` [rad/s].
-
-    Without it the optimum drops the displacement gain, and the load drifts with tide and swell.
-    """
-
-    output: str
-    disturbance: str
-    below: float
-    name: str = "low_frequency"
-
-    @property
-    @override
-    def signals(self) -> tuple[str, ...]:
-        return (self.output,)
-
-    @property
-    @override
-    def edges(self) -> tuple[float, ...]:
-        return (self.below,)
-
-    @override
-    def rows(self, symbols: Symbols, bound: Any) -> Any:
-        at = np.flatnonzero(symbols.omega <= self.below)
-        response = symbols.response(self.output, self.disturbance)
-        return log(squared(response[..., at]) / bound**2)
-
-    @override
-    def measure(self, loop: Assessment) -> float:
-        return loop.largest_response(self.output, self.disturbance, self.below)[0]
-
-    @override
-    def critical(self, loop: Assessment) -> FloatArray:
-        worst = loop.largest_response(self.output, self.disturbance, self.below)[1]
-        return np.array([worst, self.below])
-
-
-def _around(omega: FloatArray) -> FloatArray:
-    """Return frequencies at and about `omega`: a crossing moves while the gains do."""
-    return np.outer(omega, 1.0 + _ABOUT).ravel()
 
 
 def _off_segment(symbols: Symbols, start: Any, end: Any, ratio: float) -> Any:

@@ -39,6 +39,6 @@ if TYPE_CHECKING:
         with_drag,
     )
     from .margins import Margins, crossings, loop_margins, refine_minima
-    from .pole_region import PoleRegion
+    from .pole_region import PoleRegion, counted_poles, with_delay_models
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

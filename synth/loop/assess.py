@@ -28,13 +28,10 @@ from .controller import LinearController, closed_loop_plant, closed_loop_poles
 from .disturbance import Disturbance
 from .loop import DragElement, closed_loop, numeric_blocks, return_differences, with_drag
 from .margins import Margins, loop_margins, refine_minima, sensitivity_peaks, worst_margins
-from .pole_region import PoleRegion
+from .pole_region import PoleRegion, with_delay_models
 
 _RTOL = 1e-8  # of every variance
-_PADE = 6  # order of the delay models that the poles are those of
-_LATE, _LATE_PADE = 0.2, 12  # delay beyond which that is too little [s], and the order it takes
 _GRID_PER_DECADE = 150
-_MOST_NODES = 150  # that a region of high sensitivity asks for
 
 
 class Assessment:
@@ -88,20 +85,16 @@ class Assessment:
     @cached_property
     def poles(self) -> ComplexArray:
         """Poles of the closed loop [1/s], delays as Pade models."""
-        return closed_loop_poles(self._modelled, self.controller)
+        return closed_loop_poles(self._modelled[0], self.controller)
 
     @cached_property
     def pole_region(self) -> PoleRegion:
         """Decay, damping and frequency of the closed loop's poles, without the delay models'."""
-        own = len(self.plant.states)
-        models = np.linalg.eigvals(self._modelled.A[own:, own:])
-        return PoleRegion.of(self.poles, np.asarray(models, dtype=np.complex128))
+        return PoleRegion.of(self.poles, self._modelled[1])
 
     @cached_property
-    def _modelled(self) -> LinearPlant:
-        """The plant with Pade models for its delays, their states after its own."""
-        late = max(self.plant.delays, default=0.0) > _LATE
-        return self.plant.without_delays(_LATE_PADE if late else _PADE)
+    def _modelled(self) -> tuple[LinearPlant, ComplexArray]:
+        return with_delay_models(self.plant)
 
     @property
     def stable(self) -> bool:
@@ -177,27 +170,33 @@ class Assessment:
         found = [at[least < 1.0 / above] for at, least in self._peaks]
         return np.unique(np.concatenate(found))
 
-    def sensitivity_region(self, above: float) -> FloatArray:
-        """Return the peaks of |S| above a value, and the grid around them [rad/s]."""
-        found = []
-        for i, (at, least) in enumerate(self._peaks):
-            distance = np.abs(1.0 + self._grid_gain[i])
-            region = self.grid[distance < 1.0 / above]
-            found += [at[least < 1.0 / above], region[:: max(1, region.size // _MOST_NODES)]]
-        return np.unique(np.concatenate(found))
+    def largest_loop_gain(self, above: float) -> float:
+        """Return the largest |L| from frequency `above` [rad/s] on."""
+        grid = np.append(self.grid[self.grid > above], [above, 10.0 * self.grid[-1]])
+        return self._largest(lambda w: np.max(np.abs(self._gains(w)), 0), grid)
 
-    def largest_loop_gain(self, above: float) -> tuple[float, float]:
-        """Return the largest |L| from frequency `above` [rad/s] on, and where it is."""
-        return self._largest(
-            lambda w: np.max(np.abs(self._gains(w)), 0),
-            np.unique(np.append(self.grid[self.grid > above], [above, 10.0 * self.grid[-1]])),
-        )
+    def largest_response(
+        self,
+        output: str,
+        disturbance: str,
+        weight: Callable[[FloatArray], FloatArray],
+        edges: Sequence[float] = (),
+    ) -> float:
+        """Return the largest |response| times a weight on it.
 
-    def largest_response(self, output: str, disturbance: str, below: float) -> tuple[float, float]:
-        """Return the largest |response| up to frequency `below` [rad/s], and where it is."""
+        Parameters
+        ----------
+        output, disturbance
+            The ends of the channel.
+        weight
+            From frequencies [rad/s] to the weight there, zero where it does not matter.
+        edges
+            Frequencies [rad/s] at which the weight has a kink or an end.
+        """
+        ends = [share * edge for edge in edges for share in (1e-4, 1.0)]
         return self._largest(
-            lambda w: np.abs(self.response(output, disturbance, w)),
-            np.unique(np.append(self.grid[self.grid < below], [1e-4 * below, below])),
+            lambda w: np.abs(self.response(output, disturbance, w)) * weight(w),
+            np.append(self.grid, ends),
         )
 
     def spectrum(self, output: str, omega: FloatArray) -> FloatArray:
@@ -287,12 +286,9 @@ class Assessment:
         return [[response[:, i, j] for j in range(columns)] for i in range(rows)]
 
     @staticmethod
-    def _largest(
-        function: Callable[[FloatArray], FloatArray], grid: FloatArray
-    ) -> tuple[float, float]:
-        at, value = refine_minima(lambda w: -function(w), grid, -function(grid))
-        k = int(np.argmin(value))
-        return float(-value[k]), float(at[k])
+    def _largest(function: Callable[[FloatArray], FloatArray], places: FloatArray) -> float:
+        grid = np.unique(places)
+        return float(-refine_minima(lambda w: -function(w), grid, -function(grid))[1].min())
 
 
 def frequency_grid(poles: ComplexArray) -> FloatArray:

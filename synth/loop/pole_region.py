@@ -1,4 +1,10 @@
-"""Where the poles of a closed loop lie: decay, damping and frequency, for limits on them."""
+"""Where the poles of a closed loop lie: decay, damping and frequency, for limits on them.
+
+A late loop has poles without end, all of them far left but for a few; the models that stand for
+its delays put as many of their own there as their order is.  So each takes the pole nearest to it
+away, of the decaying ones; where damping is asked for, of those only that are too fast for the
+models to be right.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.basics import BoolArray, ComplexArray
+from models.plant import LinearPlant
 
+_PADE = 6  # order of the delay models that the poles are those of
+_LATE, _LATE_PADE = 0.2, 12  # delay beyond which that is too little [s], and the order it takes
 _AS_FAST = 0.8  # of the slowest model's pole: up to there a delay model is as good as the delay
 
 
@@ -39,14 +48,10 @@ class PoleRegion:
         poles
             The closed loop's poles, those that delay models bring with them among them.
         models
-            Poles of the delay models alone.  A late loop has poles without end, all of them
-            far left but for a few; the models put as many of their own there as their order
-            is.  So each takes the pole nearest to it away, of the decaying ones; where damping
-            is asked for, of those only that are too fast for the models to be right.
+            Poles of the delay models alone.
         """
         known = np.zeros(0, dtype=np.complex128) if models is None else models
-        too_fast = np.abs(poles) > _AS_FAST * np.abs(known).min(initial=np.inf)
-        swinging, all_left = _without(poles, known, too_fast), _without(poles, known)
+        swinging, all_left = (poles[counted] for counted in counted_poles(poles, known))
         sizes = np.abs(swinging)
         ratios = -swinging.real / np.where(sizes > 0.0, sizes, 1.0)
         return PoleRegion(
@@ -56,11 +61,26 @@ class PoleRegion:
         )
 
 
+def with_delay_models(plant: LinearPlant) -> tuple[LinearPlant, ComplexArray]:
+    """Return a plant with Pade models for its delays, and the poles of these alone [1/s]."""
+    late = max(plant.delays, default=0.0) > _LATE
+    modelled = plant.without_delays(_LATE_PADE if late else _PADE)
+    own = len(plant.states)  # those of the models come after them
+    return modelled, np.asarray(np.linalg.eigvals(modelled.A[own:, own:]), dtype=np.complex128)
+
+
+def counted_poles(poles: ComplexArray, models: ComplexArray) -> tuple[BoolArray, BoolArray]:
+    """Return which poles a damping ratio and which a highest frequency are about, (n,) each."""
+    too_fast = np.abs(poles) > _AS_FAST * np.abs(models).min(initial=np.inf)
+    return _without(poles, models, too_fast), _without(poles, models)
+
+
 def _without(
     poles: ComplexArray, models: ComplexArray, among: BoolArray | bool = True
-) -> ComplexArray:
+) -> BoolArray:
     decaying = (poles.real < 0.0) & among
-    left, others = poles[decaying], poles[~decaying]
-    for model in models[: left.size]:
-        left = np.delete(left, np.argmin(np.abs(left - model)))
-    return np.concatenate([left, others])
+    left = poles.real < np.inf
+    for model in models[: np.count_nonzero(decaying)]:
+        away = np.where(decaying & left, np.abs(poles - model), np.inf)
+        left[np.argmin(away)] = False
+    return left

@@ -23,16 +23,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from operator import methodcaller
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eig
 
-from models.basics import ComplexArray, FloatArray, Quadrature
+from models.basics import BoolArray, ComplexArray, FloatArray, Quadrature
 from models.plant import PlantResponse
 
+from ..limits import Size
 from ..loop import (
     Dual,
     at_least,
+    counted_poles,
     crossings,
     exp,
     joined,
@@ -45,10 +49,10 @@ from ..loop import (
 from ..structures import ParametrisedController
 from .problem import Goal, Problem
 
-_CLOSE = 1.5  # dips of |1 + L| below this many times the margin are followed between the nodes
-_LEAST_MARGIN = 0.1  # ... or times this one
 _FAINT = 1e-3  # loop gains whose crossings of the axis no gain margin is about
-_SHIFT = 1e-6  # relative, of a frequency, of differences
+_SHIFT = 1e-6  # relative, of a frequency or a parameter, of differences
+_SMALL = 1e-3  # of its typical size: a parameter below it is shifted as if it were that
+_SINGLE, _NUDGE = 1e-9, 1e-15  # product of unit eigenvectors below which poles are pulled apart
 _LEAST_CYCLES = float(np.exp(0.5))  # of a peak: a factor of one, below which the log turns negative
 
 
@@ -70,7 +74,7 @@ class LoopBlocks:
     def of(cls, problem: Problem, response: PlantResponse, outputs: Sequence[str]) -> LoopBlocks:
         """Return the blocks of a response for some outputs and the problem's disturbances."""
         z = [response.outputs.index(name) for name in outputs]
-        w = [response.disturbances.index(d.name) for d in problem.disturbances]
+        w = [response.disturbances.index(name) for name in problem.sources]
         zw, yw = response.zw[:, z][:, :, w], response.yw[:, :, w]
         zu, yu = response.zu[:, z], response.yu
         if problem.drag is not None:
@@ -295,7 +299,10 @@ Moments = Mapping[int, FloatArray]
 def moment_weights(problem: Problem, nodes: Quadrature) -> Moments:
     """Return quadrature weights times densities times powers of omega, (nw, k), by order."""
     densities = [d.density(nodes.omega) * nodes.weights for d in problem.disturbances]
-    return {order: np.array(densities) * nodes.omega**order for order in (0, 2)}
+    # What only limits speak of shakes nothing.
+    still = np.zeros((len(problem.sources) - len(densities), nodes.omega.size))
+    every = np.vstack([*densities, still])
+    return {order: every * nodes.omega**order for order in (0, 2)}
 
 
 Fresh = Callable[[FloatArray, bool], LoopResponses]
@@ -314,6 +321,8 @@ class LoopNumbers:
         The closed loop on the quadrature nodes and on the margin frequencies.
     weights, omega
         The weights of the moments on those nodes, and those frequencies [rad/s].
+    point
+        What the loop is closed with.
     log_drag
         Logarithm of the drag coefficient, or None.
     extra
@@ -330,6 +339,7 @@ class LoopNumbers:
         margins: LoopResponses,
         weights: Moments,
         omega: FloatArray,
+        point: Point,
         *,
         log_drag: Any = None,
         extra: Any = None,
@@ -337,7 +347,7 @@ class LoopNumbers:
     ) -> None:
         self._problem, self._outputs, self._weights = problem, tuple(outputs), weights
         self._cost, self._margins = cost, margins
-        self.omega = omega
+        self.omega, self._point = omega, point
         self.log_drag, self.extra = log_drag, extra
         self._amplitude = exp(extra * 2.0) if goal is Goal.SEA else None
         self._fresh: Fresh | None = None
@@ -351,6 +361,7 @@ class LoopNumbers:
             self._margins,
             weights,
             self.omega,
+            self._point,
             log_drag=self.log_drag,
             extra=self.extra,
         )
@@ -377,25 +388,78 @@ class LoopNumbers:
         """
         self._fresh = fresh
 
-    @cached_property
-    def nearest(self) -> list[Any]:
-        """1 + L of every loop at the refined dips of its size, (p,) each; none on a grid.
+    def curves(
+        self, size: Size, above: float, channel: tuple[str, str] | None = None
+    ) -> list[tuple[FloatArray, Any]]:
+        """Return curves at the margin frequencies, and at the refined peaks of a size between them.
 
-        The dips move with the parameters, but at a dip that changes its size in second order only.
+        The peaks move with the parameters, but at a peak that changes the size in second order
+        only.  See `synth.limits.Symbols`.
         """
+        takes: list[Callable[[LoopResponses], Any]]
+        if channel is None:
+            found = [(self.omega, d) for d in self.differences]
+            takes = [methodcaller("difference", i) for i in range(len(found))]
+        else:
+            row, column = self._outputs.index(channel[0]), self._problem.sources.index(channel[1])
+            takes = [methodcaller("response", row, column)]
+            found = [(self.omega, self._padded(takes[0](self._margins)))]
         fresh = self._fresh
         if fresh is None:
-            return []
-        found = []
-        for i, d in enumerate(self.differences):
-            at, _ = refine_minima(
-                partial(_size, fresh, i),
-                self.omega,
-                np.abs(value_of(d)),
-                np.abs(value_of(d)) < _CLOSE * max(self.module_margin, _LEAST_MARGIN),
-            )
-            found.append(self._padded(fresh(at, isinstance(d, Dual)).difference(i)))
+            return found
+        for take, (omega, curve) in zip(takes, found[:], strict=True):
+            there = size(omega, value_of(curve))
+
+            def away(w: FloatArray, take: Callable[[LoopResponses], Any] = take) -> FloatArray:
+                return -size(w, value_of(take(fresh(w, False))))
+
+            at, _ = refine_minima(away, omega, -there, there > above)
+            found.append((at, self._padded(take(fresh(at, isinstance(curve, Dual))))))
         return found
+
+    @cached_property
+    def poles(self) -> tuple[Any, BoolArray, BoolArray]:
+        """The closed loop's poles [1/s], and which count for damping and for frequency.
+
+        Of a conjugate pair one counts.  By u^H dA v / u^H v with the unit eigenvectors u, v; a
+        double pole, which moves infinitely fast, is pulled apart by a hair.
+        """
+        problem, point = self._problem, self._point
+        plant, models = problem.modelled
+        drag = point.drag
+        if not point.slopes:
+            given = [*point.values, *([] if drag is None else [drag])]
+            rows = np.stack(np.broadcast_arrays(*given), axis=-1)
+            count, found = len(point.values), []
+            for row in rows.reshape(-1, len(given)):
+                matrix = problem.loop_matrix(plant, row[:count], *row[count:])
+                poles = np.linalg.eigvals(matrix).astype(np.complex128)
+                found.append((poles, *_counted(poles, models)))
+            shape = (*rows.shape[:-2], -1)
+            several, swinging, own = (np.reshape(part, shape) for part in zip(*found, strict=True))
+            return several, swinging, own
+        values = np.array(point.values, dtype=np.float64)
+        uneven = np.linspace(-1.0, 1.0, values.size) if values.size > 1 else np.ones(1)
+        for nudge in (0.0, _NUDGE):
+            near = values * (1.0 + nudge * uneven)
+            matrix = problem.loop_matrix(plant, near, drag)
+            poles, left, right = eig(matrix, left=True, right=True)
+            product = np.einsum("ik,ik->k", left.conj(), right)
+            if np.abs(product).min() > _SINGLE:
+                break
+        product = np.where(product == 0.0, 1.0, product)
+        scales = [_SMALL * p.scale for p in problem.law.parameters]
+        steps = np.diag(_SHIFT * np.maximum(np.abs(values), scales))
+        slopes = []
+        ends = [[(values + sign * step, drag) for sign in (1.0, -1.0)] for step in steps]
+        widths = [2.0 * step.sum() for step in steps]
+        if problem.drag is not None:
+            ends.append([(values, drag * (1.0 + sign * _SHIFT)) for sign in (1.0, -1.0)])
+            widths.append(2.0 * _SHIFT)  # of its logarithm
+        for (more, less), width in zip(ends, widths, strict=True):
+            change = problem.loop_matrix(plant, *more) - problem.loop_matrix(plant, *less)
+            slopes.append(np.einsum("ik,ij,jk->k", left.conj(), change / width, right) / product)
+        return self._padded(Dual(poles, np.array(slopes))), *_counted(poles, models)
 
     @cached_property
     def on_axis(self) -> Any | None:
@@ -449,12 +513,6 @@ class LoopNumbers:
             turns = ((loop.slope + rate * shift) / gain).imag
             found.append(Dual(turn / at, turns / at - turn / at**2 * shift))
         return joined(found)
-
-    def response(self, output: str, disturbance: str) -> Any:
-        """Return the closed-loop response at the margin frequencies, (k,)."""
-        names = [d.name for d in self._problem.disturbances]
-        row, column = self._outputs.index(output), names.index(disturbance)
-        return self._padded(self._margins.response(row, column))
 
     @cached_property
     def _moments(self) -> Mapping[tuple[str, int], Any]:
@@ -513,13 +571,19 @@ class LoopNumbers:
         return Dual(found.value, np.concatenate([found.slope, np.zeros_like(found.slope[:1])]))
 
 
+def _counted(poles: ComplexArray, models: ComplexArray) -> tuple[BoolArray, BoolArray]:
+    """Return which poles count for damping and for frequency, one of each conjugate pair."""
+    swinging, own = counted_poles(poles, models)
+    # Of a pair of which the delay models took one the other counts, whichever it is.
+    below = poles.imag < 0.0
+    for counted in (swinging, own):
+        mates = np.isclose(poles[:, None], poles[counted & ~below].conj(), rtol=1e-9, atol=0.0)
+        counted &= ~(below & mates.any(axis=1))
+    return swinging, own
+
+
 def _gain(loop: LoopResponses, index: int) -> ComplexArray:
     return np.asarray(value_of(loop.difference(index)) - 1.0)
-
-
-def _size(fresh: Fresh, index: int, omega: FloatArray) -> FloatArray:
-    """Return |1 + L|, (k,)."""
-    return np.abs(1.0 + _gain(fresh(omega, False), index))
 
 
 def _height(fresh: Fresh, index: int, omega: FloatArray) -> FloatArray:

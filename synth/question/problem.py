@@ -13,7 +13,7 @@ from models.basics import ComplexArray, FloatArray
 from models.plant import LinearPlant
 
 from ..limits import Limit
-from ..loop import Assessment, Disturbance, DragElement, with_drag
+from ..loop import Assessment, Disturbance, DragElement, with_delay_models, with_drag
 from ..structures import ParametrisedController
 
 Values = Sequence[float] | FloatArray
@@ -62,13 +62,29 @@ class Problem:
             wanted.add(self.drag.velocity)
         return tuple(sorted(wanted))
 
+    @cached_property
+    def modelled(self) -> tuple[LinearPlant, ComplexArray]:
+        """The plant whose poles limits are on, and the poles of its delay models [1/s]."""
+        return with_delay_models(self.plant)
+
+    @cached_property
+    def sources(self) -> tuple[str, ...]:
+        """Names of the disturbances that shake the plant, then of others that limits speak of."""
+        spoken = [limit.channel[1] for limit in self.limits if limit.channel is not None]
+        return tuple(dict.fromkeys([*(d.name for d in self.disturbances), *spoken]))
+
     def loop_poles(self, values: Values, coefficient: float | None = None) -> ComplexArray:
         """Return the closed loop's poles [1/s], delays as Pade models."""
-        plant = self.rational
+        matrix = self.loop_matrix(self.rational, values, coefficient)
+        return np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
+
+    def loop_matrix(
+        self, plant: LinearPlant, values: Values, coefficient: float | None = None
+    ) -> FloatArray:
+        """Return the closed loop's state matrix on a rational model of the plant."""
         if self.drag is not None and coefficient is not None:
             plant = with_drag(plant, self.drag, coefficient)
-        matrix = self.law.closed_loop_matrix(plant, [float(v) for v in values])
-        return np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
+        return self.law.closed_loop_matrix(plant, [float(v) for v in values])
 
     def growth(self, values: Values) -> float:
         """Return the largest real part of a closed-loop pole [1/s], drag as the plant holds it."""

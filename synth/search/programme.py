@@ -488,6 +488,7 @@ class _Loop:
             LoopResponses(self._margins, closing.part(self._parts[1])),
             self.weights[0],
             self.omega,
+            _point(values, log_drag, slopes),
             log_drag=_variable(log_drag, values.size, values.size, extra, slopes),
             extra=_variable(extra, -1, values.size + (log_drag is not None), extra, slopes),
             goal=goal,

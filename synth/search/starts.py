@@ -201,13 +201,14 @@ def _merits(family: FamilyProblem, points: FloatArray) -> list[FloatArray]:
             drag = None
             if problem.drag is not None:
                 drag = _consistent(problem, own, parts[0], weights[0])
-            closing = Closing.of(problem, blocks.s, Point(values=own, drag=drag))
+            point = Point(values=own, drag=drag)
+            closing = Closing.of(problem, blocks.s, point)
             cuts = slice(0, nodes.omega.size), slice(nodes.omega.size, None)
             cost, margins = (
                 LoopResponses(part, closing.part(cut))
                 for part, cut in zip(parts, cuts, strict=True)
             )
-            numbers = LoopNumbers(problem, outputs, cost, margins, weights[0], omega)
+            numbers = LoopNumbers(problem, outputs, cost, margins, weights[0], omega, point)
             for k, i in enumerate(group):
                 member = family.scenarios[i].problem
                 seen = numbers if i == group[0] else numbers.under(member, weights[k])

@@ -11,6 +11,7 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .drum_speed import DrumSpeedLoop, SteadyMotion
+    from .fixed import Fixed
     from .low_order import LowOrder, LowOrderFeedback, LowOrderLaw
     from .lqg import LqgEstimator, LqgRegulator, reduced, weighing
     from .recursive import RecursiveController, Signals, checked_sample_time, make_recursion

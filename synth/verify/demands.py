@@ -8,12 +8,12 @@ becomes a `Demand`, and `Demand.measured` says what a recomputed loop makes of i
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from models.basics import FloatArray, SolverError, peak_factor, zero_crossing_period
+from models.basics import ComplexArray, FloatArray, SolverError, peak_factor, zero_crossing_period
 from models.case import Case
 from models.plant import LinearPlant, PlantData, fixed_top_modes, lump_rope, lumped_modes
 
@@ -29,7 +29,9 @@ HOOK = "hook.heave"
 
 _TORQUE, _SPEED, _TENSION = "motor.torque", "motor.speed", "rope.tension"
 _POWER = "motor.power.peak"
-_MARGINS = ("max_sensitivity", "gain", "gain_down", "delay")
+_MARGINS = ("max_sensitivity", "gain", "gain_down", "delay", "disk")
+_POLES = ("decay", "damping", "frequency")
+_AS_FAST = 0.8  # of the slowest pole of a delay model: it is as good as the delay up to there
 _WITH_PERIOD = ("peak", "least", "power")
 _MODELLED = 0.05  # a lumped mode within this share of the exact one counts as modelled
 _KINDS = {  # by class of `synth.limits.margin_limits` and `synth.limits.signal_limits`
@@ -37,6 +39,11 @@ _KINDS = {  # by class of `synth.limits.margin_limits` and `synth.limits.signal_
     "GainMargin": "gain",
     "GainMarginDown": "gain_down",
     "DelayMargin": "delay",
+    "DiskMargin": "disk",
+    "LeastDecay": "decay",
+    "LeastDamping": "damping",
+    "HighestFrequency": "frequency",
+    "WeightedResponse": "weighted",
     "LowFrequency": "low_frequency",
     "RollOff": "roll_off",
     "Rms": "rms",
@@ -56,9 +63,10 @@ class Demand:
     name
         As in reports.
     kind
-        A margin (``max_sensitivity``, ``gain``, ``gain_down``, ``delay``), a gain
-        (``low_frequency``, ``roll_off``) or a size (``rms``, ``continuous``, ``peak``,
-        ``least``, ``power``).
+        A margin (``max_sensitivity``, ``gain``, ``gain_down``, ``delay``, ``disk``), a gain
+        (``low_frequency``, ``roll_off``, ``weighted``), a figure of the poles (``decay``,
+        ``damping``, ``frequency``) or a size (``rms``, ``continuous``, ``peak``, ``least``,
+        ``power``).
     bound
         The bound.
     enforced
@@ -66,13 +74,15 @@ class Demand:
     outputs
         The signals that it is about.
     disturbance
-        The other end of a ``low_frequency`` gain.
+        The other end of a ``low_frequency`` or ``weighted`` gain.
     static
         Value at rest of the (first) signal.
     frequency
         Up to which (``low_frequency``) or from which (``roll_off``) it holds [rad/s].
     duration
         Exposure time of a peak [s].
+    weights
+        Of a ``weighted`` gain, from frequencies [rad/s].
     """
 
     name: str
@@ -84,11 +94,12 @@ class Demand:
     static: float = 0.0
     frequency: float = math.nan
     duration: float = math.nan
+    weights: Callable[[FloatArray], FloatArray] = np.ones_like
 
     @property
     def at_least(self) -> bool:
         """Whether the bound is a lower one."""
-        return self.kind in ("gain", "delay", "least")
+        return self.kind in ("gain", "delay", "least", "disk", "decay", "damping")
 
     @property
     def drive(self) -> bool:
@@ -98,7 +109,7 @@ class Demand:
     @property
     def orders(self) -> dict[str, tuple[int, ...]]:
         """Orders of the spectral moments that it needs, by output."""
-        if self.kind in (*_MARGINS, "low_frequency", "roll_off"):
+        if self.kind in (*_MARGINS, *_POLES, "low_frequency", "roll_off", "weighted"):
             return {}
         return dict.fromkeys(self.outputs, (0, 2) if self.kind in _WITH_PERIOD else (0,))
 
@@ -111,13 +122,20 @@ class Demand:
         """Return what a loop, its margins and its m0 (and m2) make of the limit."""
         if self.kind in _MARGINS:
             return float(getattr(margins, self.kind))
-        if self.kind == "low_frequency":
+        if self.kind in _POLES:
+            return _pole_figure(self.kind, loop.closed, loop.models)
+        if self.kind in ("low_frequency", "weighted"):
 
             def drift(omega: FloatArray) -> FloatArray:
                 found = loop.transfer(imaginary(omega), self.outputs, [self.disturbance])
-                return np.asarray(np.abs(found[:, 0, 0]), dtype=np.float64)
+                sizes = np.abs(found[:, 0, 0]) * self.weights(omega)
+                return np.asarray(sizes, dtype=np.float64)
 
-            return largest(drift, 1e-4 * self.frequency, self.frequency, loop.marks)
+            if self.kind == "low_frequency":
+                return largest(drift, 1e-4 * self.frequency, self.frequency, loop.marks)
+            marks = np.abs(loop.marks)
+            ends = min(1e-4, 0.01 * float(marks.min())), 100.0 * float(marks.max())
+            return largest(drift, *ends, loop.marks)
         if self.kind == "roll_off":
             loops = [loop.broken(i) for i in range(loop.inputs)]
 
@@ -160,7 +178,7 @@ def limit_demand(limit: StatedLimit, enforced: bool = True) -> Demand:
             "independent measure for"
         )
     outputs: tuple[str, ...] = limit.outputs
-    if kind == "low_frequency":
+    if kind in ("low_frequency", "weighted"):
         outputs = (getattr(limit, "output"),)  # noqa: B009
     frequency = getattr(limit, "below", getattr(limit, "above", math.nan))
     return Demand(
@@ -173,6 +191,7 @@ def limit_demand(limit: StatedLimit, enforced: bool = True) -> Demand:
         static=getattr(limit, "static", 0.0),
         frequency=frequency,
         duration=getattr(limit, "duration", math.nan),
+        weights=getattr(limit, "weights", np.ones_like),
     )
 
 
@@ -242,6 +261,25 @@ def case_demands(case: Case, data: PlantData, plant: LinearPlant, masses: int) -
             )
         )
     return {demand.name: demand for demand in found}
+
+
+def _pole_figure(kind: str, poles: ComplexArray, models: ComplexArray) -> float:
+    """Return a figure of a loop's poles [1/s], those that delay models bring with them left out.
+
+    Each model's pole stands for the nearest decaying one: of a damping ratio for those alone that
+    are too fast for the models to be right.
+    """
+    left = sorted(poles, key=lambda s: s.real)
+    if kind == "decay":
+        return -float(left[-1].real)
+    slowest = _AS_FAST * float(np.abs(models).min(initial=np.inf))
+    for model in models:
+        near = [s for s in left if s.real < 0.0 and (kind == "frequency" or abs(s) > slowest)]
+        if near:
+            left.remove(min(near, key=lambda s: abs(s - model)))
+    if kind == "frequency":
+        return float(max(abs(s) for s in left))
+    return float(min((-s.real / abs(s) for s in left), default=1.0))
 
 
 def _first_unmodelled(data: PlantData, masses: int) -> float:

@@ -21,6 +21,7 @@ from .verification import Check, agreement, failure
 from .winding import Winding, count_unstable, open_loop_poles
 
 PADE = 8  # order of the delay models: those of the optimiser have five or six
+_COUNTED_PADE = 6  # order of the delay models that say which poles a limit on poles counts
 _LATE, _LATE_PADE = 0.2, 12  # delay beyond which that is too little [s], and the order it takes
 TIGHT = 1e-4  # of margins, drag and limits on the design's own plant
 
@@ -74,9 +75,9 @@ def winding_check(winding: Winding, on: str) -> Check:
     )
 
 
-def pade_order(plant: LinearPlant) -> int:
+def pade_order(plant: LinearPlant, usual: int = PADE) -> int:
     """Return the order of delay models that tells a loop's poles, rope and all."""
-    return _LATE_PADE if max(plant.delays, default=0.0) > _LATE else PADE
+    return _LATE_PADE if max(plant.delays, default=0.0) > _LATE else usual
 
 
 def pole_check(name: str, plant: LinearPlant, law: LawMatrices, on: str, slowest: float) -> Check:
@@ -128,11 +129,15 @@ class CheckedLoop:
     def loop(self) -> Loop:
         """The closed loop by its responses."""
         marks = closed_loop_marks(self.plant, self.law)
+        rational = self.plant.without_delays(pade_order(self.plant, _COUNTED_PADE))
+        own = len(self.plant.states)
         return Loop(
             plant=self.exact or self.plant.response_at,
             law=self.law,
             marks=np.concatenate([marks, np.asarray(self.marks, dtype=np.complex128)]),
             inputs=len(self.plant.inputs),
+            closed=np.linalg.eigvals(closed_matrices(rational, self.law)[0]).astype(np.complex128),
+            models=np.linalg.eigvals(rational.A[own:, own:]).astype(np.complex128),
         )
 
     @cached_property

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -73,12 +73,16 @@ class Loop:
         Poles [1/s] near which something happens: of the open and of the closed loop.
     inputs
         Number of inputs, that is of loops to break.
+    closed, models
+        Poles [1/s] of the closed loop and of its delay models, where limits on them are measured.
     """
 
     plant: Callable[[ComplexArray], PlantResponse]
     law: Callable[[ComplexArray], ComplexArray]
     marks: ComplexArray
     inputs: int = 1
+    closed: ComplexArray = field(default_factory=lambda: np.zeros(0, dtype=np.complex128))
+    models: ComplexArray = field(default_factory=lambda: np.zeros(0, dtype=np.complex128))
 
     def difference(self, s: ComplexArray) -> ComplexArray:
         """Return det(I - C P_yu), (k,)."""

@@ -6,8 +6,11 @@ import dataclasses
 from collections.abc import Callable
 from types import SimpleNamespace
 
+import control
 import numpy as np
 import pytest
+import scipy.optimize
+import scipy.signal
 from loop_numbers import (
     closed_matrices,
     dense_grid,
@@ -26,8 +29,12 @@ from models.plant import LinearPlant
 from synth import (
     Continuous,
     DelayMargin,
+    DiskMargin,
     GainMargin,
     GainMarginDown,
+    HighestFrequency,
+    LeastDamping,
+    LeastDecay,
     LowFrequency,
     LowOrder,
     MaxSensitivity,
@@ -37,6 +44,7 @@ from synth import (
     Rms,
     RollOff,
     StaticGain,
+    WeightedResponse,
     White,
     tune,
 )
@@ -134,6 +142,40 @@ def peak(plant: LinearPlant, controller: LinearController, output: str, duration
     return float(np.sqrt(2.0 * np.log(duration / period) * m0))
 
 
+def disk(plant: LinearPlant, controller: LinearController) -> float:
+    sensitivity = 1.0 / (1.0 + loop_response(plant, controller)(dense_grid(plant, controller)))
+    return float(1.0 / np.abs(sensitivity - 0.5).max())
+
+
+def poles(plant: LinearPlant, controller: LinearController) -> np.ndarray:
+    return np.linalg.eigvals(closed_matrices(plant, controller)[0])
+
+
+def lead() -> control.TransferFunction:
+    return control.tf([1.0, 0.0], [0.3, 1.0])
+
+
+def weighted_effort(plant: LinearPlant, controller: LinearController) -> float:
+    """Largest |W F| from the disturbance to the command, by python-control."""
+    A, E, C, F = closed_matrices(plant, controller)
+    row = plant.outputs.index("u_sent")
+    loop = control.ss(A, E, C[[row]], F[[row]])
+    return largest_gain(control.ss(lead()) * loop)
+
+
+def largest_gain(system: control.StateSpace) -> float:
+    """Largest gain of a system of one input and one output, on a dense grid and then by Brent."""
+    grid = np.geomspace(1e-3, 1e4, 20001)
+    k = int(np.argmax(np.abs(system(1j * grid))))
+    found = scipy.optimize.minimize_scalar(
+        lambda w: -abs(system(1j * w)),
+        bounds=(grid[max(0, k - 1)], grid[min(k + 1, grid.size - 1)]),
+        method="bounded",
+        options={"xatol": 1e-9},
+    )
+    return max(-float(found.fun), float(np.abs(system(1j * grid[k]))))
+
+
 Measure = Callable[[LinearPlant, LinearController], float]
 HOUR = 3600.0
 
@@ -175,6 +217,53 @@ BINDING = {
         0.265,
         delay_reserve,
         0.1,
+    ),
+    "disk_margin": (
+        late_servo(),
+        StaticGain(),
+        SERVO_QUESTION,
+        lambda bound: DiskMargin(bound=bound),
+        0.9,
+        disk,
+        1e-3,
+    ),
+    "decay": (
+        servo(),
+        StaticGain(),
+        SERVO_QUESTION,
+        lambda bound: LeastDecay(bound=bound),
+        2.2,
+        lambda p, c: float(-poles(p, c).real.max()),
+        1e-6,
+    ),
+    "damping": (
+        servo(),
+        StaticGain(),
+        SERVO_QUESTION,
+        lambda bound: LeastDamping(bound=bound),
+        0.9,
+        lambda p, c: float((-poles(p, c).real / np.abs(poles(p, c))).min()),
+        1e-6,
+    ),
+    "frequency": (
+        servo(),
+        StaticGain(),
+        SERVO_QUESTION,
+        lambda bound: HighestFrequency(bound=bound),
+        3.0,
+        lambda p, c: float(np.abs(poles(p, c)).max()),
+        1e-6,
+    ),
+    "weighted": (
+        servo(),
+        StaticGain(),
+        SERVO_QUESTION,
+        lambda bound: WeightedResponse(
+            output="u_sent", disturbance="f", weight=lead(), bound=bound
+        ),
+        3.5,
+        weighted_effort,
+        1e-4,
     ),
     "roll_off": (
         two_carts(),
@@ -366,7 +455,7 @@ def rows(limit: Limit, loop_gains, omega=None, module_margin: float = 0.0) -> np
     omega = np.ones(points.size) if omega is None else np.broadcast_to(omega, points.shape)
     symbols = SimpleNamespace(
         differences=[1.0 + points],
-        nearest=[],
+        curves=lambda size, above, channel: [(np.array(omega, dtype=float), 1.0 + points)],
         on_axis=None,
         turning_delays=None,
         omega=np.array(omega, dtype=float),
@@ -430,6 +519,115 @@ def test_roll_off_looks_only_above_its_frequency() -> None:
     assert rows(limit, [0.09j, 9.0], [6.0, 4.0]).max() < 0.0
 
 
+def test_disk_margin_forbids_a_disc_about_what_is_beyond_minus_one() -> None:
+    limit = DiskMargin(bound=1.0)  # gain from 1/3 to 3: from -3 to -1/3 on the axis
+    assert np.all(rows(limit, [-2.99, -1.0 + 0.01j, -0.34]) > 0.0)
+    assert np.all(rows(limit, [-3.01, -0.33, 0.0, 1.0, 1e6j, 1e6, -1.0 + 1.4j]) < 0.0)
+
+
+def test_weight_may_be_a_callable_a_table_or_a_transfer_function() -> None:
+    omega = np.geomspace(1e-2, 1e2, 400)
+    exact = np.abs(1j * omega / (0.3j * omega + 1.0))
+    for weight in (
+        lambda w: 1j * w / (0.3j * w + 1.0),
+        (omega, exact),
+        scipy.signal.lti([1.0, 0.0], [0.3, 1.0]),
+        scipy.signal.StateSpace([[-1.0 / 0.3]], [[1.0]], [[-1.0 / 0.09]], [[1.0 / 0.3]]),
+        lead(),
+        control.ss(lead()),
+    ):
+        limit = WeightedResponse(output="x", disturbance="f", weight=weight)
+        assert limit.weights(omega) == pytest.approx(exact, rel=1e-9)
+        assert limit.name == "x/f.weighted"
+        assert limit.bound == 1.0
+    table = WeightedResponse(output="x", disturbance="f", weight=([1.0, 100.0], [2.0, 200.0]))
+    assert table.weights(np.array([0.5, 10.0, 101.0])) == pytest.approx([0.0, 20.0, 0.0])
+
+
+def test_low_frequency_is_a_weight_of_one_up_to_its_end() -> None:
+    question = {**MASS_QUESTION, "spectrum": {"f": White(1.0)}}
+    plant = with_full_state(oscillator())
+    old = LowFrequency(bound=0.1, output="x", disturbance="f", below=0.5)
+    new = WeightedResponse(bound=0.1, output="x", disturbance="f", weight=([1e-6, 0.5], [1.0, 1.0]))
+    found = [tune(plant, StaticGain(), limits=[limit], **question) for limit in (old, new)]
+    assert all(f.ok for f in found)
+    assert found[0].cost == pytest.approx(found[1].cost, rel=1e-7)
+
+
+def test_weighted_limit_may_be_on_a_disturbance_without_a_spectrum() -> None:
+    # From the place's noise to the command, of which the spectrum says nothing.
+    question = {"spectrum": {"f": White(1.0)}, "minimise": {"x": 1.0, "effort": 0.05}, "starts": 3}
+    law = StaticGain(bounds={"K[u,y]": (-30.0, 30.0)})
+    plant = oscillator(damping=2.0)
+    free = tune(plant, law, **question)
+    limit = WeightedResponse(output="effort", disturbance="n", weight=lambda w: 1.0 + 0.0 * w)
+    use = limit.measure(free.assessment)
+    found = tune(plant, law, limits=[dataclasses.replace(limit, bound=0.9 * use)], **question)
+    assert found.ok, found.status
+    A, E, C, F = closed_matrices(plant, found.controller)
+    peak_gain = largest_gain(control.ss(A, E[:, [1]], C[[1]], F[[1]][:, [1]]))
+    assert peak_gain == pytest.approx(0.9 * use, rel=1e-4)
+    assert found.verify().ok
+
+
+def test_peak_between_the_nodes_is_followed_and_held() -> None:
+    # A narrow weight about one frequency, which no grid knows of, at the loop's own peak.
+    def notch(omega):
+        return 1.0 / np.abs(1.0 + 1j * 400.0 * (omega / 2.0 - 2.0 / omega))
+
+    limit = WeightedResponse(output="u_sent", disturbance="f", weight=notch)
+    free = tune(servo(), StaticGain(), **SERVO_QUESTION)
+    grid = np.linspace(1.9, 2.1, 40001)
+    A, E, C, _ = closed_matrices(servo(), free.controller)
+    exact = max(
+        abs(C[3] @ np.linalg.solve(1j * w * np.eye(3) - A, E[:, 0])) * notch(w) for w in grid[::20]
+    )
+    with_edge = dataclasses.replace(limit, weight=_Edged(notch))
+    assert with_edge.measure(free.assessment) == pytest.approx(exact, rel=1e-6)
+
+
+class _Edged:
+    """A weight that says where it is lively, as a transfer function does by its poles."""
+
+    poles = (2.0,)
+
+    def __init__(self, function) -> None:
+        self.function = function
+
+    def __call__(self, omega):
+        return self.function(omega)
+
+
+@pytest.mark.parametrize(
+    ("limits", "double"),
+    [
+        ([LeastDamping(bound=1.0)], None),
+        ([LeastDecay(bound=3.0), HighestFrequency(bound=3.05)], 3.0),
+        ([LeastDecay(bound=2.5), LeastDamping(bound=1.0)], 2.5),
+        ([HighestFrequency(bound=1.0)], 1.0),
+    ],
+    ids=["damping", "decay and frequency", "decay and damping", "frequency"],
+)
+def test_double_pole_at_the_optimum_does_not_break_the_search(limits, double) -> None:
+    # x'' = u + f, u = -k x - c v: the regulator's poles are -1.495 +- 1.495i; these limits make
+    # them one double pole, s = -p, which moves infinitely fast with k.
+    plant = with_full_state(double_integrator())
+    question = {"spectrum": {"f": White(1.0)}, "minimise": {"x": 1.0, "effort": 0.05}}
+    found = tune(plant, StaticGain(), limits=limits, starts=4, **question)
+    assert found.ok, found.status
+
+    def cost(p: float) -> float:
+        controller = LinearController.static([[-(p**2), -2.0 * p]], plant.measurements, ("u",))
+        noise = {"f": White(1.0)}
+        variances = lyapunov_variances(plant, controller, noise)
+        return float(np.sqrt(variances["x"] + 0.05 * variances["effort"]))
+
+    if double is None:
+        double = scipy.optimize.minimize_scalar(cost, bounds=(0.3, 10.0), method="bounded").x
+    assert found.cost == pytest.approx(cost(double), rel=1e-4)
+    assert found.assessment.poles == pytest.approx([-double, -double], rel=2e-3)
+
+
 def test_use_is_one_at_the_bound_and_grows_beyond_it() -> None:
     cases: list[tuple[Limit, float, float]] = [
         (MaxSensitivity(bound=2.0), 2.0, 2.2),
@@ -437,6 +635,10 @@ def test_use_is_one_at_the_bound_and_grows_beyond_it() -> None:
         (GainMarginDown(bound=0.5), 0.5, 0.6),
         (DelayMargin(bound=0.1), 0.1, 0.05),
         (RollOff(bound=0.2, above=1.0), 0.2, 0.3),
+        (DiskMargin(bound=0.7), 0.7, 0.6),
+        (LeastDecay(bound=0.2), 0.2, 0.1),
+        (LeastDamping(bound=0.5), 0.5, 0.3),
+        (HighestFrequency(bound=20.0), 20.0, 30.0),
         (Rms(output="x", bound=3.0), 3.0, 4.0),
         (Peak(output="x", bound=3.0), 3.0, 4.0),
         (Continuous(output="x", bound=3.0), 3.0, 4.0),
@@ -471,6 +673,20 @@ def test_least_and_peak_are_mirror_images() -> None:
         (lambda: GainMargin(bound=0.5), "GainMargin: bound must be above 1, got 0.5"),
         (lambda: GainMarginDown(bound=1.0), r"GainMarginDown: bound must be in \[0, 1\), got 1.0"),
         (lambda: DelayMargin(bound=0.0), "DelayMargin: bound must be above 0 s, got 0.0"),
+        (lambda: DiskMargin(bound=2.0), r"DiskMargin: bound must be in \(0, 2\), got 2.0"),
+        (lambda: LeastDecay(bound=0.0), "LeastDecay: bound must be above 0 1/s, got 0.0"),
+        (lambda: LeastDamping(bound=1.1), r"LeastDamping: bound must be in \(0, 1\], got 1.1"),
+        (lambda: HighestFrequency(bound=-1.0), "HighestFrequency: bound must be above 0 rad/s"),
+        (
+            lambda: WeightedResponse(output="x", disturbance="f", weight=([1.0, 2.0], [0.0, 1.0])),
+            "WeightedResponse: weight must be a callable, a transfer function or a table",
+        ),
+        (
+            lambda: WeightedResponse(
+                output="x", disturbance="f", weight=scipy.signal.dlti([1.0], [1.0, 0.5])
+            ),
+            "WeightedResponse: weight must be continuous in time, got a sampled one",
+        ),
         (lambda: Rms(output="x", bound=-1.0), "Rms: bound must be above 0, got -1.0"),
         (
             lambda: Peak(output="x", bound=1.0, duration=0.0),
