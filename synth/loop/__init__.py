@@ -1,7 +1,7 @@
 """The closed loop of a plant and a linear controller.
 
 In come a linear plant, a controller in state space and the spectra of the disturbances; out come
-responses (for numbers and for CasADi symbols alike), poles, variances, stability margins and the
+responses, poles, variances, stability margins and the
 drag that agrees with the motion.
 """
 
@@ -29,11 +29,8 @@ if TYPE_CHECKING:
     )
     from .loop import (
         DragElement,
-        Phasor,
         PlantBlocks,
-        close_scalar,
         closed_loop,
-        determinant,
         numeric_blocks,
         return_differences,
         with_drag,

@@ -355,7 +355,7 @@ def consistent_coefficient(
                 if not loop(other).stable:
                     return np.inf
                 calm = other
-            # More drag is a rank-one change of the closed loop, as in `close_scalar`.
+            # More drag is a rank-one change of the closed loop (Woodbury).
             return float(np.sqrt(np.abs(1.0 + (other - coefficient) * felt) ** -2 @ weights))
 
         return velocity

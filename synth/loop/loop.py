@@ -14,9 +14,8 @@ r"""The closed loop on frequency nodes: every response from one diagram, exact d
     L = -C yu                               loop gain broken at u
     1 + L_i = det(I - C yu) / minor_ii      loop i broken, all others closed; S_i its inverse
 
-The formulas are stated once, for NumPy's complex arrays and for `Phasor` symbols (CasADi knows
-only reals): the optimiser and the reports thus cannot disagree on what a loop is.  (The
-verification uses none of this.)
+For reports; the optimiser, which wants slopes too, has them in `synth.question.loop_numbers`, and
+the verification uses neither.
 
 Quadratic drag enters as an equivalent linear element: stochastic linearisation replaces the force
 q |v| v of a Gaussian velocity by C v, C = q sqrt(8/pi) sigma_v (Caughey 1963; Roberts and Spanos,
@@ -31,75 +30,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
 from models.basics import check_range
 from models.plant import LinearPlant, PlantResponse
 
-# What both kinds of number share; NumPy and CasADi have no common static type.
-Complex = Any
+Complex = Any  # a vector over the nodes, or a number
 Matrix = list[list[Complex]]
-
-
-@dataclass(frozen=True)
-class Phasor:
-    """A vector of complex numbers as two CasADi vectors (or scalars) of equal shape."""
-
-    re: Any
-    im: Any
-
-    def __add__(self, other: Complex) -> Phasor:
-        b = _phasor(other)
-        return Phasor(self.re + b.re, self.im + b.im)
-
-    __radd__ = __add__
-
-    def __neg__(self) -> Phasor:
-        return Phasor(-self.re, -self.im)
-
-    def __sub__(self, other: Complex) -> Phasor:
-        b = _phasor(other)
-        return Phasor(self.re - b.re, self.im - b.im)
-
-    def __rsub__(self, other: Complex) -> Phasor:
-        return _phasor(other) - self
-
-    def __mul__(self, other: Complex) -> Phasor:
-        b = _phasor(other)
-        return Phasor(self.re * b.re - self.im * b.im, self.re * b.im + self.im * b.re)
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Complex) -> Phasor:
-        b = _phasor(other)
-        scale = 1.0 / (b.re * b.re + b.im * b.im)
-        return Phasor(
-            (self.re * b.re + self.im * b.im) * scale, (self.im * b.re - self.re * b.im) * scale
-        )
-
-    def __rtruediv__(self, other: Complex) -> Phasor:
-        return _phasor(other) / self
-
-    def squared(self) -> Any:
-        """Return the squared magnitude."""
-        return self.re * self.re + self.im * self.im
-
-
-def _phasor(value: Complex) -> Phasor:
-    if isinstance(value, Phasor):
-        return value
-    if isinstance(value, complex | np.complexfloating):
-        return Phasor(value.real, value.imag)
-    return Phasor(value, 0.0)
-
-
-def constant(values: npt.NDArray[np.complex128]) -> Phasor:
-    """Return numbers, (k,), as a phasor of CasADi constants."""
-    return Phasor(
-        ca.DM(np.ascontiguousarray(values.real)), ca.DM(np.ascontiguousarray(values.imag))
-    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,13 +60,12 @@ class PlantBlocks:
         return self.disturbances.index(disturbance)
 
 
-def numeric_blocks(response: PlantResponse, *, symbolic: bool = False) -> PlantBlocks:
-    """Return the blocks of a response, as NumPy vectors or as CasADi constants."""
+def numeric_blocks(response: PlantResponse) -> PlantBlocks:
+    """Return the blocks of a response as vectors over the nodes."""
 
     def nested(block: npt.NDArray[np.complex128]) -> Matrix:
         rows, columns = block.shape[1:]
-        make = constant if symbolic else np.asarray
-        return [[make(block[:, i, j]) for j in range(columns)] for i in range(rows)]
+        return [[block[:, i, j] for j in range(columns)] for i in range(rows)]
 
     return PlantBlocks(
         zw=nested(response.zw),
@@ -171,47 +108,6 @@ def return_differences(blocks: PlantBlocks, law: Matrix) -> list[Complex]:
     return result
 
 
-def determinant(blocks: PlantBlocks, law: Matrix) -> Complex:
-    """Return det(I - C yu): closed-loop over open-loop characteristic function."""
-    rows = [list(line) for line in _difference(blocks, law)]
-    result: Complex = rows[0][0]
-    for k in range(len(rows) - 1):
-        for i in range(k + 1, len(rows)):
-            ratio = rows[i][k] / rows[k][k]
-            for j in range(k + 1, len(rows)):
-                rows[i][j] = rows[i][j] - ratio * rows[k][j]
-        result = result * rows[k + 1][k + 1]
-    return result
-
-
-def close_scalar(blocks: PlantBlocks, output: str, disturbance: str, gain: Any) -> PlantBlocks:
-    """Return the blocks with `disturbance` = ... + gain * `output` closed around the plant.
-
-    This is how an equivalent linear element (drag: force = -C velocity) enters with a
-    coefficient that is itself unknown: a rank-one update of every block,
-    ``P_ab + P_af gain (1 - P_vf gain)^-1 P_vb`` (Woodbury).
-    """
-    v, f = blocks.row(output), blocks.column(disturbance)
-    factor = gain / (1.0 - blocks.zw[v][f] * gain)
-    to_z = [blocks.zw[i][f] * factor for i in range(len(blocks.zw))]
-    to_y = [blocks.yw[i][f] * factor for i in range(len(blocks.yw))]
-
-    def updated(block: Matrix, out: list[Complex], row: list[Complex]) -> Matrix:
-        return [
-            [entry + out[i] * row[j] for j, entry in enumerate(line)]
-            for i, line in enumerate(block)
-        ]
-
-    return PlantBlocks(
-        zw=updated(blocks.zw, to_z, blocks.zw[v]),
-        zu=updated(blocks.zu, to_z, blocks.zu[v]),
-        yw=updated(blocks.yw, to_y, blocks.zw[v]),
-        yu=updated(blocks.yu, to_y, blocks.zu[v]),
-        outputs=blocks.outputs,
-        disturbances=blocks.disturbances,
-    )
-
-
 def _difference(blocks: PlantBlocks, law: Matrix) -> Matrix:
     """Return I - C yu."""
     columns = range(len(law))
@@ -226,12 +122,12 @@ def _dot(a: Sequence[Complex], b: Sequence[Complex]) -> Complex:
     for x, y in zip(a, b, strict=True):
         if isinstance(x, float | int) and x == 0.0:
             continue  # a structural zero costs nothing
-        total = y * x + total  # the response first: it knows complex arithmetic
+        total = x * y + total
     return total
 
 
 def _solve(matrix: Matrix, right: Sequence[Complex]) -> list[Complex]:
-    """Solve a small system whose entries are vectors over the nodes (no pivoting: symbols)."""
+    """Solve a small system whose entries are vectors over the nodes, without pivoting."""
     count = len(matrix)
     rows = [list(line) for line in matrix]
     b = list(right)

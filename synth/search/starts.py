@@ -10,6 +10,7 @@ where too few are stable, moves the least unstable ones left by minimising their
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -59,26 +60,35 @@ def begin_points(
     first = [guess for guess in given if family.abscissa(guess, enough=0.0) < _STABLE][:count]
     # Guesses that are not may be mended by phase I.
     points = [np.vstack(given)] if len(given) > len(first) else []
+    beside = 0  # candidates of another kind, which come last
     if all(loop.blend is None for loop in loops):
         chosen = loops[:: max(1, len(loops) // 4)]
         drawn = [candidates(loop.problem, _CANDIDATES // len(chosen), seed) for loop in chosen]
-        points += drawn
+        others = [others_of(loop.problem) for loop in chosen]
+        points += [*drawn, *others]
+        beside = sum(len(part) for part in others)
     if not points:
         return first
     every = np.vstack(points)
     abscissas = np.array([family.abscissa(point, enough=0.0) for point in every])
-    stable = every[abscissas < _STABLE]
+    settled = abscissas < _STABLE
+    stable, beside = every[settled], int(np.count_nonzero(settled[len(every) - beside :]))
     if len(stable) < count:
         # Phase I moves the least unstable ones; those that are stable need no moving.
         rest = np.where(abscissas < 0.0, np.inf, abscissas)
         found = stabilise(family, every, rest, count)
-        stable = np.vstack([stable, *[f[None] for f in found]])
+        stable = np.vstack([*[f[None] for f in found], stable])
     if not len(stable):
         return first
     wanted = count - len(first)
-    orders = [pick_spread(stable, m, family.scales, wanted) for m in _merits(family, stable)]
+    kinds = np.split(np.arange(len(stable)), [len(stable) - beside])
+    orders = [
+        [at[i] for i in pick_spread(stable[at], merit[at], family.scales, wanted)]
+        for merit in _merits(family, stable)
+        for at in kinds
+    ]
     # In turns: the quickest to keep the limits, and the most still with limits to mend.
-    turns = dict.fromkeys(i for pair in zip(*orders, strict=True) for i in pair)
+    turns = dict.fromkeys(int(i) for turn in zip_longest(*orders) for i in turn if i is not None)
     return [*first, *(stable[i] for i in list(turns)[:wanted])]
 
 
@@ -91,6 +101,11 @@ def candidates(problem: Problem, count: int, seed: int) -> FloatArray:
     # A hair off the imaginary axis, where an undamped pole cannot be hit.
     yu = problem.plant.response_at((1e-3 + 1j) * omega).yu
     return np.vstack([law.guesses(problem, omega), law.draw(points, omega, yu)])
+
+
+def others_of(problem: Problem) -> FloatArray:
+    """Return the law's candidates of another kind, stable or not."""
+    return problem.law.others(problem, crossover_grid(problem))
 
 
 def crossover_grid(problem: Problem) -> FloatArray:

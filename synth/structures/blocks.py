@@ -1,7 +1,7 @@
 r"""Filter sections with parameters, of which controller structures are put together.
 
 Each section is one transfer function with named, bounded parameters.  It says the same thing
-three times, for the optimiser (`response`, numbers or symbols), for the guard of its search
+three times, for the optimiser (`response`, numbers or duals), for the guard of its search
 (`characteristic`, the monic denominator) and for everything that runs or checks the controller
 (`matrices`, a state-space form).
 
@@ -57,7 +57,7 @@ class FilterSection(ABC):
 
     @abstractmethod
     def response(self, values: Sequence[Any], s: Any) -> Any:
-        """Return the transfer function at s, numbers or a `synth.loop.Phasor`."""
+        """Return the transfer function at s for numbers or `synth.loop.Dual` values."""
 
     @abstractmethod
     def matrices(self, values: Sequence[float]) -> Matrices:

@@ -84,6 +84,10 @@ class _FixedLaw(ParametrisedController):
         return self._law.guesses(problem, omega)[:, self._free]
 
     @override
+    def others(self, problem: GeneralisedPlant, omega: FloatArray) -> FloatArray:
+        return self._law.others(problem, omega)[:, self._free]
+
+    @override
     def draw(self, points: FloatArray, omega: FloatArray, yu: ComplexArray) -> FloatArray:
         return self._law.draw(points, omega, yu)[:, self._free]
 

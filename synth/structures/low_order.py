@@ -3,7 +3,8 @@ r"""A free controller of low order, for any number of inputs and measurements.
 Its parameters are those of `BlockForm`: n (nu + ny) numbers for order n, plus nu
 ny for a direct term.  Random controllers of this kind are seldom stable in a loop, so the
 candidates are LQG designs (`synth.structures.lqg`) for weights and noises of many sizes, reduced to
-the order.
+the order; and, as these may all lie about one optimum of several, controllers whose poles are
+drawn, with the zeros that bring them closest to a state feedback.
 
 `BlockForm` is a controller of given order in as few numbers as there can be: parallel canonical
 blocks.  Second-order blocks (and one of first order if the order is odd), each in observable
@@ -29,8 +30,9 @@ from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, solve_continuous_lyapunov
 from scipy.optimize import linear_sum_assignment
+from scipy.stats import qmc
 from typing_extensions import override
 
 from models.basics import ComplexArray, FloatArray, InputError, SynthesisError
@@ -62,6 +64,8 @@ from .whitened import whitened
 
 _PADE = 4  # of the delays, in the designs that candidates are made of
 _SIDE = 12  # so many regulators times so many filters
+_DRAWN = 64  # controllers whose poles are drawn
+_LIGHTEST, _HEAVIEST = 0.03, 10.0  # damping ratios of these
 
 _NEAR = 1e-6  # poles closer than this, relatively, are pulled apart
 _NOTHING = 1e-14  # of the matrix's size, is a pole at zero
@@ -221,6 +225,26 @@ class LowOrderLaw(ParametrisedController):
             fast += [self.values(LinearController.static(gain, *names)) for gain in gains]
         found = self._family(plant, regulators, filters)
         return self.clipped(np.vstack([found, *fast]))
+
+    @override
+    def others(self, problem: GeneralisedPlant, omega: FloatArray) -> FloatArray:
+        """Return controllers with poles of many sizes and dampings.
+
+        Their commands come closest, in the mean square of the loop that a state feedback makes,
+        to those of the state feedback: with its poles held a controller is linear in the rest, but
+        for what an input hears from another's blocks, which is left out.
+        """
+        plant = whitened(self._plant.without_delays(_PADE), problem.disturbances)
+        regulators, _ = designs(plant, problem.minimise, omega)
+        points = qmc.Sobol(2 * len(self._form.blocks), seed=0).random(_DRAWN)
+        sizes = omega[0] * (omega[-1] / omega[0]) ** points[:, ::2]
+        dampings = _LIGHTEST * (_HEAVIEST / _LIGHTEST) ** points[:, 1::2]
+        found = np.zeros((_DRAWN * bool(regulators), len(self.parameters)))
+        for k, row in enumerate(found):
+            regulator = regulators[k % len(regulators)]
+            with contextlib.suppress(np.linalg.LinAlgError):
+                self._form.fill(row, plant, regulator, sizes[k], dampings[k])
+        return self.clipped(found)
 
     @override
     def draw(self, points: FloatArray, omega: FloatArray, yu: ComplexArray) -> FloatArray:
@@ -393,7 +417,7 @@ class BlockForm:
         return A, B, C
 
     def response(self, values: Sequence[Any], s: Any) -> list[list[Any]]:
-        """Return C (s - A)^-1 B, nu lists of ny entries, for numbers or symbols."""
+        """Return C (s - A)^-1 B, nu lists of ny entries, for numbers or `synth.loop.Dual`."""
         measured = range(self.ny)
         result: list[list[Any]] = [[0.0] * self.ny for _ in range(self.nu)]
         for block in self.blocks:
@@ -414,6 +438,58 @@ class BlockForm:
                     for j in measured:
                         result[i][j] = state[j] * weight + result[i][j]
         return result
+
+    def fill(
+        self,
+        values: FloatArray,
+        plant: LinearPlant,
+        feedback: LqgRegulator,
+        sizes: FloatArray,
+        dampings: FloatArray,
+    ) -> None:
+        """Write the numbers of a controller with given poles that comes closest to a feedback.
+
+        Parameters
+        ----------
+        values
+            What is written to.
+        plant, feedback
+            Shaken by white noises of intensity 1, and u = K x.
+        sizes, dampings
+            Of the poles of each block [rad/s], [-].
+        """
+        # Every measurement through 1 and s over each block's denominator, beside the plant.
+        filters = []
+        for block, size, damping in zip(self.blocks, sizes, dampings, strict=True):
+            pair = block.size == 2
+            values[block.alpha] = [2.0 * damping * size, size**2] if pair else [size]
+            companion = [[0.0, 1.0], [-(size**2), -2.0 * damping * size]] if pair else [[-size]]
+            filters += [np.array(companion)] * self.ny
+        heard, noise = plant.C + plant.D @ feedback.gain, plant.F
+        entries = [np.eye(len(f))[:, -1:] for f in filters]
+        rows = [np.tile(x, (len(self.blocks), 1)) for x in (heard, noise)]
+        into, shaken = (
+            np.vstack([e @ row[None] for e, row in zip(entries, of, strict=True)]) for of in rows
+        )
+        n = len(plant.A)
+        A = block_diag(plant.A + plant.B @ feedback.gain, *filters)
+        A[n:, :n] = into
+        E = np.vstack([plant.E, shaken])
+        covariance = solve_continuous_lyapunov(A, -E @ E.T)
+        owner = np.repeat([b.row for b in self.blocks], [b.size * self.ny for b in self.blocks])
+        command = np.zeros(len(owner))
+        for i, gain in enumerate(feedback.gain):
+            at = n + np.flatnonzero(owner == i)
+            size = np.sqrt(np.maximum(np.diag(covariance)[at], 1e-300))
+            share = covariance[np.ix_(at, at)] / np.outer(size, size)
+            wanted = covariance[at, :n] @ gain / size
+            command[at - n] = np.linalg.lstsq(share, wanted, rcond=1e-12)[0] / size
+        start = 0
+        for block in self.blocks:
+            end = start + block.size * self.ny
+            # B1 goes with s, B2 with 1.
+            values[block.B] = command[start:end].reshape(self.ny, block.size).T[::-1].ravel()
+            start = end
 
     def values(self, A: FloatArray, B: FloatArray, C: FloatArray) -> FloatArray:
         """Return the numbers of a controller of this order.

@@ -2,7 +2,7 @@
 
 A structure says which controllers are searched.  Bound to a plant it becomes a
 `ParametrisedController`, which knows its parameters (names, sizes, bounds), its response C(s, p)
-(for numbers and for symbols alike) and its state-space form, and proposes candidates to start a
+(for numbers and with slopes alike) and its state-space form, and proposes candidates to start a
 search from.
 
 Signs: u = +C y.  The thesis's feedback E_a = -A (a P'' + a_1 P' + a_2 P) is
@@ -68,9 +68,10 @@ class ParametrisedController(ABC):
 
     @abstractmethod
     def response(self, values: Sequence[Any], s: Any) -> list[list[Any]]:
-        """Return C(s), nu lists of ny entries, for parameter `values`, numbers or symbols.
+        """Return C(s), nu lists of ny entries, for parameter `values` at points `s` (k,) [1/s].
 
-        `s` is i omega: NumPy complex numbers, or a `synth.loop.Phasor`.
+        The values are numbers, arrays that broadcast against `s`, or `synth.loop.Dual` numbers
+        with slopes: write it with + - * / alone, and 0.0 where an entry is always zero.
         """
 
     @abstractmethod
@@ -81,6 +82,14 @@ class ParametrisedController(ABC):
         """Return candidates, (m, number of parameters), that the whole question suggests.
 
         `omega` (k,) are frequencies at which the loop may cross over [rad/s].
+        """
+        del problem, omega
+        return np.zeros((0, len(self.parameters)))
+
+    def others(self, problem: GeneralisedPlant, omega: FloatArray) -> FloatArray:
+        """Return candidates of another kind, which starts are taken from in turn with the rest.
+
+        As `guesses`; for a law whose guesses may all lie about one optimum of several.
         """
         del problem, omega
         return np.zeros((0, len(self.parameters)))

@@ -20,14 +20,24 @@ from loop_numbers import (
 )
 from lqg_optimum import lqg
 from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov
-from scipy.optimize import brentq, differential_evolution, minimize
+from scipy.optimize import brentq, differential_evolution, minimize, minimize_scalar
 
 from models.basics import InputError
 from models.plant import LinearPlant
-from synth import LowOrder, MaxSensitivity, Rms, StaticGain, White, tune
+from synth import (
+    DiskMargin,
+    LowOrder,
+    MaxSensitivity,
+    PayloadFeedback,
+    Rms,
+    StaticGain,
+    White,
+    tune,
+)
 from synth.loop import LinearController
 from synth.structures import ParametrisedController
 from synth.structures.low_order import LowOrderLaw
+from synth.structures.structure import PAYLOAD_MEASUREMENTS
 
 WHITE = {"f": White(1.0), "n": White(0.01)}
 WEIGHTS = {"x": 1.0, "effort": 0.1}
@@ -692,3 +702,224 @@ def test_bad_arguments_are_refused_with_a_sentence(changes, message: str) -> Non
     }
     with pytest.raises(InputError, match=message):
         tune(with_full_state(double_integrator()), **arguments)
+
+
+# ------------------------------------------- parameters held, gains masked
+
+
+def test_fixed_parameter_leaves_the_best_of_the_others() -> None:
+    plant = with_full_state(oscillator())
+    question = {"spectrum": {"f": White(1.0)}, "minimise": {"x": 1.0, "effort": 0.05}}
+    found = tune(plant, StaticGain(), fixed={"K[u,m1]": 1.5}, starts=4, **question)
+    assert found.ok, found.status
+
+    def cost(gain: float) -> float:
+        controller = LinearController.static([[1.5, gain]], plant.measurements, plant.inputs)
+        return lyapunov_cost(plant, controller, question["spectrum"], question["minimise"])
+
+    exact = minimize_scalar(cost, bounds=(-20.0, -0.01), method="bounded", options={"xatol": 1e-10})
+    assert found.parameters == pytest.approx({"K[u,m1]": 1.5, "K[u,m2]": exact.x}, rel=1e-5)
+    assert found.cost == pytest.approx(exact.fun, rel=1e-9)
+    assert found.verify().ok
+
+
+def test_masked_gain_is_a_gain_held_at_zero() -> None:
+    plant = with_full_state(two_carts())
+    question = {"spectrum": {"f": White(1.0)}, "minimise": {"x1": 1.0, "x2": 1.0, "effort1": 0.1}}
+    masked = StaticGain(mask=((True, False, True, True),))
+    found = tune(plant, masked, starts=6, **question)
+    held = tune(plant, StaticGain(), fixed={"K[u1,m2]": 0.0}, starts=6, **question)
+    assert found.ok, found.status
+    assert held.ok, held.status
+    assert "K[u1,m2]" not in found.parameters
+    assert gain_of(found)[0, 1] == gain_of(held)[0, 1] == 0.0
+    assert held.cost == pytest.approx(found.cost, rel=1e-8)
+    all_free = tune(plant, StaticGain(), starts=4, **question)
+    assert all_free.cost < found.cost
+    assert lyapunov_cost(
+        plant, found.controller, question["spectrum"], question["minimise"]
+    ) == pytest.approx(found.cost, rel=1e-8)
+
+
+def test_payload_feedback_may_hold_a_gain_at_zero() -> None:
+    plant = LinearPlant(
+        A=[[0.0, 1.0], [-4.0, -0.04]],
+        B=[[0.0], [1.0]],
+        E=[[0.0], [1.0]],
+        C=[[-4.0, -0.04], [0.0, 1.0], [1.0, 0.0]],
+        D=[[1.0], [0.0], [0.0]],
+        F=[[1.0], [0.0], [0.0]],
+        Cz=[[1.0, 0.0], [0.0, 0.0]],
+        Dz=[[0.0], [1.0]],
+        measurements=PAYLOAD_MEASUREMENTS,
+        inputs=("u",),
+        disturbances=("f",),
+        outputs=("x", "effort"),
+    )
+    question = {"spectrum": {"f": White(1.0)}, "minimise": {"x": 1.0, "effort": 0.05}, "starts": 4}
+    found = tune(plant, PayloadFeedback(amplifier=2.0), fixed={"a": 0.0}, **question)
+    assert found.ok, found.status
+    assert found.parameters["a"] == 0.0
+    assert gain_of(found)[0, 0] == 0.0
+    exact = lqr_gain([[0.0, 1.0], [-4.0, -0.04]], [[0.0], [1.0]], np.diag([1.0, 0.0]), 0.05)
+    assert gain_of(found)[0, 1:] == pytest.approx(-exact[::-1], rel=1e-5)
+
+
+def lqr_gain(A, B, Q, effort) -> np.ndarray:
+    R = np.array([[effort]])
+    return np.linalg.solve(R, np.transpose(B) @ solve_continuous_are(A, B, Q, R)).ravel()
+
+
+@pytest.mark.parametrize(
+    ("fixed", "message"),
+    [
+        ({"K[u,y9]": 1.0}, r"fixed: there is no parameter 'K\[u,y9\]'; there are: K\[u,y\]"),
+        ({"K[u,y]": 9.0}, r"fixed: K\[u,y\] must be in \[-2, 2\], got 9.0"),
+        ({"K[u,y]": 1.0}, "fixed: at least one parameter must be left free"),
+    ],
+)
+def test_fixed_parameters_that_make_no_sense_are_refused(fixed, message) -> None:
+    law = StaticGain(bounds={"K[u,y]": (-2.0, 2.0)})
+    with pytest.raises(InputError, match=message):
+        tune(oscillator(), law, spectrum=WHITE, minimise=WEIGHTS, fixed=fixed)
+
+
+# ------------------------------------------------ the best possible beside it
+
+
+def test_lqg_figure_is_the_riccati_optimum_and_is_printed_once_known() -> None:
+    plant, spectrum, minimise = cart_problem(1)
+    found = tune(plant, LowOrder(2), spectrum=spectrum, minimise=minimise, starts=4)
+    assert "best possible" not in str(found)
+    best = lqg(plant, minimise=minimise, spectrum=spectrum).cost
+    assert found.lqg.cost == pytest.approx(best, rel=1e-5)
+    assert found.lqg.cost <= best * (1.0 + 1e-9)
+    assert found.cost > best
+    assert f"best possible, whatever the margins: {found.lqg.cost:.6g}" in str(found)
+
+
+def test_lqg_figure_keeps_limits_on_an_rms() -> None:
+    question = {"spectrum": WHITE, "minimise": {"x": 1.0}, "starts": 4}
+    limit = Rms(output="effort", bound=0.9)
+    found = tune(double_integrator(), LowOrder(2), limits=[limit], **question)
+    assert found.ok, found.status
+    # Order two is the plant's own, so that nothing does better; a bound comes from below.
+    assert found.lqg.cost == pytest.approx(found.cost, rel=1e-4)
+
+
+def test_lqg_figure_that_is_not_known_says_why() -> None:
+    plant = with_full_state(oscillator())
+    found = tune(plant, StaticGain(), spectrum={"f": White(1.0)}, minimise=WEIGHTS, starts=2)
+    assert found.lqg.cost is None
+    assert "m1 must have noise of its own" in found.lqg.note
+    assert "best possible, whatever the margins: not known: bound: m1" in str(found)
+
+
+# ----------------------------------------------------- how far to be trusted
+
+
+def test_few_starts_that_agree_are_remarked_upon() -> None:
+    few = tune(oscillator(), LowOrder(2), spectrum=WHITE, minimise=WEIGHTS, starts=2)
+    assert few.ok
+    assert few.status.endswith(f"; only {few.agreed} of {len(few.starts)} starts reached it")
+    more = tune(oscillator(), LowOrder(2), spectrum=WHITE, minimise=WEIGHTS, starts=6)
+    assert more.agreed >= 4
+    assert "starts reached it" not in more.status
+    for found in (few, more):
+        assert found.agreed <= len(found.starts)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.04])
+def test_undamped_mass_on_a_spring_within_a_margin(damping: float) -> None:
+    # Its pole lies on the axis, where a node of any grid may fall.
+    plant = oscillator(4.0, damping)
+    limits = [MaxSensitivity(bound=1.2)]
+    found = tune(plant, LowOrder(2), spectrum=WHITE, minimise=WEIGHTS, limits=limits, starts=4)
+    assert found.ok, found.status
+    grid = np.geomspace(1e-3, 1e3, 40001)
+    peak = np.abs(1.0 / (1.0 + loop_response(plant, found.controller)(grid))).max()
+    assert peak == pytest.approx(1.2, rel=1e-4)
+    exact = lyapunov_cost(plant, found.controller, WHITE, WEIGHTS)
+    assert found.cost == pytest.approx(exact, rel=1e-8)
+    assert found.verify().ok
+
+
+def test_two_integrators_within_a_margin() -> None:
+    # The open-loop blocks 1/s^2 have no digits left at low frequency.
+    limits = [DiskMargin(bound=0.9)]
+    plant = double_integrator()
+    found = tune(plant, LowOrder(2), spectrum=WHITE, minimise=WEIGHTS, limits=limits, starts=4)
+    assert found.ok, found.status
+    exact = lyapunov_cost(plant, found.controller, WHITE, WEIGHTS)
+    assert found.cost == pytest.approx(exact, rel=1e-8)
+    assert found.verify().ok
+
+
+def four_modes(seed: int = 115) -> LinearPlant:
+    """Four lightly damped modes, pushed, shaken and seen at random, and a noisy measurement."""
+    rng = np.random.default_rng(seed)
+    omega = np.exp(rng.uniform(np.log(0.3), np.log(6.0), 4))
+    damping = rng.uniform(0.005, 0.05, 4)
+    A = np.zeros((8, 8))
+    for k in range(4):
+        A[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = [
+            [0.0, 1.0],
+            [-(omega[k] ** 2), -2.0 * damping[k] * omega[k]],
+        ]
+    B, E, C, Cz = np.zeros((8, 1)), np.zeros((8, 2)), np.zeros((1, 8)), np.zeros((2, 8))
+    B[1::2, 0] = rng.choice([-1, 1], 4) * rng.uniform(0.3, 1.5, 4)
+    E[1::2, 0] = rng.normal(size=4)
+    C[0, ::2] = rng.choice([-1, 1], 4) * rng.uniform(0.3, 1.5, 4)
+    Cz[0, ::2] = rng.normal(size=4)
+    return LinearPlant(
+        A=A,
+        B=B,
+        E=E,
+        C=C,
+        F=[[0.0, 1.0]],
+        Cz=Cz,
+        Dz=[[0.0], [1.0]],
+        inputs=("u",),
+        measurements=("y",),
+        disturbances=("f", "n"),
+        outputs=("x", "effort"),
+    )
+
+
+@pytest.mark.ci
+def test_reductions_of_lqg_agree_on_a_local_optimum_that_drawn_poles_leave(monkeypatch) -> None:
+    question = {
+        "spectrum": {"f": White(1.0), "n": White(1e-2)},
+        "minimise": {"x": 1.0, "effort": 3e-2},
+    }
+    plant = four_modes()
+    found = tune(plant, LowOrder(3), **question)
+    assert found.ok, found.status
+    assert lyapunov_cost(plant, found.controller, **question) == pytest.approx(found.cost, rel=1e-8)
+    monkeypatch.setattr(LowOrderLaw, "others", ParametrisedController.others)
+    without = tune(plant, LowOrder(3), **question)
+    assert without.agreed == len(without.starts) == 4  # all of them, and all wrong
+    assert found.cost < 0.98 * without.cost
+
+
+def test_drawn_poles_come_with_the_zeros_that_follow_a_state_feedback() -> None:
+    # As many states as the plant has, at an LQG controller's own poles: its transfer function is
+    # the best that these poles allow, if the filter is perfect.
+    plant = with_full_state(two_carts())
+    minimise = {"x2": 1.0, "effort1": 0.1}
+    found = tune(plant, LowOrder(2), spectrum={"f": White(1.0)}, minimise=minimise, starts=1)
+    law, omega = found.problem.law, np.geomspace(0.05, 30.0, 64)
+    others = law.others(found.problem, omega)
+    assert others.shape == (64, len(law.parameters))
+    sizes = np.array([np.abs(np.linalg.eigvals(law.controller(list(v)).A)) for v in others])
+    assert sizes.min() < 0.2
+    assert sizes.max() > 10.0
+    # Fast poles let everything through: the state feedback itself.
+    stable = [v for v in others if found.problem.stable(v)]
+    assert len(stable) > 32
+    costs = [
+        lyapunov_cost(plant, law.controller(list(v)), {"f": White(1.0)}, minimise) for v in stable
+    ]
+    exact = lqr_gain(plant.A, plant.B, np.diag([0.0, 1.0, 0.0, 0.0]), 0.1)
+    best = LinearController.static(-exact[None], plant.measurements, plant.inputs)
+    assert 1.0 <= min(costs) / lyapunov_cost(plant, best, {"f": White(1.0)}, minimise) < 1.1

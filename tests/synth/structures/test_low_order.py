@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import casadi as ca
 import control
 import numpy as np
 import pytest
@@ -23,7 +22,7 @@ from scipy.stats import qmc
 
 from models.basics import InputError, SynthesisError, White
 from models.plant import LinearPlant
-from synth.loop import Disturbance, LinearController, Phasor, disturbances
+from synth.loop import Disturbance, LinearController, disturbances
 from synth.question import Problem
 from synth.search.starts import candidates, crossover_grid
 from synth.structures import LowOrder, ParametrisedController, reduced, weighing
@@ -80,26 +79,6 @@ def test_parameters_are_as_few_as_they_can_be(order: int, nu: int, ny: int, prop
     columns = [(response(values + h) - response(values - h)) / 2e-6 for h in steps]
     sizes = np.linalg.svd(np.array(columns).T, compute_uv=False)
     assert sizes[-1] > 1e-7 * sizes[0]
-
-
-@pytest.mark.parametrize(("order", "nu", "ny"), SIZES)
-def test_response_in_numbers_and_symbols_is_that_of_the_state_space(
-    order: int, nu: int, ny: int
-) -> None:
-    law = LowOrder(order, proper=True).bind(any_plant(nu, ny))
-    values = any_values(law)
-    omega = np.geomspace(0.1, 10.0, 7)
-    exact = law.controller(list(values)).response_at(1j * omega)
-    x = ca.MX.sym("x", values.size)
-    in_numbers = law.response(list(values), 1j * omega)
-    in_symbols = law.response([x[i] for i in range(values.size)], Phasor(0.0, ca.DM(omega)))
-    for i in range(nu):
-        for j in range(ny):
-            assert in_numbers[i][j] == pytest.approx(exact[:, i, j], rel=1e-10)
-            entry = in_symbols[i][j]
-            re, im = ca.Function("entry", [x], [entry.re, entry.im])(values)
-            found = np.array(re).ravel() + 1j * np.array(im).ravel()
-            assert found == pytest.approx(exact[:, i, j], rel=1e-10)
 
 
 def test_names_say_what_the_parameters_are() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 
-import casadi as ca
 import numpy as np
 import pytest
 from loop_numbers import double_integrator, integrator, two_carts, with_full_state
@@ -13,7 +12,7 @@ from scipy.stats import qmc
 
 from models.basics import InputError, White
 from models.plant import LinearPlant
-from synth.loop import Phasor, closed_loop_matrix, disturbances
+from synth.loop import disturbances
 from synth.question import FamilyProblem, Problem
 from synth.search.starts import candidates, crossover_grid, pick_spread, stabilise
 from synth.structures import ParametrisedController, PayloadFeedback, StaticGain
@@ -67,26 +66,6 @@ def test_payload_feedback_has_the_thesis_sign_and_finds_its_measurements() -> No
     controller = law.controller([1.0, 2.0, 3.0])
     assert controller.D.tolist() == [[-30.0, -10.0, -20.0]]
     assert controller.measurements[1] == "payload.acceleration"
-
-
-@pytest.mark.parametrize("structure", [StaticGain(), PayloadFeedback(amplifier=7.0)])
-def test_response_in_numbers_and_symbols_is_the_controller(structure) -> None:
-    law = structure.bind(payload_plant())
-    values = [0.3, -1.2, 2.0]
-    exact = law.controller(values).D
-    in_numbers = law.response(values, np.array([0.5j, 1.0j]))
-    x = ca.MX.sym("x", 3)
-    in_symbols = law.response([x[i] for i in range(3)], Phasor(0.0, ca.DM([0.5, 1.0])))
-    evaluate = ca.Function("entries", [x], [ca.vertcat(*in_symbols[0])])
-    assert np.array(in_numbers, dtype=float) == pytest.approx(exact, rel=1e-15)
-    assert np.array(evaluate(values)).ravel() == pytest.approx(exact.ravel(), rel=1e-15)
-
-
-def test_quick_closed_loop_matrix_is_the_general_one_with_a_direct_term() -> None:
-    law = PayloadFeedback(amplifier=2.0).bind(payload_plant())
-    values = [0.2, 0.7, -0.4]
-    general = closed_loop_matrix(payload_plant(), law.controller(values))
-    assert law.closed_loop_matrix(payload_plant(), values) == pytest.approx(general, rel=1e-12)
 
 
 def test_scale_of_a_gain_makes_a_loop_gain_of_about_one() -> None:

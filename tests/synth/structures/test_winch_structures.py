@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import casadi as ca
 import numpy as np
 import pytest
 from scipy.stats import qmc
@@ -16,7 +15,7 @@ from models.plant import DriveLimits
 from models.simulation import SimulationOptions, prepare, run_simulation
 from synth.controllers import LinearFeedback
 from synth.design import Design, optimise_gains
-from synth.loop import Phasor, closed_loop_matrix
+from synth.loop import closed_loop_matrix
 from synth.question import PAYLOAD, pose
 from synth.search.starts import candidates
 from synth.structures import structure_named, structure_names
@@ -61,30 +60,6 @@ def values_of(case: Case, name: str) -> list[float]:
     posed = pose(case, name)
     yu = posed.plant.response(OMEGA).yu
     return [float(v) for v in law.draw(points, OMEGA, yu)[5]]
-
-
-@pytest.mark.parametrize("name", DIAGRAMS)
-@pytest.mark.parametrize("bundled", ["subsea-crane", "thesis-1975"])
-def test_response_state_space_and_symbols_say_the_same(name: str, bundled: str) -> None:
-    case = load_case(bundled)
-    law = pose(case, name).law
-    values = values_of(case, name)
-    numbers = law.response(values, 1j * OMEGA)[0]
-    row = np.array([np.broadcast_to(entry, OMEGA.shape) for entry in numbers]).T
-    state = law.controller(values).response_at(1j * OMEGA)[:, 0]
-    size = np.abs(state).max(axis=0)
-    assert np.abs(row - state).max(axis=0) == pytest.approx(np.zeros(size.size), abs=1e-9) or (
-        np.all(np.abs(row - state) <= 1e-9 * size)
-    )
-    x = ca.MX.sym("x", len(values))
-    symbols = [x[k] for k in range(len(values))]
-    s = Phasor(0.0, ca.DM(OMEGA))
-    for entry, wanted in zip(law.response(symbols, s)[0], row.T, strict=True):
-        parts = [entry.re, entry.im] if isinstance(entry, Phasor) else [entry, 0.0]
-        ones = ca.DM.ones(OMEGA.size)
-        found = ca.Function("f", [x], [part * ones for part in parts])(values)
-        re, im = (np.array(part).ravel() for part in found)
-        assert re + 1j * im == pytest.approx(wanted, rel=1e-9, abs=1e-12)
 
 
 def test_combined_is_the_law_of_the_page(crane: Case) -> None:
