@@ -9,7 +9,7 @@ Here the question is checked and the answer is put into words; the work is done 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -129,7 +129,8 @@ class Tuning:
         # A spectrum that is white is told by where its density comes from.
         origins = {d.name: (getattr(d.density, "__self__", None), d) for d in problem.disturbances}
         spectra = {
-            name: origin if isinstance(origin, White) else d for name, (origin, d) in origins.items()
+            name: origin if isinstance(origin, White) else d
+            for name, (origin, d) in origins.items()
         }
         limits = {limit.output: limit.bound for limit in problem.limits if isinstance(limit, Rms)}
         try:
@@ -217,7 +218,8 @@ def tune(
     problem = _problem(plant, structure, spectrum, minimise, limits, drag)
     check_range("tune", "starts", starts, low=1)
     with one_thread():
-        return tuning_of(problem, search(problem, int(starts), seed, guesses, progress))
+        answer = tuning_of(problem, search(problem, int(starts), seed, guesses, progress))
+    return replace(answer, status=answer.status + _few(answer))
 
 
 def limit_uses(
@@ -268,7 +270,7 @@ def tuning_of(problem: Problem, found: Found) -> Tuning:
     return Tuning(
         problem=problem,
         ok=ok,
-        status=_status(ok, assessment, uses, cost) + _few(ok, found),
+        status=_status(ok, assessment, uses, cost),
         cost=cost,
         parameters=problem.law.named([float(v) for v in solved.values]),
         controller=problem.law.controller([float(v) for v in solved.values]),
@@ -297,11 +299,11 @@ def _status(ok: bool, assessment: Assessment, uses: Mapping[str, LimitUse], cost
     return f"the limits cannot all be kept; the least violation leaves {' and '.join(values)}"
 
 
-def _few(ok: bool, found: Found) -> str:
+def _few(answer: Tuning) -> str:
     """Return a remark on an answer that few starts reached."""
-    if not ok or found.agreed >= _FEW or not found.starts:
+    if not answer.ok or answer.agreed >= _FEW:
         return ""
-    return f"; only {found.agreed} of {len(found.starts)} starts reached it"
+    return f"; only {answer.agreed} of {len(answer.starts)} starts reached it"
 
 
 def _problem(

@@ -436,14 +436,14 @@ class LoopNumbers:
                 poles = np.linalg.eigvals(matrix).astype(np.complex128)
                 found.append((poles, *_counted(poles, models)))
             shape = (*rows.shape[:-2], -1)
-            several, swinging, own = (np.reshape(part, shape) for part in zip(*found, strict=True))
-            return several, swinging, own
+            several, swinging, own = ([each[i] for each in found] for i in range(3))
+            return np.reshape(several, shape), np.reshape(swinging, shape), np.reshape(own, shape)
         values = np.array(point.values, dtype=np.float64)
         uneven = np.linspace(-1.0, 1.0, values.size) if values.size > 1 else np.ones(1)
         for nudge in (0.0, _NUDGE):
             near = values * (1.0 + nudge * uneven)
             matrix = problem.loop_matrix(plant, near, drag)
-            poles, left, right = eig(matrix, left=True, right=True)
+            poles, left, right = eig(matrix, left=True, right=True)  # type: ignore[misc]  # its stub
             product = np.einsum("ik,ik->k", left.conj(), right)
             if np.abs(product).min() > _SINGLE:
                 break

@@ -64,7 +64,7 @@ def begin_points(
     if all(loop.blend is None for loop in loops):
         chosen = loops[:: max(1, len(loops) // 4)]
         drawn = [candidates(loop.problem, _CANDIDATES // len(chosen), seed) for loop in chosen]
-        others = [others_of(loop.problem) for loop in chosen]
+        others = [others_of(loop.problem, seed) for loop in chosen]
         points += [*drawn, *others]
         beside = sum(len(part) for part in others)
     if not points:
@@ -103,9 +103,9 @@ def candidates(problem: Problem, count: int, seed: int) -> FloatArray:
     return np.vstack([law.guesses(problem, omega), law.draw(points, omega, yu)])
 
 
-def others_of(problem: Problem) -> FloatArray:
+def others_of(problem: Problem, seed: int) -> FloatArray:
     """Return the law's candidates of another kind, stable or not."""
-    return problem.law.others(problem, crossover_grid(problem))
+    return problem.law.others(problem, crossover_grid(problem), seed)
 
 
 def crossover_grid(problem: Problem) -> FloatArray:

@@ -84,8 +84,8 @@ class _FixedLaw(ParametrisedController):
         return self._law.guesses(problem, omega)[:, self._free]
 
     @override
-    def others(self, problem: GeneralisedPlant, omega: FloatArray) -> FloatArray:
-        return self._law.others(problem, omega)[:, self._free]
+    def others(self, problem: GeneralisedPlant, omega: FloatArray, seed: int) -> FloatArray:
+        return self._law.others(problem, omega, seed)[:, self._free]
 
     @override
     def draw(self, points: FloatArray, omega: FloatArray, yu: ComplexArray) -> FloatArray:

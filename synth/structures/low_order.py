@@ -227,7 +227,7 @@ class LowOrderLaw(ParametrisedController):
         return self.clipped(np.vstack([found, *fast]))
 
     @override
-    def others(self, problem: GeneralisedPlant, omega: FloatArray) -> FloatArray:
+    def others(self, problem: GeneralisedPlant, omega: FloatArray, seed: int) -> FloatArray:
         """Return controllers with poles of many sizes and dampings.
 
         Their commands come closest, in the mean square of the loop that a state feedback makes,
@@ -236,7 +236,7 @@ class LowOrderLaw(ParametrisedController):
         """
         plant = whitened(self._plant.without_delays(_PADE), problem.disturbances)
         regulators, _ = designs(plant, problem.minimise, omega)
-        points = qmc.Sobol(2 * len(self._form.blocks), seed=0).random(_DRAWN)
+        points = qmc.Sobol(2 * len(self._form.blocks), seed=seed).random(_DRAWN)
         sizes = omega[0] * (omega[-1] / omega[0]) ** points[:, ::2]
         dampings = _LIGHTEST * (_HEAVIEST / _LIGHTEST) ** points[:, 1::2]
         found = np.zeros((_DRAWN * bool(regulators), len(self.parameters)))

@@ -86,12 +86,12 @@ class ParametrisedController(ABC):
         del problem, omega
         return np.zeros((0, len(self.parameters)))
 
-    def others(self, problem: GeneralisedPlant, omega: FloatArray) -> FloatArray:
+    def others(self, problem: GeneralisedPlant, omega: FloatArray, seed: int) -> FloatArray:
         """Return candidates of another kind, which starts are taken from in turn with the rest.
 
         As `guesses`; for a law whose guesses may all lie about one optimum of several.
         """
-        del problem, omega
+        del problem, omega, seed
         return np.zeros((0, len(self.parameters)))
 
     @abstractmethod

@@ -819,8 +819,9 @@ def test_lqg_figure_that_is_not_known_says_why() -> None:
 
 
 def test_few_starts_that_agree_are_remarked_upon() -> None:
-    few = tune(oscillator(), LowOrder(2), spectrum=WHITE, minimise=WEIGHTS, starts=2)
+    few = tune(oscillator(), LowOrder(2), spectrum=WHITE, minimise=WEIGHTS, starts=1)
     assert few.ok
+    assert few.agreed < 4
     assert few.status.endswith(f"; only {few.agreed} of {len(few.starts)} starts reached it")
     more = tune(oscillator(), LowOrder(2), spectrum=WHITE, minimise=WEIGHTS, starts=6)
     assert more.agreed >= 4
@@ -833,12 +834,12 @@ def test_few_starts_that_agree_are_remarked_upon() -> None:
 def test_undamped_mass_on_a_spring_within_a_margin(damping: float) -> None:
     # Its pole lies on the axis, where a node of any grid may fall.
     plant = oscillator(4.0, damping)
-    limits = [MaxSensitivity(bound=1.2)]
+    limits = [MaxSensitivity(bound=1.3)]
     found = tune(plant, LowOrder(2), spectrum=WHITE, minimise=WEIGHTS, limits=limits, starts=4)
     assert found.ok, found.status
     grid = np.geomspace(1e-3, 1e3, 40001)
     peak = np.abs(1.0 / (1.0 + loop_response(plant, found.controller)(grid))).max()
-    assert peak == pytest.approx(1.2, rel=1e-4)
+    assert peak == pytest.approx(1.3, rel=1e-4)
     exact = lyapunov_cost(plant, found.controller, WHITE, WEIGHTS)
     assert found.cost == pytest.approx(exact, rel=1e-8)
     assert found.verify().ok
@@ -855,7 +856,7 @@ def test_two_integrators_within_a_margin() -> None:
     assert found.verify().ok
 
 
-def four_modes(seed: int = 115) -> LinearPlant:
+def four_modes(seed: int = 111) -> LinearPlant:
     """Four lightly damped modes, pushed, shaken and seen at random, and a noisy measurement."""
     rng = np.random.default_rng(seed)
     omega = np.exp(rng.uniform(np.log(0.3), np.log(6.0), 4))
@@ -887,7 +888,7 @@ def four_modes(seed: int = 115) -> LinearPlant:
 
 
 @pytest.mark.ci
-def test_reductions_of_lqg_agree_on_a_local_optimum_that_drawn_poles_leave(monkeypatch) -> None:
+def test_drawn_poles_leave_the_optimum_that_reductions_of_lqg_end_in(monkeypatch) -> None:
     question = {
         "spectrum": {"f": White(1.0), "n": White(1e-2)},
         "minimise": {"x": 1.0, "effort": 3e-2},
@@ -898,8 +899,8 @@ def test_reductions_of_lqg_agree_on_a_local_optimum_that_drawn_poles_leave(monke
     assert lyapunov_cost(plant, found.controller, **question) == pytest.approx(found.cost, rel=1e-8)
     monkeypatch.setattr(LowOrderLaw, "others", ParametrisedController.others)
     without = tune(plant, LowOrder(3), **question)
-    assert without.agreed == len(without.starts) == 4  # all of them, and all wrong
-    assert found.cost < 0.98 * without.cost
+    assert without.ok, without.status
+    assert found.cost < 0.5 * without.cost
 
 
 def test_drawn_poles_come_with_the_zeros_that_follow_a_state_feedback() -> None:
@@ -909,7 +910,7 @@ def test_drawn_poles_come_with_the_zeros_that_follow_a_state_feedback() -> None:
     minimise = {"x2": 1.0, "effort1": 0.1}
     found = tune(plant, LowOrder(2), spectrum={"f": White(1.0)}, minimise=minimise, starts=1)
     law, omega = found.problem.law, np.geomspace(0.05, 30.0, 64)
-    others = law.others(found.problem, omega)
+    others = law.others(found.problem, omega, 0)
     assert others.shape == (64, len(law.parameters))
     sizes = np.array([np.abs(np.linalg.eigvals(law.controller(list(v)).A)) for v in others])
     assert sizes.min() < 0.2
