@@ -25,7 +25,8 @@ _FEW = 4  # starts of a structure within another
 _BETTER = 1e-6  # of the log cost that counts as better
 _HAIR = 2e-5  # of the log cost that says nothing
 _PLAIN, _ROLLED = "payload-feedback", "payload-feedback-rolloff"
-_WITHIN: Mapping[str, tuple[str, ...]] = {
+#: By structure, the simpler ones within it.
+WITHIN: Mapping[str, tuple[str, ...]] = {
     _ROLLED: (_PLAIN,),
     "payload-feedback-lead": (_PLAIN,),
     "payload-feedback-notch": (_ROLLED,),
@@ -64,7 +65,7 @@ def nested_starts(
         Called as progress(stage, done, total).
     """
     structure = question.structure
-    within = _WITHIN.get(structure.name, ())
+    within = WITHIN.get(structure.name, ())
     if isinstance(structure, LowOrderFeedback) and structure.order >= 2:
         within = (_ROLLED,)
     found: list[list[float]] = []

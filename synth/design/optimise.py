@@ -20,17 +20,29 @@ from scipy.optimize import brentq
 from models.basics import InputError, check_range, one_thread
 from models.case import Case
 from models.plant import MAX_MASSES, masses_for_bandwidth
+from models.sensing import aboard
 
 from ..loop import Assessment
 from ..question import GAINS, PAYLOAD, DesignQuestion, Problem, pose, with_masses
 from ..search import Progress, search
-from ..structures import LowOrderFeedback
+from ..structures import LowOrderFeedback, structure_named
 from .design import Design
 from .high_order import high_order_gains
 from .infeasible import Shortfall, shortfall
-from .nested import gains_in_use, nested_starts, no_worse, starts_from
+from .nested import WITHIN, gains_in_use, nested_starts, no_worse, starts_from
 from .tuning import LimitUse, Tuning, limit_uses, tuning_of
 
+#: Structures that are tried where none is named, the simplest first.
+NESTED = (
+    "payload-feedback",
+    "payload-feedback-rolloff",
+    "drum-feedback",
+    "feed-forward",
+    "combined",
+)
+_AS_STILL = 1.05  # of the stillest design's motion, with which a simpler one is preferred
+_ROUGHEST = 0.99  # of the largest sea that any structure can do
+_SHARE = 4  # of the starts that each of several structures has
 _MODES = 5.0  # every rope mode below this many crossovers belongs in the design plant
 _MOST_MASSES = 40
 _RESUMED = 5  # ends of a search that the next one, on more masses, begins from
@@ -41,16 +53,18 @@ _CALMER = 3.0  # logarithm of what the largest sea may have to be calmer by, for
 @one_thread()
 def optimise_gains(
     case: Case,
-    structure: str = "payload-feedback",
+    structure: str | Sequence[str] | None = None,
     *,
     starts: int = 16,
     seed: int = 0,
     progress: Progress | None = None,
     guesses: Sequence[Mapping[str, float]] = (),
 ) -> Design:
-    """Return the controller of a structure that minimises the payload's variance within limits.
+    """Return the controller that minimises the payload's variance within the limits of a case.
 
-    Where the limits cannot all be kept, it looks for the largest sea in which they can.
+    Of several structures it is the simplest within five percent of the stillest that is ok; the
+    others are its `alternatives`.  Where the limits cannot all be kept, it is the stillest in the
+    largest sea in which any structure can keep them.
 
     Parameters
     ----------
@@ -58,9 +72,11 @@ def optimise_gains(
         The case; its `gains.A` fixes the amplifier of payload feedback, as only the products
         A a, A a1, A a2 act.
     structure
-        Name of the structure, see `synth.structures.structure_names`.
+        Name of the structure, see `synth.structures.structure_names`, or several, the simplest
+        first; by default those of `NESTED` whose sensors the case names.
     starts, seed
-        Size and seed of the multi-start search.
+        Size and seed of the multi-start search; each of several structures has a quarter of the
+        starts, and begins at the simpler ones' answers too.
     progress
         Called as progress(stage, done, total).
     guesses
@@ -80,7 +96,58 @@ def optimise_gains(
         If there is no such structure, or a limit lies below the static load.
     """
     check_range("optimise_gains", "starts", starts, low=1)
-    count = int(starts)
+    if isinstance(structure, str):
+        return _optimised(case, structure, int(starts), seed, progress, guesses)
+    names = structures_aboard(case) if structure is None else tuple(dict.fromkeys(structure))
+    if not names:
+        raise InputError("optimise_gains: structure must name at least one structure, got none")
+    few = max(1, -(-int(starts) // _SHARE))
+    designs: list[Design] = []
+    for k, name in enumerate(names):
+        stage = None if progress is None else _told(progress, f"{name} ({k + 1}/{len(names)})")
+        simpler = [d.parameters for d in designs if d.structure in WITHIN.get(name, ())]
+        known = [*guesses, *(parameters for parameters in simpler if parameters)]
+        designs.append(_optimised(case, name, few, seed, stage, known))
+    chosen = _simplest(designs)
+    others = tuple(design for design in designs if design is not chosen)
+    return replace(chosen, alternatives=others)
+
+
+def structures_aboard(case: Case) -> tuple[str, ...]:
+    """Return the structures of `NESTED` whose sensors a case names, the simplest first."""
+    heard = set(aboard(case))
+    named = {name: structure_named(name, case) for name in NESTED}
+    return tuple(name for name, made in named.items() if heard.issuperset(made.measurements))
+
+
+def _simplest(designs: Sequence[Design]) -> Design:
+    """Return the simplest design within five percent of the stillest; see `optimise_gains`."""
+    ok = [design for design in designs if design.ok]
+    if not ok:
+        roughest = max(design.significant_height for design in designs)
+        there = [d for d in designs if d.significant_height >= _ROUGHEST * roughest]
+        return min(there, key=lambda design: design.payload_rms)
+    stillest = min(design.payload_rms for design in ok)
+    return next(design for design in ok if design.payload_rms <= _AS_STILL * stillest)
+
+
+def _told(progress: Progress, name: str) -> Progress:
+    def tell(stage: str, done: int, total: int) -> None:
+        progress(f"{name}: {stage}", done, total)
+
+    return tell
+
+
+def _optimised(
+    case: Case,
+    structure: str,
+    starts: int,
+    seed: int,
+    progress: Progress | None,
+    guesses: Sequence[Mapping[str, float]],
+) -> Design:
+    """Return the design of one structure; see `optimise_gains`."""
+    count = starts
     question = pose(case, structure)
     if isinstance(named := question.structure, LowOrderFeedback) and named.family == "high-order":
         question, parameters = high_order_gains(case, named.order or None, progress)
