@@ -35,7 +35,7 @@ from stillhook.text import AFTER, BEFORE
 case = sh.load_case("thesis-1975")
 designs = {
     "the thesis's gains": sh.evaluate_gains(case, {"A": 200, "a": 50, "a1": 100, "a2": 100}),
-    "optimised, $M_s$ at most 2": sh.optimise_gains(case, starts=8),
+    "optimised, $M_s$ at most 2": sh.optimise_gains(case, "payload-feedback", starts=8),
 }
 COLOURS = dict(zip(designs, (BEFORE, AFTER), strict=True))
 

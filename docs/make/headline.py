@@ -128,7 +128,7 @@ def products(gains: Mapping[str, float]) -> dict[str, float]:
 
 def redesign(key: Row) -> sh.Design:
     """Return the design of one row."""
-    return sh.optimise_gains(case_for(key))
+    return sh.optimise_gains(case_for(key), "payload-feedback")
 
 
 def study(

@@ -33,7 +33,7 @@ SEEDS = 20
 SETTLED = 10.0  # after the set-point has come to rest, before the payload counts as held [s]
 SCENARIO_PAYS_OUT = 8.0  # to the seabed and half a metre more [m]
 BOUNCE = 10.0  # after touchdown, in which a bounce counts [s]
-# What `sh.optimise_gains(sh.load_case("landing"))` finds; a slow test asks it again.
+# What `optimise_gains` finds for the case with payload feedback; a slow test asks it again.
 GAINS = {"A": 1.0, "a": 98.31, "a1": 156.6, "a2": 1993.0}
 
 PERFECT_MRU: Mapping[str, object] = {
@@ -257,8 +257,8 @@ print(runs)
 ```
 
 Below are all controllers, {SEEDS} seeds each, the feedback with the gains that
-`sh.optimise_gains(case)` finds: means over the seeds, with their 95 % intervals. *Lowered without
-compensation* is a feed-forward with a share of zero.
+`sh.optimise_gains(case, "payload-feedback")` finds: means over the seeds, with their 95 %
+intervals. *Lowered without compensation* is a feed-forward with a share of zero.
 
 ## Holding it above the seabed
 

@@ -16,6 +16,7 @@ from ..text import Drawing, OutputFolder, Report, ReportSection, markdown, pairs
 from .design_file import design_text
 from .figures import limits, nyquist, payload_spectrum, responses
 from .summary import (
+    alternatives_table,
     command_text,
     effect,
     facts,
@@ -55,6 +56,8 @@ def design_report(design: Design, *, bound: bool = True) -> Report:
             ],
         ),
     ]
+    if (tried := alternatives_table(design)) is not None:
+        sections.append(ReportSection("Structures", [tried]))
     if (shares := share_table(design)) is not None:
         sections.append(ReportSection("", [shares]))
     if has_loop(design):

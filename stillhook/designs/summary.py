@@ -50,6 +50,13 @@ AT_LEAST = ("gain_margin_up", "delay_margin", "rope.tension.least")
 """Limits whose bound is the least value."""
 SHARES: Mapping[str, tuple[str, ...]] = {"sea": (HOOK,), "MRU": ("mru.error",), "noise": ()}
 """Which disturbances make up a share of a signal's variance, by its name; noise is the rest."""
+_INSTRUMENTS: Mapping[str, set[str]] = {
+    "payload": {"payload"},
+    "MRU": {"mru"},
+    "load cell": {"rope"},
+    "encoder": {"drum", "motor"},
+}
+"""Instruments by what their signals' names begin with."""
 _PRICED = 1e-5  # a price below this share of the payload's rms is noise of the solver
 
 
@@ -98,6 +105,39 @@ def effect(design: Design) -> str:
         else:
             told.append(f"{percent(1.0 - after / other)} less than {name} ({loss})")
     return f"the payload moves {' and '.join(told)}"
+
+
+def alternatives_table(design: Design) -> Table | None:
+    """Return the structures that were tried, what each hears, and why it was not taken."""
+    if not design.alternatives:
+        return None
+    tried = sorted((design, *design.alternatives), key=lambda d: -d.payload_rms)
+    return Table(
+        columns=columns("structure; payload_rms=payload [m]; residual=of the hook's [%]; hears <"),
+        rows=[(d.structure, d.payload_rms, d.residual, _hears(d)) for d in tried],
+        notes=tuple(
+            f"{other.structure}: {_why_not(design, other)}"
+            for other in tried
+            if other is not design
+        ),
+        broken=tuple(k for k, other in enumerate(tried) if not other.ok),
+    )
+
+
+def _hears(design: Design) -> str:
+    """Return the instruments that a structure hears."""
+    heard = {name.partition(".")[0] for name in design.measurements}
+    return ", ".join(said for said, parts in _INSTRUMENTS.items() if heard & parts)
+
+
+def _why_not(taken: Design, other: Design) -> str:
+    """Return why a structure was not taken."""
+    if not other.ok:
+        return other.status
+    if other.payload_rms > taken.payload_rms:
+        return f"{number(other.payload_rms / taken.payload_rms)} times the motion"
+    less = percent(1.0 - other.payload_rms / taken.payload_rms)
+    return f"only {less} less motion for a larger controller"
 
 
 def has_loop(design: Design) -> bool:

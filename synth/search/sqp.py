@@ -39,6 +39,7 @@ _STIFF = 1.5  # weight of the rows over the sum of their multipliers
 _HEAVY = 1e4  # of the penalty: if rows are broken still, nothing near mends them
 _HOPELESS = 0.999  # share of what rows are broken by that is left where nothing near mends them
 INFEASIBLE = "the limits exclude each other"
+_NOTHING = 1e-7  # of the objective, promised where no step helps: slopes and values round
 _KEPT = 1e-8  # row that counts as kept
 _SKIPPED = 1e-6  # an update along less than this share of a step is left out
 
@@ -181,7 +182,7 @@ def descend(
             if stalled == 2:
                 rest = None  # by differences: what the updates have gathered may mislead
             if room < _LEAST_ROOM or stalled > 4:
-                small = promised <= 1e2 * tolerance and at.broken <= 1e2 * _KEPT
+                small = promised <= max(1e2 * tolerance, _NOTHING) and at.broken <= 1e2 * _KEPT
                 done = "" if small else "no step helps"
                 return _ended(x, at, prices, equation_prices, done, k + 1)
             continue

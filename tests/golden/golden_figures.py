@@ -581,7 +581,7 @@ def vessel(found: Figures) -> None:
 @group()
 def optimum(found: Figures) -> None:
     """Costs of small searches on one spring."""
-    design = sh.optimise_gains(case("thesis-1975"), starts=3)
+    design = sh.optimise_gains(case("thesis-1975"), "payload-feedback", starts=3)
     found.put("optimum.thesis.payload_rms", design.payload_rms, "optimum")
     found.put("optimum.thesis.status", design.status, "text")
     late = case("thesis-1975").replace(_LATE_NOISY)
@@ -602,7 +602,7 @@ def optimum(found: Figures) -> None:
 @group(slow=True)
 def optimum_crane(found: Figures) -> None:
     """The README's design, and a combined structure."""
-    design = sh.optimise_gains(case("subsea-crane"), starts=2)
+    design = sh.optimise_gains(case("subsea-crane"), "payload-feedback", starts=2)
     found.put("optimum_crane.payload_rms", design.payload_rms, "optimum")
     found.put("optimum_crane.status", design.status, "text")
     for name, use in design.limits.items():

@@ -25,9 +25,8 @@ ARGUMENTS = (
     text(
         "--structure",
         "NAME",
-        "controller structure, such as combined; `stillhook structures CASE` compares them "
-        "(default: payload-feedback)",
-        "payload-feedback",
+        "controller structure, such as payload-feedback, or several, the simplest first "
+        "(default: those that the case's sensors allow)",
     ),
     NO_BOUND,
 )
@@ -42,7 +41,9 @@ def run(arguments: argparse.Namespace) -> int:
     from synth.structures import structure_named
 
     case = given_case(arguments)
-    structure_named(arguments.structure, case)  # an unknown name ends here, before any file
+    names = _names(arguments.structure)
+    for name in names or ():
+        structure_named(name, case)  # an unknown name ends here, before any file
     folder = prepared(arguments, case.name)
     folder.write("case.yaml", case.to_yaml())
     from synth import optimise_gains
@@ -59,9 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
                     tell(stage, done, total)
 
                 starts, seed = arguments.starts, arguments.seed
-                design = optimise_gains(
-                    case, arguments.structure, starts=starts, seed=seed, progress=step
-                )
+                asked = names[0] if names is not None and len(names) == 1 else names
+                design = optimise_gains(case, asked, starts=starts, seed=seed, progress=step)
             # Outside, as a report that is interrupted leaves whole files.
             written = write_report(folder, design=design, bound=arguments.bound, progress=tell)
     except KeyboardInterrupt:
@@ -74,6 +74,13 @@ def run(arguments: argparse.Namespace) -> int:
         following=lambda: _next(design, arguments, folder),
         result=lambda: design_data(design),
     )
+
+
+def _names(given: str | None) -> tuple[str, ...] | None:
+    """Return the structures that are asked for; None for those that the sensors allow."""
+    if given is None:
+        return None
+    return tuple(name.strip() for name in given.split(","))
 
 
 def _kept(folder: OutputFolder, design: Design | None) -> str:

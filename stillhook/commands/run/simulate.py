@@ -209,7 +209,7 @@ def _with_gains(
                 raise KeyboardInterrupt
             tell(stage, done, total)
 
-        design = optimise_gains(asked.case, progress=step)
+        design = optimise_gains(asked.case, "payload-feedback", progress=step)
     folder.write("design.yaml", design_text(design))
     if design.margins is None and not asked.every:
         raise SynthesisError(f"no gains for the feedback: {design.status}")

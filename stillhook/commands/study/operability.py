@@ -164,7 +164,7 @@ def _design(case: Case, arguments: argparse.Namespace, step: Progress) -> Design
     if arguments.design is None and arguments.gains is None and case.gains is None:
         from synth import optimise_gains
 
-        return optimise_gains(case, progress=step)
+        return optimise_gains(case, "payload-feedback", progress=step)
     return given_design(case, arguments)
 
 

@@ -25,6 +25,7 @@ from stillhook.commands import gains_text, interruptible, parse_gains
 from stillhook.designs import design_report
 from stillhook.text import console, progress, show, told_once
 
+THREE = ("--structure", "payload-feedback")
 THESIS = "A=200,a=50,a1=100,a2=100"
 CASE = load_case("thesis-1975").to_yaml()
 
@@ -46,7 +47,7 @@ def optimised(tmp_path_factory):
     """One real run of `stillhook optimise`, in a process of its own."""
     folder = tmp_path_factory.mktemp("optimise")
     done = subprocess.run(
-        [sys.executable, "-m", "stillhook", "optimise", "thesis-1975"],
+        [sys.executable, "-m", "stillhook", "optimise", "thesis-1975", *THREE],
         cwd=folder,
         capture_output=True,
         text=True,
@@ -107,14 +108,14 @@ def test_optimise_suggests_commands_that_work(optimised, run):
 
 def test_quiet_prints_the_verdict_only(run, handed_over):
     handed_over(thesis_design())
-    ending = run("optimise", "thesis-1975", "--quiet")
+    ending = run("optimise", "thesis-1975", *THREE, "--quiet")
     assert ending == Ending(status=1, out="thesis-1975: stable; breaks max_sensitivity\n", err="")
     assert Path("out/thesis-1975/design.yaml").exists()
 
 
 def test_an_infeasible_case_leads_with_the_verdict_and_ends_with_1(run, handed_over):
     handed_over(infeasible_design())
-    ending = run("optimise", "thesis-1975", "--out", "here")
+    ending = run("optimise", "thesis-1975", *THREE, "--out", "here")
     assert ending.status == 1
     assert ending.out.splitlines()[2].startswith("NOT OK: not feasible at H_s 2.44 m")
     assert re.search(r"motor torque, peak +11\.9 kN m +13\.0 kN m", ending.out)
@@ -125,14 +126,16 @@ def test_an_infeasible_case_leads_with_the_verdict_and_ends_with_1(run, handed_o
 
 def test_a_changed_case_is_kept_and_used_in_the_next_commands(run, handed_over):
     handed_over(thesis_design())
-    ending = run("optimise", "thesis-1975", "--set", "rope.length=1900 m", "--out", "with space")
+    ending = run(
+        "optimise", "thesis-1975", *THREE, "--set", "rope.length=1900 m", "--out", "with space"
+    )
     assert sh.load_case("with space/case.yaml").rope.length == 2000.0  # the design's own case
     assert "stillhook check 'with space/case.yaml'" in ending.out
 
 
 def test_no_stabilising_gains_end_with_1(run):
     bounds = [f"--set=gain_bounds.{name}=[-2, -1]" for name in ("a", "a1", "a2")]
-    ending = run("optimise", "thesis-1975", "--set=gains=null", *bounds, "--starts", "2")
+    ending = run("optimise", "thesis-1975", *THREE, "--set=gains=null", *bounds, "--starts", "2")
     assert ending.status == 1
     assert "NOT OK: no stabilising gains were found" in ending.out
     assert ending.err == ""
@@ -140,7 +143,7 @@ def test_no_stabilising_gains_end_with_1(run):
 
 @pytest.mark.slow
 def test_the_thesis_winch_on_a_rope_is_not_feasible(run):
-    ending = run("optimise", "thesis-1975-rope", "--quiet")
+    ending = run("optimise", "thesis-1975-rope", *THREE, "--quiet")
     assert ending.status == 1
     assert "not feasible at H_s 2.44 m" in ending.out
 
@@ -508,7 +511,7 @@ def test_a_folder_that_may_not_be_written_to_is_found_out_first(run, monkeypatch
         return write(path, data)
 
     monkeypatch.setattr(Path, "write_bytes", refuse)
-    ending = run("optimise", "thesis-1975", "--out", "locked")
+    ending = run("optimise", "thesis-1975", *THREE, "--out", "locked")
     assert ending.status == 2
     assert re.fullmatch(r"locked/\.\d+\.probe: cannot be written: Permission denied\n", ending.err)
 
@@ -522,7 +525,7 @@ def test_an_interrupted_search_keeps_the_case(run, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("synth.optimise_gains", interrupted)
-    ending = run("optimise", "thesis-1975", "--out", "here")
+    ending = run("optimise", "thesis-1975", *THREE, "--out", "here")
     assert ending == Ending(
         status=130,
         out="",
@@ -541,7 +544,7 @@ def test_an_interrupted_search_says_that_other_files_are_old(run, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("synth.optimise_gains", interrupted)
-    ending = run("optimise", "thesis-1975", "--out", "here")
+    ending = run("optimise", "thesis-1975", *THREE, "--out", "here")
     assert ending.err.endswith(
         "kept in here: case.yaml, design.yaml (all but case.yaml are from an earlier run)\n"
     )
@@ -559,7 +562,7 @@ def test_an_interrupt_while_drawing_keeps_what_is_finished(run, handed_over, mon
         return b"a picture"
 
     monkeypatch.setattr("stillhook.text.style.picture", interrupted)
-    ending = run("optimise", "thesis-1975", "--out", "here")
+    ending = run("optimise", "thesis-1975", *THREE, "--out", "here")
     assert ending.status == 130
     kept = {"case.yaml", "design.yaml", "payload_spectrum.svg", "payload_spectrum.png"}
     assert {path.name for path in Path("here").iterdir()} == kept | {"responses.svg"}
@@ -597,7 +600,7 @@ def test_an_interrupt_that_is_swallowed_comes_again():
 @main_thread
 def test_ctrl_c_in_the_midst_of_the_search(tmp_path):
     started = subprocess.Popen(
-        [sys.executable, "-m", "stillhook", "optimise", "thesis-1975", "--starts", "400"],
+        [sys.executable, "-m", "stillhook", "optimise", "thesis-1975", *THREE, "--starts", "400"],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -57,7 +57,7 @@ def test_it_is_no_better_than_the_bound_and_much_better_than_three_gains() -> No
     best = bound_for(design)
     assert best.rms is not None
     assert best.free.value < best.rms
-    three = sh.optimise_gains(design.case, starts=4)
+    three = sh.optimise_gains(design.case, "payload-feedback", starts=4)
     assert design.payload_rms < 0.1 * three.payload_rms
 
 

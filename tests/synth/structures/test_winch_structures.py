@@ -149,7 +149,7 @@ def test_without_the_payload_slow_motion_is_reported_only(crane: Case) -> None:
 
 
 def test_payload_feedback_is_what_optimise_gains_finds(spring: Case) -> None:
-    design = optimise_gains(spring, starts=4)
+    design = optimise_gains(spring, "payload-feedback", starts=4)
     assert design.ok
     assert design.structure == "payload-feedback"
     assert tuple(design.parameters) == ("A", "a", "a1", "a2")
