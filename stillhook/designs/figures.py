@@ -76,9 +76,14 @@ def payload_spectrum(design: Design) -> Figure:
         ("hook", HOOK, view.hook.density(omega), view.hook_motion.rms),
         ("payload, drum held", BEFORE, view.held_density(omega), design.payload_rms_before),
     ]
+    for other in design.alternatives:
+        if other.structure == "payload-feedback" and other.margins is not None:
+            density = MotionView(other).payload_density(omega)
+            curves.append((f"payload, {other.structure}", DRUM, density, other.payload_rms))
     if view.compensated:
         density = view.payload_density(omega)
-        curves.append(("payload, with the gains", AFTER, density, design.payload_rms))
+        label = f"payload, {design.structure}" if design.alternatives else "payload, with the gains"
+        curves.append((label, AFTER, density, design.payload_rms))
     right = max(2.0, 1.15 * max(_quantile(omega, density) for _, _, density, _ in curves))
     peaks = [float(density[np.isfinite(density)].max()) for _, _, density, _ in curves]
     bottom = max(1e-3 * min(peaks), 1e-10 * max(peaks))
@@ -191,9 +196,9 @@ def limits(design: Design) -> Figure:
 def _spectrum_finding(design: Design) -> str:
     if design.margins is None:
         return "The loop is unstable: no compensated payload to show"
-    before, after = quantity(design.payload_rms_before, "m"), quantity(design.payload_rms, "m")
-    change = decibels(design.payload_rms_before / design.payload_rms)
-    return f"The payload goes from {before} to {after} rms ({change})"
+    hook, payload = quantity(design.hook_rms, "m"), quantity(design.payload_rms, "m")
+    change = decibels(design.hook_rms / design.payload_rms)
+    return f"The hook moves {hook}, the payload {payload} rms ({change})"
 
 
 def _response_finding(view: MotionView) -> str:

@@ -155,21 +155,9 @@ def test_readme_shows_the_real_demo(run):
     ending = run("optimise", "subsea-crane")
     assert ending.status == 0
     real = ending.out.partition("\nWritten to")[0]
-    # How many starts agree may hang on the processor's last bit; what they agree on does not.  The
-    # optimum has two peaks of S of the same height: which one is named hangs on it too.
-    peaks = re.compile(r"(sensitivity peak M_s +2\.00 +at) (1\.98|13\.1) rad/s")
-    for text in (shown, real):
-        assert "starts agree" in text
-        assert peaks.search(text)
-    lines = [
-        [
-            peaks.sub(r"\1", line.rstrip())
-            for line in text.strip().splitlines()
-            if "starts agree" not in line
-        ]
-        for text in (shown, real)
-    ]
-    assert lines[0] == lines[1]
+    head, real = ([line.rstrip() for line in text.strip().splitlines()] for text in (shown, real))
+    assert len(head) > 15
+    assert head == real[: len(head)]
 
 
 # evaluate
