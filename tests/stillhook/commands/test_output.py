@@ -112,6 +112,6 @@ def test_only_the_command_that_is_asked_for_is_imported():
 
 def test_json_of_a_design_holds_its_fields(capsys):
     result = told(capsys, "evaluate", *CALM, "--gains", GAINS, "--no-bound")["result"]
-    assert result["gains"] == {"A": 1.0, "a": 16.0, "a1": 44.0, "a2": 6.4}
+    assert result["parameters"] == {"A": 1.0, "a": 16.0, "a1": 44.0, "a2": 6.4}
     assert result["payload_rms"] > 0.0
     assert "case" not in result

@@ -172,7 +172,7 @@ def test_a_design_for_another_case_is_a_warning(run):
 
 
 def test_a_case_without_gains_gets_the_best_ones_first(run, monkeypatch):
-    monkeypatch.setattr("synth.optimise_gains", lambda case, **rest: thesis_design())
+    monkeypatch.setattr("synth.optimise_gains", lambda case, *named, **rest: thesis_design())
     ending = run("simulate", *CALM, "--set", "gains=null", *SHORT, "--out", "here")
     assert ending.status == 0
     assert " ".join(ending.out.split()).startswith(
@@ -184,7 +184,7 @@ def test_a_case_without_gains_gets_the_best_ones_first(run, monkeypatch):
 
 
 def test_a_case_without_stabilising_gains_ends_with_1(run, monkeypatch):
-    monkeypatch.setattr("synth.optimise_gains", lambda case, **rest: loopless_design())
+    monkeypatch.setattr("synth.optimise_gains", lambda case, *named, **rest: loopless_design())
     ending = run("simulate", *CALM, "--set", "gains=null", *SHORT)
     assert (ending.status, ending.out) == (1, "")
     assert "no gains for the feedback: no stabilising gains were found" in ending.err
@@ -483,7 +483,7 @@ def test_an_interrupt_before_anything_was_simulated_says_so(run, monkeypatch):
 
 
 def test_an_interrupt_while_the_gains_are_sought_says_what_is_kept(run, monkeypatch):
-    def interrupted(case, *, progress):
+    def interrupted(case, structure, *, progress):
         progress("starts", 3, 16)
         raise AssertionError("the search went on")
 
