@@ -156,7 +156,9 @@ def refine_minima(
         # function is foretold there: a smooth minimum is found in two or three rounds.
         left, centre, right = (inside[rows, middle + i] for i in (-1, 0, 1))
         bend = left - 2.0 * centre + right
-        step = np.clip((left - right) / np.where(bend > 0.0, 2.0 * bend, np.inf), -1.0, 1.0)
+        # Clipped before the division, which would overflow where the nodes are all but level.
+        reach = 2.0 * np.maximum(bend, 0.0)
+        step = np.clip(left - right, -reach, reach) / np.where(reach > 0.0, reach, 1.0)
         vertex = nodes[rows, middle] + step * 0.5 * (high - low)
         lowest = function(vertex)
         for place, value in ((nodes[rows, k], inside[rows, k]), (vertex, lowest)):

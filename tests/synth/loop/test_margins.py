@@ -187,3 +187,13 @@ def test_margins_of_a_plant_bound_the_gain_at_which_it_goes_unstable() -> None:
 
 def test_margins_print_as_a_tree() -> None:
     assert "M_s" in str(margins_of([4.0], [1.0, 3.0, 3.0, 1.0]))
+
+
+def test_three_nodes_all_but_on_a_line_bend_no_parabola():
+    def narrow(omega):
+        return np.where(np.abs(omega - 0.95) < 0.02, 0.0, np.maximum(2.0 - omega, 1e-310))
+
+    grid = np.array([0.0, 0.95, 2.0])
+    at, value = refine_minima(narrow, grid, narrow(grid))
+    assert value.min() == 0.0
+    assert at[np.argmin(value)] == 0.95
