@@ -155,7 +155,8 @@ class PlantStack:
 def stacked_members(family: Family, members: Sequence[Member], masses: int) -> PlantStack:
     """Return the plants of members of a family, all with so many rope masses.
 
-    Their linear drag is the case's fixed one, or zero where it is solved with the response.
+    Their linear drag is the case's fixed one, or zero where it is solved with the response.  The
+    noise in each measurement is a disturbance, named as `models.sensing.sensed_plant` names it.
     """
     data = numbers_of(family, members)
     plant = build_plant(data[0], masses)
@@ -175,14 +176,31 @@ def stacked_members(family: Family, members: Sequence[Member], masses: int) -> P
             full.reshape(full.shape[0], m, full.shape[1] // m).transpose(1, 0, 2)
         )
     first = plant.linearise(drag=float(drag[0]))
+    noises = {f"{name}_noise": first.units[name] for name in first.measurements}
     return PlantStack(
-        like=first,
+        like=replace(
+            first,
+            disturbances=(*first.disturbances, *noises),
+            units={**first.units, **noises},
+            **_noisy({"E": first.E, "F": first.F, "Fz": first.Fz}),
+        ),
         delays=np.array([[d.delay] * len(first.measurements) for d in data]),
         static=_static(data),
         quadratic_drag=np.array([d.quadratic_drag if fixed is None else 0.0 for d in data]),
         linear_drag=drag,
-        **blocks,
+        **(blocks | _noisy(blocks)),
     )
+
+
+def _noisy(blocks: Mapping[str, FloatArray]) -> dict[str, Any]:
+    """Return E, F and Fz, (.., rows, columns), with one input more for each measurement's noise."""
+    count = blocks["F"].shape[-2]
+    found = {}
+    for name, added in (("E", np.zeros(())), ("F", np.eye(count)), ("Fz", np.zeros(()))):
+        block = blocks[name]
+        more = np.broadcast_to(added, (*block.shape[:-1], count))
+        found[name] = np.concatenate([block, more], axis=-1)
+    return found
 
 
 def numbers_of(family: Family, members: Sequence[Member]) -> list[PlantData]:
