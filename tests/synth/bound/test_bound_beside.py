@@ -237,7 +237,7 @@ def test_the_design_itself_where_nothing_better_was_found(monkeypatch: pytest.Mo
         controller=best.free.controller,
         margins=crane_design("combined").margins,
     )
-    monkeypatch.setattr("synth.bound.case.high_order", lambda *words: worse)
+    monkeypatch.setattr("synth.bound.case.high_order", lambda *words, **more: worse)
     monkeypatch.setattr("synth.bound.case.youla_design", lambda *words, **more: None)
     assert best.is_own
     assert "is the design itself: 20.9 mm" in str(best)
