@@ -25,7 +25,7 @@ Progress = Callable[[str, int, int], None]
 
 AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
 _ENOUGH, _MOST = 8, 0.7  # starts, and share of all, that agree on the best answer: no more needed
-_NEAR, _BESIDE = 1e-2, 0.15  # of log cost and parameters, relative: on the way to one end
+_NEAR, _BESIDE = 0.05, 0.25  # of log cost and parameters, relative: on the way to one end
 _POLISHED = 6  # distinct answers that are polished at most
 _MORE, _LEAST_MORE = 2, 6  # times the starts, and at least, that are tried roughly beside them
 _MOST_MORE = 108  # ... and at most, over the number of parameters
