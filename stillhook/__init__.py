@@ -45,8 +45,11 @@ if TYPE_CHECKING:
     from synth.controllers import BrakeOn, ConstantTension, LinearFeedback, VelocityFeedForward
     from synth.design import (
         Design,
+        Look,
+        View,
         evaluate_gains,
         optimise_gains,
+        prepare,
         tune,
     )
     from synth.operability import Operability, operability

@@ -44,7 +44,7 @@ _AS_STILL = 1.05  # of the stillest design's motion, with which a simpler one is
 _ROUGHEST = 0.99  # of the largest sea that any structure can do
 _SHARE = 4  # of the starts that each of several structures has
 _MODES = 5.0  # every rope mode below this many crossovers belongs in the design plant
-_MOST_MASSES = 40
+MOST_MASSES = 40
 _RESUMED = 5  # ends of a search that the next one, on more masses, begins from
 _HAIR = 1e-4  # relative excess over a limit in the largest sea
 _CALMER = 3.0  # logarithm of what the largest sea may have to be calmer by, for the sensors' noise
@@ -192,31 +192,31 @@ def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback
         If there is no such structure, or a parameter is missing, unknown or out of its range.
     """
     question = pose(case, structure)
-    complete = _complete(question, gains)
+    complete = checked_parameters(question, gains)
     growth = _growth(question, complete)
-    if growth > 0.0 and question.masses < _MOST_MASSES and question.data.masses is None:
+    if growth > 0.0 and question.masses < MOST_MASSES and question.data.masses is None:
         # Few masses do not have their modes where the rope does: made on it, a loop may hold there.
-        finer = with_masses(question, _MOST_MASSES)
+        finer = with_masses(question, MOST_MASSES)
         if (there := _growth(finer, complete)) <= 0.0:
             question, growth = finer, there
     if growth <= 0.0:
-        masses = _masses_for(question, question.assess(complete))
+        masses = masses_for(question, question.assess(complete))
         if masses > question.masses:
             question = with_masses(question, masses)
             growth = _growth(question, complete)
     if growth > 0.0:
         status = f"unstable: grows by a factor e every {1.0 / growth:.3g} s"
-        return _record(question, complete, None, {}, ok=False, status=status)
+        return recorded(question, complete, None, {}, ok=False, status=status)
     return verified(_evaluated(question, complete), None, question)
 
 
 def _evaluated(question: DesignQuestion, parameters: Mapping[str, float]) -> Design:
     """Return what parameters of a stable loop do."""
     assessment = question.assess(parameters)
-    uses = _uses(question, assessment, {})
+    uses = every_use(question, assessment, {})
     broken = [u.name for u in uses.values() if u.enforced and not u.kept]
     status = "stable; " + (f"breaks {', '.join(broken)}" if broken else "keeps every limit")
-    return _record(question, parameters, assessment, uses, ok=not broken, status=status)
+    return recorded(question, parameters, assessment, uses, ok=not broken, status=status)
 
 
 def _searched(
@@ -298,8 +298,8 @@ def _kept_in(question: DesignQuestion, parameters: Mapping[str, float], height: 
         sea = {"sea.significant_height": float(np.exp(log_height))}
         calmer = pose(question.case.replace(sea), question.structure.name, question.masses)
         assessment = calmer.assess(parameters)
-        uses = _uses(calmer, assessment, {})
-        return _record(calmer, parameters, assessment, uses, ok=False, status="")
+        uses = every_use(calmer, assessment, {})
+        return recorded(calmer, parameters, assessment, uses, ok=False, status="")
 
     def over(log_height: float) -> float:
         limits = at(log_height).limits
@@ -333,11 +333,11 @@ def design_of(question: DesignQuestion, tuning: Tuning, *, drive_kept: bool = Tr
     """Return a tuning as a design, with the limits that it did not have to keep as reported."""
     if tuning.assessment is None:
         status = "no stabilising gains were found"
-        design = _record(question, {}, None, {}, ok=False, status=status)
+        design = recorded(question, {}, None, {}, ok=False, status=status)
     else:
         prices = {name: use.price for name, use in tuning.limits.items()}
-        uses = _uses(question, tuning.assessment, prices, drive_kept=drive_kept)
-        design = _record(
+        uses = every_use(question, tuning.assessment, prices, drive_kept=drive_kept)
+        design = recorded(
             question,
             question.named(list(tuning.parameters.values())),
             tuning.assessment,
@@ -348,13 +348,14 @@ def design_of(question: DesignQuestion, tuning: Tuning, *, drive_kept: bool = Tr
     return replace(design, starts=tuning.starts, agreed=tuning.agreed, drive_kept=drive_kept)
 
 
-def _uses(
+def every_use(
     question: DesignQuestion,
     assessment: Assessment,
     prices: Mapping[str, float],
     *,
     drive_kept: bool = True,
 ) -> dict[str, LimitUse]:
+    """Return the use of the limits that bind and of those that are reported only, by name."""
     enforced = question.limits if drive_kept else question.loop
     reported = (*question.reported, *(() if drive_kept else question.drive))
     return {
@@ -363,7 +364,7 @@ def _uses(
     }
 
 
-def _record(
+def recorded(
     question: DesignQuestion,
     parameters: Mapping[str, float],
     assessment: Assessment | None,
@@ -441,7 +442,7 @@ def _in_small_motion(question: DesignQuestion, parameters: Mapping[str, float]) 
     return "; without drag, in small motion, the loop is unstable and swings by itself"
 
 
-def _complete(question: DesignQuestion, gains: object) -> dict[str, float]:
+def checked_parameters(question: DesignQuestion, gains: object) -> dict[str, float]:
     """Return parameters by name, checked; the amplifier is the case's own if it is left out."""
     given: dict[str, object] = {}
     if isinstance(gains, Mapping):
@@ -471,10 +472,10 @@ def _complete(question: DesignQuestion, gains: object) -> dict[str, float]:
 def _masses_wanted(question: DesignQuestion, tuning: Tuning) -> int:
     if tuning.assessment is None or not tuning.assessment.stable:
         return question.masses
-    return _masses_for(question, tuning.assessment)
+    return masses_for(question, tuning.assessment)
 
 
-def _masses_for(question: DesignQuestion, assessment: Assessment) -> int:
+def masses_for(question: DesignQuestion, assessment: Assessment) -> int:
     """Return the rope masses that the loop's crossover asks for, where the case leaves it open."""
     if question.data.masses is not None or not assessment.margins.crossovers.size:
         return question.masses
@@ -482,4 +483,4 @@ def _masses_for(question: DesignQuestion, assessment: Assessment) -> int:
     try:
         return max(question.masses, masses_for_bandwidth(question.data, highest))
     except InputError:
-        return _MOST_MASSES
+        return MOST_MASSES

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
         return_differences,
         with_drag,
     )
-    from .margins import Margins, crossings, loop_margins, refine_minima
+    from .margins import Margins, crossings, loop_margins, refine_minima, worst_margins
     from .pole_region import PoleRegion, counted_poles, with_delay_models
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

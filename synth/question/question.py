@@ -24,6 +24,7 @@ from models.case import Case
 from models.hook import HookMotion
 from models.plant import (
     LinearPlant,
+    Plant,
     PlantData,
     build_plant,
     fixed_top_modes,
@@ -104,8 +105,8 @@ class DesignQuestion:
         The case, and the structure whose parameters are asked for.
     data, hook
         The plant's numbers and the hook's motion.
-    masses
-        Rope masses.
+    model
+        The plant before it is linearised.
     plant
         The linear plant with what the structure hears, its drag that before compensation.
     spectra
@@ -122,7 +123,7 @@ class DesignQuestion:
     structure: PayloadFeedback | WinchStructure | LowOrderFeedback
     data: PlantData
     hook: HookMotion
-    masses: int
+    model: Plant
     plant: LinearPlant
     spectra: Mapping[str, Any]
     loop: tuple[Limit, ...]
@@ -131,6 +132,11 @@ class DesignQuestion:
     drag: DragElement | None
     drag_before: float
     payload_rms_before: float
+
+    @property
+    def masses(self) -> int:
+        """Rope masses."""
+        return self.model.masses
 
     @property
     def limits(self) -> tuple[Limit, ...]:
@@ -185,7 +191,10 @@ class DesignQuestion:
 
 
 def pose(
-    case: Case, structure: str = "payload-feedback", masses: int | None = None
+    case: Case,
+    structure: str = "payload-feedback",
+    masses: int | None = None,
+    known: DesignQuestion | None = None,
 ) -> DesignQuestion:
     """Return the question of a case and a structure.
 
@@ -200,6 +209,8 @@ def pose(
         Name of the structure, see `synth.structures.structure_names`.
     masses
         Rope masses; by default the case's, or a number that suits a quick loop.
+    known
+        The question of a similar case: what this one has in common with it is taken from there.
 
     Raises
     ------
@@ -208,9 +219,16 @@ def pose(
     """
     named = structure_named(structure, case)
     data = PlantData.from_case(case)
-    hook = HookMotion.from_case(case)
-    model = build_plant(data, masses)
-    drag_before, rms_before = uncompensated(case, data, hook)
+    shaken = known if known is not None and _same_sea(case, known.case) else None
+    hook = HookMotion.from_case(case) if shaken is None else shaken.hook
+    if known is not None and known.data == data and masses in (None, known.masses):
+        model = known.model
+    else:
+        model = build_plant(data, masses)
+    if shaken is not None and shaken.data == data and case.payload == shaken.case.payload:
+        drag_before, rms_before = shaken.drag_before, shaken.payload_rms_before
+    else:
+        drag_before, rms_before = uncompensated(case, data, hook)
     sensed = with_sensors(model.linearise(drag=drag_before), case.sensors)
     plant = sensed.select(measurements=named.measurements)
     stochastic = case.payload.fixed_drag is None and data.quadratic_drag > 0.0
@@ -223,7 +241,7 @@ def pose(
         structure=named,
         data=data,
         hook=hook,
-        masses=model.masses,
+        model=model,
         plant=plant,
         spectra=heard_spectra(case, hook, named.measurements),
         loop=tuple(limit for limit in loop if limit not in slow),
@@ -235,6 +253,13 @@ def pose(
         drag_before=drag_before,
         payload_rms_before=rms_before,
     )
+
+
+def _same_sea(case: Case, other: Case) -> bool:
+    """Return whether the hook moves alike in two cases: nothing but limits, sensors, rig differ."""
+    apart = {"limits", "sensors", "winch", "motor", "rope", "payload", "gains", "name"}
+    sections = set(type(case).model_fields) - apart
+    return all(getattr(case, name) == getattr(other, name) for name in sections)
 
 
 def controller_for(case: Case, structure: str, parameters: Mapping[str, float]) -> LinearController:
@@ -347,7 +372,7 @@ def with_masses(question: DesignQuestion, masses: int) -> DesignQuestion:
     sensed = with_sensors(model.linearise(drag=question.drag_before), question.case.sensors)
     return replace(
         question,
-        masses=model.masses,
+        model=model,
         plant=sensed.select(measurements=question.structure.measurements),
         loop=tuple(_rescaled(lim, question.data, model.masses) for lim in question.loop),
     )

@@ -1,0 +1,155 @@
+"""The prepared view: its looks against verified designs, what it keeps, its warm descent."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from models import InputError, load_case
+from synth.design import Look, evaluate_gains, optimise_gains, prepare
+
+CASES = {
+    "thesis-1975": {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0},
+    "thesis-1975-rope": {"A": 200.0, "a": 0.4684, "a1": 0.3252, "a2": 0.7769},
+    "subsea-crane": {"A": 1.0, "a": 16.02, "a1": 44.36, "a2": 6.416},
+    "landing": {"A": 1.0, "a": 96.03, "a1": 189.64, "a2": 2020.0},
+}
+THESIS = CASES["thesis-1975"]
+
+
+def agree(name: str, count: int, seed: int) -> None:
+    """Compare looks at random stable designs with what is verified."""
+    case, rng = load_case(name), np.random.default_rng(seed)
+    view, compared, drawn = prepare(case), 0, 0
+    while compared < count:
+        drawn += 1
+        assert drawn < 40 * count
+        gains = {k: v * float(np.exp(0.7 * rng.normal())) for k, v in CASES[name].items()}
+        look = view.evaluate(gains)
+        if not look.stable:
+            assert not evaluate_gains(case, gains).ok
+            continue
+        compared += 1
+        design = evaluate_gains(case, gains)
+        assert design.margins is not None
+        assert look.margins is not None
+        assert look.masses == design.masses
+        assert look.payload_rms == pytest.approx(design.payload_rms, rel=1e-3)
+        worst = design.margins.max_sensitivity
+        assert look.margins.max_sensitivity == pytest.approx(worst, rel=5e-3)
+        assert look.drag == pytest.approx(design.drag, rel=1e-3)
+        assert set(look.limits) == set(design.limits)
+        for limit, use in design.limits.items():
+            assert look.limits[limit].use == pytest.approx(use.use, rel=5e-3, abs=1e-6)
+            assert look.limits[limit].enforced == use.enforced
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("name", CASES)
+def test_a_look_agrees_with_a_verified_design(name: str) -> None:
+    agree(name, 5, 3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_looks_agree_with_a_thousand_verified_designs(name: str) -> None:
+    agree(name, 250, 4)
+
+
+def test_the_curves_are_those_of_the_figures() -> None:
+    look = prepare(load_case("thesis-1975")).evaluate(THESIS)
+
+    assert isinstance(look, Look)
+    assert look.stable
+    assert not look.verified
+    assert look.margins is not None
+    nearest = 1.0 / np.abs(1.0 + look.loop_gain).min()
+    assert nearest <= look.margins.max_sensitivity  # which is refined between the frequencies
+    assert nearest == pytest.approx(look.margins.max_sensitivity, rel=5e-2)
+    assert np.sqrt(np.trapezoid(look.spectrum, look.omega)) == pytest.approx(
+        look.payload_rms, rel=5e-2
+    )
+    assert look.residual == look.payload_rms / look.hook_rms
+    assert look.response.shape == look.omega.shape
+
+
+def test_an_unstable_loop_has_a_growth_rate_and_nothing_else() -> None:
+    look = prepare(load_case("thesis-1975")).evaluate({**THESIS, "a1": -1e4})
+
+    assert not look.stable
+    assert not look.ok
+    assert look.growth > 0.0
+    assert look.payload_rms == np.inf
+    assert look.margins is None
+
+
+@pytest.mark.parametrize("gains", [{"a": 1.0}, {**THESIS, "b": 1.0}, None])
+def test_unknown_and_missing_gains_are_refused(gains: Any) -> None:
+    with pytest.raises(InputError, match="gains: must be a, a1, a2 and optionally A"):
+        prepare(load_case("thesis-1975")).evaluate(gains)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"sea.significant_height": 3.0},
+        {"sea.peak_period": 11.0},
+        {"limits.max_sensitivity": 1.5},
+        {"sensors.telemetry.delay": 0.2},
+        {"rope.length": 1400.0},
+        {"payload.mass": 60000.0},
+        {"vessel.heading": 2.0},
+        {"winch.drum.inertia": 60000.0},
+        {"payload.drag_coefficient": 0.9},
+    ],
+)
+def test_a_view_of_a_changed_case_is_that_of_the_case_posed_anew(changes: dict[str, Any]) -> None:
+    case, gains = load_case("subsea-crane"), CASES["subsea-crane"]
+    view = prepare(case)
+    before = view.evaluate(gains)
+
+    found = view.replace(changes).evaluate(gains)
+    anew = prepare(case.replace(changes)).evaluate(gains)
+
+    assert found.payload_rms == pytest.approx(anew.payload_rms, rel=1e-5)
+    assert found.drag == pytest.approx(anew.drag, rel=1e-5)
+    assert found.hook_rms == anew.hook_rms
+    for name, use in anew.limits.items():
+        assert found.limits[name].use == pytest.approx(use.use, rel=1e-4)
+    uses = [look.limits["max_sensitivity"].use for look in (found, before)]
+    assert uses[0] != uses[1] or found.payload_rms != before.payload_rms
+
+
+@pytest.mark.ci
+def test_a_warm_descent_finds_the_optimum_nearby() -> None:
+    case = load_case("subsea-crane")
+    best = optimise_gains(case, "payload-feedback", starts=4)
+    start = {k: v * (1.0 if k == "A" else 0.8) for k, v in best.gains.items()}
+
+    design = prepare(case).optimise(start, verify=True)
+
+    assert design.ok
+    assert design.verification is not None
+    assert design.payload_rms == pytest.approx(best.payload_rms, rel=1e-4)
+    assert "max_sensitivity" in design.binding
+
+
+@pytest.mark.parametrize("name", ["subsea-crane", "landing"])
+def test_a_warm_descent_is_never_worse_than_a_start_that_keeps_the_limits(name: str) -> None:
+    view = prepare(load_case(name))
+    start = view.optimise(CASES[name]).gains
+    look = view.evaluate(start)
+    assert look.ok
+
+    design = view.optimise(start)
+
+    assert design.ok
+    assert design.verification is None
+    assert design.payload_rms <= look.payload_rms * (1.0 + 1e-5)
+
+
+def test_a_descent_wants_a_stable_start() -> None:
+    with pytest.raises(InputError, match="start: must be gains of a stable loop"):
+        prepare(load_case("thesis-1975")).optimise({**THESIS, "a1": -1e4})
