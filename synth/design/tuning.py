@@ -190,7 +190,7 @@ def tune(
     limits
         What may not be exceeded, see `synth.limits.limits`.
     starts
-        How many starts the search has, at least 1.
+        How many starts are drawn, at least 1; some more go roughly where they lead.
     seed
         Seed of the Sobol set; the same seed gives the same answer.
     drag

@@ -598,7 +598,9 @@ def test_one_start_and_a_guess_are_enough() -> None:
         guesses=[[-3.0, -2.5]],
     )
     assert found.ok
-    assert len(found.starts) == 1
+    assert found.starts[0].begin.tolist() == [-3.0, -2.5]  # the guess comes first
+    assert found.starts[0].converged
+    assert found.starts[0].cost == pytest.approx(found.cost, rel=1e-4)
 
 
 def test_bounds_of_parameters_are_kept_and_cost_something() -> None:
