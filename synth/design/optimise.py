@@ -19,11 +19,11 @@ from scipy.optimize import brentq
 
 from models.basics import InputError, check_range, one_thread
 from models.case import Case
-from models.plant import MAX_MASSES, masses_for_bandwidth
+from models.plant import MAX_MASSES
 from models.sensing import aboard
 
 from ..loop import Assessment
-from ..question import GAINS, PAYLOAD, DesignQuestion, Problem, pose, with_masses
+from ..question import GAINS, PAYLOAD, DesignQuestion, Problem, masses_for, pose, with_masses
 from ..search import Progress, search
 from ..structures import LowOrderFeedback, structure_named
 from .design import Design
@@ -43,8 +43,6 @@ NESTED = (
 _AS_STILL = 1.05  # of the stillest design's motion, with which a simpler one is preferred
 _ROUGHEST = 0.99  # of the largest sea that any structure can do
 _SHARE = 4  # of the starts that each of several structures has
-_MODES = 5.0  # every rope mode below this many crossovers belongs in the design plant
-MOST_MASSES = 40
 _RESUMED = 5  # ends of a search that the next one, on more masses, begins from
 _HAIR = 1e-4  # relative excess over a limit in the largest sea
 _CALMER = 3.0  # logarithm of what the largest sea may have to be calmer by, for the sensors' noise
@@ -156,7 +154,9 @@ def _optimised(
     count += len(known)
     known = [*known, *gains_in_use(question)]
     tuning = _searched(question.problem, count, seed, known, progress)
-    while (wanted := _masses_wanted(question, tuning)) > question.masses:
+    while (loop := tuning.assessment) is not None and loop.stable:
+        if (wanted := masses_for(question, loop)) <= question.masses:
+            break
         # The rope turned out to need more masses: the ends of the search are the guesses.
         question, tuning = _on_more(question, wanted, tuning, count, seed, progress)
     if not tuning.ok:
@@ -194,9 +194,9 @@ def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback
     question = pose(case, structure)
     complete = checked_parameters(question, gains)
     growth = _growth(question, complete)
-    if growth > 0.0 and question.masses < MOST_MASSES and question.data.masses is None:
+    if growth > 0.0 and question.masses < MAX_MASSES and question.data.masses is None:
         # Few masses do not have their modes where the rope does: made on it, a loop may hold there.
-        finer = with_masses(question, MOST_MASSES)
+        finer = with_masses(question, MAX_MASSES)
         if (there := _growth(finer, complete)) <= 0.0:
             question, growth = finer, there
     if growth <= 0.0:
@@ -467,20 +467,3 @@ def checked_parameters(question: DesignQuestion, gains: object) -> dict[str, flo
             "gains", name, every[name], low=0.0 if low >= 0.0 else -np.inf, open_low=low > 0.0
         )
     return checked
-
-
-def _masses_wanted(question: DesignQuestion, tuning: Tuning) -> int:
-    if tuning.assessment is None or not tuning.assessment.stable:
-        return question.masses
-    return masses_for(question, tuning.assessment)
-
-
-def masses_for(question: DesignQuestion, assessment: Assessment) -> int:
-    """Return the rope masses that the loop's crossover asks for, where the case leaves it open."""
-    if question.data.masses is not None or not assessment.margins.crossovers.size:
-        return question.masses
-    highest = _MODES * float(assessment.margins.crossovers.max())
-    try:
-        return max(question.masses, masses_for_bandwidth(question.data, highest))
-    except InputError:
-        return MOST_MASSES

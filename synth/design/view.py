@@ -28,7 +28,7 @@ from models.basics import (
     one_thread,
 )
 from models.case import Case
-from models.plant import LinearPlant, consistent_drag
+from models.plant import MAX_MASSES, LinearPlant, consistent_drag
 
 from ..loop import Assessment, Margins, loop_margins, refine_minima, worst_margins
 from ..question import (
@@ -40,16 +40,15 @@ from ..question import (
     LoopResponses,
     Point,
     Problem,
+    masses_for,
     pose,
     with_masses,
 )
 from ..search import KEPT, Solution, cost_nodes, margin_nodes, settle
 from .design import Design
 from .optimise import (
-    MOST_MASSES,
     checked_parameters,
     every_use,
-    masses_for,
     recorded,
     verified,
 )
@@ -310,8 +309,8 @@ class View:
         question, problem = self._on(self.question.masses)
         values = np.array(question.values(parameters))
         growth = problem.growth(values)
-        if growth > 0.0 and question.masses < MOST_MASSES and question.data.masses is None:
-            finer, finest = self._on(MOST_MASSES)
+        if growth > 0.0 and question.masses < MAX_MASSES and question.data.masses is None:
+            finer, finest = self._on(MAX_MASSES)
             if (there := finest.growth(values)) <= 0.0:
                 question, problem, growth = finer, finest, there
         if growth > 0.0:

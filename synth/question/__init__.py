@@ -33,5 +33,6 @@ if TYPE_CHECKING:
         uncompensated,
         with_masses,
     )
+    from .rope_masses import masses_for
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -13,19 +13,17 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
-from models.basics import InputError
 from models.case import Case
-from models.plant import LinearPlant, masses_for_bandwidth
+from models.plant import LinearPlant
 
 from ..loop import Assessment
 from ..structures import ParametrisedController
 from .family_problem import FamilyLoop, FamilyProblem, Objective
 from .problem import Problem
 from .question import DesignQuestion, pose
+from .rope_masses import masses_for
 
 PAYLOAD_FEEDBACK = "payload-feedback"
-_MODES = 5.0  # every rope mode below this many crossovers belongs in the plant
-_MOST_MASSES = 40
 
 
 class FamilyQuestion:
@@ -85,19 +83,14 @@ class FamilyQuestion:
         return FamilyLoop(name=name, problem=problem, weight=weight)
 
     def masses_wanted(self, cases: Sequence[Case], assessments: Sequence[Assessment]) -> int:
-        """Return the rope masses that the fastest crossover of any member asks for."""
+        """Return the rope masses that the most demanding loop of any member asks for."""
         most = self.most_masses
         if self.masses is not None:
             return most
-        for case, assessment in zip(cases, assessments, strict=True):
-            data, crossovers = self.question(case).data, assessment.margins.crossovers
-            if data.masses is not None or not crossovers.size or not assessment.stable:
-                continue
-            try:
-                most = max(most, masses_for_bandwidth(data, _MODES * float(crossovers.max())))
-            except InputError:
-                return _MOST_MASSES
-        return most
+        loops = zip(cases, assessments, strict=True)
+        return max(
+            [most, *(masses_for(self.question(c), loop) for c, loop in loops if loop.stable)]
+        )
 
     def _pose(self, case: Case) -> tuple[DesignQuestion, Problem]:
         if case not in self._posed:

@@ -7,6 +7,7 @@ import pytest
 from designs import THESIS_GAINS, thesis_design
 
 from models import InputError, load_case
+from models.sensing import sensed_line_at
 from synth.design import evaluate_gains, optimise_gains
 from synth.question import PAYLOAD
 
@@ -17,6 +18,8 @@ FED = {
     "heave.lead": 0.28,
     "heave.bandwidth": 100.0,
 }
+
+LATE_ON_7 = {"A": 1.0, "a": 6.687476, "a1": 9.196571, "a2": 7.977194}  # optimal on 7 masses
 
 
 def test_the_section_of_a_case_is_a_set_of_gains() -> None:
@@ -88,3 +91,30 @@ def test_noise_does_not_shrink_with_the_largest_sea() -> None:
     assert max(used) == pytest.approx(1.0, abs=3e-4)
     noise = design.shares["motor.voltage"]["payload.velocity_noise"]
     assert noise > 0.02 * design.assessment.sigma("motor.voltage")
+
+
+@pytest.mark.ci
+def test_a_limit_that_binds_on_a_rope_mode_is_kept_on_the_distributed_rope() -> None:
+    """With late payload signals the peak of S stands on a mode far above all crossovers."""
+    case = load_case("subsea-crane").replace({"sensors.telemetry.delay": 0.4})
+    design = optimise_gains(case, "payload-feedback", starts=4)
+    assert design.ok
+    assert design.margins is not None
+    assert design.margins.peak > 5.0 * design.margins.crossovers.max()
+    bound = design.limits["max_sensitivity"].bound
+    assert design.margins.max_sensitivity == pytest.approx(bound, rel=1e-5)
+
+    gains, omega = design.parameters, np.geomspace(1e-2, 1e2, 40_000)
+    line = sensed_line_at(case, 1j * omega, drag=design.drag)
+    heard = ("payload.acceleration", "payload.velocity", "payload.displacement")
+    felt = line.yu[:, [line.measurements.index(name) for name in heard], 0]
+    loop = gains["A"] * felt @ [gains["a"], gains["a1"], gains["a2"]]
+    on_the_rope = float(np.max(1.0 / np.abs(1.0 + loop)))
+    assert on_the_rope == pytest.approx(bound, rel=1e-3)
+
+    # As few masses as the crossovers ask for keep it, and the rope does not.
+    few = evaluate_gains(case.replace({"rope.masses": 7}), LATE_ON_7)
+    assert few.limits["max_sensitivity"].kept
+    assert few.verification is not None
+    assert few.verification.failed == ("rope.max_sensitivity",)
+    assert "max_sensitivity" in evaluate_gains(case, LATE_ON_7).status
