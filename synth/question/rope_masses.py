@@ -58,7 +58,7 @@ def _sensitivity_on_the_rope(question: DesignQuestion, loop: Assessment, above: 
         blocks = numeric_blocks(line.select(measurements=controller.measurements))
         law = np.moveaxis(controller.response_at(1j * omega), 0, -1)
         differences = return_differences(blocks, [list(row) for row in law])
-        return np.min(np.abs(differences), axis=0)
+        return np.asarray(np.min(np.abs(differences), axis=0))
 
     near = distance(grid)
     return float(1.0 / refine_minima(distance, grid, near, near < 1.0 / above)[1].min())
