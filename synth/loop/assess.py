@@ -32,6 +32,7 @@ from .pole_region import PoleRegion, with_delay_models
 
 _RTOL = 1e-8  # of every variance
 _GRID_PER_DECADE = 150
+_LOW = 0.3  # of the largest value on the grid, below which no peak between its points is looked for
 
 
 class Assessment:
@@ -194,9 +195,10 @@ class Assessment:
             Frequencies [rad/s] at which the weight has a kink or an end.
         """
         ends = [share * edge for edge in edges for share in (1e-4, 1.0)]
+        places = np.append(self.grid, ends)
         return self._largest(
             lambda w: np.abs(self.response(output, disturbance, w)) * weight(w),
-            np.append(self.grid, ends),
+            places[weight(places) > 0.0],
         )
 
     def spectrum(self, output: str, omega: FloatArray) -> FloatArray:
@@ -287,8 +289,12 @@ class Assessment:
 
     @staticmethod
     def _largest(function: Callable[[FloatArray], FloatArray], places: FloatArray) -> float:
+        if not places.size:
+            return 0.0
         grid = np.unique(places)
-        return float(-refine_minima(lambda w: -function(w), grid, -function(grid))[1].min())
+        sizes = function(grid)
+        high = sizes > _LOW * sizes.max()
+        return float(-refine_minima(lambda w: -function(w), grid, -sizes, high)[1].min())
 
 
 def frequency_grid(poles: ComplexArray) -> FloatArray:
