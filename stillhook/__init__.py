@@ -53,10 +53,16 @@ if TYPE_CHECKING:
         tune,
     )
     from synth.operability import Operability, operability
-    from synth.robust import Family, Robustness, optimise_robust, robustness, schedule_gains
+    from synth.robust import (
+        Family,
+        Robustness,
+        gain_tolerance,
+        optimise_robust,
+        robustness,
+        schedule_gains,
+    )
     from synth.sensitivity import Sensitivity, morris_screening, sensitivity, sobol_indices
     from synth.sizing import co_design, pareto_front, size_winch, worth
-    from synth.sweeps import gain_tolerance
 
     from .comparison import Comparison, compare, write_comparison
     from .designs import load_design, save_design, write_report

@@ -12,6 +12,5 @@ if TYPE_CHECKING:
     from .dataset import case_of, spread_of
     from .frequency import FrequencyEngine, frequency_sweep
     from .metrics import METRICS
-    from .tolerance import gain_tolerance
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import control
 import numpy as np
 import pytest
+from designs import thesis_design
 from loop_numbers import double_integrator, integrator, two_carts, with_full_state
 
 from models import load_case
@@ -12,7 +13,7 @@ from models.basics import InputError
 from synth import PayloadFeedback, StaticGain, Structure
 from synth.loop import LinearController, closed_loop_poles
 from synth.question import pose
-from synth.robust import gain_radius
+from synth.robust import gain_radius, gain_tolerance
 from synth.structures import Parameter, ParametrisedController
 
 GAINS = (50.0, 100.0, 100.0)
@@ -151,3 +152,17 @@ def test_a_filtered_loop_has_the_gain_margin_of_its_characteristic_polynomial():
     loop = control.tf([2.0], [0.2, 1.0, 0.0]) * control.tf(numerator, denominator)
     up = control.stability_margins(loop)[0]
     assert radius.box == pytest.approx(min(up - 1.0, 1.0), rel=1e-6)
+
+
+def test_gains_within_the_exact_radius_are_stable_and_just_beyond_not() -> None:
+    inside = gain_tolerance(thesis_design(), 0.05)
+    assert inside.ok
+    assert inside.beyond is True
+    assert inside.stable.count == inside.stable.total == 2000
+    at_edge = gain_tolerance(thesis_design(), 0.999 * inside.radius.box, samples=4000)
+    assert at_edge.ok
+    assert at_edge.stable.count == 4000
+    outside = gain_tolerance(thesis_design(), 1.15 * inside.radius.box, samples=4000)
+    assert not outside.ok
+    assert outside.stable.count < 4000
+    assert "NOT stable" in str(outside)

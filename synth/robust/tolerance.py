@@ -1,7 +1,7 @@
 """Tolerance of gains by their components', against the exact radius of stability.
 
 A sweep of gains shows what errors do to the motion; whether any of them is unstable needs no
-samples at all: `synth.robust.perturbation` knows the least errors that are, exactly.  Here the two
+samples at all: `gain_radius` knows the least errors that are, exactly.  Here the two
 are put side by side, on the design's own plant and drag.
 """
 
@@ -15,8 +15,8 @@ from models.basics import InputError, Share, check_range, share
 from models.spread import DRAG, GAINS, Samples, Spread, Uniform
 
 from ..design import Design
-from ..robust import GainRadius, gain_radius
-from .frequency import FrequencyEngine
+from ..sweeps import FrequencyEngine
+from .perturbation import GainRadius, gain_radius
 
 _OUTSIDE = 1.001  # times the radius, where the nearest unstable gains have to be unstable
 _FACES = 0.5  # share of the draws that are put on the faces of the box
