@@ -1,7 +1,6 @@
-"""Any design on rows of a spread: the vectorised engine behind a sweep.
+"""Any design on rows of a spread: the vectorised engine behind sweeps and robust designs.
 
-    rows (n, d) -> numbers, controllers, densities -> loops -> drag, variances -> stability, M_s
-                -> metrics, (n,) each; NaN where a loop is unstable
+    rows (n, d) -> numbers, controllers, densities -> loops -> drag, variances, stability, M_s
 
 Everything goes through the rope's recursion (`synth.sweeps.chain`) but variances and stability of
 three gains on one spring without delay and noise, for which polynomials (`synth.sweeps.kernel`)
@@ -11,7 +10,7 @@ Rows whose variances two rules disagree on begin again on finer nodes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,12 +28,10 @@ from models.basics import (
 from models.plant import lump_rope
 from models.spread import Spread
 
-from ..design import Design
-from ..question import SampledNoise
+from ..question import DesignQuestion, SampledNoise
 from .chain import BLOCK, VELOCITY, Chain, ChainLoops, Shaken
 from .kernel import SpringLoops
 from .law_rows import DesignLaw, LawColumns
-from .metrics import FrequencyMetric, finished
 from .numbers import NOISE_OF, PlantNumbers, at_rows, numbers_of
 from .sea_rows import SeaRows
 from .sweep_nodes import Panel, SweepNodes, halved, sweep_nodes, sweep_panels
@@ -42,6 +39,7 @@ from .winding_count import calming_drag, light_poles, survey
 
 Velocity = Callable[[IndexArray, FloatArray], FloatArray]
 
+ACCURACY = 1e-5  # difference of two rules from which a variance gets finer nodes
 _REFERENCE = 3.0  # frequency by which polynomials are scaled [rad/s]
 _LEVELS = 6  # of nodes, each with panels half as long
 _PILOTS = 16  # rows that ask for panels
@@ -73,16 +71,43 @@ class _Batch:
         )
 
 
-class _Solved:
-    """What is known of n rows: drag, stability, M_s and moments by (output, order), all rules."""
+class SolvedRows:
+    """What is known of the loops of n rows.
 
-    def __init__(self, count: int, outputs: Sequence[str], rules: int) -> None:
+    Attributes
+    ----------
+    numbers
+        Their plants.
+    drag
+        Linear drag coefficient, (n,) [N s/m].
+    stable
+        Whether each is stable, (n,).
+    peak
+        M_s, (n,); NaN where it was not asked for.
+    moments
+        Variances of each output and of its rate by all rules, (n, 2, rules).
+    """
+
+    def __init__(self, numbers: PlantNumbers, outputs: Sequence[str], rules: int = 1) -> None:
+        count = len(numbers)
+        self.numbers = numbers
         self.drag = np.full(count, np.nan)
         self.stable = np.zeros(count, dtype=bool)
         self.peak = np.full(count, np.nan)
         self.moments = {name: np.full((count, 2, rules), np.nan) for name in outputs}
 
-    def put(self, at: IndexArray, other: _Solved) -> None:
+    def sigma(self, output: str) -> FloatArray:
+        """Return the standard deviation of an output, (n,)."""
+        with np.errstate(all="ignore"):
+            return np.asarray(np.sqrt(self.moments[output][:, 0, 0]))
+
+    def period(self, output: str) -> FloatArray:
+        """Return the mean zero-crossing period of an output, (n,) [s]."""
+        zero, second = self.moments[output][:, :, 0].T
+        with np.errstate(all="ignore"):
+            return np.asarray(2.0 * np.pi * np.sqrt(zero / second))
+
+    def put(self, at: IndexArray, other: SolvedRows) -> None:
         """Take over some rows' numbers, of the rule that counts."""
         self.drag[at], self.stable[at], self.peak[at] = other.drag, other.stable, other.peak
         for name, column in other.moments.items():
@@ -90,68 +115,73 @@ class _Solved:
 
 
 class DesignRows:
-    """A design, asked about rows of a spread.
+    """A structure with its parameters, asked about rows of a spread.
 
     Parameters
     ----------
-    design
-        The design.
+    question
+        The structure on the plant that it is bound to.
+    parameters
+        Its parameters by name.
     spread
         The spread on its case (`Spread.on`).
-    metrics
-        What is wanted.
+    outputs
+        The outputs whose variances are wanted.
+    second
+        Those of them whose rates' variances are wanted too.
+    peaks
+        Whether M_s is.
+    masses
+        Rope masses of all plants; by default those of the question.
+    start
+        About what the drag is, where it agrees with the response [N s/m].
     accuracy
         Relative difference of two rules from which a variance gets finer nodes.
     nodes
         Nodes to use for all, with no look at their error; chosen here if left out.
-
-    Raises
-    ------
-    InputError
-        If the design has no controller.
     """
 
     def __init__(
         self,
-        design: Design,
+        question: DesignQuestion,
+        parameters: Mapping[str, float],
         spread: Spread,
-        metrics: Sequence[FrequencyMetric],
         *,
-        accuracy: float,
+        outputs: Sequence[str],
+        second: Sequence[str],
+        peaks: bool,
+        start: float,
+        masses: int | None = None,
+        accuracy: float = ACCURACY,
         nodes: Quadrature | None = None,
     ) -> None:
         assert spread.case is not None
         case = spread.case
-        self.design, self.spread, self.case = design, spread, case
-        self.metrics = tuple(metrics)
+        self.spread, self.case = spread, case
         self.accuracy = accuracy
-        self.law = DesignLaw(design)
-        self.lumps = lump_rope(design.masses, case.rope.lumping)
+        self.law = DesignLaw(question, parameters)
+        self.lumps = lump_rope(masses or question.masses, case.rope.lumping)
         self.sea = SeaRows(case, spread)
         self.given = None if nodes is None else SweepNodes.of(nodes, self.sea.density)
         self._nodes: dict[int, SweepNodes] = {}  # by level
         self.columns: bool | None = None  # whether column arithmetic suffices
         self.refined = 0  # rows that needed finer nodes
         self.unresolved = 0  # ... and those that none of them resolved
-        outputs = [m.output for m in metrics if m.output]
-        if np.isnan(self._pilots.numbers.fixed_drag).any():
-            outputs.append(VELOCITY)  # which the drag agrees with
-        self._outputs = tuple(dict.fromkeys(outputs))
-        self._second = tuple(
-            dict.fromkeys(m.output for m in metrics if m.kind in ("peak", "least", "period"))
-        )
-        self._peaks = any(m.name == "max_sensitivity" for m in metrics)
+        consistent = bool(np.isnan(self._pilots.numbers.fixed_drag).any())
+        # The drag agrees with the velocity.
+        self._outputs = tuple(dict.fromkeys([*outputs, *([VELOCITY] * consistent)]))
+        self._second, self._peaks, self._start = tuple(second), peaks, start
         delayed = case.sensors.telemetry.delay > 0.0 or "sensors.telemetry.delay" in spread.paths
-        three = design.structure == "payload-feedback"
-        self.spring = design.masses == 1 and three and not delayed and not self._noisy
+        three = question.structure.name == "payload-feedback"
+        self.spring = self.lumps.masses.size == 1 and three and not delayed and not self._noisy
 
     @property
     def block(self) -> int:
         """Rows that are best looked at together: their columns stay in the cache."""
         return 16_384 if self.spring else 2048
 
-    def evaluate(self, rows: FloatArray) -> dict[str, FloatArray | BoolArray]:
-        """Return ``stable`` and the metrics of rows, (n,) each.
+    def solve(self, rows: FloatArray) -> SolvedRows:
+        """Return drag, stability, M_s and variances of rows, (n, d).
 
         Raises
         ------
@@ -159,7 +189,7 @@ class DesignRows:
             If a row is no valid case.
         """
         batch = self._batch(rows)
-        solved = _Solved(len(rows), self._outputs, 1)
+        solved = SolvedRows(batch.numbers, self._outputs)
         # All rows on common nodes first; those whose two rules disagree begin again on panels half
         # as long, and so on: narrow resonances are few, and pay for themselves.
         at: IndexArray = np.arange(len(rows))
@@ -185,23 +215,7 @@ class DesignRows:
         if self._peaks and self.spring and solved.stable.any():
             chosen = np.flatnonzero(solved.stable)
             solved.peak[chosen] = survey(self._chains(batch, solved.drag), chosen)[1]
-        numbers = batch.numbers
-        values = finished(
-            self.metrics,
-            moments={
-                (name, 2 * k): column[:, k, 0]
-                for name, column in solved.moments.items()
-                for k in (0, 1)
-            },
-            drag=solved.drag,
-            max_sensitivity=solved.peak,
-            tension=numbers.static_tension,
-            arm=numbers["drum_radius"] / (numbers["gear_ratio"] * numbers["gear_efficiency"]),
-            exposure=self.case.limits.exposure_time,
-            count=len(rows),
-        )
-        kept = {name: np.where(solved.stable, column, np.nan) for name, column in values.items()}
-        return {"stable": solved.stable, **kept}
+        return solved
 
     def loop_gain(self, rows: FloatArray, omega: FloatArray) -> ComplexArray:
         """Return L(i omega) of rows, (n, k), at frequencies above zero [rad/s]."""
@@ -289,7 +303,7 @@ class DesignRows:
         sound = np.where(np.isfinite(drag), drag, 0.0)
         return ChainLoops(batch.numbers, batch.law, sound, lumps=self.lumps)
 
-    def _doubt(self, found: _Solved, level: int) -> IndexArray:
+    def _doubt(self, found: SolvedRows, level: int) -> IndexArray:
         """Return the stable rows whose two rules disagree."""
         error = np.zeros(found.stable.size)
         for name, column in found.moments.items():
@@ -309,12 +323,12 @@ class DesignRows:
         panels = sweep_panels(axis, splits, level=2, marks=marks, clearance=0.6)
         return sweep_nodes(axis, panels, self.sea.density)
 
-    def _solved(self, batch: _Batch, nodes: SweepNodes, *, alone: bool = False) -> _Solved:
+    def _solved(self, batch: _Batch, nodes: SweepNodes, *, alone: bool = False) -> SolvedRows:
         """Return drag, stability and moments of rows; M_s too, but of springs.
 
         `alone` leaves stability and M_s out: all count as stable.
         """
-        found = _Solved(len(batch), self._outputs, len(nodes.weights))
+        found = SolvedRows(batch.numbers, self._outputs, len(nodes.weights))
         ratios = self.sea.ratios(batch.rows, nodes.omega)
         shaken = Shaken(
             factors=self.sea.factors(batch.rows),
@@ -351,20 +365,19 @@ class DesignRows:
         nodes: SweepNodes,
         shaken: Shaken,
         edge: FloatArray,
-        found: _Solved,
+        found: SolvedRows,
         free: BoolArray,
     ) -> None:
         """Find the drag of chosen loops where it is free, above its edge, and their moments."""
         s = np.asarray(1j * nodes.omega, dtype=np.complex128)
         step = max(1, BLOCK // len(nodes))
-        start = self.design.drag or 1.0
         quadratic = np.broadcast_to(loops.numbers["quadratic_drag"], (len(loops),))
         for at in range(0, chosen.size, step):
             rows = chosen[at : at + step]
             chain = Chain(loops, rows, s)
             if free[rows].any():
                 velocity = _velocity_of(chain.velocity_of_drag(nodes, shaken), edge[rows])
-                agreed = _agreeing_drag(quadratic[rows], start, velocity)
+                agreed = _agreeing_drag(quadratic[rows], self._start, velocity)
                 # At the very edge the motion that calms a loop is that of its own instability.
                 agreed = np.where(agreed <= _EDGE * edge[rows], np.inf, agreed)
                 found.drag[rows] = np.where(free[rows], agreed, found.drag[rows])
@@ -375,7 +388,7 @@ class DesignRows:
                     found.moments[name][rows] = column
 
     def _solve_springs(
-        self, batch: _Batch, nodes: SweepNodes, shaken: Shaken, found: _Solved
+        self, batch: _Batch, nodes: SweepNodes, shaken: Shaken, found: SolvedRows
     ) -> None:
         """Find the drag of springs, their stability and their moments."""
         free = np.flatnonzero(np.isnan(found.drag))
@@ -388,7 +401,7 @@ class DesignRows:
                 seen = _spring_moments(loops, [VELOCITY], nodes, shaken, free[some])
                 return np.where(loops.stable, np.sqrt(seen[VELOCITY][:, 0]), np.inf)
 
-            agreed = _agreeing_drag(quadratic, self.design.drag or 1.0, velocity)
+            agreed = _agreeing_drag(quadratic, self._start, velocity)
             below = np.where(np.isfinite(agreed), agreed, 0.0) / _EDGE
             found.drag[free] = np.where(self._spring(own, below).stable, agreed, np.inf)
         loops = self._spring(batch, found.drag)
@@ -439,9 +452,8 @@ def _velocity_of(parts: Sequence[FloatArray], edge: FloatArray) -> Velocity:
 def _agreeing_drag(quadratic: FloatArray, start: float, velocity: Velocity) -> FloatArray:
     """Return the drag that agrees with each loop's response, (n,) [N s/m]; infinite for none.
 
-    C = q sqrt(8/pi) sigma_v(C), by the secant rule on logarithms, as `synth.robust.plant_stack`
-    does.  More drag means less motion, so that the right side falls; where a loop is unstable it
-    is given more.
+    C = q sqrt(8/pi) sigma_v(C), by the secant rule on logarithms.  More drag means less motion, so
+    that the right side falls; where a loop is unstable it is given more.
 
     Parameters
     ----------

@@ -30,13 +30,12 @@ from models.spread import Spread
 from ..design import Design
 from ..search import Progress
 from .dataset import dataset_of
-from .design_rows import DesignRows
-from .metrics import chosen_metrics
+from .design_rows import ACCURACY, DesignRows
+from .metrics import chosen_metrics, finished
 
 if TYPE_CHECKING:
     import xarray as xr
 
-ACCURACY = 1e-5  # difference of two rules from which a variance gets finer nodes
 _CHUNK = 65_536
 
 
@@ -88,7 +87,19 @@ class FrequencyEngine:
         self.case: Case = case
         self.spread = spread.on(case, design.parameters, design.drag)
         self.metrics = chosen_metrics(metrics, dc=case.winch.motor.type == "dc")
-        self.rows = DesignRows(design, self.spread, self.metrics, accuracy=accuracy, nodes=nodes)
+        if not design.parameters:
+            raise InputError(f"sweep: the design has no controller: {design.status}")
+        self.rows = DesignRows(
+            design.question,
+            design.parameters,
+            self.spread,
+            outputs=[m.output for m in self.metrics if m.output],
+            second=[m.output for m in self.metrics if m.kind in ("peak", "least", "period")],
+            peaks=any(m.name == "max_sensitivity" for m in self.metrics),
+            start=design.drag,
+            accuracy=accuracy,
+            nodes=nodes,
+        )
 
     def evaluate(
         self, rows: FloatArray, progress: Progress | None = None
@@ -123,7 +134,10 @@ class FrequencyEngine:
         }
         for at in range(0, len(table), self.rows.block):
             part = slice(at, min(at + self.rows.block, len(table)))
-            for name, column in self.rows.evaluate(table[part]).items():
+            solved = self.rows.solve(table[part])
+            found["stable"][part] = solved.stable
+            columns = finished(self.metrics, solved, self.case.limits.exposure_time)
+            for name, column in columns.items():
                 found[name][part] = column
             if progress is not None:
                 progress("cases", part.stop, len(table))

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import ComplexArray, FloatArray, IndexArray, InputError
+from models.basics import ComplexArray, FloatArray, IndexArray
 from models.spread import GAINS, Spread
 
-from ..design import Design
 from ..question import GAINS as THESIS
+from ..question import DesignQuestion
 from ..structures import ParametrisedController
 from .numbers import at_rows
 
@@ -83,26 +83,20 @@ class LawColumns:
 
 
 class DesignLaw:
-    """A design's controller, asked about rows of a spread.
+    """A structure with its parameters, asked about rows of a spread.
 
     Parameters
     ----------
-    design
-        The design.
-
-    Raises
-    ------
-    InputError
-        If the design has no controller.
+    question
+        The structure on the plant that it is bound to.
+    parameters
+        Its parameters by name.
     """
 
-    def __init__(self, design: Design) -> None:
-        if not design.parameters:
-            raise InputError(f"sweep: the design has no controller: {design.status}")
-        question = design.question
+    def __init__(self, question: DesignQuestion, parameters: Mapping[str, float]) -> None:
         self.law, self.amplifier = question.law, question.amplifier or 1.0
-        self._own = dict(design.parameters)
-        self.measurements = tuple(design.measurements)
+        self._own = dict(parameters)
+        self.measurements = tuple(question.structure.measurements)
         self._names = [p.name for p in self.law.parameters]
         poles = self._poles(self._row(self._own))
         self._fixed = {

@@ -10,6 +10,8 @@ import numpy as np
 from models.basics import FloatArray, InputError
 from models.casefile import suggestion
 
+from .design_rows import SolvedRows
+
 DEFAULT = ("payload_rms", "torque_rms", "speed_rms", "max_sensitivity")
 
 
@@ -92,55 +94,39 @@ def chosen_metrics(names: Sequence[str] | None, *, dc: bool) -> tuple[FrequencyM
 
 
 def finished(
-    metrics: Sequence[FrequencyMetric],
-    *,
-    moments: Mapping[tuple[str, int], FloatArray],
-    drag: FloatArray,
-    max_sensitivity: FloatArray,
-    tension: FloatArray,
-    arm: FloatArray,
-    exposure: float,
-    count: int,
+    metrics: Sequence[FrequencyMetric], loops: SolvedRows, exposure: float
 ) -> dict[str, FloatArray]:
-    """Return metrics, (n,) each, from moments by (output, order).
+    """Return metrics of loops, (n,) each; NaN where a loop is unstable.
 
     Parameters
     ----------
-    metrics, moments, drag, max_sensitivity
+    metrics, loops
         What is wanted, and what it is made of.
-    tension, arm
-        Rope tension at rest [N], and motor torque per tension when hauling [m].
     exposure
         Time for which most probable extremes are taken [s].
-    count
-        Number of cases.
     """
-    static = {"motor.torque": tension * arm, "rope.tension": tension}
+    static = loops.numbers.at_rest
     alone = {
-        "max_sensitivity": max_sensitivity,
-        "drag": drag,
-        "static_torque": tension * arm,
-        "static_tension": tension,
+        "max_sensitivity": loops.peak,
+        "drag": loops.drag,
+        "static_torque": static["motor.torque"],
+        "static_tension": static["rope.tension"],
     }
     found = {}
     for metric in metrics:
         if not metric.output:
-            found[metric.name] = np.broadcast_to(alone[metric.name], (count,))
-            continue
-        variance = moments[metric.output, 0]
-        with np.errstate(all="ignore"):
-            sigma = np.sqrt(variance)
-            if metric.kind == "rms":
-                found[metric.name] = sigma
-                continue
-            period = 2.0 * np.pi * np.sqrt(variance / moments[metric.output, 2])
+            value = alone[metric.name]
+        elif metric.kind == "period":
+            value = loops.period(metric.output)
+        else:
+            value = loops.sigma(metric.output)
+        if metric.kind in ("peak", "least"):
+            rest = static.get(metric.output, np.zeros(1))
             # The most probable maximum of a Gaussian signal (Rice 1945), as
             # `models.basics.metrics`.
-            factor = np.sqrt(2.0 * np.log(np.maximum(exposure / period, np.exp(0.5))))
-        rest = static.get(metric.output, np.zeros(1))
-        found[metric.name] = {
-            "peak": np.abs(rest) + factor * sigma,
-            "least": rest - factor * sigma,
-            "period": period,
-        }[metric.kind]
+            with np.errstate(all="ignore"):
+                crossings = np.maximum(exposure / loops.period(metric.output), np.exp(0.5))
+            reach = np.sqrt(2.0 * np.log(crossings)) * value
+            value = np.abs(rest) + reach if metric.kind == "peak" else rest - reach
+        found[metric.name] = np.where(loops.stable, value, np.nan)
     return found

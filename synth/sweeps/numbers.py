@@ -147,6 +147,19 @@ class PlantNumbers:
         return self["payload_weight"] + self["rope_weight"] * self["rope_length"]
 
     @property
+    def at_rest(self) -> dict[str, FloatArray]:
+        """What hauling the load at rest takes, by output, (n,) or (1,)."""
+        tension = self.static_tension
+        torque = tension * self["drum_radius"] / (self["gear_ratio"] * self["gear_efficiency"])
+        current = torque / self["torque_constant"]
+        return {
+            "rope.tension": tension,
+            "motor.torque": torque,
+            "motor.current": current,
+            "motor.voltage": current * self["resistance"],
+        }
+
+    @property
     def gear_factor(self) -> FloatArray:
         """(1/eta + eta)/2, see `PlantData.mean_gear_factor` [-]."""
         eta = self["gear_efficiency"]

@@ -69,7 +69,7 @@ def chains(masses: int, count: int, seed: int, delay: float) -> tuple[FrequencyE
     engine = FrequencyEngine(design, Spread({**wide, "payload.mass": "40 %", "depth": "-0 %"}))
     rows = engine.spread.sample(count, seed=seed)
     numbers, _ = numbers_of(case, engine.spread, rows)
-    law = DesignLaw(design).columns(engine.spread, rows)
+    law = DesignLaw(design.question, design.parameters).columns(engine.spread, rows)
     return engine, ChainLoops(numbers, law, numbers.fixed_drag, lumps=lump_rope(masses))
 
 
@@ -160,7 +160,7 @@ def test_spring_and_chain_agree_where_both_are_possible() -> None:
     rows = engine.spread.sample(500, seed=3)
     found = engine.evaluate(rows)
     numbers, _ = numbers_of(engine.case, engine.spread, rows)
-    law = DesignLaw(thesis_design()).columns(engine.spread, rows)
+    law = engine.rows.law.columns(engine.spread, rows)
     loops = ChainLoops(numbers, law, numbers.fixed_drag, lumps=lump_rope(1, "thesis"))
     stable = found["stable"].astype(bool)
     np.testing.assert_array_equal(count_unstable(loops) == 0, stable)
