@@ -20,7 +20,7 @@ import numpy as np
 from models.basics import FloatArray, InputError, check_range
 from models.case import Case
 from models.sea import Scatter
-from models.spread import ALIASES
+from models.spread import ALIASES, Samples, Spread, Uniform
 
 _MOST_CORNERS = 4096
 
@@ -229,6 +229,29 @@ class Family:
             }
             given |= {path: share * v for path, v in together.items() if path not in given}
         return given
+
+    def kind(self, member: Member) -> tuple[Any, ...]:
+        """Return what a member shares with those that differ from it in numbers alone."""
+        chosen = [v for a, v in zip(self.axes, member.point, strict=True) if not a.continuous]
+        return (*chosen, *self.seas[member.sea].changes(self.case))
+
+    def spread(self, like: Member) -> Spread:
+        """Return the numbers in which members of one kind differ, as a spread on the case of one.
+
+        First the ranges, then the sea.
+        """
+        varied: dict[str, Any] = {a.path: Uniform(a.low, a.high) for a in self.axes if a.continuous}
+        shared = self.kind(like)
+        for path in self.seas[like.sea].changes(self.case):
+            changes = (s.changes(self.case) for s in self.seas)
+            varied[path] = Samples([c[path] for c in changes if set(c) <= set(shared)])
+        return Spread(varied).on(self.case_at(like))
+
+    def row(self, member: Member) -> list[float]:
+        """Return a member's numbers in the order of `spread`."""
+        pairs = zip(self.axes, member.point, strict=True)
+        own = [float(v) for a, v in pairs if a.continuous]
+        return [*own, *self.seas[member.sea].changes(self.case).values()]
 
     def name_of(self, member: Member) -> str:
         """Return a member's values in words."""

@@ -1,25 +1,22 @@
 """The plants of a family as synthesis sees them: from a member to its scenario.
 
-Family + structure -> FamilyPlants -> FamilyLoop of a member, PlantStack of many
+Family + structure -> FamilyPlants -> FamilyLoop of a member, SolvedRows of many
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-from functools import cached_property
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
-from models.basics import FloatArray, Quadrature, spectral_nodes
 from models.case import Case
-from models.sensing import sensed_plant
 
 from ..loop import Assessment
 from ..question import PAYLOAD_FEEDBACK, DesignQuestion, FamilyLoop, FamilyQuestion
 from ..structures import ParametrisedController
+from ..sweeps import DesignRows, SolvedRows
 from .family import Family, Member
-from .plant_stack import PlantStack, numbers_of, stacked_members
 
 
 class FamilyPlants:
@@ -42,6 +39,7 @@ class FamilyPlants:
         self.posed = FamilyQuestion(family.case_at(family.nominal()[0]), structure, masses)
         self._cases: dict[Member, Case] = {}
         self._scenarios: dict[Member, FamilyLoop] = {}
+        self._engines: dict[tuple[Any, ...], DesignRows] = {}
 
     @property
     def structure(self) -> str:
@@ -86,49 +84,41 @@ class FamilyPlants:
             )
         return self._scenarios[member]
 
-    def stack(self, members: Sequence[Member]) -> PlantStack:
-        """Return the plants of many members at once, all with the most rope masses."""
-        masses = self.posed.masses or self.posed.most_masses
-        if self.structure == PAYLOAD_FEEDBACK:
-            return stacked_members(self.family, members, masses)
-        case = self.family.case
-        fixed = case.payload.fixed_drag
-        numbers = numbers_of(self.family, members)
-        plants = [
-            sensed_plant(one, masses=masses, drag=fixed or 0.0, sensors=case.sensors)
-            for one in numbers
-        ]
-        quadratic = [one.quadratic_drag if fixed is None else 0.0 for one in numbers]
-        return replace(
-            PlantStack.of(plants),
-            quadratic_drag=np.array(quadratic),
-            linear_drag=np.full(len(members), fixed or 0.0),
-        )
+    def loops(
+        self, values: Sequence[float], members: Sequence[Member], outputs: Sequence[str]
+    ) -> Iterator[tuple[list[int], SolvedRows]]:
+        """Yield the closed loops of members of one kind, and which members they are.
 
-    @cached_property
-    def _shaken(self) -> tuple[Quadrature, dict[str, FloatArray]]:
-        """Common nodes, and each disturbance's density there in each sea, (seas, nodes)."""
-        nominal = self.family.nominal()[0]
-        members = [replace(nominal, sea=k) for k in range(len(self.family.seas))]
-        seas = [self.scenario(member).problem.disturbances for member in members]
-        every = [d for sources in seas for d in sources]
-        bands = [d.band for d in every if d.band is not None]
-        nodes = spectral_nodes(
-            min(b[0] for b in bands),
-            max(b[1] for b in bands),
-            splits=sorted({w for d in every for w in d.splits}),
-            half_line=len(bands) < len(every),
-        )
-        return nodes, {
-            d.name: np.stack([sources[k].density(nodes.omega) for sources in seas])
-            for k, d in enumerate(seas[0])
-        }
+        All have the most rope masses.  They are closed by the engine of sweeps, which no search
+        uses.
 
-    def shaken(self, members: Sequence[Member]) -> tuple[Quadrature, dict[str, FloatArray]]:
-        """Return common nodes, and each disturbance's density there for each member."""
-        nodes, densities = self._shaken
-        which = np.array([m.sea for m in members])
-        return nodes, {name: density[which] for name, density in densities.items()}
+        Parameters
+        ----------
+        values
+            The gains.
+        members
+            The members.
+        outputs
+            Those whose variances are wanted.
+        """
+        kinds: dict[tuple[Any, ...], list[int]] = {}
+        for k, member in enumerate(members):
+            kinds.setdefault(self.family.kind(member), []).append(k)
+        for kind, at in kinds.items():
+            asked = (tuple(values), tuple(outputs), kind)
+            if asked not in self._engines:
+                self._engines[asked] = DesignRows(
+                    self.nominal,
+                    self.nominal.named(values),
+                    self.family.spread(members[at[0]]),
+                    outputs=outputs,
+                    second=outputs,
+                    peaks=True,
+                    start=self.nominal.drag_before,
+                    masses=self.posed.masses or self.posed.most_masses,
+                )
+            rows = np.array([self.family.row(members[k]) for k in at])
+            yield at, self._engines[asked].solve(rows)
 
     def _case(self, member: Member) -> Case:
         if member not in self._cases:

@@ -51,12 +51,12 @@ class SchedulePoint:
     max_sensitivity: float
     use: float
     limit: str
-    growth: float
+    stable: bool
 
     @property
     def ok(self) -> bool:
         """Whether the loop is stable and every limit is kept, to a part in a thousand."""
-        return self.growth < 0.0 and self.use <= 1.0 + KEPT_BETWEEN
+        return self.stable and self.use <= 1.0 + KEPT_BETWEEN
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -418,7 +418,7 @@ class _ScheduleSearch:
             max_sensitivity=figures.max_sensitivity,
             use=figures.use,
             limit=figures.limit,
-            growth=figures.growth,
+            stable=figures.stable,
         )
 
     def _best(self, length: float) -> float:

@@ -3,9 +3,9 @@
     gains + family -> corners, Sobol points -> the worst of them, zoomed in on -> members to add
     gains + family -> 10 000 draws -> share that is stable, worst figures -> DrawCheck
 
-Everything goes through `plant_stack.LoopStack`, which no search uses.  Peaks of narrow resonances
-and limits that need crossings (gain and delay margins, roll-off) are looked at exactly, one
-by one, for the members that are worst already.
+Everything goes through the engine of sweeps, which no search uses.  Limits that need crossings
+(gain and delay margins, roll-off) are looked at exactly, one by one, for the members that are worst
+already.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import qmc
 
-from models.basics import FloatArray, InputError, read_only, share
+from models.basics import FloatArray, InputError, peak_factor, read_only, share
 
 from ..limits import Limit, MaxSensitivity
 from ..question import PAYLOAD, Objective
 from ..search import Progress
+from ..sweeps import SolvedRows
 from .family import Member
 from .family_plants import FamilyPlants
-from .plant_stack import PlantStack, StackAssessment, consistent_stack
 
 _SAMPLES = 256  # Sobol points of a search for the worst
 _TOP = 6  # of them that are zoomed in on
@@ -42,8 +42,8 @@ class Figures:
     ----------
     member
         The member.
-    growth
-        Largest real part of a pole [1/s].
+    stable
+        Whether the loop is stable.
     payload_rms, max_sensitivity
         [m] and [-]; infinite where the loop is unstable.
     use, limit
@@ -51,16 +51,11 @@ class Figures:
     """
 
     member: Member
-    growth: float
+    stable: bool
     payload_rms: float
     max_sensitivity: float
     use: float
     limit: str
-
-    @property
-    def stable(self) -> bool:
-        """Whether the loop is stable."""
-        return self.growth < 0.0
 
     def hurt(self, level: float) -> float:
         """Return how much the member asks for more than a cost `level` and the limits give."""
@@ -111,54 +106,67 @@ class DrawCheck:
 def figures_of(
     plants: FamilyPlants, values: Sequence[float], members: Sequence[Member]
 ) -> list[Figures]:
-    """Return what gains do to many members, on common nodes."""
-    stack = plants.stack(members)
-    nodes, densities = plants.shaken(members)
-    controller = plants.law.controller([float(v) for v in values])
-    loops = consistent_stack(stack, controller, nodes, densities, plants.nominal.drag_before)
+    """Return what gains do to many members."""
     limits = [lim for lim in plants.nominal.limits if lim.drive or isinstance(lim, MaxSensitivity)]
     outputs = sorted({PAYLOAD, *(o for limit in limits for o in limit.outputs)})
-    moments = loops.moments(outputs, nodes, densities)
-    peaks, growth = loops.max_sensitivity(), loops.growth
-    stable = loops.stable
-    found = []
-    for k, member in enumerate(members):
-        if not stable[k]:
-            found.append(_unstable(member, max(float(growth[k]), 1e-300)))
-            continue
-        sigmas = {name: (float(m[0][k]), float(m[1][k])) for name, m in moments.items()}
-        assessment = StackAssessment(max_sensitivity=float(peaks[k]), sigmas=sigmas)
-        use, name = 0.0, ""
-        for limit in limits:
-            own = _at_rest(limit, stack, k)
-            used = own.use(own.measure(assessment))  # type: ignore[arg-type]  # all that it asks for
-            if used > use:
-                use, name = used, limit.name
-        found.append(
-            Figures(
-                member=member,
-                growth=float(growth[k]),
-                payload_rms=assessment.sigma(PAYLOAD),
-                max_sensitivity=float(peaks[k]),
-                use=use,
-                limit=name,
-            )
-        )
-    return found
+    found: dict[int, Figures] = {}
+    for at, loops in plants.loops(values, members, outputs):
+        found |= {at[k]: _figures(limits, members[at[k]], loops, k) for k in range(len(at))}
+    return [found[k] for k in range(len(members))]
+
+
+def _figures(limits: Sequence[Limit], member: Member, loops: SolvedRows, index: int) -> Figures:
+    """Return what gains do to a member, by its index among solved loops."""
+    if not loops.stable[index]:
+        return _unstable(member)
+    moments = {name: column[index, :, 0] for name, column in loops.moments.items()}
+    at_rest = {name: float(v[index % v.size]) for name, v in loops.numbers.at_rest.items()}
+    assessment = _OneLoop(max_sensitivity=float(loops.peak[index]), moments=moments)
+    use, name = 0.0, ""
+    for limit in limits:
+        own = _at_rest(limit, at_rest)
+        used = own.use(own.measure(assessment))  # type: ignore[arg-type]  # all that it asks for
+        if used > use:
+            use, name = used, limit.name
+    return Figures(
+        member=member,
+        stable=True,
+        payload_rms=assessment.sigma(PAYLOAD),
+        max_sensitivity=assessment.max_sensitivity,
+        use=use,
+        limit=name,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _OneLoop:
+    """One of many loops as the limits see it (`synth.limits.limits.Limit.measure`)."""
+
+    max_sensitivity: float
+    moments: Mapping[str, FloatArray]
+
+    def sigma(self, output: str) -> float:
+        """Return the standard deviation of an output."""
+        return float(np.sqrt(self.moments[output][0]))
+
+    def peak(self, output: str, duration: float) -> float:
+        """Return the most probable maximum of an output in `duration` [s]."""
+        m0, m2 = self.moments[output]
+        period = 2.0 * np.pi * np.sqrt(m0 / m2) if m2 > 0.0 else np.inf
+        return peak_factor(float(period), duration) * self.sigma(output)
 
 
 def exact_figures(plants: FamilyPlants, values: Sequence[float], member: Member) -> Figures:
     """Return what gains do to one member: every limit, refined nodes, exact delays."""
     problem = plants.scenario(member).problem
     assessment = problem.assess(values)
-    growth = float(assessment.poles.real.max())
-    if growth >= 0.0:
-        return _unstable(member, growth)
+    if not assessment.stable:
+        return _unstable(member)
     uses = {limit.name: limit.use(limit.measure(assessment)) for limit in problem.limits}
     name = max(uses, key=lambda n: uses[n], default="")
     return Figures(
         member=member,
-        growth=growth,
+        stable=True,
         payload_rms=assessment.sigma(PAYLOAD),
         max_sensitivity=assessment.max_sensitivity,
         use=uses.get(name, 0.0),
@@ -258,17 +266,17 @@ def draw_check(
     )
 
 
-def _unstable(member: Member, growth: float) -> Figures:
+def _unstable(member: Member) -> Figures:
     figures = dict.fromkeys(("payload_rms", "max_sensitivity", "use"), np.inf)
-    return Figures(member=member, growth=growth, limit="stability", **figures)
+    return Figures(member=member, stable=False, limit="stability", **figures)
 
 
-def _at_rest(limit: Limit, stack: PlantStack, index: int) -> Limit:
-    """Return a limit with the static value of one plant of a stack."""
-    name = getattr(limit, "output", None) or getattr(limit, "torque", None)
-    if name is None or not hasattr(limit, "static") or name not in stack.static:
+def _at_rest(limit: Limit, values: Mapping[str, float]) -> Limit:
+    """Return a limit with the static value of one plant."""
+    if not hasattr(limit, "static"):
         return limit
-    changed: Limit = replace(limit, static=float(stack.static[name][index]))  # type: ignore[call-arg]
+    static = values.get(limit.outputs[0], 0.0)
+    changed: Limit = replace(limit, static=static)  # type: ignore[call-arg]
     return changed
 
 

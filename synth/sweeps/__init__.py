@@ -10,6 +10,7 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .dataset import case_of, spread_of
+    from .design_rows import DesignRows, SolvedRows
     from .frequency import FrequencyEngine, frequency_sweep
     from .metrics import METRICS
 else:

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from models import load_case
 from models.basics import InputError
-from models.plant import PlantData
 from models.sea import Scatter, read_scatter
 from synth.loop import Assessment
 from synth.robust import DiscreteValues, Family, sea_states
 from synth.robust.family import Member
 from synth.robust.family_plants import FamilyPlants
-from synth.robust.plant_stack import numbers_of
 from synth.robust.worst_case import draw_check, exact_figures, figures_of
 
 GAINS = (5.0, 2.0, 3.0)
@@ -81,17 +75,6 @@ def test_draws_stay_in_the_ranges_and_meet_the_seas_by_their_occurrence(family):
     assert members == family.draw(4000, seed=5)
 
 
-@settings(max_examples=10, deadline=None)
-@given(share=st.tuples(*[st.floats(0.0, 1.0)] * 3))
-def test_unchecked_numbers_are_those_of_the_checked_case(family, share):
-    point = tuple(a.low + u * (a.high - a.low) for a, u in zip(family.axes, share, strict=True))
-    member = Member(point=point)
-    quick, checked = numbers_of(family, [member])[0], PlantData.from_case(family.case_at(member))
-    for field in fields(PlantData):
-        one, other = getattr(quick, field.name), getattr(checked, field.name)
-        assert one == other or (one != one and other != other)
-
-
 def test_stacked_loops_agree_with_loops_one_by_one(family):
     plants = FamilyPlants(family)
     members = family.draw(12, seed=2)
@@ -119,6 +102,21 @@ def test_stacked_loops_agree_where_the_drag_follows_the_response(crane):
         uses["max_sensitivity"] = view.max_sensitivity / 2.0
         assert figures.use == pytest.approx(max(uses.values()), rel=1e-3)
         assert figures.limit == max(uses, key=lambda name: uses[name])
+
+
+def test_members_of_several_kinds_are_told_apart(crane):
+    radii = {"rope.length": [800.0, 1200.0], "winch.drum.radius": DiscreteValues(0.5, 0.6)}
+    family = Family.of(crane.case, radii, seas=[(1.5, 8.0), (2.4, 9.0, 3.0)])
+    plants, gains = FamilyPlants(family), (16.0, 44.0, 6.4)
+    members = family.draw(4, seed=2)
+    assert len({family.kind(m) for m in members}) == 2
+    together = figures_of(plants, gains, members)
+    assert [figures.member for figures in together] == members
+    for figures in together:
+        alone = figures_of(plants, gains, [figures.member])[0]
+        assert figures.payload_rms == pytest.approx(alone.payload_rms, rel=1e-9)
+    exact = exact_figures(plants, gains, members[-1])
+    assert together[-1].payload_rms == pytest.approx(exact.payload_rms, rel=1e-3)
 
 
 def test_unstable_draws_are_counted(case):
