@@ -1,4 +1,4 @@
-r"""Conventions of RAO files, and the one conversion out of them and back: `Convention`.
+r"""Conventions of RAO files, and the one conversion out of them: `Convention`.
 
 Every program has its own; what one may mean by "roll 1.2, phase 90, heading 30" is told by the
 thirteen fields of a :class:`Convention`.  A reader says which holds for its file, and
@@ -126,13 +126,6 @@ class Convention:
             return 2.0 * math.pi / column
         return column if self.waves == "frequency (rad/s)" else 2.0 * math.pi * column
 
-    def column(self, omega: npt.ArrayLike) -> FloatArray:
-        """Return frequencies [rad/s] as the table's first column has them; undoes `omega`."""
-        frequency = np.asarray(omega, dtype=np.float64)
-        if self.waves == "period (s)":
-            return 2.0 * math.pi / frequency
-        return frequency if self.waves == "frequency (rad/s)" else frequency / (2.0 * math.pi)
-
     def directions(self, headings: npt.ArrayLike) -> FloatArray:
         """Return where waves of these headings [deg] travel towards, in [0, 2 pi) [rad]."""
         turn = 1.0 if self.turning == "counter-clockwise" else -1.0
@@ -142,14 +135,6 @@ class Convention:
         # out as 360 itself.
         wrapped = np.mod(ours, 360.0)
         return np.radians(np.where(wrapped >= 360.0, 0.0, wrapped))
-
-    def headings_deg(self, directions: npt.ArrayLike) -> FloatArray:
-        """Return the headings [deg] in [0, 360) of directions [rad]; undoes `directions`."""
-        turn = 1.0 if self.turning == "counter-clockwise" else -1.0
-        flip = 180.0 if self.headings == "from" else 0.0
-        ours = np.degrees(np.asarray(directions, dtype=np.float64))
-        wrapped = np.mod(turn * (ours - self.heading_zero - flip), 360.0)
-        return np.where(wrapped >= 360.0, 0.0, wrapped)
 
     def values(
         self, amplitude: npt.ArrayLike, phase: npt.ArrayLike, slope: npt.ArrayLike
@@ -177,23 +162,6 @@ class Convention:
         found = found * (np.exp(1j * _LEAD[self.phase_relative_to]) * self.signs)
         result: ComplexArray = found * self._rotation_units(slope)
         return result
-
-    def table(
-        self, values: npt.ArrayLike, slope: npt.ArrayLike
-    ) -> tuple[FloatArray, FloatArray, ComplexArray]:
-        """Return operators as this convention writes them; undoes :meth:`values`.
-
-        Returns
-        -------
-        tuple[FloatArray, FloatArray, ComplexArray]
-            Amplitudes, phases, and the same as complex numbers, each (..., 6).
-        """
-        found = np.asarray(values, dtype=np.complex128) / self._rotation_units(slope)
-        found = found * (np.exp(-1j * _LEAD[self.phase_relative_to]) * self.signs)
-        if self.phase == "lags":
-            found = np.conj(found)
-        unit = 180.0 / math.pi if self.phase_unit == "degrees" else 1.0
-        return np.abs(found), np.angle(found) * unit, found
 
     def _rotation_units(self, slope: npt.ArrayLike) -> FloatArray:
         """Return the factors from the file's units to m/m and rad/m (..., 6)."""

@@ -129,7 +129,7 @@ def csv_text(raos: VesselRaos) -> str:
     writer = csv.writer(out, lineterminator="\n")
     parts = [f"{mode}_{part}" for mode in MODES for part in ("real", "imag")]
     writer.writerow(["omega [rad/s]", "heading [deg]", *parts])
-    for j, heading in enumerate(Convention().headings_deg(raos.heading)):
+    for j, heading in enumerate(raos.heading_deg):
         for i, omega in enumerate(raos.omega):
             cells = raos.values[i, j].view(np.float64)
             writer.writerow([repr(float(v)) for v in (omega, heading, *cells)])
