@@ -1,7 +1,7 @@
 """The assembly of RAO tables from rows in any order.
 
-What the readers share: bytes and text out of a file that may be anything, rows sorted into a grid,
-the wave's point of zero phase brought to the origin, the headings that symmetry gives.
+What the readers share: text out of a file that may be anything, rows sorted into a grid, the
+wave's point of zero phase brought to the origin, the headings that symmetry gives.
 """
 
 from __future__ import annotations
@@ -9,17 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import ComplexArray, FloatArray, InputError, reason
+from ..basics import ComplexArray, FloatArray, InputError
 from .raos import VesselRaos
 from .symmetry import completed, looks_symmetric
-
-LARGEST = 200_000_000
-"""Largest file that is read [bytes]; RAO files are under one megabyte."""
 
 MOST_ROWS = 2_000_000
 """Most cells of a table, frequencies times headings."""
@@ -27,35 +23,6 @@ MOST_ROWS = 2_000_000
 _SAME_FREQUENCY = 1e-9  # relative
 _SAME_HEADING = 1e-7  # rad
 _SAME_VALUE = 1e-3  # of the largest, for a heading that is there twice, as 0 and 360 deg
-
-
-def read_bytes(path: str | Path) -> bytes:
-    """Return what is in a file.
-
-    Raises
-    ------
-    InputError
-        If it is not there, no file, empty, unreadable, or larger than :data:`LARGEST`.
-    """
-    place = Path(path)
-    try:
-        if not place.is_file():
-            raise InputError(f"{place}: there is no such file")
-        size = place.stat().st_size
-        if size > LARGEST:
-            raise InputError(
-                f"{place}: a RAO file must be at most {LARGEST / 1e6:g} MB, got {size / 1e6:.0f} MB"
-            )
-        data = place.read_bytes()
-    except InputError:
-        raise
-    except OSError as error:
-        raise InputError(f"{place}: cannot be read: {reason(error)}") from error
-    except ValueError as error:  # a NUL in the path
-        raise InputError(f"{place!r}: is no path: {error}") from error
-    if not data.strip():
-        raise InputError(f"{place}: the file is empty")
-    return data
 
 
 def text_of(owner: str, data: bytes) -> str:

@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ...basics import FloatArray, InputError, check_range
-from ..assemble import read_bytes
+from ...basics import FloatArray, InputError, check_range, read_bytes
 from .hull import Hull, panel_areas
 
 FORMATS = (".stl", ".gdf", ".pnl", ".hst", ".mar")

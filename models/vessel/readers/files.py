@@ -25,9 +25,10 @@ from ...basics import (
     StillhookError,
     check_finite,
     check_hdf5,
+    read_bytes,
     write_text_atomically,
 )
-from ..assemble import finished, read_bytes, text_of
+from ..assemble import finished, text_of
 from ..convention import one_of
 from ..raos import VesselRaos
 from ..symmetry import SYMMETRIES
@@ -151,6 +152,8 @@ def read_raos(
     place = _place(path)
     owner = str(path)
     data = read_bytes(place)
+    if not data.strip():
+        raise InputError(f"{place}: the file is empty")
     check_hdf5(place)  # a damaged one can hang whoever opens it
     if file_format is not None and file_format not in FORMATS:
         raise InputError(

@@ -214,7 +214,7 @@ def test_the_lid_of_a_mesh_file_is_left_out(tmp_path: Path) -> None:
     ("name", "content", "words"),
     [
         ("hull.obj", b"v 0 0 0", "must be one of .stl"),
-        ("hull.stl", b"", "empty"),
+        ("hull.stl", b"", "no STL file"),
         ("hull.stl", b"this is a letter", "no STL file"),
         ("hull.stl", stl(box_hull(9.0, 3.0, 1.0).panels)[:-20], "cut off"),
         ("hull.stl", stl(box_hull(9.0, 3.0, 1.0).panels, binary=False)[:-300], "cut off"),

@@ -289,7 +289,7 @@ def test_what_is_no_rao_file_is_said_to_be_none(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=words):
             read_raos(put(tmp_path, name, content))
-    with pytest.raises(InputError, match="there is no such file"):
+    with pytest.raises(InputError, match="no such file"):
         read_raos(tmp_path / "lost.csv")
     with pytest.raises(InputError, match="no bundled vessel of this name"):
         read_raos("queen-mary")
@@ -300,7 +300,7 @@ def test_what_is_no_rao_file_is_said_to_be_none(tmp_path: Path) -> None:
     known = r"ulen says nothing .* \(its options: body, depth, length, origin, waves\)"
     with pytest.raises(InputError, match=known):
         read_raos(tmp_path / "a.4", ulen=80.0)
-    with pytest.raises(InputError, match="there is no such file"):
+    with pytest.raises(InputError, match="is a folder"):
         read_raos(tmp_path)
 
 

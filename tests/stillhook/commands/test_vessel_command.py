@@ -69,7 +69,7 @@ def test_a_file_that_contradicts_long_waves_ends_with_two_and_one_line(
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["lost.4"], "lost.4: there is no such file\n"),
+        (["lost.4"], "lost.4: no such file\n"),
         (["queen-mary"], "no bundled vessel of this name (there is: osv-83m)"),
         (["osv-83m", "--draught", "deep"], "draught says nothing about a csv file"),
         (["osv-83m", "--origin", "1,2"], "--origin must be 3 numbers"),
