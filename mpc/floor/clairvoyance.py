@@ -35,7 +35,14 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import FloatArray, InputError, check_range, reason, replace_atomically
+from models.basics import (
+    FloatArray,
+    InputError,
+    check_choice,
+    check_range,
+    reason,
+    replace_atomically,
+)
 from models.case import Case
 from models.operation import Motion
 from models.plant import DriveLimits, PlantData, stochastic_equivalent
@@ -45,7 +52,6 @@ from .floor import Clairvoyant, Start, floor_of
 from .plant import HOLDS, Hold, RecordPlant, record_plant
 from .problem import RecordProblem, RecordSolution
 from .qp import solve_record
-from .solvers import SOLVERS
 
 _Pose = Callable[[float], RecordProblem]
 
@@ -71,7 +77,6 @@ def clairvoyant(
     minimum_tension: float | None = None,
     start: Start = "free",
     hold: Hold = "line",
-    solver: str = "piqp",
     cache: str | Path | None = None,
 ) -> Clairvoyant:
     """Return the floor of a record: the stillest payload with everything known in advance.
@@ -100,8 +105,6 @@ def clairvoyant(
     hold
         ``line``: a demand that is a straight line over each sample, the floor.  ``command``: a
         command that is held and keeps the limits at both ends, which the drive can follow.
-    solver
-        ``piqp`` or ``clarabel``.
     cache
         Folder in which answers are kept.
 
@@ -129,13 +132,8 @@ def clairvoyant(
     """
     began = clock.perf_counter()
     check_range(_OWNER, "sample_time", sample_time, low=0.0, unit="s", open_low=True)
-    for name, value, allowed in (
-        ("start", start, _STARTS),
-        ("hold", hold, HOLDS),
-        ("solver", solver, SOLVERS),
-    ):
-        if value not in allowed:
-            raise InputError(f"{_OWNER}: {name} must be one of {', '.join(allowed)}, got {value!r}")
+    check_choice(_OWNER, "start", start, _STARTS)
+    check_choice(_OWNER, "hold", hold, HOLDS)
     if drag is not None:
         check_range(_OWNER, "drag", drag, low=0.0, unit="N s/m")
     limits = DriveLimits.from_case(case) if limits is None else limits
@@ -171,18 +169,18 @@ def clairvoyant(
         asked = {
             "case": case.to_dict(),
             "limits": repr(limits),
-            "options": [sample_time, settle, masses, drag, tension, start, hold, solver],
+            "options": [sample_time, settle, masses, drag, tension, start, hold],
         }
         key = fingerprint(asked, heave, rate, acceleration)
         found = _from_cache(cache, key, posed, problem)
         if found is not None:
             posed, solution = found
     if solution is None:
-        posed, solution = _solved(posed, problem, solver, case if drag is None else None)
+        posed, solution = _solved(posed, problem, case if drag is None else None)
         iterations = solution.iterations
         if cache is not None:
             store_solution(cache, key, solution, posed.plant.drag)
-    return floor_of(case, limits, start, settle, posed, solution, solver, iterations, began)
+    return floor_of(case, limits, start, settle, posed, solution, iterations, began)
 
 
 def _rows(record: Motion, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -210,13 +208,10 @@ def _with_hook(plant: RecordPlant, heave: float, rate: float) -> FloatArray:
 
 
 def _solved(
-    posed: RecordProblem,
-    problem: _Pose,
-    solver: str,
-    case: Case | None,
+    posed: RecordProblem, problem: _Pose, case: Case | None
 ) -> tuple[RecordProblem, RecordSolution]:
     """Return problem and answer; with a case, drag and motion agree."""
-    solution = solve_record(posed, solver=solver)
+    solution = solve_record(posed)
     quadratic = 0.0 if case is None else PlantData.from_case(case).quadratic_drag
     if quadratic == 0.0:
         return posed, solution
@@ -229,7 +224,7 @@ def _solved(
         if abs(found - before) <= _AGREED * found or found < 1e-3 * quadratic:
             break
         posed = problem(found)
-        solution = solve_record(posed, solver=solver)
+        solution = solve_record(posed)
     return posed, solution
 
 

@@ -56,8 +56,8 @@ class Clairvoyant(ReadOnlyArrays):
         What a controller asks of the drive at the start of each sample, (N,) [unit of the command].
     drag
         Linear drag coefficient [N s/m].
-    solver, iterations, seconds
-        What solved it, in how many steps (0: from the cache), and the whole time taken [s].
+    iterations, seconds
+        Steps of the solver (0: from the cache), and the whole time taken [s].
     certificate
         Residuals of the optimality conditions, by code that did not solve it.
     problem, solution
@@ -85,7 +85,6 @@ class Clairvoyant(ReadOnlyArrays):
     speed: FloatArray
     command: FloatArray
     drag: float
-    solver: str
     iterations: int
     seconds: float
     certificate: Certificate
@@ -145,7 +144,7 @@ class Clairvoyant(ReadOnlyArrays):
             f"├ at limits: {at}\n"
             f"├ linear drag: {self.drag:.4g} N s/m; demand per sample: {self.hold}; "
             f"start: {self.start}\n"
-            f"└ solver: {self.solver}, {self.iterations} steps; {self.certificate}"
+            f"└ solver: piqp, {self.iterations} steps; {self.certificate}"
         )
 
 
@@ -156,7 +155,6 @@ def floor_of(
     settle: float,
     problem: RecordProblem,
     solution: RecordSolution,
-    solver: str,
     iterations: int,
     began: float,
 ) -> Clairvoyant:
@@ -164,7 +162,7 @@ def floor_of(
 
     Parameters
     ----------
-    case, limits, start, settle, problem, solution, solver, iterations
+    case, limits, start, settle, problem, solution, iterations
         As the attributes.
     began
         When the work began, by `time.perf_counter` [s].
@@ -214,7 +212,6 @@ def floor_of(
         speed=speed,
         command=plant.commands(states[:N], demand[:, 0]),
         drag=plant.drag,
-        solver=solver,
         iterations=iterations,
         seconds=clock.perf_counter() - began,
         certificate=certify(problem, solution),

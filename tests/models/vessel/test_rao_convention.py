@@ -67,7 +67,9 @@ def test_there_and_back_is_the_identity(convention: Convention, seed: int) -> No
         convention.complex_values(numbers, slope),
     ):
         assert np.allclose(back, raos.values, rtol=1e-12, atol=1e-15)
-    assert np.allclose(convention.omega(first_column(convention, raos.omega)), raos.omega, rtol=1e-14)
+    assert np.allclose(
+        convention.omega(first_column(convention, raos.omega)), raos.omega, rtol=1e-14
+    )
     there = headings(convention, raos.heading)
     assert np.all((there >= 0.0) & (there < 360.0))
     apart = np.exp(1j * (convention.directions(there) - raos.heading))
