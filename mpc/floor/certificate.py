@@ -89,17 +89,15 @@ def certify(problem: RecordProblem, solution: RecordSolution) -> Certificate:
     # values of the rows, from the whole motion
     states, inputs = y + problem.still, solution.inputs + problem.still_inputs
     prices, hang = solution.window_prices, solution.tension_prices
-    excess, loss = 0.0, 0.0
+    levels = plant.levels(states, inputs)
+    excess = float(np.abs(levels).max()) - 1.0
+    loss = float((np.maximum(prices, 0.0) * (1.0 - levels)).sum())
+    loss += float((np.maximum(-prices, 0.0) * (1.0 + levels)).sum())
     on_state = np.zeros_like(y)
     on_input = RHO * solution.inputs
     for end in (0, 1):
         span = slice(end, end + N)
-        both = np.stack([plant.demand(states, inputs, end), states[span] @ plant.speed], axis=1)
-        values = both @ plant.windows.T
-        excess = max(excess, float(np.abs(values).max()) - 1.0)
         own = prices[:, end]
-        loss += float((np.maximum(own, 0.0) * (1.0 - values)).sum())
-        loss += float((np.maximum(-own, 0.0) * (1.0 + values)).sum())
         on_demand = own @ plant.windows[:, 0]
         on_state[span] += np.outer(own @ plant.windows[:, 1], plant.speed)
         if plant.hold == "line":

@@ -180,8 +180,7 @@ def floor_of(
     torque_ends += plant.peak * np.stack([states[:-1] @ on_states, states[1:] @ on_states], axis=1)
     torque = np.append(torque_ends[:, 0], torque_ends[-1, 1])
     tensions = problem.still_tensions() + y[:N] @ plant.tensions.T
-    whole = np.stack([demand[:, 0], speed[:N]], axis=1) @ plant.windows.T
-    at = np.abs(whole[problem.first :]) >= 1.0 - _AT_LIMIT
+    at = np.abs(plant.levels(states, inputs)[problem.first :, 0]) >= 1.0 - _AT_LIMIT
     names = tuple(dict.fromkeys(plant.window_names))
     shares = {
         name: float(at[:, [n == name for n in plant.window_names]].any(axis=1).mean())

@@ -148,6 +148,15 @@ class RecordPlant(ReadOnlyArrays):
         at = states[end : end + len(inputs)]
         return np.asarray(self.static_demand + inputs[:, 0] - at @ self.feedback)
 
+    def levels(self, states: FloatArray, inputs: FloatArray) -> FloatArray:
+        """Return the window rows' values at both ends of every sample, (N, 2, nwin)."""
+        speed, N = states @ self.speed, len(inputs)
+        ends = [
+            np.stack([self.demand(states, inputs, end), speed[end : end + N]], axis=1)
+            for end in (0, 1)
+        ]
+        return np.asarray(np.stack(ends, axis=1) @ self.windows.T)
+
     def commands(self, states: FloatArray, demand: FloatArray) -> FloatArray:
         """Return the drive's command [its unit] that asks for a demand in a state."""
         asked = (demand - self.static_demand) * self.peak / self.command_gain

@@ -78,16 +78,6 @@ class RecordProblem:
         """Number of samples whose payload displacement counts."""
         return self.samples + 1 - self.first
 
-    def window_levels(self) -> FloatArray:
-        """Return the window rows' values of the still payload, (N, 2 ends, nwin)."""
-        p = self.plant
-        levels = np.empty((self.samples, 2, len(p.windows)))
-        for end in (0, 1):
-            speed = self.still[end : end + self.samples] @ p.speed
-            demand = p.demand(self.still, self.still_inputs, end)
-            levels[:, end] = np.stack([demand, speed], axis=1) @ p.windows.T
-        return levels
-
     def still_tensions(self) -> FloatArray:
         """Return the tensions of the still payload, (N, nt) [N]."""
         p, N = self.plant, self.samples

@@ -174,8 +174,8 @@ class _Assembly:
 
     def _limits(self, rows: int) -> tuple[sp.csc_matrix, FloatArray, FloatArray]:
         problem, plant = self._problem, self._problem.plant
-        windows, tensions = problem.window_levels(), problem.still_tensions()
-        tensions = tensions - problem.minimum_tension
+        windows = plant.levels(problem.still, problem.still_inputs)
+        tensions = problem.still_tensions() - problem.minimum_tension
         parts, low, high = [], np.empty(rows), np.full(rows, math.inf)
         for g in self._groups:
             at = slice(g.first, g.first + g.blocks * g.length)

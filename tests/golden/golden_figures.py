@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from other_conventions import first_column, headings, written
 
 import stillhook as sh
 from models import HookMotion, SeaSpectrum, build_plant, fixed_top_modes, line_response
@@ -542,12 +543,12 @@ def vessel(found: Figures) -> None:
         ),
     }
     for name, convention in conventions.items():
-        amplitude, phase, numbers = convention.table(raos.values, slope)
+        amplitude, phase, numbers = written(convention, raos.values, slope)
         found.put(f"vessel.{name}.amplitude", np.linalg.norm(amplitude))
         found.put(f"vessel.{name}.phase", np.linalg.norm(phase[40, 5]))
         found.put(f"vessel.{name}.real", numbers[40, 5, 2].real)
-        found.put(f"vessel.{name}.heading", convention.headings_deg(raos.heading)[5])
-        found.put(f"vessel.{name}.column", convention.column(raos.omega)[40])
+        found.put(f"vessel.{name}.heading", headings(convention, raos.heading)[5])
+        found.put(f"vessel.{name}.column", first_column(convention, raos.omega)[40])
     moved = raos.with_phase_origin((10.0, -3.0))
     found.put("vessel.phase_origin", moved.values[40, 5, 2].real)
     for label, one in (

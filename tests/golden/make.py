@@ -31,6 +31,7 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 import numpy as np  # noqa: E402
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE.parent / "support"))  # as pytest has it
 FIGURES, COMMANDS, FACES = HERE / "figures.csv", HERE / "commands.csv", HERE / "faces.json"
 MACHINE = HERE / "machine.txt"
 COLUMNS = ("name", "value", "tolerance", "elsewhere", "kind", "note")
