@@ -16,7 +16,7 @@ from typing import Any
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
 
-from .quantity import custom_error
+from ..basics import InputError
 
 FOLDER = "folder"
 """Key of the case file's folder in pydantic's validation context."""
@@ -42,7 +42,7 @@ class DataFile:
             Folder that a relative path starts from; the working directory if None.
         """
         if not isinstance(value, str | Path) or not str(value).strip():
-            raise custom_error(f"must be the path of {self.what}, got {value!r:.60}")
+            raise InputError(f"must be the path of {self.what}, got {value!r:.60}")
         text = str(value)
         if text in self.names():
             return text
@@ -50,13 +50,13 @@ class DataFile:
             path = Path(folder or ".", Path(text).expanduser()).resolve()
             found, is_folder = path.exists(), path.is_dir()
         except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: no such ~user
-            raise custom_error(f"must be the path of {self.what}, got {text!r}: {error}") from None
+            raise InputError(f"must be the path of {self.what}, got {text!r}: {error}") from None
         if is_folder:
-            raise custom_error(f"must be the path of {self.what}, got the folder {text!r}")
+            raise InputError(f"must be the path of {self.what}, got the folder {text!r}")
         if not found:
             known = ", ".join(self.names())
             hint = f"; bundled: {known}" if known else ""
-            raise custom_error(f"no such file: {text!r} (looked for {path}){hint}")
+            raise InputError(f"no such file: {text!r} (looked for {path}){hint}")
         return str(path)
 
     def __get_pydantic_core_schema__(

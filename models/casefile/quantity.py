@@ -13,14 +13,9 @@ from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from pydantic_core import CoreSchema, core_schema
 
 from ..basics import KINDS, InputError, range_text, read_quantity, units_of
-
-
-def custom_error(message: str, **context: Any) -> PydanticCustomError:
-    """Return a pydantic error whose text is `message`, whatever braces it holds."""
-    return PydanticCustomError("stillhook", "{message}", {"message": message, **context})
 
 
 @dataclass(frozen=True)
@@ -90,14 +85,7 @@ class Quantity:
     ) -> CoreSchema:
         """Tell pydantic to validate with `read` alone."""
         del source, handler
-
-        def validate(value: Any) -> float | int | str:
-            try:
-                return self.read(value)
-            except InputError as error:
-                raise custom_error(str(error)) from None
-
-        return core_schema.no_info_plain_validator_function(validate)
+        return core_schema.no_info_plain_validator_function(self.read)
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler

@@ -19,7 +19,7 @@ from pydantic_core import PydanticCustomError
 
 from ..basics import InputError
 from .messages import Path, line_of, message_line, suggestion
-from .quantity import Quantity, custom_error
+from .quantity import Quantity
 
 TAGS = ("type", "method", "spectrum")
 """Fields that select a section among its alternatives."""
@@ -67,7 +67,8 @@ def problems(*found: tuple[str, str]) -> PydanticCustomError:
         Pairs of a field's name in the section (dotted for deeper ones, empty for the section
         itself) and the sentence about it.
     """
-    return custom_error("; ".join(text for _, text in found), problems=tuple(found))
+    message = "; ".join(text for _, text in found)
+    return PydanticCustomError("stillhook", "{message}", {"message": message, "problems": found})
 
 
 def describe(
@@ -148,12 +149,12 @@ def _sentences(entry: Any, path: Path, owner: type[Section] | None) -> Iterator[
     got = _got(entry.get("input"))
     fields = owner.model_fields if owner is not None else {}
     key = next((part for part in reversed(path) if isinstance(part, str)), "")
-    if kind == "stillhook" and "problems" in context:
+    if kind == "stillhook":
         for name, text in context["problems"]:
             parts = [int(part) if part.isdigit() else part for part in name.split(".") if part]
             yield (*path, *parts), text
-    elif kind == "stillhook":
-        yield path, context["message"]
+    elif isinstance(context.get("error"), InputError):
+        yield path, str(context["error"])
     elif kind == "missing":
         yield path, f"is missing{_wanted(fields.get(key))}"
     elif kind in ("extra_forbidden", "invalid_key"):

@@ -21,7 +21,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from ..basics import InputError
-from ..casefile import Quantity, Section, custom_error
+from ..casefile import Quantity, Section
 from .tables import DRUM_LAYERS
 
 
@@ -204,7 +204,7 @@ def _named_layers(value: Any) -> Any:
     if not isinstance(value, str):
         return value
     if value not in DRUM_LAYERS:
-        raise custom_error(
+        raise InputError(
             f"must be a list of layers or one of {', '.join(map(repr, DRUM_LAYERS))}, got {value!r}"
         )
     return [

@@ -24,9 +24,10 @@ from pydantic import (
 )
 
 from ..basics import GRAVITY, InputError, file_stamp, range_text
-from ..casefile import DataFile, Quantity, Section, custom_error, problems
-from .sea import SeaSpectrum
+from ..casefile import DataFile, Quantity, Section, problems
+from .sea import FIELDS, SeaSpectrum
 from .shapes import fully_arisen, gaussian_widths, jonswap_gamma
+from .spreading import Spreading
 from .table import SpectrumTable, row_faults
 
 # T_p of the 1975 form over its T_S: it peaks at f T_mean = 0.54^(1/4) with T_mean = 0.9 T_S.
@@ -40,20 +41,14 @@ _IDLE = ("gamma", "order")
 
 
 def _on_the_table(wind_speed: float) -> float:
-    try:
-        fully_arisen(wind_speed)
-    except InputError as error:
-        raise custom_error(str(error)) from None
+    fully_arisen(wind_speed)
     return wind_speed
 
 
 def _readable(file: str) -> str:
     from .records import read_seas  # here, as most cases have no file
 
-    try:
-        read_seas(file)
-    except InputError as error:
-        raise custom_error(str(error)) from None
+    read_seas(file)
     return file
 
 
@@ -82,6 +77,13 @@ _Gamma = Annotated[
         "(DNV-RP-C205). The other spectra do not use it."
     ),
 ]
+
+
+def _takes(kind: str) -> str:
+    """Return what a kind takes besides a height, in words."""
+    if kind == "measured":
+        return "a table or a file"
+    return " and ".join(FIELDS[kind]) or "no period"
 
 
 def _kind(section: type[SeaSection]) -> str:
@@ -125,8 +127,6 @@ class SeaSection(Section):
 
     alternatives = (("peak_period", "significant_period", "wind_speed"), ("table", "file"))
     forgets = False
-    takes: ClassVar[str] = "peak_period"
-    """What the kind takes besides a height, for messages."""
 
     @model_validator(mode="before")
     @classmethod
@@ -146,7 +146,7 @@ class SeaSection(Section):
             if name not in given
         ]
         found += [
-            (name, f"is not for the {kind} spectrum, which takes {cls.takes}")
+            (name, f"is not for the {kind} spectrum, which takes {_takes(kind)}")
             for name in data
             if name in given & foreign and name not in _IDLE
         ]
@@ -194,7 +194,7 @@ class SeaSection(Section):
 
     def _form(self) -> dict[str, Any]:
         """Return what the kind hands to :class:`SeaSpectrum`, besides height and spreading."""
-        raise NotImplementedError
+        return {name: getattr(self, name) for name in FIELDS[self.spectrum]}
 
     def _files(self) -> tuple[str, ...]:
         return ()
@@ -210,9 +210,6 @@ class _SeaByPeak(SeaSection):
     def spectral_peak_period(self) -> float:
         """Period of the spectrum's peak [s]."""
         return self.peak_period
-
-    def _form(self) -> dict[str, Any]:
-        return {"peak_period": self.peak_period}
 
 
 class _SeaOfLimitedFetch(_SeaByPeak):
@@ -241,11 +238,6 @@ class TmaSea(_SeaOfLimitedFetch):
     """`tma`: the JONSWAP sea in shallow water."""
     depth: Annotated[float, Quantity("length", 0.0, 12e3, open_low=True)]
     """Water depth, for `tma` only."""
-
-    takes = "peak_period and depth"
-
-    def _form(self) -> dict[str, Any]:
-        return {**super()._form(), "depth": self.depth}
 
 
 class TorsethaugenSea(_SeaByPeak):
@@ -276,15 +268,10 @@ class GaussianSwell(_SeaByPeak):
     width: Annotated[float, Quantity("frequency", 0.0, 10.0, open_low=True)]
     """Standard deviation of the frequency of `gaussian-swell`, 1/200 to 1/6 of the peak's."""
 
-    takes = "peak_period and width"
-
     def _faults(self) -> Iterator[tuple[str, str]]:
         low, high = gaussian_widths(2.0 * math.pi / self.peak_period)
         if not low <= self.width <= high:
             yield ("width", f"must be {range_text(low, high, 'rad/s')}, got {self.width!r}")
-
-    def _form(self) -> dict[str, Any]:
-        return {**super()._form(), "width": self.width}
 
 
 class _SeaByWind(SeaSection):
@@ -326,10 +313,7 @@ class Bretschneider1975Sea(_SeaByWind):
     )
     """Significant period T_S, for `bretschneider-1975` only (T_mean = 0.9 T_S)."""
 
-    takes = _period = "significant_period"
-
-    def _form(self) -> dict[str, Any]:
-        return {"significant_period": self.significant_period}
+    _period = "significant_period"
 
 
 class BretschneiderSea(_SeaByWind):
@@ -343,17 +327,12 @@ class BretschneiderSea(_SeaByWind):
 
     _period = "peak_period"
 
-    def _form(self) -> dict[str, Any]:
-        return {"peak_period": self.peak_period}
-
 
 class PiersonMoskowitzSea(_SeaByWind):
     """A fully developed sea, whose period follows from its height."""
 
     spectrum: Literal["pierson-moskowitz"]
     """`pierson-moskowitz`: fully developed."""
-
-    takes = "no period"
 
     def _form(self) -> dict[str, Any]:
         # Another height than the wind's scales the sea of that wind.
@@ -394,8 +373,6 @@ class MeasuredSea(_SeaOfData):
     Default decay."""
     significant_height: _Height = Field(default_factory=_height_of_rows)
 
-    takes = "a table or a file"
-
     @field_validator("record")
     @classmethod
     def _in_the_file(cls, record: int, info: ValidationInfo) -> int:
@@ -403,12 +380,9 @@ class MeasuredSea(_SeaOfData):
 
         file = info.data.get("file", "")
         if file is None:
-            raise custom_error("is for a file of spectra, and none is given")
+            raise InputError("is for a file of spectra, and none is given")
         if file:
-            try:
-                read_seas(file).sea(record)
-            except InputError as error:
-                raise custom_error(str(error)) from None
+            read_seas(file).sea(record)
         return record
 
     def _faults(self) -> Iterator[tuple[str, str]]:
@@ -464,8 +438,6 @@ class SumSea(_SeaOfData):
         default_factory=lambda data: math.hypot(*(p.significant_height for p in data["parts"]))
     )
 
-    takes = "parts"
-
     def _faults(self) -> Iterator[tuple[str, str]]:
         yield from super()._faults()
         if not 1 <= len(self.parts) <= _MOST_PARTS:
@@ -507,10 +479,6 @@ def _rows(
 @lru_cache(maxsize=64)
 def _spectrum(section: SeaSection, stamps: tuple[tuple[int, int], ...]) -> SeaSpectrum:
     del stamps  # a part of the cache's key only
-    # Here, so that a case file is read without the numerics.
-    from .sea import SeaSpectrum
-    from .spreading import Spreading
-
     law = section.spreading
     return SeaSpectrum(
         kind=section.spectrum,

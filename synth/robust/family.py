@@ -305,7 +305,7 @@ def _read(case: Case, path: str, text: Any) -> Any:
     try:
         return TypeAdapter(kind).validate_python(text)
     except ValidationError as error:
-        reason = error.errors()[0]["msg"]
+        reason = error.errors()[0]["msg"].removeprefix("Value error, ")
         raise InputError(f"family: {path}: {reason}") from None
 
 
