@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from .case import Case, bundled_cases, case_schema, load_case, template_text
     from .hook import HookMotion, HookRecord
     from .plant import (
-        DiscretePlant,
         LinearPlant,
         Plant,
         PlantData,

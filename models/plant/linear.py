@@ -7,7 +7,7 @@ Any plant with named signals will do, a user's own included::
     z  = Cz x + Dz u + Fz w       performance outputs
 
 `Plant.linearise` makes one of the winch; synthesis takes its frequency responses
-(`PlantResponse`), the verification its poles, MPC its sampled form (`DiscretePlant`).
+(`PlantResponse`), the verification its poles, MPC its sampled form.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from ..basics import (
     ComplexArray,
     FloatArray,
     InputError,
+    ReadOnlyArrays,
     check_finite,
     check_range,
     pick,
@@ -34,7 +35,7 @@ from ..basics import (
     signal_names,
     signal_rates,
 )
-from .discrete import DiscretePlant, StateSpace, zero_order_hold
+from .discrete import zero_order_hold
 from .pade import pade_bank
 from .resolvent import Resolvent, Transfer
 from .response import PlantResponse
@@ -47,7 +48,7 @@ _HAIR = 1e-8  # relative distance at which 1/(s - pole) leaves a closed loop eig
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, init=False)
-class LinearPlant(StateSpace):
+class LinearPlant(ReadOnlyArrays):
     """A linear, time-invariant plant with named signals and delayed measurements.
 
     Parameters
@@ -78,6 +79,22 @@ class LinearPlant(StateSpace):
         delay is negative.
     """
 
+    A: FloatArray
+    B: FloatArray
+    E: FloatArray
+    C: FloatArray
+    D: FloatArray
+    F: FloatArray
+    Cz: FloatArray
+    Dz: FloatArray
+    Fz: FloatArray
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    disturbances: tuple[str, ...]
+    measurements: tuple[str, ...]
+    outputs: tuple[str, ...]
+    delays: tuple[float, ...]
+    rates: Mapping[str, str]
     units: Mapping[str, str]
     static: Mapping[str, float]
 
@@ -235,7 +252,7 @@ class LinearPlant(StateSpace):
         for field in fields(self):
             value = changes.get(field.name, getattr(self, field.name))
             object.__setattr__(plant, field.name, value)
-        StateSpace.__post_init__(plant)
+        plant.__post_init__()
         if "A" not in changes:
             object.__setattr__(plant, "resolvent", self.resolvent)
         return plant
@@ -388,8 +405,8 @@ class LinearPlant(StateSpace):
             states=(*self.states, *_delay_states(self.measurements, self.delays, pade_order)),
         )
 
-    def discretise(self, dt: float) -> DiscretePlant:
-        """Return the plant sampled every `dt` [s], inputs and disturbances held.
+    def discretise(self, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return A, B and E of the plant sampled every `dt` [s], inputs and disturbances held.
 
         Raises
         ------
@@ -398,10 +415,7 @@ class LinearPlant(StateSpace):
         """
         check_range(_OWNER, "dt", dt, low=0.0, unit="s", open_low=True)
         Ad, BEd = zero_order_hold(self.A, np.hstack([self.B, self.E]), dt)
-        nu = self.B.shape[1]
-        parts: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(StateSpace)}
-        parts |= {"A": Ad, "B": BEd[:, :nu], "E": BEd[:, nu:]}
-        return DiscretePlant(dt=float(dt), **parts)
+        return Ad, BEd[:, : len(self.inputs)], BEd[:, len(self.inputs) :]
 
     def to_control(self, pade_order: int = 6) -> control.StateSpace:
         """Return a python-control system, inputs then disturbances to measurements then outputs.

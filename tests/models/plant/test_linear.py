@@ -223,18 +223,13 @@ def test_without_delays_says_what_it_cannot_do() -> None:
 @pytest.mark.parametrize("dt", [0.01, 0.1, 1.0])
 def test_discretise_agrees_with_scipy(dt: float) -> None:
     plant = random_plant()
-    sampled = plant.discretise(dt)
+    Ad, Bd, Ed = plant.discretise(dt)
     BE = np.hstack([plant.B, plant.E])
     DF = np.hstack([plant.D, plant.F])
     wanted = scipy.signal.cont2discrete((plant.A, BE, plant.C, DF), dt, method="zoh")
-    np.testing.assert_allclose(sampled.A, wanted[0], atol=1e-12)
-    np.testing.assert_allclose(np.hstack([sampled.B, sampled.E]), wanted[1], atol=1e-12)
-    np.testing.assert_array_equal(sampled.Fz, plant.Fz)
-    assert sampled.disturbances == plant.disturbances
-    assert sampled.dt == dt
-    np.testing.assert_allclose(
-        np.sort_complex(sampled.poles()), np.sort_complex(np.exp(plant.poles() * dt)), atol=1e-12
-    )
+    np.testing.assert_allclose(Ad, wanted[0], atol=1e-12)
+    np.testing.assert_allclose(np.hstack([Bd, Ed]), wanted[1], atol=1e-12)
+    assert Bd.shape == plant.B.shape
 
 
 def test_a_double_integrator_is_sampled_exactly() -> None:
@@ -373,7 +368,6 @@ def test_prints_as_a_small_tree() -> None:
         "├ measurements: y1 (50 ms late), y2 (50 ms late)\n"
         "└ outputs: x"
     )
-    assert "sampled every 0.1 s" in str(oscillator().discretise(0.1))
 
 
 def test_an_element_closed_around_a_plant_is_a_rank_one_update() -> None:
