@@ -26,7 +26,7 @@ from scipy.optimize import brentq, root
 from torque_loop import TorqueLoop
 
 from models.basics import ComplexArray, FloatArray, check_range
-from models.plant import energy_equivalent
+from models.rig import energy_equivalent
 from synth.loop import loop_margins
 
 _POINTS = 512  # of a cycle

@@ -12,7 +12,7 @@ from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .discrete import zero_order_hold
-    from .drag import consistent_drag, energy_equivalent, settled_drag, stochastic_equivalent
+    from .drag import consistent_drag, settled_drag, stochastic_equivalent
     from .drive import SPEED_BAND, DriveLimits
     from .equations import MEASUREMENTS, MOTION, displacement_names, parameter_values
     from .line import line_response, line_response_at, rope_transfers

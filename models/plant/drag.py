@@ -22,31 +22,6 @@ _ROUNDS = 12  # of finding nodes for a drag; two are the rule
 _SETTLED = 1e-3  # relative change of a drag for which the nodes need not change
 
 
-def energy_equivalent(quadratic: float, amplitude: float, frequency: float) -> float:
-    """Return the C that takes as much energy as q v|v| from a sine [N s/m].
-
-    C = 8/(3 pi) q omega Y = 4/(3 pi) rho C_D A omega Y (1975 thesis, eq. 13).
-
-    Parameters
-    ----------
-    quadratic
-        q [N s2/m2].
-    amplitude
-        Amplitude Y of the displacement [m].
-    frequency
-        omega [rad/s].
-
-    Raises
-    ------
-    InputError
-        If an argument is negative or not finite.
-    """
-    check_range(_OWNER, "quadratic", quadratic, low=0.0, unit="N s2/m2")
-    check_range(_OWNER, "amplitude", amplitude, low=0.0, unit="m")
-    check_range(_OWNER, "frequency", frequency, low=0.0, unit="rad/s")
-    return 8.0 / (3.0 * math.pi) * quadratic * frequency * amplitude
-
-
 def gaussian_gain(sigma: float, current: float = 0.0) -> float:
     """Return E[d/dv |v + U|(v + U)], v Gaussian: the equivalent gain of v|v| [m/s].
 

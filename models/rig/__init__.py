@@ -10,7 +10,7 @@ from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .limits import GainBounds, Gains, Limits
-    from .payload import Payload
+    from .payload import Payload, energy_equivalent
     from .rope import Rope
     from .sensors import MRU, Encoder, LoadCell, PayloadSensor, Sensors, Telemetry
     from .winch import ACMotor, DCMotor, Drive, Winch

@@ -25,11 +25,6 @@ class GivenDrag(Section):
     coefficient: Annotated[float, Quantity("damping", 0.0, 1e9)]
     """Linear drag coefficient C of the payload."""
 
-    def linear_coefficient(self, quadratic: float) -> float:
-        """Return C [N s/m]; the `quadratic` coefficient [N s2/m2] plays no part."""
-        del quadratic
-        return self.coefficient
-
 
 class EnergyDrag(Section):
     """Linear drag that takes the same energy from a sine of a given amplitude."""
@@ -41,37 +36,12 @@ class EnergyDrag(Section):
     frequency: Annotated[float, Quantity("frequency", 0.0, 100.0, open_low=True)]
     """Frequency of the payload's sine."""
 
-    def linear_coefficient(self, quadratic: float) -> float:
-        """Return C = 4/(3 pi) rho C_D A omega Y [N s/m] (1975 thesis, eq. 13).
-
-        Parameters
-        ----------
-        quadratic
-            rho C_D A / 2, the factor of V|V| [N s2/m2].
-        """
-        return 8.0 / (3.0 * math.pi) * quadratic * self.frequency * self.amplitude
-
 
 class StochasticDrag(Section):
     """Linear drag found together with the response that it belongs to."""
 
     method: Literal["stochastic"] = "stochastic"
     """`stochastic`: linear drag consistent with the payload's own speed in the sea."""
-
-    def linear_coefficient(self, quadratic: float, speed_rms: float) -> float:
-        """Return C = sqrt(8/pi) sigma_v rho C_D A / 2 [N s/m].
-
-        It is the coefficient with the least mean square error for a Gaussian speed (Borgman
-        1969; stochastic linearisation of |v| v).
-
-        Parameters
-        ----------
-        quadratic
-            rho C_D A / 2, the factor of V|V| [N s2/m2].
-        speed_rms
-            Standard deviation of the payload's speed through the water [m/s].
-        """
-        return math.sqrt(8.0 / math.pi) * quadratic * speed_rms
 
 
 Drag = Annotated[GivenDrag | EnergyDrag | StochasticDrag, Field(discriminator="method")]
@@ -169,6 +139,24 @@ class Payload(Section):
     @property
     def fixed_drag(self) -> float | None:
         """Linear drag coefficient [N s/m], or None where it depends on the response."""
-        if isinstance(self.drag, StochasticDrag):
-            return None
-        return self.drag.linear_coefficient(self.quadratic_drag)
+        drag = self.drag
+        if isinstance(drag, EnergyDrag):
+            return energy_equivalent(self.quadratic_drag, drag.amplitude, drag.frequency)
+        return drag.coefficient if isinstance(drag, GivenDrag) else None
+
+
+def energy_equivalent(quadratic: float, amplitude: float, frequency: float) -> float:
+    """Return the C that takes as much energy as q v|v| from a sine [N s/m].
+
+    C = 8/(3 pi) q omega Y = 4/(3 pi) rho C_D A omega Y (1975 thesis, eq. 13).
+
+    Parameters
+    ----------
+    quadratic
+        q = rho C_D A / 2 [N s2/m2].
+    amplitude
+        Amplitude Y of the displacement [m].
+    frequency
+        omega [rad/s].
+    """
+    return 8.0 / (3.0 * math.pi) * quadratic * frequency * amplitude

@@ -24,8 +24,9 @@ from models import HookMotion, SeaSpectrum, build_plant, fixed_top_modes, line_r
 from models.basics.metrics import most_probable_maximum, peak_factor
 from models.basics.quadrature import spectral_nodes
 from models.operation.excitation import SpectrumMotion
-from models.plant.drag import consistent_drag, energy_equivalent, stochastic_equivalent
+from models.plant.drag import consistent_drag, stochastic_equivalent
 from models.plant.plant import MEAN_LOSSES
+from models.rig import energy_equivalent
 from models.run.extremes import gumbel_maximum, pareto_maximum
 from models.sea.spreading import Spreading
 from models.sensing import MEASURED
