@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .drag import consistent_drag, settled_drag, stochastic_equivalent
     from .drive import SPEED_BAND, DriveLimits
     from .equations import MEASUREMENTS, MOTION, displacement_names, parameter_values
-    from .line import line_response, line_response_at, rope_transfers
+    from .line import line_response, rope_transfers
     from .linear import LinearPlant
     from .pade import pade_bank
     from .payout import DrumTravel

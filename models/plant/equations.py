@@ -40,18 +40,26 @@ class Equations:
 
     Parameters
     ----------
-    states, disturbances, outputs
-        Names of the entries of x, w and z.
+    data
+        The numbers it was built from.
+    lumps
+        The rope's lumping.
+    states, inputs, disturbances, measurements, outputs
+        Names of the entries of x, u, w, y and z.
     parameters
         Names and values of the entries of p.
     function
-        (x, u, w, p) -> (xdot, y, z).
+        casadi.Function (x, u, w, p) -> (xdot, y, z), smooth but for slack rope.
     jacobians
         (x, u, w, p) -> (A, B, E, C, D, F, Cz, Dz, Fz).
     units
         Unit of each signal by name.
     """
 
+    data: PlantData
+    lumps: RopeLumps
+    inputs: tuple[str, ...] = INPUTS
+    measurements: tuple[str, ...] = MEASUREMENTS
     states: tuple[str, ...]
     disturbances: tuple[str, ...]
     outputs: tuple[str, ...]
@@ -71,17 +79,7 @@ def build_equations(
 ) -> Equations:
     """Return the equations for a lumping of the rope; the data decide which states exist.
 
-    Parameters
-    ----------
-    data, lumps
-        The plant's numbers, and lengths of the rope's springs and masses.
-    limits
-        Limits of the drive; None for a motor without any.
-    travel
-        Layers of the drum, for a rope that gets longer and shorter; None for a rope of one
-        length on a drum of one radius.
-    surroundings
-        What acts on the payload besides still water.
+    The arguments are those of `models.plant.plant.build_plant`.
     """
     n = len(lumps.masses)
     parameters = parameter_values(data)
@@ -207,6 +205,8 @@ def build_equations(
     if surroundings is not None:
         units |= {name: unit for name, unit in surroundings.output_units.items() if name in z}
     return Equations(
+        data=data,
+        lumps=lumps,
         states=states,
         disturbances=disturbances,
         outputs=tuple(z),

@@ -34,29 +34,8 @@ if TYPE_CHECKING:
 _OWNER = "line response"
 
 
-def line_response(source: Case | PlantData, omega: npt.ArrayLike, *, drag: float) -> PlantResponse:
-    """Return the exact response of a case's plant at real frequencies.
-
-    Parameters
-    ----------
-    source
-        A case, or the plant's numbers.
-    omega
-        Frequencies [rad/s], (k,), not zero: the drum's angle is an integrator.
-    drag
-        Equivalent linear drag coefficient C of the payload [N s/m].
-
-    Raises
-    ------
-    InputError
-        If a frequency is zero or not finite, or `drag` is negative.
-    """
-    frequencies = check_finite(_OWNER, "omega", omega).reshape(-1)
-    return line_response_at(source, 1j * frequencies, drag=drag)
-
-
-def line_response_at(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) -> PlantResponse:
-    """Return the exact response at points of the complex plane, as a Nyquist contour needs it.
+def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) -> PlantResponse:
+    """Return the exact response of a case's plant at points of the complex plane.
 
     Safe from overflow for any Re s >= 0: every hyperbolic function is carried as its product
     with exp(-gamma).
@@ -66,7 +45,7 @@ def line_response_at(source: Case | PlantData, s: npt.ArrayLike, *, drag: float)
     source
         A case, or the plant's numbers.
     s
-        Points [1/s], (k,), none of them a pole (s = 0 is one).
+        Points [1/s], (k,), such as i omega; none of them a pole (s = 0 is one).
     drag
         Equivalent linear drag coefficient C of the payload [N s/m].
 

@@ -26,10 +26,10 @@ import casadi as ca
 import numpy as np
 
 from ..basics import FloatArray, SolverError, check_range, pick, read_only
-from .equations import INPUTS, MEASUREMENTS, RATES, Equations, build_equations, displacement_names
+from .equations import RATES, Equations, build_equations, displacement_names
 from .linear import LinearPlant
 from .plant_data import PlantData, as_plant_data
-from .rope import RopeLumps, lump_rope
+from .rope import lump_rope
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -93,22 +93,7 @@ class OperatingPoint:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Plant(Equations):
-    """The symbolic plant; `build_plant` makes it.
-
-    Parameters
-    ----------
-    data
-        The numbers it was built from.
-    lumps
-        The rope's lumping.
-    states, inputs, disturbances, measurements, outputs
-        Names of the entries of x, u, w, y and z.
-    parameters
-        Names and values of the entries of p.
-    function
-        casadi.Function (x, u, w, p) -> (xdot, y, z), smooth but for slack rope.
-    units
-        Unit of each signal by name.
+    """The symbolic plant; `build_plant` makes it, `Equations` says what is in it.
 
     Notes
     -----
@@ -119,11 +104,6 @@ class Plant(Equations):
     ``winch.gear_switching`` [s/rad] above zero the direction follows the motor's speed, as
     tanh(switching * speed).
     """
-
-    data: PlantData
-    lumps: RopeLumps
-    inputs: tuple[str, ...] = INPUTS
-    measurements: tuple[str, ...] = MEASUREMENTS
 
     @property
     def masses(self) -> int:
@@ -293,7 +273,5 @@ def build_plant(
     """
     data = as_plant_data(source)
     lumps = lump_rope(data.chosen_masses(masses), data.lumping)
-    equations = build_equations(
-        data, lumps, limits=limits, travel=travel, surroundings=surroundings
-    )
-    return Plant(**vars(equations), data=data, lumps=lumps)
+    made = build_equations(data, lumps, limits=limits, travel=travel, surroundings=surroundings)
+    return Plant(**vars(made))

@@ -28,7 +28,7 @@ from ..plant import (
     PlantData,
     PlantResponse,
     build_plant,
-    line_response_at,
+    line_response,
 )
 from ..rig import Sensors
 from .mru import MruModel
@@ -214,9 +214,9 @@ def sensed_line_at(
     Returns
     -------
     PlantResponse
-        With the names of `sensed_plant`, on the distributed rope (`models.plant.line_response_at`).
+        With the names of `sensed_plant`, on the distributed rope (`models.plant.line_response`).
     """
-    line, sensors = line_response_at(data or case, s, drag=drag), case.sensors
+    line, sensors = line_response(data or case, s, drag=drag), case.sensors
     points = line.s
     noises = tuple(name for name in NOISES if name != "mru.error_rate")
     heave = line.disturbances.index("hook.heave")

@@ -181,7 +181,7 @@ def thesis(found: Figures) -> None:
     magnitudes(found, "thesis.haul_ratio", omega7, loop.response(HAUL, HOOK, omega7))
     omega9 = np.array([0.43, 0.65, 0.94, 1.46])
     magnitudes(found, "thesis.table_9", omega9, loop.response(PAYLOAD, HOOK, omega9) ** 2)
-    held = line_response(one, omega9, drag=one.payload.fixed_drag)
+    held = line_response(one, 1j * omega9, drag=one.payload.fixed_drag)
     lumped = build_plant(one).linearise(drag=one.payload.fixed_drag).response(omega9)
     at = lumped.outputs.index(PAYLOAD), lumped.disturbances.index(HOOK)
     magnitudes(found, "thesis.table_8", omega9, lumped.zw[:, at[0], at[1]] ** 2)
@@ -429,7 +429,7 @@ def plant(found: Figures) -> None:
         found.put(f"plant.{name}.radius", one.drum_radius)
         found.put(f"plant.{name}.static_torque_budget", one.static_torque_budget)
         omega = np.array([0.3, 1.0, 3.0, 9.0])
-        exact, lumped = line_response(one, omega, drag=5e3), linear.response(omega)
+        exact, lumped = line_response(one, 1j * omega, drag=5e3), linear.response(omega)
         for block in ("zw", "zu", "yw", "yu"):
             for label, r in (("exact", exact), ("lumped", lumped)):
                 size = np.linalg.norm(getattr(r, block))

@@ -194,7 +194,7 @@ def test_best_found_stands_on_the_exact_rope(name: str) -> None:
         assert poles.real.max() < 0.0
     near = np.concatenate([poles, plant.poles()]).imag
     omega = np.unique(np.concatenate([np.geomspace(1e-4, 1e3, 20_000), near[near > 0.0]]))
-    line = line_response(design.sea_case, omega, drag=design.drag)
+    line = line_response(design.sea_case, 1j * omega, drag=design.drag)
     heard = dict(zip(line.measurements, line.yu[:, :, 0].T, strict=True))
     heard |= {n: line.zu[:, line.outputs.index(n), 0] for n in ("drum.haul", "motor.speed")}
     C = found.controller.response_at(1j * omega)[:, 0]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models import load_case
-from models.plant import LinearPlant, PlantData, build_plant, line_response_at
+from models.plant import LinearPlant, PlantData, build_plant, line_response
 from synth.verify import LawMatrices, Loop, closed_matrices, winding_of_plant
 from synth.verify.nyquist import curve_margins, largest
 from synth.verify.recheck import closed_loop_marks
@@ -160,7 +160,7 @@ def test_the_distributed_rope_is_counted_as_its_masses_are() -> None:
         gains = scale * np.array([[10000.0, 20000.0, 20000.0]])
         law = LawMatrices(A=np.zeros((0, 0)), B=np.zeros((0, 3)), C=np.zeros((1, 0)), D=-gains)
         marks = closed_loop_marks(plant, law)
-        rope = Loop(plant=lambda s: line_response_at(data, s, drag=5000.0), law=law, marks=marks)
+        rope = Loop(plant=lambda s: line_response(data, s, drag=5000.0), law=law, marks=marks)
         found = count_unstable(rope.difference, poles=[0.0], marks=marks)
         closed = np.linalg.eigvals(closed_matrices(plant, law)[0])
         assert found.unstable == int(np.sum(closed.real > 0.0))
