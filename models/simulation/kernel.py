@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import threading
-from collections.abc import Callable
 from typing import Any
 
 import casadi as ca
@@ -102,12 +100,6 @@ class Kernel:
         self.outputs = int(self._function.numel_out(1))
         self._engine, self.note = _engine(self._function, compiled)
         self.compiled = isinstance(self._engine, _Compiled)
-        # Buffers of `step`, whose addresses are bound once; the lock keeps threads apart.
-        self._state, self._row = np.zeros(self.states), np.zeros(self.row_size)
-        self._p, self._out = np.zeros(self.parameters), np.zeros(self.outputs)
-        self._shapes = self._state.shape, self._row.shape, self._p.shape
-        self._once = self._engine.bind(self._state, self._row, self._p, self._out)
-        self._lock = threading.Lock()
 
     def run(
         self, state: npt.ArrayLike, rows: npt.ArrayLike, parameters: npt.ArrayLike
@@ -142,10 +134,12 @@ class Kernel:
         moving = np.array(state, dtype=np.float64)  # a copy: it is changed in place
         given = np.asarray(rows, dtype=np.float64, order="C")
         p = np.asarray(parameters, dtype=np.float64, order="C")
-        if moving.shape != self._shapes[0] or p.shape != self._shapes[2]:
-            raise self._wrong(moving, given, p)
-        if given.ndim != 2 or given.shape[1] != self.row_size:
-            raise self._wrong(moving, given, p)
+        shapes = moving.shape, given.shape[1:], p.shape
+        if given.ndim != 2 or shapes != ((self.states,), (self.row_size,), (self.parameters,)):
+            raise InputError(
+                f"kernel: state, row and parameters must have {self.states}, {self.row_size} and "
+                f"{self.parameters} numbers, got shapes {moving.shape}, {given.shape} and {p.shape}"
+            )
         out = np.empty((len(given), self.outputs))
         self._engine.run(moving, given, p, out)
         return moving, out
@@ -154,21 +148,8 @@ class Kernel:
         self, state: npt.ArrayLike, row: npt.ArrayLike, parameters: npt.ArrayLike
     ) -> tuple[FloatArray, FloatArray]:
         """Run the recursion over one row (nr,); otherwise as `run`, with `out` (nout,)."""
-        moving, given, p = np.asarray(state), np.asarray(row), np.asarray(parameters)
-        if (moving.shape, given.shape, p.shape) != self._shapes:
-            raise self._wrong(moving, given, p)
-        with self._lock:
-            self._state[:] = moving
-            self._row[:] = given
-            self._p[:] = p
-            self._once()
-            return self._state.copy(), self._out.copy()
-
-    def _wrong(self, state: FloatArray, rows: FloatArray, p: FloatArray) -> InputError:
-        return InputError(
-            f"kernel: state, row and parameters must have {self.states}, {self.row_size} and "
-            f"{self.parameters} numbers, got shapes {state.shape}, {rows.shape} and {p.shape}"
-        )
+        after, out = self.run(state, np.asarray(row)[np.newaxis], parameters)
+        return after, out[0]
 
     @override
     def __reduce__(self) -> tuple[Any, ...]:
@@ -201,26 +182,12 @@ class _Compiled:
             if failed != -1:
                 raise _failed(first + max(0, failed))
 
-    def bind(
-        self, state: FloatArray, row: FloatArray, p: FloatArray, out: FloatArray
-    ) -> Callable[[], None]:
-        # Prepared once: making them costs more than the call itself.
-        one = ctypes.c_longlong(1)
-        addresses = [ctypes.c_void_p(array.ctypes.data) for array in (state, row, p, out)]
-
-        def once() -> None:
-            if self._drive(one, *addresses) != -1:
-                raise _failed(0)
-
-        return once
-
 
 class _Interpreted:
     """The recursion in CasADi's virtual machine, in place too, many rows to a call."""
 
     def __init__(self, function: ca.Function) -> None:
-        self._function = function
-        self._accumulators = {1: function}
+        self._accumulated = functools.cache(lambda size: function.mapaccum("rows", size))
 
     def run(self, state: FloatArray, rows: FloatArray, p: FloatArray, out: FloatArray) -> None:
         # A call from Python costs more than a sample: long stretches go in one call, the rest in
@@ -230,54 +197,23 @@ class _Interpreted:
             if len(rows) - first < size:
                 continue
             # A C-contiguous (n, nr) is CasADi's column-major (nr, n): nothing is copied.
-            states = np.empty((size, state.size))
-            buffer, evaluate = _buffer(self._accumulated(size))
-            repeated = np.tile(p, (size, 1))
+            states, repeated = np.empty((size, state.size)), np.tile(p, (size, 1))
+            several: Any = self._accumulated(size)  # CasADi's stubs know buffers only in C++
+            buffer, evaluate = several.buffer()
             buffer.set_arg(0, state.data)
             buffer.set_arg(2, repeated.data)
             buffer.set_res(0, states.data)
             while len(rows) - first >= size:
                 buffer.set_arg(1, rows[first : first + size].data)
                 buffer.set_res(1, out[first : first + size].data)
-                _evaluate(evaluate, buffer, first)
+                try:
+                    evaluate()
+                except RuntimeError as error:
+                    raise _failed(first) from error
+                if buffer.ret():
+                    raise _failed(first)
                 state[:] = states[-1]
                 first += size
-
-    def bind(
-        self, state: FloatArray, row: FloatArray, p: FloatArray, out: FloatArray
-    ) -> Callable[[], None]:
-        after = np.empty_like(state)
-        buffer, evaluate = _buffer(self._function)
-        for i, array in enumerate((state, row, p)):
-            buffer.set_arg(i, array.data)
-        for i, array in enumerate((after, out)):
-            buffer.set_res(i, array.data)
-
-        def once() -> None:
-            _evaluate(evaluate, buffer, 0)
-            state[:] = after
-
-        return once
-
-    def _accumulated(self, size: int) -> ca.Function:
-        if size not in self._accumulators:
-            self._accumulators[size] = self._function.mapaccum("rows", size)
-        return self._accumulators[size]
-
-
-def _buffer(function: ca.Function) -> tuple[Any, Callable[[], None]]:
-    """Return what binds arrays, and what evaluates; CasADi's stubs know it only in C++."""
-    buffer, evaluate = function.buffer()
-    return buffer, evaluate
-
-
-def _evaluate(evaluate: Callable[[], None], buffer: Any, row: int) -> None:
-    try:
-        evaluate()
-    except RuntimeError as error:
-        raise _failed(row) from error
-    if buffer.ret():
-        raise _failed(row)
 
 
 def _in_form(function: ca.Function) -> ca.Function:
