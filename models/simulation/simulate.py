@@ -21,9 +21,7 @@ from __future__ import annotations
 
 import math
 import time as clock
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable
 
 import numpy as np
 from typing_extensions import override
@@ -32,13 +30,13 @@ from ..basics import FloatArray, SolverError, check_range, check_seed
 from ..run import Accumulator, Event, Run, Timings
 from ..sensing import Measurement, holds_brake
 from .simulation import Simulation
-from .trips import Trip, TripLimit, find_trip
+from .trips import Watch
 
 Progress = Callable[[float], None]
 
 CHUNK = 8192  # samples between two looks at trips, Ctrl-C and progress
 STORED = 40_000  # samples that a run keeps unless told otherwise
-Ran = tuple[FloatArray, FloatArray, Trip | None]
+Ran = tuple[FloatArray, FloatArray, Event | None]
 
 
 def run_simulation(
@@ -92,45 +90,47 @@ def run_simulation(
     )
     store = _Store(dt, samples, options.store_step)
     rows = simulation.rows(check_seed(owner, seed), wanted)
-    stepper = _Fused(simulation) if simulation.fused else _FromPython(simulation)
+    stepper = (_Stepper if simulation.fused else _FromPython)(simulation)
     foresee = getattr(simulation.controller, "foresee", None)
     if foresee is not None:  # a controller with perfect preview, for reference
         foresee(rows.motions[0])
     events = [Event(time=t, kind=kind, text=text) for t, kind, text in scenario.events]
     status, message = "completed", ""
-    state, mru, trip_time = simulation.start(rows), rows.start(), math.nan
-    breaks = simulation.schedule.breaks
+    state, mru = simulation.start(rows), rows.start()
+    schedule, trip = simulation.schedule, None
     try:
         while store.seen < samples:
             first = store.seen
             # A chunk ends where a parameter changes: the recursion has one set of them in a call.
-            until = min([samples, first + CHUNK, *(row for row in breaks if row > first)])
-            p = _parameters(simulation, first)
+            until = min([samples, first + CHUNK, *(row for row in schedule.breaks if row > first)])
+            p = np.array(list({**loop.parameters, **schedule.parameters_at(first)}.values()))
             chunk, mru = rows.block(first, until - first, mru)
-            if not math.isnan(trip_time):
-                rows.trip(chunk, first, trip_time)
+            if trip is not None:
+                rows.trip(chunk, first, trip.time)
             # A trip ends the stepper's work early; the rest of the chunk goes on with the brake.
             while len(chunk):
                 at = store.seen
-                watching = simulation.trips if math.isnan(trip_time) else ()
-                state, log, trip = stepper.run(state, _Part(chunk, p, at, watching))
+                state, log, found = stepper.run(state, chunk, p, at)
                 chunk = chunk[len(log) :]
                 good = _finite(log)  # up to the divergence everything is kept
                 accumulator.update(log[:good], at * dt)
                 store.add(log[:good])
                 if good < len(log):
-                    raise _DivergedError(store.seen * dt)
-                if trip is not None:
-                    trip_time = trip.time
-                    events.append(trip.event)
-                    rows.trip(chunk, store.seen, trip_time)
+                    raise _DivergedError
+                if found is not None:
+                    trip, stepper.watch = found, None
+                    events.append(trip)
+                    rows.trip(chunk, store.seen, trip.time)
             if progress is not None:
                 progress(store.seen / samples)
     except KeyboardInterrupt:
         status, message = "interrupted", f"interrupted at {store.seen * dt:.6g} s"
-    except _DivergedError as error:
-        status, message = "diverged", str(error)
-        events.append(Event(time=store.seen * dt, kind="diverged", text=message))
+    except _DivergedError:
+        when, status = store.seen * dt, "diverged"
+        message = (
+            f"the simulation diverged at {when:.6g} s: the loop is unstable and nothing limits it"
+        )
+        events.append(Event(time=when, kind="diverged", text=message))
     events = [event for event in events + stepper.events if event.time <= store.seen * dt]
     time, values = store.arrays(len(loop.signals))
     wall = clock.perf_counter() - began
@@ -161,55 +161,44 @@ def run_simulation(
     )
 
 
-class _Part(NamedTuple):
-    """Rows to run over and their parameters as for `Kernel.run`, first sample, what to watch."""
-
-    rows: FloatArray
-    parameters: FloatArray
-    first: int
-    limits: Sequence[TripLimit]
-
-
-class Stepper(ABC):
-    """Runs the loop of one run; made anew for each."""
+class _Stepper:
+    """Runs the loop of one run, made anew for each; here the controller is part of it."""
 
     def __init__(self, simulation: Simulation) -> None:
+        self._kernels = simulation.kernels
         self._signals = simulation.loop.signals
         self._sample_time = simulation.loop.sample_time
+        self.watch: Watch | None = Watch(simulation.trips, self._signals, self._sample_time)
         self.seconds: list[float] = []
         self.fallbacks: dict[str, int] = {}
         self.events: list[Event] = []
 
-    @abstractmethod
-    def run(self, state: FloatArray, part: _Part) -> Ran:
+    def run(self, state: FloatArray, rows: FloatArray, parameters: FloatArray, first: int) -> Ran:
         """Run over rows, to their end or to the first trip, whose row is the last of the log.
+
+        Parameters
+        ----------
+        state, rows, parameters
+            As for `Kernel.run`.
+        first
+            Number of the first sample.
 
         Returns
         -------
         state, log, trip
             The state after the last row of the log, the log, and the trip if there was one.
         """
+        (kernel,) = self._kernels
+        after, log = kernel.run(state, rows, parameters)
+        found = None if self.watch is None else self.watch.trip(log, first)
+        if found is None:
+            return after, log, None
+        row, trip = found
+        # Once more, up to the sample where it happened.
+        return *kernel.run(state, rows[: row + 1], parameters), trip
 
 
-class _Fused(Stepper):
-    """The controller is part of the recursion."""
-
-    def __init__(self, simulation: Simulation) -> None:
-        super().__init__(simulation)
-        self._kernel = simulation.kernels[0]
-
-    @override
-    def run(self, state: FloatArray, part: _Part) -> Ran:
-        rows, parameters, first, limits = part
-        after, log = self._kernel.run(state, rows, parameters)
-        trip = find_trip(limits, self._signals, log, first, self._sample_time)
-        if trip is not None and trip.sample - first + 1 < len(log):
-            # Once more, up to the sample where it happened.
-            after, log = self._kernel.run(state, rows[: trip.sample - first + 1], parameters)
-        return after, log, trip
-
-
-class _FromPython(Stepper):
+class _FromPython(_Stepper):
     """The controller is called between the two halves of a sample."""
 
     def __init__(self, simulation: Simulation) -> None:
@@ -217,32 +206,22 @@ class _FromPython(Stepper):
         deadline = simulation.options.deadline
         if deadline is not None:
             check_range("simulation", "deadline", deadline, low=0.0, unit="s", open_low=True)
-        self._measure, self._advance = simulation.kernels
         self._controller = simulation.controller
         self._deadline = math.inf if deadline is None else deadline
         self._command = simulation.rest.command
         self._controller.reset()
 
     @override
-    def run(self, state: FloatArray, part: _Part) -> Ran:
-        rows, parameters, first, limits = part
+    def run(self, state: FloatArray, rows: FloatArray, parameters: FloatArray, first: int) -> Ran:
+        measure, advance = self._kernels
         log = np.empty((len(rows), len(self._signals)))
-        given = np.empty(rows.shape[1] + 1)
-        watched = [limit for limit in limits if limit.signal in self._signals]
-        columns = [self._signals.index(limit.signal) for limit in watched]
         for k, row in enumerate(rows):
-            time = (first + k) * self._sample_time
-            state, seen = self._measure.step(state, row, parameters)
-            given[:-1] = row
-            given[-1] = self._ask(Measurement(seen), time)
-            state, log[k] = self._advance.step(state, given, parameters)
-            for limit, column in zip(watched, columns, strict=True):
-                if not limit.low <= log[k, column] <= limit.high:
-                    trip = find_trip(
-                        limits, self._signals, log[k : k + 1], first + k, self._sample_time
-                    )
-                    if trip is not None:
-                        return state, log[: k + 1], trip
+            state, seen = measure.step(state, row, parameters)
+            command = self._ask(Measurement(seen), (first + k) * self._sample_time)
+            state, log[k] = advance.step(state, np.append(row, command), parameters)
+            found = None if self.watch is None else self.watch.trip(log[k : k + 1], first + k)
+            if found is not None:
+                return state, log[: k + 1], found[1]
         return state, log, None
 
     def _ask(self, measurement: Measurement, time: float) -> float:
@@ -276,11 +255,6 @@ class _FromPython(Stepper):
 class _DivergedError(Exception):
     """The plant's state is no longer a number."""
 
-    def __init__(self, time: float) -> None:
-        super().__init__(
-            f"the simulation diverged at {time:.6g} s: the loop is unstable and nothing limits it"
-        )
-
 
 class _Store:
     """Keeps every so manieth sample."""
@@ -305,13 +279,6 @@ class _Store:
         """Return times (n,) and values (n, signals)."""
         values = np.concatenate(self._kept) if self._kept else np.zeros((0, signals))
         return self._dt * self._every * np.arange(len(values), dtype=np.float64), values
-
-
-def _parameters(simulation: Simulation, row: int) -> FloatArray:
-    """Return the recursion's parameters in force at a row."""
-    changes = simulation.schedule.parameters_at(row)
-    values = {**simulation.loop.parameters, **changes}
-    return np.array(list(values.values()))
 
 
 def _finite(log: FloatArray) -> int:

@@ -46,25 +46,6 @@ class TripLimit:
     text: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class Trip:
-    """A range that was left.
-
-    Parameters
-    ----------
-    sample
-        Number of the sample at which it happened.
-    time
-        Its time [s].
-    event
-        What to say.
-    """
-
-    sample: int
-    time: float
-    event: Event
-
-
 def trip_limits(case: Case) -> tuple[TripLimit, ...]:
     """Return the limits of a case: overspeed, the stroke, and the rope that the drum has."""
     fastest = OVERSPEED * case.winch.speed_limit
@@ -85,40 +66,39 @@ def trip_limits(case: Case) -> tuple[TripLimit, ...]:
     return tuple(limits)
 
 
-def find_trip(
-    limits: Sequence[TripLimit],
-    signals: Sequence[str],
-    log: FloatArray,
-    first: int,
-    sample_time: float,
-) -> Trip | None:
-    """Return the first trip in a log, or None.
+class Watch:
+    """The ranges of some signals, watched in the log of a run.
 
     Parameters
     ----------
     limits
-        The ranges to watch; of signals that the log does not have nothing is known.
+        The ranges; of signals that the log does not have nothing is known.
     signals
         Names of the log's columns.
-    log
-        One row for each sample (n, signals).
-    first
-        Number of the log's first sample.
     sample_time
         Time between samples [s].
     """
-    found: Trip | None = None
-    for limit in limits:
-        if limit.signal not in signals:
-            continue
-        value = log[:, signals.index(limit.signal)]
-        outside = (value < limit.low) | (value > limit.high)
+
+    def __init__(
+        self, limits: Sequence[TripLimit], signals: Sequence[str], sample_time: float
+    ) -> None:
+        self._limits = [limit for limit in limits if limit.signal in signals]
+        self._columns = [signals.index(limit.signal) for limit in self._limits]
+        self._low = np.array([limit.low for limit in self._limits])
+        self._high = np.array([limit.high for limit in self._limits])
+        self._sample_time = sample_time
+
+    def trip(self, log: FloatArray, first: int) -> tuple[int, Event] | None:
+        """Return the row of the first trip in a log (n, signals) and what to say, or None.
+
+        `first` is the number of the log's first sample.
+        """
+        values = log[:, self._columns]
+        outside = (values < self._low) | (values > self._high)
         if not outside.any():
-            continue
-        at = int(np.argmax(outside))
-        if found is None or first + at < found.sample:
-            time = (first + at) * sample_time
-            text = limit.text.format(value=value[at])
-            event = Event(time=time, kind=limit.kind, text=text)
-            found = Trip(sample=first + at, time=time, event=event)
-    return found
+            return None
+        row, at = np.argwhere(outside)[0]
+        limit = self._limits[at]
+        text = limit.text.format(value=values[row, at])
+        time = (first + int(row)) * self._sample_time
+        return int(row), Event(time=time, kind=limit.kind, text=text)
