@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -28,9 +28,7 @@ import numpy.typing as npt
 from ..basics import (
     ComplexArray,
     FloatArray,
-    InputError,
     ReadOnlyArrays,
-    check_finite,
     check_range,
     check_seed,
     read_only,
@@ -38,6 +36,9 @@ from ..basics import (
 from ..rig import MRU
 from .draws import MRU_ERROR, draw
 from .telemetry import Interval, Size, check_intervals, during
+
+PERFECT = MRU(noise_floor=0.0, noise_fraction=0.0)
+"""A unit that shows the hook's motion as it is: that of a case which says nothing of one."""
 
 Bias = tuple[float, float, float, float]
 
@@ -155,14 +156,12 @@ class MruModel:
     @property
     def delay(self) -> float:
         """Delay from the motion to the signal [s]."""
-        return 0.0 if self.mru is None else self.mru.delay
+        return self._unit.delay
 
     @property
     def error_rms(self) -> float:
         """Standard deviation of the error of the heave [m]."""
-        if self.mru is None:
-            return 0.0
-        return max(self.mru.noise_floor, self.mru.noise_fraction * self.heave_rms)
+        return max(self._unit.noise_floor, self._unit.noise_fraction * self.heave_rms)
 
     def transfer(self, omega: npt.ArrayLike) -> ComplexArray:
         """Return reported heave over heave [-] at `omega` [rad/s], without the error."""
@@ -179,7 +178,7 @@ class MruModel:
         That of the heave rate's error is `omega` squared times as large.
         """
         frequency = np.asarray(omega, dtype=np.float64)
-        w = 1.0 if self.mru is None else self.mru.noise_bandwidth
+        w = self._unit.noise_bandwidth
         shape = 2.0 * math.sqrt(2.0) / math.pi * w**3 / (frequency**4 + w**4)
         return np.asarray(self.error_rms**2 * shape)
 
@@ -195,10 +194,10 @@ class MruModel:
             low = wave / (s**2 + math.sqrt(2.0) * self._corner * s + self._corner**2)
             mode = complex(to_mode(low.real, (s * low).real, pole))
         error = 0.0 + 0.0j
-        if self.error_rms > 0.0 and self.mru is not None:
+        if self.error_rms > 0.0:
             # The first row of the table of draws begins the process; the others drive it.
             n, rate = draw(self.seed, MRU_ERROR, 0, 1, 2)[0] * self.error_rms
-            width = self.mru.noise_bandwidth
+            width = self._unit.noise_bandwidth
             error = complex(to_mode(n, width * rate, low_pass_pole(width)))
         heave, rate = self._filtered(
             np.array([mode]), np.array([displacement]), np.array([velocity])
@@ -231,20 +230,10 @@ class MruModel:
         state
             What `initial` or the block before returned; it is not changed.
         displacement, velocity
-            True motion of the hook at the samples [m], [m/s], (n,).
-
-        Raises
-        ------
-        InputError
-            If the two have different lengths, are empty or not finite.
+            True motion of the hook at the samples [m], [m/s], (n,), n > 0.
         """
-        z, v = _motions(displacement, velocity)
-        n, start = len(z), state.sample
-        if self.mru is None and not (self.outages or self.biases):
-            shown_as_it_is = MruBlock(heave=z, heave_rate=v, valid=np.ones(n))
-            last = read_only([z[-1], v[-1]])
-            return shown_as_it_is, replace(state, sample=start + n, last=last, held=last)
-        true = np.column_stack((z, v))
+        true = np.column_stack((displacement, velocity))
+        n, start = len(true), state.sample
         mode, error_mode = state.filter, state.error
         shown = true
         if self._corner is not None:
@@ -253,8 +242,8 @@ class MruModel:
             mode = complex(modes[-1])
             shown = self._filtered(modes[-n:], *true.T)
         delayed, past = self._delayed(np.vstack((state.past, shown)), n)
-        if self.error_rms > 0.0 and self.mru is not None:
-            pole = low_pass_pole(self.mru.noise_bandwidth)
+        if self.error_rms > 0.0:
+            pole = low_pass_pole(self._unit.noise_bandwidth)
             errors = self._errors(error_mode, start, n)
             error_mode = complex(errors[-1])
             delayed = delayed + np.column_stack(from_mode(errors, pole))
@@ -276,9 +265,13 @@ class MruModel:
         return MruBlock(heave=reported[:, 0], heave_rate=reported[:, 1], valid=valid), after
 
     @property
+    def _unit(self) -> MRU:
+        return self.mru or PERFECT
+
+    @property
     def _corner(self) -> float | None:
         """Corner frequency of the high-pass [rad/s]; None for no high-pass."""
-        period = None if self.mru is None else self.mru.heave_filter_period
+        period = self._unit.heave_filter_period
         return None if period is None else 2.0 * math.pi / period
 
     @cached_property
@@ -335,30 +328,19 @@ class MruModel:
     @cached_property
     def _error_step(self) -> tuple[complex, FloatArray]:
         """Factor of the error's mode over a sample, and the root of what a sample adds (2, 2)."""
-        width = 1.0 if self.mru is None else self.mru.noise_bandwidth
+        width = self._unit.noise_bandwidth
         factor = complex(np.exp(low_pass_pole(width) * self.sample_time))
         return factor, self.error_rms * noise_root(width, self.sample_time)
 
     def _errors(self, mode: complex, start: int, n: int) -> ComplexArray:
         """Return the error's mode at n samples; `mode` is that at the sample before."""
         factor, root = self._error_step
-        pole = low_pass_pole(1.0 if self.mru is None else self.mru.noise_bandwidth)
+        pole = low_pass_pole(self._unit.noise_bandwidth)
         # Sample 0 is the beginning itself, so that row k of the draws drives sample k.
         first = max(start, 1)
         pushes = draw(self.seed, MRU_ERROR, first, start + n - first, 2) @ root.T
         modes = mode_recursion(factor, mode, to_mode(pushes[:, 0], pushes[:, 1], pole))
         return modes if start == 0 else modes[1:]
-
-
-def _motions(displacement: npt.ArrayLike, velocity: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    z = check_finite("MRU", "displacement", displacement).reshape(-1)
-    v = check_finite("MRU", "velocity", velocity).reshape(-1)
-    if not 0 < len(z) == len(v):
-        raise InputError(
-            f"MRU: velocity must have as many samples as displacement, at least one, "
-            f"got {len(v)} and {len(z)}"
-        )
-    return z, v
 
 
 def low_pass_pole(corner: float) -> complex:

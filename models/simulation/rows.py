@@ -72,13 +72,12 @@ class RowMaker:
         heave, rate, _ = moved[0]
         shown, mru = self.mru.block(mru, heave[: count * n : n], rate[: count * n : n])
         planned = self.schedule.block(start, count)
-        self.sensors.rows(
-            self._noise(start, count),
-            self.telemetry.block(start, count),
-            shown,
-            planned.reference,
-            out=rows[:, columns : -len(FLAGS)],
-        )
+        noise = np.zeros((count, len(NOISE)))
+        if self.sensors.noisy:  # numbers that nobody reads are not drawn
+            noise = self.sensors.noise(self.seed, start, count)
+        link = self.telemetry.block(start, count)
+        sensed = self.sensors.rows(noise, link, shown, planned.reference)
+        rows[:, columns : -len(FLAGS)] = sensed
         rows[:, -2] = planned.engage
         rows[:, -1] = self._brake(planned.brake, start)
         return rows, mru
@@ -100,12 +99,6 @@ class RowMaker:
         late = time > 0.0
         rows[late, -2] = 0.0
         rows[late, -1] = np.maximum(rows[late, -1], closed[late])
-
-    def _noise(self, start: int, count: int) -> FloatArray:
-        """Return the sensors' noise; numbers that nobody reads are not drawn."""
-        if not self.sensors.noisy:
-            return np.zeros((count, len(NOISE)))
-        return self.sensors.noise(self.seed, start, count)
 
     def _brake(self, wanted: FloatArray, start: int) -> FloatArray:
         """Return how far the brake is closed, following the order at a limited rate."""

@@ -314,17 +314,6 @@ def test_refused(arguments, message):
         model(NOISY, **arguments)
 
 
-def test_refuses_motions_that_do_not_fit():
-    unit = model(NOISY)
-    state = unit.initial(0.0, 0.0)
-    with pytest.raises(InputError, match="velocity must have as many samples as displacement"):
-        unit.block(state, [0.0, 1.0], [0.0])
-    with pytest.raises(InputError, match="got 0 and 0"):
-        unit.block(state, [], [])
-    with pytest.raises(InputError, match="MRU: displacement must be finite numbers, got nan at"):
-        unit.block(state, [0.0, math.nan], [0.0, 0.0])
-
-
 def replace_delay(mru, delay):
     return MRU(**(dict(mru) | {"delay": delay}))
 
