@@ -31,7 +31,7 @@ from ..plant import (
     line_response,
 )
 from ..rig import Sensors
-from .mru import MruModel
+from .mru import PERFECT, MruModel
 
 #: What is measured, in the order of the plant's measurements.
 MEASURED = (
@@ -51,6 +51,8 @@ NOISES = (
     *(f"{name}_noise" for name in MEASUREMENTS),
     "rope.tension_noise",
 )
+_ABOARD = (*ENCODER, "rope.tension")  # measured outputs of the plant
+_OF_PLANT = [MEASURED.index(name) for name in (*MEASUREMENTS, *_ABOARD)]
 SAMPLE_TIME = 0.01  # of the load cell's noise, which a data sheet gives per sample [s]
 
 
@@ -111,11 +113,11 @@ def with_sensors(plant: LinearPlant, sensors: Sensors | None) -> LinearPlant:
     LinearPlant
         As `sensed_plant` describes it.
     """
-    known = {name: k for k, name in enumerate(plant.outputs)}
+    sensors = sensors or Sensors()
+    unit, cell = sensors.mru or PERFECT, sensors.load_cell
     n, nw = len(plant.states), len(plant.disturbances)
     hook = [plant.disturbances.index(name) for name in ("hook.heave", "hook.heave_rate")]
-    period = sensors.mru.heave_filter_period if sensors is not None and sensors.mru else None
-    cell = sensors.load_cell if sensors is not None else None
+    period = unit.heave_filter_period
     filters = ["mru.low", "mru.low_rate"] if period is not None else []
     states = [*plant.states, *filters, *(["load_cell.tension"] if cell is not None else [])]
     more = len(states) - n
@@ -128,11 +130,13 @@ def with_sensors(plant: LinearPlant, sensors: Sensors | None) -> LinearPlant:
     C = np.zeros((len(MEASURED), len(states)))
     D = np.zeros((len(MEASURED), len(plant.inputs)))
     F = np.zeros((len(MEASURED), nw + len(NOISES)))
-    count = len(MEASUREMENTS)
-    C[:count, :n], D[:count], F[:count, :nw] = plant.C, plant.D, plant.F
+    shown = [plant.outputs.index(name) for name in _ABOARD]
+    C[_OF_PLANT, :n] = np.vstack([plant.C, plant.Cz[shown]])
+    D[_OF_PLANT] = np.vstack([plant.D, plant.Dz[shown]])
+    F[_OF_PLANT, :nw] = np.vstack([plant.F, plant.Fz[shown]])
 
     at = {name: k for k, name in enumerate(MEASURED)}
-    heave, rate = at["mru.heave"], at["mru.heave_rate"]
+    heave, rate, tension = at["mru.heave"], at["mru.heave_rate"], at["rope.tension"]
     F[heave, hook[0]] = F[rate, hook[1]] = 1.0
     if period is not None:
         # l'' + sqrt(2) w l' + w^2 l = Z; shown are Z - sqrt(2) w l' - w^2 l = l'' and l'''.
@@ -145,24 +149,18 @@ def with_sensors(plant: LinearPlant, sensors: Sensors | None) -> LinearPlant:
         C[rate] = -d * w * C[heave]
         C[rate, low_rate] -= w**2
         F[rate, hook[0]] = -d * w
-    for name in ("drum.haul", "motor.speed"):
-        row = known[name]
-        C[at[name], :n], D[at[name]], F[at[name], :nw] = plant.Cz[row], plant.Dz[row], plant.Fz[row]
-    row, tension = known["rope.tension"], at["rope.tension"]
-    if cell is None:
-        C[tension, :n], D[tension], F[tension, :nw] = plant.Cz[row], plant.Dz[row], plant.Fz[row]
-    else:
+    if cell is not None:
         b = cell.bandwidth
-        A[-1, :n], A[-1, -1] = b * plant.Cz[row], -b
-        B[-1], E[-1, :nw] = b * plant.Dz[row], b * plant.Fz[row]
+        A[-1], B[-1], E[-1] = b * C[tension], b * D[tension], b * F[tension]
+        A[-1, -1] = -b
+        C[tension] = D[tension] = F[tension] = 0.0
         C[tension, -1] = 1.0
     heard_by = {"mru.error": "mru.heave", "mru.error_rate": "mru.heave_rate"}
     for k, name in enumerate(NOISES):
         F[at[heard_by.get(name, name.removesuffix("_noise"))], nw + k] = 1.0
 
-    late_mru = sensors.mru.delay if sensors is not None and sensors.mru else 0.0
     delays = dict.fromkeys(MEASUREMENTS, plant.delays[0])
-    delays |= {"mru.heave": late_mru, "mru.heave_rate": late_mru}
+    delays |= {"mru.heave": unit.delay, "mru.heave_rate": unit.delay}
     units = {"mru.heave": "m", "mru.heave_rate": "m/s", "mru.error": "m", "mru.error_rate": "m/s"}
     units |= {f"{name}_noise": plant.units[name] for name in (*MEASUREMENTS, "rope.tension")}
     return replace(
@@ -217,35 +215,29 @@ def sensed_line_at(
         With the names of `sensed_plant`, on the distributed rope (`models.plant.line_response`).
     """
     line, sensors = line_response(data or case, s, drag=drag), case.sensors
-    points = line.s
+    points, nw, at = line.s, len(line.disturbances), MEASURED.index
     noises = tuple(name for name in NOISES if name != "mru.error_rate")
-    heave = line.disturbances.index("hook.heave")
-    yw = np.zeros((points.size, len(MEASURED), len(line.disturbances) + len(noises)), complex)
+    yw = np.zeros((points.size, len(MEASURED), nw + len(noises)), complex)
     yu = np.zeros((points.size, len(MEASURED), len(line.inputs)), complex)
-    shown, late = np.ones_like(points), np.ones_like(points)
-    if (mru := sensors.mru) is not None:
-        late = np.exp(-points * mru.delay)
-        if mru.heave_filter_period is not None:
-            w = 2.0 * math.pi / mru.heave_filter_period
-            shown = points**2 / (points**2 + math.sqrt(2.0) * w * points + w**2)
-    cell = sensors.load_cell
-    pass_cell = 1.0 / (1.0 + points / cell.bandwidth) if cell is not None else 1.0
+    shown = [line.outputs.index(name) for name in _ABOARD]
+    yw[:, _OF_PLANT, :nw] = np.concatenate([line.yw, line.zw[:, shown]], axis=1)
+    yu[:, _OF_PLANT] = np.concatenate([line.yu, line.zu[:, shown]], axis=1)
+    if sensors.load_cell is not None:
+        weighed = 1.0 / (1.0 + points / sensors.load_cell.bandwidth)
+        for block in (yw, yu):
+            block[:, at("rope.tension")] *= weighed[:, None]
+    unit = sensors.mru or PERFECT
+    late, passed = np.exp(-points * unit.delay), np.ones_like(points)
+    if unit.heave_filter_period is not None:
+        w = 2.0 * math.pi / unit.heave_filter_period
+        passed = points**2 / (points**2 + math.sqrt(2.0) * w * points + w**2)
+    for name, rate in (("mru.heave", 1.0), ("mru.heave_rate", points)):
+        yw[:, at(name), line.disturbances.index("hook.heave")] = rate * passed * late
+        yw[:, at(name), nw + noises.index("mru.error")] = rate * late
     sent = np.exp(-points * sensors.telemetry.delay)
-    for k, name in enumerate(MEASURED):
-        if name.startswith("mru."):
-            rate = points if name == "mru.heave_rate" else 1.0
-            yw[:, k, heave] = rate * shown * late
-            yw[:, k, len(line.disturbances) + noises.index("mru.error")] = rate * late
-            continue
-        of_line = name not in MEASUREMENTS
-        row = (line.outputs if of_line else line.measurements).index(name)
-        w_row, u_row = (line.zw, line.zu) if of_line else (line.yw, line.yu)
-        through = pass_cell if name == "rope.tension" else 1.0
-        yw[:, k, : len(line.disturbances)] = np.multiply(through, w_row[:, row].T).T
-        yu[:, k] = np.multiply(through, u_row[:, row].T).T
-        if f"{name}_noise" in noises:
-            column = len(line.disturbances) + noises.index(f"{name}_noise")
-            yw[:, k, column] = 1.0 if of_line else sent
+    for name in (*MEASUREMENTS, "rope.tension"):
+        noise = 1.0 if name == "rope.tension" else sent
+        yw[:, at(name), nw + noises.index(f"{name}_noise")] = noise
     still = np.zeros((points.size, len(line.outputs), len(noises)))
     return replace(
         line,
