@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     )
     from models.case import Case, bundled_cases, case_schema, load_case
     from models.hook import HookDemand, HookSurvey, hook_motion
-    from models.operation import RecordMotion, Scenario, SineMotion, SixDofMotion
+    from models.operation import RecordMotion, Scenario, SineMotion, tip_heave
     from models.run import Run
     from models.sea import Scatter, read_scatter, read_seas
     from models.spread import LogNormal, Normal, Samples, Spread, Triangular, Uniform

@@ -18,6 +18,6 @@ if TYPE_CHECKING:
     from .scenario import Scenario
     from .scenarios import scenario_named, scenario_names, scenario_options
     from .schedule import Schedule
-    from .six_dof import SixDofMotion
+    from .six_dof import tip_heave
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -14,7 +14,9 @@ Files are text with a header line, columns separated by commas, semicolons or ta
     0.1, 0.148
 
 A column is in SI unless its header says otherwise, as in `displacement [cm]`.  Lines that start
-with `#` and further columns are passed over.
+with `#` and further columns are passed over.  Of a vessel's six degrees of freedom the columns are
+time, heave, roll and pitch, from which the motion of the crane's tip follows
+(`models.operation.six_dof`).
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ import math
 import re
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -42,6 +44,7 @@ from ..basics import (
 )
 from .excitation import Motion
 from .hermite import interpolated
+from .six_dof import tip_heave
 
 _FEWEST = 8  # samples: what a spline of fifth degree needs to be one
 _UNEVEN = 0.05  # of the mean step that a sample may be early or late
@@ -53,6 +56,7 @@ _KINDS = {
     "velocity": "speed",
     "acceleration": "acceleration",
 }
+_SIX_DOF = {"time": "time", "heave": "length", "roll": "angle", "pitch": "angle"}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,6 +84,8 @@ class RecordMotion:
         cls,
         path: str | Path,
         *,
+        tip: Sequence[float] | None = None,
+        exact: bool = False,
         detrend: Literal["none", "mean", "linear"] = "mean",
         high_pass: float | None = None,
     ) -> RecordMotion:
@@ -89,6 +95,9 @@ class RecordMotion:
         ----------
         path
             The file.
+        tip, exact
+            Of a file with the columns time, heave, roll and pitch, as in
+            `models.operation.six_dof.tip_heave`: the crane's tip moves.
         detrend, high_pass
             As in `from_arrays`.
 
@@ -96,17 +105,24 @@ class RecordMotion:
         ------
         InputError
             If the file cannot be read, lacks a column, or holds what is no number; if its time
-            steps are not equal or its samples are fewer than 8.
+            steps are not equal or its samples are fewer than 8; if the tip is not three numbers.
 
         Warns
         -----
         PhysicsWarning
-            If a measured velocity or acceleration is not the displacement's derivative.
+            If a measured velocity or acceleration is not the displacement's derivative, or an
+            angle is so large that it is probably in degrees.
         """
-        columns = read_columns(path, _KINDS, required=("time", "displacement"))
-        return cls.from_arrays(
-            **columns, detrend=detrend, high_pass=high_pass, source=str(Path(path).name)
-        )
+        source = Path(path).name
+        if tip is None:
+            columns = read_columns(path, _KINDS, required=("time", "displacement"))
+            return cls.from_arrays(**columns, detrend=detrend, high_pass=high_pass, source=source)
+        motions = read_columns(path, _SIX_DOF, required=tuple(_SIX_DOF))
+        time = motions.pop("time")
+        z = tip_heave(**motions, tip=tip, exact=exact, source=source)
+        found = cls.from_arrays(time, z, detrend=detrend, high_pass=high_pass, source=source)
+        place = ", ".join(f"{value:g}" for value in tip)
+        return replace(found, description=f"{found.description}, tip at ({place}) m")
 
     @classmethod
     def from_arrays(

@@ -150,7 +150,7 @@ def _quantity(arguments: argparse.Namespace, name: str) -> float | None:
 
 
 def _hook(arguments: argparse.Namespace) -> MotionSource | None:
-    from models.operation import RecordMotion, SineMotion, SixDofMotion
+    from models.operation import RecordMotion, SineMotion
 
     if arguments.tip is not None and arguments.hook is None:
         raise InputError("--tip: belongs to --hook, a file with heave, roll and pitch")
@@ -171,13 +171,12 @@ def _hook(arguments: argparse.Namespace) -> MotionSource | None:
         tip = split_numbers(arguments.tip)
         if len(tip) != 3:
             raise InputError(f"--tip: must be three numbers X,Y,Z [m], got {arguments.tip!r}")
-        return SixDofMotion.read(arguments.hook, tip=tip)
+        return RecordMotion.read(arguments.hook, tip=tip)
 
 
 def _fitting(lasting: float, hook: MotionSource | None, sample_time: float | None) -> float:
     """Return the length of a run that a record is long enough for."""
-    record = getattr(hook, "record", hook)
-    length = getattr(record, "duration", None)
+    length = getattr(hook, "duration", None)
     if length is None:
         return lasting
     # The last sample needs the motion up to its end.

@@ -1,7 +1,7 @@
 """Six motions in time against the hook's spectrum, and long records against both.
 
 The motions are drawn here by summing waves of many headings on the barge's closed formulas, each
-met at its own frequency of encounter, and taken to the crane's tip in time (`SixDofMotion`): no
+met at its own frequency of encounter, and taken to the crane's tip in time (`tip_heave`): no
 table, no operator of the hook, no mapped spectrum on the way.
 """
 
@@ -17,7 +17,7 @@ from standard_error import spectral_standard_error
 from models.basics import wave_number
 from models.hook import HookMotion
 from models.hook.encounter import speed_along
-from models.operation import SixDofMotion
+from models.operation import RecordMotion, tip_heave
 from models.sea import Spreading
 
 SPREAD = {"kind": "cos-2s", "exponent": 6.0}
@@ -73,9 +73,8 @@ def tip_record(case, seed):
         for mode in range(3):
             np.add.at(lines[mode], at[slow], about[slow, mode])
     heave, roll, pitch = np.fft.irfft(0.5 * size * lines, size)[:, : time.size]
-    tip = SixDofMotion.from_arrays(
-        time, heave, roll, pitch, tip=case.vessel.hook_point, detrend="none"
-    )
+    z = tip_heave(heave, roll, pitch, tip=case.vessel.hook_point)
+    tip = RecordMotion.from_arrays(time, z, detrend="none")
     motion = tip.motion(DURATION, STEP, seed=0)
     displacement, velocity, _ = motion.block(0, motion.rows)
     return displacement, velocity

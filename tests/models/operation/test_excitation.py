@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from still_motion import StillMotion
 
 from models import InputError, PhysicsWarning, load_case
-from models.operation import RecordMotion, SineMotion, SixDofMotion, SpectrumMotion
+from models.operation import RecordMotion, SineMotion, SpectrumMotion
 from models.operation.contact_scenarios import boat_motion, surface_motion
 from models.operation.excitation import (
     SECOND_BODY,
@@ -489,20 +489,20 @@ class TestSixDof:
                 for a, b, c, d in zip(t, heave, roll, pitch, strict=True)
             )
         )
-        source = SixDofMotion.read(path, tip=(-20.0, 8.0, 15.0), detrend="none")
+        source = RecordMotion.read(path, tip=(-20.0, 8.0, 15.0), detrend="none")
         found = whole(source.motion(60.0, 0.1, seed=0))[0]
         wanted = heave + 20.0 * np.radians(pitch) + 8.0 * np.radians(roll)
         np.testing.assert_allclose(found, wanted, atol=1e-8)
         assert source.description == "mru.csv, 60 s at 0.1 s, tip at (-20, 8, 15) m"
         with pytest.raises(InputError, match=r"mru\.csv: tip must be x, y and z \[m\], got 2 "):
-            SixDofMotion.read(path, tip=(1.0, 2.0))
+            RecordMotion.read(path, tip=(1.0, 2.0))
 
     def test_degrees_are_noticed(self):
         t = 0.1 * np.arange(100)
         with pytest.warns(PhysicsWarning, match="six-dof: roll reaches 5 rad; angles are in rad"):
-            SixDofMotion.from_arrays(t, 0 * t, 5.0 * np.cos(t), 0 * t, tip=(0.0, 1.0, 0.0))
+            tip_heave(0 * t, 5.0 * np.cos(t), 0 * t, tip=(0.0, 1.0, 0.0))
 
     def test_motions_of_unequal_length(self):
         t = 0.1 * np.arange(100)
         with pytest.raises(InputError, match="heave, roll and pitch must be equally long, got "):
-            SixDofMotion.from_arrays(t, t, t[1:], t, tip=(0.0, 1.0, 0.0))
+            tip_heave(t, t[1:], t, tip=(0.0, 1.0, 0.0))
