@@ -28,67 +28,53 @@ from .options import (
     ScenarioRecipe,
     Values,
     WordOption,
-    acceleration_option,
-    begin,
-    duration_after,
     length_option,
     lifting_speed,
     lowering_speed,
     move,
+    moving,
     payload_height,
     payload_side,
+    set_point_options,
     speed_option,
-    time_option,
     wave_height,
     weight_in_air,
 )
-from .profile import Profile
 
 
-def _landing(case: Case, values: Values) -> dict[str, Any]:
-    del case
+def _landing(_: Case, values: Values) -> dict[str, Any]:
     height, stop = values["height"], values["stop"]
     if stop >= height:
         raise InputError(
             f"scenario landing: stop must be below height, {height:g} m, got {stop:g} m"
         )
-    down = move(values, begin(values), stop - height)
-    touch = move(
-        values, down.end + values["wait"], -stop - values["slack"], values["landing_speed"]
-    )
-    profile = Profile(moves=(down, touch))
+    down = move(values, stop - height)
+    rest, last = down.end + values["wait"], -stop - values["slack"]
+    touch = move(values, last, start=rest, speed=values["landing_speed"])
     seabed = Seabed(below=height, stiffness=values["stiffness"], damping=values["damping"])
     return {
-        "duration": duration_after(profile),
-        "profile": profile,
+        **moving(down, touch),
         # A payload that stands can no longer be lowered: a feedback from it would pay out rope
         # for ever.
-        "disengage_at": profile.end,
+        "disengage_at": touch.end,
         "surroundings": Surroundings(seabed=seabed),
     }
 
 
 def _lift_off(case: Case, values: Values) -> dict[str, Any]:
-    profile = Profile(moves=(move(values, begin(values), values["height"]),))
     weight = weight_in_air(case)
     # The rope carries nothing at the start: the drum has let out its stretch, and the slack.
     stretch = weight * values["rope"] / case.rope.ea
     return {
-        "duration": duration_after(profile),
-        "profile": profile,
+        **moving(move(values, values["height"])),
         "initial_haul": -(stretch + values["slack"]),
         **_on_deck(case, values, -weight / values["stiffness"]),
     }
 
 
 def _set_down(case: Case, values: Values) -> dict[str, Any]:
-    down = -values["height"] - values["slack"]
-    profile = Profile(moves=(move(values, begin(values), down),))
-    return {
-        "duration": duration_after(profile),
-        "profile": profile,
-        **_on_deck(case, values, values["height"]),
-    }
+    down = move(values, -values["height"] - values["slack"])
+    return {**moving(down), **_on_deck(case, values, values["height"])}
 
 
 def _on_deck(case: Case, values: Values, below: float) -> dict[str, Any]:
@@ -112,7 +98,6 @@ def _on_deck(case: Case, values: Values, below: float) -> dict[str, Any]:
 
 
 def _splash(case: Case, values: Values) -> dict[str, Any]:
-    profile = Profile(moves=(move(values, begin(values), -values["height"] - values["depth"]),))
     payload = case.payload
     water = SplashZone(
         below=values["height"],
@@ -126,8 +111,7 @@ def _splash(case: Case, values: Values) -> dict[str, Any]:
     )
     surroundings = Surroundings(water=water)
     return {
-        "duration": duration_after(profile),
-        "profile": profile,
+        **moving(move(values, -values["height"] - values["depth"])),
         "surroundings": surroundings,
         "motions": {"surface": surface_motion(case, payload_side(case))},
         # Hauled in by what the rope stretches more under the weight in air, so that P is 0.
@@ -136,16 +120,12 @@ def _splash(case: Case, values: Values) -> dict[str, Any]:
     }
 
 
-_WAIT = time_option(60.0, "time at rest before it, with the controller engaged")
-
 _DECK: Mapping[str, Option | WordOption] = {
     "deck": WordOption(words=("boat", "platform"), text="what the deck is part of", motion=True),
     "stiffness": Option(
         quantity=Quantity("stiffness", 1e3, 1e9), default=5e6, text="stiffness of the deck"
     ),
     "rope": length_option(40.0, "rope from the drum to the payload at the start", low=1.0),
-    "speed": speed_option(lifting_speed),
-    "acceleration": acceleration_option(0.5),
 }
 
 CONTACT_SCENARIOS: Mapping[str, ScenarioRecipe] = {
@@ -171,9 +151,7 @@ CONTACT_SCENARIOS: Mapping[str, ScenarioRecipe] = {
                 default=6.5e5,
                 text="damping of the seabed [N s/m^1.5]",
             ),
-            "speed": speed_option(lowering_speed),
-            "acceleration": acceleration_option(0.1),
-            "wait": _WAIT,
+            **set_point_options(),
         },
         ramp=2.0,
     ),
@@ -185,7 +163,7 @@ CONTACT_SCENARIOS: Mapping[str, ScenarioRecipe] = {
             # Less than the boat may sink from under it, and it would be lifted too early.
             "slack": length_option(wave_height, "slack rope at the start"),
             **_DECK,
-            "wait": time_option(10.0, "time at rest before it, with the controller engaged"),
+            **set_point_options(lifting_speed, 0.5, wait=10.0),
         },
         warm_up=10.0,
         ramp=5.0,
@@ -197,7 +175,7 @@ CONTACT_SCENARIOS: Mapping[str, ScenarioRecipe] = {
             "height": length_option(5.0, "height of the payload above the deck at the start"),
             "slack": length_option(wave_height, "rope paid out beyond the deck's mean height"),
             **_DECK,
-            "wait": _WAIT,
+            **set_point_options(lifting_speed, 0.5),
         },
     ),
     "splash": ScenarioRecipe(
@@ -215,9 +193,7 @@ CONTACT_SCENARIOS: Mapping[str, ScenarioRecipe] = {
             "slamming_coefficient": Option(
                 quantity=Quantity("ratio", 0.0, 50.0), default=5.0, text="slamming coefficient"
             ),
-            "speed": speed_option(lowering_speed),
-            "acceleration": acceleration_option(0.1),
-            "wait": _WAIT,
+            **set_point_options(),
         },
     ),
 }

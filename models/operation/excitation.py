@@ -114,24 +114,12 @@ class LongRecord:
 
     def _faded(self, part: FloatArray, clock: npt.NDArray[np.int64], phase: float) -> FloatArray:
         """Return nodes times the cosine of an angle that grows by 90 degrees from clock zero on."""
-        u = np.clip(clock / self._fade, 0.0, 1.0)
-        rate = 0.5 * math.pi / (self._fade * self._step)
         # The angle itself starts and ends smoothly, so that the velocity has no jump.
-        angle = phase + 0.5 * math.pi * u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-        first = rate * 30.0 * (u * (1.0 - u)) ** 2
-        second = rate * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / (self._fade * self._step)
-        cosine, sine = np.cos(angle), np.sin(angle)
-        share, share_rate = cosine, -sine * first
-        share_change = -cosine * first**2 - sine * second
-        z, v, a = part.T
-        return np.stack(
-            [
-                share * z,
-                share * v + share_rate * z,
-                share * a + 2.0 * share_rate * v + share_change * z,
-            ],
-            axis=1,
-        )
+        grown = _smooth(clock / self._fade, self._fade * self._step)
+        turned, first, second = (0.5 * math.pi * part for part in grown)
+        cosine, sine = np.cos(phase + turned), np.sin(phase + turned)
+        shares = cosine, -sine * first, -cosine * first**2 - sine * second
+        return np.stack(_times((part[:, 0], part[:, 1], part[:, 2]), shares), axis=1)
 
     def _draw(self, piece: int) -> FloatArray:
         seed = seed_for(self._seed, _LATER_PIECE, piece) if piece else self._seed
@@ -228,14 +216,10 @@ class Motion:
             return self
 
         def evaluate(start: int, count: int) -> MotionBlock:
-            z, v, a = self.evaluate(start, count)
+            block = self.evaluate(start, count)
             if start * self.step >= duration:
-                return z, v, a
-            r = np.minimum(self.time(start, count) / duration, 1.0)
-            share = r**3 * (10.0 - 15.0 * r + 6.0 * r**2)
-            rate = 30.0 * (r * (1.0 - r)) ** 2 / duration
-            change = 60.0 * r * (1.0 - r) * (1.0 - 2.0 * r) / duration**2
-            return share * z, share * v + rate * z, share * a + 2.0 * rate * v + change * z
+                return block
+            return _times(block, _smooth(self.time(start, count) / duration, duration))
 
         return replace(self, evaluate=evaluate)
 
@@ -345,6 +329,20 @@ class SpectrumMotion:
             seed=seed,
             evaluate=interpolated(pieces, pieces.last, self.node_step, step),
         )
+
+
+def _smooth(r: FloatArray, duration: float) -> MotionBlock:
+    """Return 10 r^3 - 15 r^4 + 6 r^5 of r = time/duration, held outside [0, 1], and its rates."""
+    r = np.clip(r, 0.0, 1.0)
+    share = r**3 * (10.0 - 15.0 * r + 6.0 * r**2)
+    rate = 30.0 * (r * (1.0 - r)) ** 2 / duration
+    return share, rate, 60.0 * r * (1.0 - r) * (1.0 - 2.0 * r) / duration**2
+
+
+def _times(motion: MotionBlock, share: MotionBlock) -> MotionBlock:
+    """Return the product of a motion and a share that changes in time, and its derivatives."""
+    (z, v, a), (s, rate, change) = motion, share
+    return s * z, s * v + rate * z, s * a + 2.0 * rate * v + change * z
 
 
 def _check(owner: str, duration: float, step: float) -> None:

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
 from ..basics import InputError, check_range
 from ..case import Case
-from ..casefile import suggestion
+from ..casefile import Quantity, suggestion
 from ..plant import DriveLimits
 from .scenario import Scenario
 
@@ -26,56 +26,50 @@ PREFIX = "fault."
 """What the path of a fault begins with."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class FaultField:
-    """One number of a fault.
+@dataclass(frozen=True)
+class FaultField(Quantity):
+    """One number of a fault, of a kind and in a range."""
 
-    Attributes
-    ----------
-    kind
-        A key of `models.basics.units.KINDS`.
-    nominal
-        Its value where nothing is said: none of the faults, or the usual time.
-    low, high
-        The range that is allowed.
-    text
-        What it is.
-    """
-
-    kind: str
-    nominal: float
-    low: float
-    high: float
+    _: KW_ONLY
+    nominal: float = 0.0
+    """Its value where nothing is said: none of the faults, or the usual time."""
     text: str
-
-
-def _field(kind: str, nominal: float, low: float, high: float, text: str) -> FaultField:
-    return FaultField(kind=kind, nominal=nominal, low=low, high=high, text=text)
+    """What it is."""
 
 
 _LONG = 86400.0
 
 FAULTS: Mapping[str, FaultField] = MappingProxyType(
     {
-        "at": _field("time", 120.0, 0.0, _LONG, "when the faults begin"),
-        "lasting": _field("time", 60.0, 0.0, _LONG, "how long steps, biases and cuts last"),
-        "telemetry_outage": _field("time", 0.0, 0.0, _LONG, "how long no message comes"),
-        "sensor_outage": _field(
-            "time", 0.0, 0.0, _LONG, "how long the payload's sensor gives no numbers"
+        "at": FaultField("time", 0.0, _LONG, nominal=120.0, text="when the faults begin"),
+        "lasting": FaultField(
+            "time", 0.0, _LONG, nominal=60.0, text="how long steps, biases and cuts last"
         ),
-        "mru_outage": _field(
-            "time", 0.0, 0.0, _LONG, "how long the motion reference unit gives no numbers"
+        "telemetry_outage": FaultField("time", 0.0, _LONG, text="how long no message comes"),
+        "sensor_outage": FaultField(
+            "time", 0.0, _LONG, text="how long the payload's sensor gives no numbers"
         ),
-        "brake_trip": _field("time", 0.0, 0.0, _LONG, "how long the brake is on"),
-        "delay_step": _field("time", 0.0, 0.0, 60.0, "by how much the messages are later"),
-        "mru_heave_bias": _field("length", 0.0, -100.0, 100.0, "how much the heave shows too much"),
-        "mru_rate_bias": _field(
-            "speed", 0.0, -100.0, 100.0, "how much the heave rate shows too much"
+        "mru_outage": FaultField(
+            "time", 0.0, _LONG, text="how long the motion reference unit gives no numbers"
         ),
-        "torque_limit": _field(
-            "ratio", 1.0, 1e-3, 1.0, "share of the drive's torque and current that is left"
+        "brake_trip": FaultField("time", 0.0, _LONG, text="how long the brake is on"),
+        "delay_step": FaultField("time", 0.0, 60.0, text="by how much the messages are later"),
+        "mru_heave_bias": FaultField(
+            "length", -100.0, 100.0, text="how much the heave shows too much"
         ),
-        "power_limit": _field("ratio", 1.0, 1e-3, 1.0, "share of the drive's power that is left"),
+        "mru_rate_bias": FaultField(
+            "speed", -100.0, 100.0, text="how much the heave rate shows too much"
+        ),
+        "torque_limit": FaultField(
+            "ratio",
+            1e-3,
+            1.0,
+            nominal=1.0,
+            text="share of the drive's torque and current that is left",
+        ),
+        "power_limit": FaultField(
+            "ratio", 1e-3, 1.0, nominal=1.0, text="share of the drive's power that is left"
+        ),
     }
 )
 """Every fault by its name, without the prefix."""
@@ -173,23 +167,30 @@ def _limits(
             if name in own:
                 cut[name] = size["torque_limit"] * own[name]
     if size["power_limit"] < 1.0:
-        power = case.winch.power_limit
-        if math.isinf(power):
-            # A drive without a limit of its power gets one that it cannot reach, to be lowered.
-            power = case.winch.drive.torque_peak * case.winch.speed_limit
-            changed["winch.drive.power"] = power
+        power, given = limited_power(case)
+        changed |= given
         cut["drive.power_limit"] = size["power_limit"] * power
     if not cut:
         return {}
-    before, after = (
-        scenario.parameter_changes.get(at, {}),
-        scenario.parameter_changes.get(until, {}),
-    )
+    planned = scenario.parameter_changes
+    back: dict[str, float | None] = dict.fromkeys(cut, None)
     return {
         "parameter_changes": {
-            **scenario.parameter_changes,
-            at: {**before, **cut},
-            until: {**after, **dict.fromkeys(cut, None)},
+            **planned,
+            at: {**planned.get(at, {}), **cut},
+            until: {**planned.get(until, {}), **back},
         },
         "case_changes": changed,
     }
+
+
+def limited_power(case: Case) -> tuple[float, dict[str, float]]:
+    """Return the drive's power limit [W], and the changes of a case that give it one.
+
+    A drive without a limit gets one that it cannot reach, to be lowered.
+    """
+    power = case.winch.power_limit
+    if not math.isinf(power):
+        return power, {}
+    power = case.winch.drive.torque_peak * case.winch.speed_limit
+    return power, {"winch.drive.power": power}

@@ -142,10 +142,17 @@ def speed_option(default: Default, text: str = "speed of the set-point") -> Opti
     return Option(quantity=Quantity("speed", 0.0, 20.0, open_low=True), default=default, text=text)
 
 
-def acceleration_option(default: float) -> Option:
-    """Return an option for the acceleration of the set-point [m/s2]."""
-    quantity = Quantity("acceleration", 0.0, 10.0, open_low=True)
-    return Option(quantity=quantity, default=default, text="acceleration of the set-point")
+def set_point_options(
+    speed: Default | None = None, acceleration: float = 0.1, wait: float = 60.0
+) -> dict[str, Option]:
+    """Return the options of a set-point that moves: speed, acceleration, and the wait before it."""
+    text = "acceleration of the set-point"
+    allowed = Quantity("acceleration", 0.0, 10.0, open_low=True)
+    return {
+        "speed": speed_option(lowering_speed if speed is None else speed),
+        "acceleration": Option(quantity=allowed, default=acceleration, text=text),
+        "wait": time_option(wait, "time at rest before it, with the controller engaged"),
+    }
 
 
 # ---- figures of the case ---------------------------------------------------------------------
@@ -202,16 +209,19 @@ def begin(values: Values) -> float:
     return start
 
 
-def move(values: Values, start: float, distance: float, speed: float | None = None) -> Move:
-    """Return a move of the set-point with the speed and acceleration of the options."""
+def move(
+    values: Values, distance: float, *, start: float | None = None, speed: float | None = None
+) -> Move:
+    """Return a move of the set-point, by default when the operation begins and as fast as told."""
     return Move(
-        start=start,
+        start=begin(values) if start is None else start,
         distance=distance,
         speed=values["speed"] if speed is None else speed,
         acceleration=values["acceleration"],
     )
 
 
-def duration_after(profile: Profile, tail: float = 60.0) -> float:
-    """Return a duration that ends some time after the last move, in whole tens of seconds."""
-    return 10.0 * math.ceil((profile.end + tail) / 10.0)
+def moving(*moves: Move, tail: float = 60.0) -> dict[str, Any]:
+    """Return set-point and duration of moves, some time after the last in whole tens of seconds."""
+    profile = Profile(moves=moves)
+    return {"profile": profile, "duration": 10.0 * math.ceil((profile.end + tail) / 10.0)}

@@ -10,7 +10,6 @@ the surface are in `models.operation.contact_scenarios`.
 from __future__ import annotations
 
 import difflib
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,77 +17,60 @@ from ..basics import InputError
 from ..case import Case
 from ..casefile import Quantity
 from .contact_scenarios import CONTACT_SCENARIOS
+from .faults import limited_power
 from .options import (
     Option,
     ScenarioRecipe,
     Values,
     WordOption,
-    acceleration_option,
     begin,
-    duration_after,
     length_option,
-    lowering_speed,
     move,
+    moving,
     rope_left,
-    speed_option,
+    set_point_options,
     time_option,
 )
-from .profile import Profile
 from .scenario import Scenario
 
 _AFTER = 240.0  # [s] in which a failure's consequences are seen
 
 
-def _hold(case: Case, values: Values) -> dict[str, Any]:
-    del case
+def _hold(_: Case, values: Values) -> dict[str, Any]:
     return {"duration": begin(values) + 1200.0, "settle": begin(values) + 60.0}
 
 
-def _engage(case: Case, values: Values) -> dict[str, Any]:
-    del case
+def _engage(_: Case, values: Values) -> dict[str, Any]:
     end = begin(values) + values["hold"]
     return {"duration": end + values["ramp"] + 60.0, "disengage_at": end}
 
 
-def _lower(case: Case, values: Values) -> dict[str, Any]:
-    del case
-    profile = Profile(moves=(move(values, begin(values), -values["distance"]),))
-    return {"duration": duration_after(profile), "profile": profile}
+def _lower(_: Case, values: Values) -> dict[str, Any]:
+    return moving(move(values, -values["distance"]))
 
 
-def _steps(case: Case, values: Values) -> dict[str, Any]:
-    del case
-    moves = tuple(
-        move(
-            values,
-            begin(values) + i * values["interval"],
-            values["size"] if i % 2 == 0 else -values["size"],
-        )
+def _steps(_: Case, values: Values) -> dict[str, Any]:
+    interval, size = values["interval"], values["size"]
+    moves = (
+        move(values, -size if i % 2 else size, start=begin(values) + i * interval)
         for i in range(round(values["count"]))
     )
-    profile = Profile(moves=moves)
-    return {"duration": duration_after(profile, values["interval"]), "profile": profile}
+    return moving(*moves, tail=interval)
 
 
-def _brake_trip(case: Case, values: Values) -> dict[str, Any]:
-    del case
+def _brake_trip(_: Case, values: Values) -> dict[str, Any]:
     period = _failure(values)
     return {"duration": period[1] + _AFTER, "brake_trips": (period,)}
 
 
-def _sensor_loss(case: Case, values: Values) -> dict[str, Any]:
-    del case
+def _sensor_loss(_: Case, values: Values) -> dict[str, Any]:
     period = _failure(values)
     which = {"telemetry": "telemetry_outages", "sensor": "sensor_failures", "mru": "mru_outages"}
     return {"duration": period[1] + _AFTER, which[values["lost"]]: (period,)}
 
 
 def _power_limit(case: Case, values: Values) -> dict[str, Any]:
-    power, changes = case.winch.power_limit, {}
-    if math.isinf(power):
-        # A drive without a limit of its power gets one that it cannot reach, to be lowered.
-        power = case.winch.drive.torque_peak * case.winch.speed_limit
-        changes = {"winch.drive.power": power}
+    power, changes = limited_power(case)
     low, high = _failure(values)
     return {
         "duration": high + _AFTER,
@@ -109,11 +91,6 @@ def _lasting(default: float, text: str) -> Option:
     return Option(quantity=quantity, default=default, text=text)
 
 
-_SET_POINT: Mapping[str, Option] = {
-    "speed": speed_option(lowering_speed),
-    "acceleration": acceleration_option(0.1),
-    "wait": time_option(60.0, "time at rest before it, with the controller engaged"),
-}
 _WAIT = time_option(120.0, "time before it")
 
 _RECIPES: Mapping[str, ScenarioRecipe] = {
@@ -134,7 +111,7 @@ _RECIPES: Mapping[str, ScenarioRecipe] = {
         build=_lower,
         options={
             "distance": length_option(lambda case: min(20.0, 0.5 * rope_left(case)), "how far"),
-            **_SET_POINT,
+            **set_point_options(),
         },
     ),
     "steps": ScenarioRecipe(
@@ -144,7 +121,7 @@ _RECIPES: Mapping[str, ScenarioRecipe] = {
             "size": length_option(0.5, "size of a step"),
             "count": Option(quantity=Quantity("count", 1, 1000), default=4, text="steps"),
             "interval": time_option(60.0, "time from step to step"),
-            **_SET_POINT,
+            **set_point_options(),
         },
     ),
     "brake-trip": ScenarioRecipe(
