@@ -1,6 +1,6 @@
 """The course of a command: its progress, Ctrl-C in it, the folder that it fills, and its end.
 
-A computation that has something to keep is `stoppable`, one that swallows Ctrl-C `interruptible`.
+A computation that has something to keep is `stoppable`.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,6 @@ from ..text import (
 )
 
 _NAMED = 3  # pictures that are named
-_AGAIN = 0.25  # s between two attempts to interrupt
 
 Stop = Callable[[], bool]
 """Whether the user has asked to stop."""
@@ -67,54 +67,9 @@ def stoppable() -> Iterator[Stop]:
         signal.signal(signal.SIGINT, before)
 
 
-@contextlib.contextmanager
-def interruptible() -> Iterator[Callable[[], None]]:
-    """Make Ctrl-C end a computation that swallows it.
-
-    CasADi turns an interrupt within IPOPT into a solve that failed, and the search goes on
-    with the next start.  So an interrupt is remembered, and raised again until it gets
-    through: by a timer where there is one, and by the function that is yielded, which the
-    computation's progress calls.
-    """
-    asked = False
-
-    def interrupt(number: int, frame: object) -> None:
-        nonlocal asked
-        del number, frame
-        asked = True
-        if hasattr(signal, "setitimer"):
-            signal.setitimer(signal.ITIMER_REAL, _AGAIN)
-        raise KeyboardInterrupt
-
-    def check() -> None:
-        if asked:
-            raise KeyboardInterrupt
-
-    if threading.current_thread() is not threading.main_thread():
-        yield check  # only the main thread may handle signals
-        return
-    alarm = getattr(signal, "SIGALRM", None)
-    before = signal.signal(signal.SIGINT, interrupt)
-    before_alarm = signal.SIG_DFL if alarm is None else signal.signal(alarm, interrupt)
-    try:
-        yield check
-    finally:
-        if alarm is not None:
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
-            signal.signal(alarm, before_alarm)
-        signal.signal(signal.SIGINT, before)
-
-
-@contextlib.contextmanager
-def working(arguments: argparse.Namespace) -> Iterator[Progress]:
-    """Show the progress of a computation, unless asked to be quiet, and let Ctrl-C end it."""
-    with progress(shown=not arguments.quiet) as tell, interruptible() as check:
-
-        def step(stage: str, done: int, total: int) -> None:
-            check()
-            tell(stage, done, total)
-
-        yield step
+def working(arguments: argparse.Namespace) -> AbstractContextManager[Progress]:
+    """Show the progress of a computation, unless asked to be quiet."""
+    return progress(shown=not arguments.quiet)
 
 
 @contextlib.contextmanager

@@ -6,10 +6,10 @@ import argparse
 
 from models.basics import InputError, check_range
 
-from ...text import Report, ReportSection, progress
+from ...text import Report, ReportSection
 from ..declare import CASE, real, text, whole
 from ..given import case_words, given_case
-from ..working import conclude
+from ..working import conclude, working
 
 ARGUMENTS = (
     CASE,
@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
             raise InputError("--sensors: names of measurements with commas between, got none")
     from synth.bound import bound_for
 
-    with progress(shown=not arguments.quiet) as tell:
+    with working(arguments) as tell:
         tell("bound", 0, 1)
         found = bound_for(case, masses=arguments.masses, measurements=heard, faint=arguments.faint)
         tell("bound", 1, 1)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import argparse
 
-from ...text import progress
 from ..declare import CASE, DESIGN, NO_BOUND, text
 from ..given import case_words, given_case
 from ..given_design import given_design
-from ..working import conclude, prepared
+from ..working import conclude, prepared, working
 
 ARGUMENTS = (
     CASE,
@@ -25,7 +24,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     folder = None if arguments.out is None else prepared(arguments, case.name)
     written = []
-    with progress(shown=not arguments.quiet) as tell:
+    with working(arguments) as tell:
         design = given_design(case, arguments)
         if folder is not None:
             written = write_report(folder, design=design, bound=arguments.bound, progress=tell)

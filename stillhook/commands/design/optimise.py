@@ -9,10 +9,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ...designs import AT_LEAST, LIMITS
-from ...text import OutputFolder, number, progress
+from ...text import OutputFolder, number
 from ..declare import CASE, NO_BOUND, results_folder, text, whole
 from ..given import case_words, gains_text, given_case
-from ..working import conclude, interruptible, kept_in, prepared
+from ..working import conclude, kept_in, prepared, working
 
 if TYPE_CHECKING:
     from synth.design import Design
@@ -52,17 +52,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     design: Design | None = None
     try:
-        with progress(shown=not arguments.quiet) as tell:
-            with interruptible() as check:
-
-                def step(stage: str, done: int, total: int) -> None:
-                    check()
-                    tell(stage, done, total)
-
-                starts, seed = arguments.starts, arguments.seed
-                asked = names[0] if names is not None and len(names) == 1 else names
-                design = optimise_gains(case, asked, starts=starts, seed=seed, progress=step)
-            # Outside, as a report that is interrupted leaves whole files.
+        with working(arguments) as tell:
+            starts, seed = arguments.starts, arguments.seed
+            asked = names[0] if names is not None and len(names) == 1 else names
+            design = optimise_gains(case, asked, starts=starts, seed=seed, progress=tell)
             written = write_report(folder, design=design, bound=arguments.bound, progress=tell)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(_kept(folder, design)) from None

@@ -14,11 +14,10 @@ from models.vessel.hull import Hull
 from models.vessel.readers import check_long_waves, write_raos
 
 from ...seas import hull_report
-from ...text import progress
 from ..declare import changed_words, choice, group, real, switch, text, whole
 from ..given import split_numbers
 from ..vary import parse_range
-from ..working import conclude, prepared_table
+from ..working import conclude, prepared_table, working
 
 _STAGE = "computing waves on the hull"
 
@@ -105,7 +104,7 @@ def run(arguments: argparse.Namespace) -> int:
     made = changed_words(arguments, ARGUMENTS, out=None, threads=None, cache=True)
     # Made and tried before anything long begins.
     folder, table = prepared_table(arguments, hull.name, "raos.nc")
-    with progress(shown=not arguments.quiet) as tell:
+    with working(arguments) as tell:
         vessel = vessel_from_hull(
             hull,
             kg=arguments.kg,

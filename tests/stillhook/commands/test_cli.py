@@ -21,7 +21,7 @@ from endings import Ending
 import stillhook as sh
 from models import SolverError, load_case, template_text
 from stillhook import cli
-from stillhook.commands import gains_text, interruptible, parse_gains
+from stillhook.commands import gains_text, parse_gains
 from stillhook.designs import design_report
 from stillhook.text import console, progress, show, told_once
 
@@ -562,26 +562,6 @@ main_thread = pytest.mark.skipif(
     threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"),
     reason="signals are for the main thread, timers for Unix",
 )
-
-
-@main_thread
-def test_an_interrupt_that_is_swallowed_comes_again():
-    before = signal.getsignal(signal.SIGINT)
-    swallowed = 0
-    with pytest.raises(KeyboardInterrupt), interruptible() as check:  # noqa: PT012
-        check()
-        try:
-            signal.raise_signal(signal.SIGINT)
-        except KeyboardInterrupt:
-            swallowed += 1
-        try:
-            time.sleep(10.0)
-        except KeyboardInterrupt:
-            swallowed += 1
-        check()
-    assert swallowed == 2
-    assert signal.getsignal(signal.SIGINT) is before
-    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
 
 
 @pytest.mark.ci
