@@ -147,12 +147,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         From the parser: with 0 for ``--help`` and ``--version``, with 2 for arguments that it
         does not understand.
     """
-    parser = build_parser(sys.argv[1:] if argv is None else argv)
-    arguments = parser.parse_args(argv)
-    if arguments.command is None:
-        parser.print_help(sys.stderr)
-        return BAD_INPUT
+    words = sys.argv[1:] if argv is None else argv
+    parser = build_parser(words)
     try:
+        arguments = parser.parse_args(words)
+        if arguments.command is None:
+            parser.print_help(sys.stderr)
+            return BAD_INPUT
         status = _run(arguments)
         # What is still in the buffer can fail too: a reader that has gone, a full disk.
         sys.stdout.flush()
@@ -165,7 +166,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"stillhook: interrupted{f'; {stop}' if str(stop) else ''}", file=sys.stderr)
         return INTERRUPTED
     except Exception as error:
-        if arguments.debug:
+        if "--debug" in words:
             raise
         return _failed(error)
 

@@ -9,18 +9,56 @@ tuple of the command that was asked for, and no other.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
+
+from models.basics import check_range
 
 Declaration = Callable[[argparse._ActionsContainer], None]
 """Adds one argument, or a group of them, to a parser."""
 
+Read = Callable[[str, Any], object]
+"""Returns what an option means from its name, for messages, and what was given."""
 
-def _argument(*names: str, **settings: Any) -> Declaration:
+
+class _Reading(argparse.Action):
+    """Reads what an option is given as it comes; `InputError` passes the parser by."""
+
+    read: Read
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        """Keep what the value means under the option's name."""
+        owner = parser.prog.rpartition(" ")[2]
+        setattr(namespace, self.dest, self.read(f"{owner}: {self.option_strings[0]}", values))
+
+
+def _argument(*names: str, read: Read | None = None, **settings: Any) -> Declaration:
     def add(parser: argparse._ActionsContainer) -> None:
-        parser.add_argument(*names, **settings)
+        if read is None:
+            parser.add_argument(*names, **settings)
+        else:
+            action = parser.add_argument(*names, action=_Reading, **settings)
+            assert isinstance(action, _Reading)
+            action.read = read
 
     return add
+
+
+def _within(number: type[float], limits: Mapping[str, Any]) -> Read | None:
+    """Return what refuses a number out of range; None where there is no range."""
+    return (lambda option, value: number(checked(option, value, **limits))) if limits else None
+
+
+def checked(option: str, value: float, **limits: Any) -> float:
+    """Return what an option is given if it is within limits as for `check_range`."""
+    owner, _, name = option.rpartition(": ")
+    return check_range(owner, name, value, **limits)
 
 
 def positional(name: str, help: str, *, optional: bool = False) -> Declaration:
@@ -28,21 +66,27 @@ def positional(name: str, help: str, *, optional: bool = False) -> Declaration:
     return _argument(name, metavar=name.upper(), help=help, nargs="?" if optional else None)
 
 
-def text(flag: str, metavar: str, help: str, default: str | None = None) -> Declaration:
-    """Declare an option with a text, as a name, a file or a quantity with its unit."""
-    return _argument(flag, metavar=metavar, help=help, default=default)
+def text(
+    flag: str, metavar: str, help: str, default: object = None, read: Read | None = None
+) -> Declaration:
+    """Declare an option with a text, as a name, a file or a quantity; `read` says what it means."""
+    return _argument(flag, metavar=metavar, help=help, default=default, read=read)
 
 
-def whole(flag: str, help: str, default: int | None = None) -> Declaration:
-    """Declare an option with a whole number; a default is told."""
+def whole(flag: str, help: str, default: int | None = None, **limits: float) -> Declaration:
+    """Declare an option with a whole number, within limits as for `check_range`."""
     told = help if default is None else f"{help} (default: {default})"
-    return _argument(flag, metavar="N", help=told, type=int, default=default)
+    read = _within(int, limits)
+    return _argument(flag, metavar="N", help=told, type=int, default=default, read=read)
 
 
-def real(flag: str, metavar: str, help: str, default: float | None = None) -> Declaration:
-    """Declare an option with a number; a default is told."""
+def real(
+    flag: str, metavar: str, help: str, default: float | None = None, **limits: Any
+) -> Declaration:
+    """Declare an option with a number, within limits as for `check_range`."""
     told = help if default is None else f"{help} (default: {default:g})"
-    return _argument(flag, metavar=metavar, help=told, type=float, default=default)
+    read = _within(float, limits)
+    return _argument(flag, metavar=metavar, help=told, type=float, default=default, read=read)
 
 
 def choice(flag: str, of: tuple[str, ...], help: str, default: str | None = None) -> Declaration:
@@ -109,7 +153,10 @@ def changed_words(
             for one in value if isinstance(value, list) else [value]:
                 words.append(action.option_strings[0])
                 if action.nargs != 0:
-                    words.append(f"{one:g}" if isinstance(one, float) else str(one))
+                    parts = one if isinstance(one, tuple) else (one,)
+                    words.append(
+                        ",".join(f"{x:g}" if isinstance(x, float) else str(x) for x in parts)
+                    )
     return words
 
 
@@ -148,6 +195,15 @@ NO_BOUND = switch(
 STRUCTURE = text(
     "--structure", "NAME", "controller structure (default: payload-feedback)", "payload-feedback"
 )
+
+
+#: The seed of a search, which any whole number is good for.
+SEED = whole("--seed", "seed of the starts", 0, low=0)
+
+
+def starts(default: int, help: str = "starts of the search") -> Declaration:
+    """Declare from how many places a search begins."""
+    return whole("--starts", help, default, low=1, high=4096)
 
 
 def results_folder(default: str) -> Declaration:

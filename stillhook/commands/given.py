@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from models.basics import InputError, PhysicsWarning
 
-from ..text import told_once
+from ..text import OutputFolder, told_once
 
 if TYPE_CHECKING:
     from models import Case
@@ -88,14 +88,6 @@ def split_pairs(
             raise InputError(f"{option}: {name} is given twice")
         found[name] = value
     return found
-
-
-def split_numbers(text: str) -> tuple[float, ...]:
-    """Return numbers from a text with commas between; none if one is no number."""
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        return ()
 
 
 def read_quantity_of(option: str, name: str, text: str, wanted: Quantity) -> float:
@@ -175,14 +167,14 @@ def gains_text(gains: Mapping[str, float]) -> str:
     return ",".join(f"{name}={value:.8g}" for name, value in gains.items())
 
 
-def case_words(arguments: argparse.Namespace, written: str | None = None) -> str:
+def case_words(arguments: argparse.Namespace, folder: OutputFolder | None = None) -> str:
     """Return the case as words of a command: its name, or with its changes where they are kept.
 
-    `written` is the case file of the output folder, if there is one.
+    `folder` is the output folder that holds the case file, if there is one.
     """
     if not arguments.changes:
         return shlex.quote(arguments.case)
-    if written is not None:
-        return shlex.quote(written)
+    if folder is not None:
+        return shlex.quote(str(folder.path / "case.yaml"))
     sets = [f"--set {shlex.quote(change)}" for change in arguments.changes]
     return " ".join([shlex.quote(arguments.case), *sets])

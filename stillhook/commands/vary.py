@@ -86,28 +86,6 @@ def parse_seas(text: str | None, scatter: str | None) -> list[SeaState] | None:
     return states
 
 
-def parse_range(name: str, text: str) -> tuple[float, float]:
-    """Return the two ends of a text LOW..HIGH.
-
-    Raises
-    ------
-    InputError
-        If it is not of that form.
-
-    Examples
-    --------
-    >>> parse_range("--schedule", "100..2000")
-    (100.0, 2000.0)
-    """
-    low, sign, high = text.partition("..")
-    try:
-        if sign:
-            return float(low), float(high)
-    except ValueError:
-        pass
-    raise InputError(f"{name}: must be LOW..HIGH in SI units, as in 100..2000, got {text!r}")
-
-
 def _read(text: str, path: str) -> Any:
     value, _ = read_yaml(text.strip(), f"--vary {path}")
     return value

@@ -12,6 +12,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from ..text import (
     OutputFolder,
     Progress,
     Report,
+    ReportSection,
     commands,
     console,
     folder_name,
@@ -113,9 +115,22 @@ def place_for(arguments: argparse.Namespace, name: str, ending: str = "") -> Pat
     return Path(arguments.out or Path("out") / f"{folder_name(name)}{ending}")
 
 
-def prepared(arguments: argparse.Namespace, name: str, ending: str = "") -> OutputFolder:
-    """Return the folder for the results, with the figures that the arguments ask for."""
-    return OutputFolder.prepare(place_for(arguments, name, ending), figure_kinds(arguments))
+def prepared(arguments: argparse.Namespace, place: str | Path, ending: str = "") -> OutputFolder:
+    """Return the folder for the results, with the figures that the arguments ask for.
+
+    Parameters
+    ----------
+    arguments
+        They say which figures, and may name the folder.
+    place
+        The folder; or a name, as for `place_for`.
+    ending
+        Stands behind the name.
+    """
+    kinds = ("svg", "png") if arguments.format is None else (arguments.format,)
+    if isinstance(place, str):
+        place = place_for(arguments, place, ending)
+    return OutputFolder.prepare(place, kinds if arguments.figures else ())
 
 
 def prepared_table(
@@ -124,24 +139,18 @@ def prepared_table(
     """Return the folder for a vessel, and its table there: the file that is given, or `table`."""
     target = place_for(arguments, name)
     alone = target.suffix.lower() in {".csv", ".nc"}
-    folder = OutputFolder.prepare(target.parent if alone else target, figure_kinds(arguments))
+    folder = prepared(arguments, target.parent if alone else target)
     return folder, target if alone else folder.path / table
-
-
-def figure_kinds(arguments: argparse.Namespace) -> tuple[str, ...]:
-    """Return the endings of the files of a figure; none where none is to be drawn."""
-    if not arguments.figures:
-        return ()
-    return ("svg", "png") if arguments.format is None else (arguments.format,)
 
 
 def conclude(
     report: Report,
     arguments: argparse.Namespace,
+    folder: OutputFolder | None = None,
+    following: Sequence[tuple[str, str]] = (),
     *,
-    written: Sequence[Path] = (),
-    following: Callable[[], Sequence[tuple[str, str]]] = tuple,
-    result: Callable[[], Any] | None = None,
+    brief: Sequence[ReportSection] = (),
+    result: Any = None,
 ) -> int:
     """Print a report, the files that were written, and what to do next; return the exit status.
 
@@ -152,30 +161,32 @@ def conclude(
     arguments
         If they ask to be quiet the verdict alone is printed; if they ask for JSON the report as
         `stillhook.text.json_data` has it, with ``written``, the files, and nothing else.
-    written
-        The files.
+    folder
+        Where files were written, if any were.
     following
-        Returns commands to go on with, each with what it does.
+        Commands to go on with, each with what it does.
+    brief
+        Sections that are the verdict, where that is no sentence.
     result
-        Returns the result itself as plain data, for JSON alone.
+        The result itself as plain data, for JSON alone.
     """
+    written = [] if folder is None else folder.written
+    out = console()
     if arguments.json:
         data = json_data(report) | {"written": [str(path) for path in written]}
-        if result is not None:
-            data["result"] = result()
-        sys.stdout.write(json_text(data))
-        return 1 if report.ok is False else 0
-    out = console()
-    if arguments.quiet:
+        sys.stdout.write(json_text(data | ({} if result is None else {"result": result})))
+    elif arguments.quiet and brief:
+        show(replace(report, sections=brief), out)
+    elif arguments.quiet:
         out.print(f"{report.name}: {report.status}", soft_wrap=True)
-        return 1 if report.ok is False else 0
-    show(report, out)
-    out.print()
-    if written:
-        pictures = [path for path in written if path.suffix in (".svg", ".png")]
-        names = [path.name for path in written if path not in pictures]
-        names += [path.name for path in pictures] if len(pictures) <= _NAMED else ["figures"]
-        out.print(f"Written to {written[0].parent}: {', '.join(names)}", soft_wrap=True)
-    if rows := following():
-        commands(rows, out)
+    else:
+        show(report, out)
+        out.print()
+        if written:
+            pictures = [path for path in written if path.suffix in (".svg", ".png")]
+            names = [path.name for path in written if path not in pictures]
+            names += [path.name for path in pictures] if len(pictures) <= _NAMED else ["figures"]
+            out.print(f"Written to {written[0].parent}: {', '.join(names)}", soft_wrap=True)
+        if following:
+            commands(following, out)
     return 1 if report.ok is False else 0

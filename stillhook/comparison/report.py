@@ -85,23 +85,17 @@ def write_comparison(
     """
     place = OutputFolder.prepare(folder)
     report = comparison_report(found)
-    written = [
-        place.write("case.yaml", found.case.to_yaml()),
-        place.write("table.csv", found.table.to_csv(index=False, lineterminator="\n")),
-        place.write("runs.csv", csv_text(_runs(found))),
-        place.write("summary.json", json_text(comparison_data(found))),
-    ]
+    place.write("case.yaml", found.case.to_yaml())
+    place.write("table.csv", found.table.to_csv(index=False, lineterminator="\n"))
+    place.write("runs.csv", csv_text(_runs(found)))
+    place.write("summary.json", json_text(comparison_data(found)))
     if found.traces:
-        written.append(place.write("traces.csv", csv_text(_traces(found))))
-    else:
-        place.discard("traces.csv")
+        place.write("traces.csv", csv_text(_traces(found)))
     drawn = place.draw(report.drawings) if figures else []
-    for drawing in report.drawings:
-        for kind in ("svg", "png"):
-            if place.path / f"{drawing.name}.{kind}" not in drawn:
-                place.discard(f"{drawing.name}.{kind}")
     text = markdown(_with_contenders(report, found), [path.stem for path in drawn])
-    return [*written, *drawn, place.write("summary.md", f"{text}\n{_SAME}\n")]
+    place.write("summary.md", f"{text}\n{_SAME}\n")
+    place.discard("traces.csv", *(f"{drawing.name}.*" for drawing in report.drawings))
+    return place.written
 
 
 def comparison_data(found: Comparison) -> dict[str, Any]:

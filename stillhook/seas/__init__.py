@@ -9,7 +9,7 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .hook import motion_figure, motion_report, own_place
-    from .operability import operability_report, workable_table, write_operability
+    from .operability import FIGURES, netcdf, operability_report, workable_table
     from .operability_figures import (
         capability_figure,
         contour_figure,

@@ -1,11 +1,10 @@
-"""Operability as a report, and its tables as files."""
+"""Operability as a report, and its tables as data."""
 
 from __future__ import annotations
 
 import math
 import warnings
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from synth.operability import AtDepth, Contour, ContourCheck, Operability
@@ -14,12 +13,10 @@ from ..text import (
     Column,
     Drawing,
     Item,
-    OutputFolder,
     Report,
     ReportSection,
     Table,
     columns,
-    csv_text,
     data_table,
     pairs,
     percent,
@@ -38,7 +35,8 @@ if TYPE_CHECKING:
 _MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
 _WHO = {"held": "drum held", "loop": "design", "reoptimised": "anew", "perfect": "perfect"}
 _ROWS = 20
-_FIGURES = ("contour", "capability", "headings", "depths", "scatter")
+FIGURES = ("contour", "capability", "headings", "depths", "scatter")
+"""Names of the figures, of which a study has some."""
 
 
 def operability_report(study: Operability, checks: Sequence[ContourCheck] = ()) -> Report:
@@ -70,29 +68,6 @@ def operability_report(study: Operability, checks: Sequence[ContourCheck] = ()) 
         ok=works and all(check.ok for check in checks),
         sections=sections,
     )
-
-
-def write_operability(folder: str | Path, study: Operability) -> list[Path]:
-    """Write a study into a folder, case, tables and figures; return the files.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be written.
-    """
-    place = OutputFolder.prepare(folder)
-    written = [
-        place.write("case.yaml", study.case.to_yaml()),
-        place.write("operability.csv", study.to_csv()),
-        place.write("operability.nc", netcdf(study.dataset)),
-    ]
-    for name in _FIGURES:
-        for kind in ("svg", "png"):
-            place.discard(f"{name}.{kind}")
-    place.discard("workable.csv")
-    if study.scatter is not None:
-        written.append(place.write("workable.csv", csv_text(workable_table(study))))
-    return written + place.draw(_drawings(study))
 
 
 def workable_table(study: Operability) -> Table:

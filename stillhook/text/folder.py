@@ -10,7 +10,7 @@ import contextlib
 import os
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from models.basics import InputError, replace_atomically
@@ -20,7 +20,7 @@ from .table import Drawing
 
 @dataclass(frozen=True)
 class OutputFolder:
-    """A folder that can be written to.
+    """A folder that can be written to, and what has been.
 
     Parameters
     ----------
@@ -28,10 +28,13 @@ class OutputFolder:
         The folder; it is made with its parents by `prepare`.
     kinds
         Endings of the files of a figure; none for no figures.
+    written
+        The files that were written, in their order.
     """
 
     path: Path
     kinds: tuple[str, ...] = ("svg", "png")
+    written: list[Path] = field(default_factory=list)
 
     @classmethod
     def prepare(
@@ -56,10 +59,20 @@ class OutputFolder:
             }
             reason = known.get(type(error), error.strerror or error)
             raise InputError(f"{folder}: the output folder cannot be made: {reason}") from error
-        ready = cls(folder, kinds)
-        ready.write(f".{os.getpid()}.probe", b"")
-        (folder / f".{os.getpid()}.probe").unlink(missing_ok=True)
-        return ready
+        probe = folder / f".{os.getpid()}.probe"
+        replace_atomically(probe, lambda place: place.write_bytes(b"")).unlink(missing_ok=True)
+        return cls(folder, kinds)
+
+    def at(self, name: str) -> Path:
+        """Return where a file goes, with the folder made that its name may begin with.
+
+        Raises
+        ------
+        InputError
+            If that folder cannot be made.
+        """
+        path = self.path / name
+        return self.prepare(path.parent).path / path.name if "/" in name else path
 
     def write(self, name: str, content: str | bytes) -> Path:
         """Write a file under a temporary name, then rename it; return its path.
@@ -69,9 +82,14 @@ class OutputFolder:
         InputError
             If it cannot be written.
         """
-        target = self.path / name
         data = content.encode("utf-8") if isinstance(content, str) else content
-        return replace_atomically(target, lambda place: place.write_bytes(data))
+        path = replace_atomically(self.at(name), lambda place: place.write_bytes(data))
+        self.keep(path)
+        return path
+
+    def keep(self, *paths: Path) -> None:
+        """Count files that somebody else has written here among those written, each once."""
+        self.written.extend(path for path in paths if path not in self.written)
 
     def draw(
         self,
@@ -117,10 +135,12 @@ class OutputFolder:
                 written.append(self.write(f"{drawing.name}.{kind}", style.picture(figure, kind)))
         return written
 
-    def discard(self, name: str) -> None:
-        """Remove a file of an earlier run, if there is one."""
-        with contextlib.suppress(OSError):
-            (self.path / name).unlink(missing_ok=True)
+    def discard(self, *patterns: str) -> None:
+        """Remove files of an earlier run by their names, with `*` for any, unless written anew."""
+        for path in (found for pattern in patterns for found in self.path.glob(pattern)):
+            if path not in self.written:
+                with contextlib.suppress(OSError):
+                    path.unlink(missing_ok=True)
 
 
 def folder_name(text: str) -> str:

@@ -23,19 +23,13 @@ def run(arguments: argparse.Namespace) -> int:
     from ...designs import design_data, design_report, write_report
 
     folder = None if arguments.out is None else prepared(arguments, case.name)
-    written = []
     with working(arguments) as tell:
         design = given_design(case, arguments)
         if folder is not None:
-            written = write_report(folder, design=design, bound=arguments.bound, progress=tell)
-    words = case_words(arguments, None if folder is None else str(folder.path / "case.yaml"))
+            write_report(folder, design=design, bound=arguments.bound, progress=tell)
     structure = "" if design.gains else f" --structure {design.structure}"
-    again = [("the best for this case", f"stillhook optimise {words}{structure}")]
+    again = [
+        ("the best for this case", f"stillhook optimise {case_words(arguments, folder)}{structure}")
+    ]
     report = design_report(design, bound=arguments.bound and not arguments.quiet)
-    return conclude(
-        report,
-        arguments,
-        written=written,
-        following=lambda: again,
-        result=lambda: design_data(design),
-    )
+    return conclude(report, arguments, folder, again, result=design_data(design))

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-from models.basics import check_range
-
 from ...text import Report, ReportSection
 from ..declare import CASE, DESIGN, repeated, whole
 from ..given import case_words, given_case, split_pairs
@@ -23,13 +21,12 @@ ARGUMENTS = (
         "what may be off and how far either way, as in payload.mass=0.3, drag=0.5 or "
         "'delay=20 ms' (default: payload.mass=0.3, stiffness=0.2, drag=0.5)",
     ),
-    whole("--draws", "random plants to check with", 1000),
+    whole("--draws", "random plants to check with", 1000, low=0, high=1_000_000),
 )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse and show; return 0 if the loop is stable over the ranges, 1 if not."""
-    check_range("margins", "--draws", arguments.draws, low=0, high=1_000_000)
     case = given_case(arguments)
     off = parse_off(arguments.off) or _USUAL
     design = given_design(case, arguments)
@@ -37,13 +34,16 @@ def run(arguments: argparse.Namespace) -> int:
 
     with working(arguments) as step:
         found = robustness(design, off, draws=arguments.draws, progress=step)
-    words = case_words(arguments, None)
     vary = " ".join(
         f"--vary {d.path}={max(d.at(-1.0), 0.0):.5g}..{d.at(1.0):.5g}"
         for d in found.doubts
         if "." in d.path
     )
-    again = [("gains for the whole range", f"stillhook robust {words} {vary}")] if vary else []
+    again = (
+        [("gains for the whole range", f"stillhook robust {case_words(arguments)} {vary}")]
+        if vary
+        else []
+    )
     first, *rest = str(found).splitlines()
     report = Report(
         name=case.name,
@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         ok=found.ok,
         sections=[ReportSection("", rest)],
     )
-    return conclude(report, arguments, following=lambda: again)
+    return conclude(report, arguments, following=again)
 
 
 def parse_off(texts: list[str]) -> dict[str, float | str]:

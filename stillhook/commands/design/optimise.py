@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 from ...designs import AT_LEAST, LIMITS
 from ...text import OutputFolder, number
-from ..declare import CASE, NO_BOUND, results_folder, text, whole
+from ..declare import CASE, NO_BOUND, SEED, results_folder, starts, text
 from ..given import case_words, gains_text, given_case
+from ..lists import names
 from ..working import conclude, kept_in, prepared, working
 
 if TYPE_CHECKING:
@@ -20,13 +21,14 @@ if TYPE_CHECKING:
 ARGUMENTS = (
     CASE,
     results_folder("out/<name of the case>"),
-    whole("--starts", "starts of the search", 16),
-    whole("--seed", "seed of the starts", 0),
+    starts(16),
+    SEED,
     text(
         "--structure",
         "NAME",
         "controller structure, such as payload-feedback, or several, the simplest first "
         "(default: those that the case's sensors allow)",
+        read=names,
     ),
     NO_BOUND,
 )
@@ -34,15 +36,11 @@ ARGUMENTS = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Optimise, show and save; return 0 if the design is ok, 1 if not."""
-    from models.basics import check_range
-
-    check_range("optimise", "--starts", arguments.starts, low=1, high=4096)
-    check_range("optimise", "--seed", arguments.seed, low=0)
     from synth.structures import structure_named
 
     case = given_case(arguments)
-    names = _names(arguments.structure)
-    for name in names or ():
+    asked = arguments.structure
+    for name in asked or ():
         structure_named(name, case)  # an unknown name ends here, before any file
     folder = prepared(arguments, case.name)
     folder.write("case.yaml", case.to_yaml())
@@ -53,27 +51,19 @@ def run(arguments: argparse.Namespace) -> int:
     design: Design | None = None
     try:
         with working(arguments) as tell:
-            starts, seed = arguments.starts, arguments.seed
-            asked = names[0] if names is not None and len(names) == 1 else names
-            design = optimise_gains(case, asked, starts=starts, seed=seed, progress=tell)
-            written = write_report(folder, design=design, bound=arguments.bound, progress=tell)
+            design = optimise_gains(
+                case,
+                asked[0] if asked is not None and len(asked) == 1 else asked,
+                starts=arguments.starts,
+                seed=arguments.seed,
+                progress=tell,
+            )
+            write_report(folder, design=design, bound=arguments.bound, progress=tell)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(_kept(folder, design)) from None
     report = design_report(design, bound=arguments.bound and not arguments.quiet)
-    return conclude(
-        report,
-        arguments,
-        written=written,
-        following=lambda: _next(design, arguments, folder),
-        result=lambda: design_data(design),
-    )
-
-
-def _names(given: str | None) -> tuple[str, ...] | None:
-    """Return the structures that are asked for; None for those that the sensors allow."""
-    if given is None:
-        return None
-    return tuple(name.strip() for name in given.split(","))
+    following = _next(design, arguments, folder)
+    return conclude(report, arguments, folder, following, result=design_data(design))
 
 
 def _kept(folder: OutputFolder, design: Design | None) -> str:
@@ -90,7 +80,7 @@ def _next(
     design: Design, arguments: argparse.Namespace, folder: OutputFolder
 ) -> list[tuple[str, str]]:
     """Return commands to go on with, each with what it does."""
-    words = case_words(arguments, str(folder.path / "case.yaml"))
+    words = case_words(arguments, folder)
     plain = design.structure == "payload-feedback"
     structure = "" if plain else f" --structure {design.structure}"
     optimise = f"stillhook optimise {words}{structure}"

@@ -6,7 +6,7 @@ import argparse
 
 from ..declare import CASE, choice, results_folder, text, whole
 from ..given import case_words, gains_text, given_case
-from ..vary import parse_range
+from ..lists import parse_range
 from ..working import conclude, prepared, working
 
 ARGUMENTS = (
@@ -18,7 +18,12 @@ ARGUMENTS = (
         "torque",
     ),
     whole("--points", "points of the front", 30),
-    text("--between", "LOW..HIGH", "ends of the front in SI units (default: found)"),
+    text(
+        "--between",
+        "LOW..HIGH",
+        "ends of the front in SI units (default: found)",
+        read=parse_range,
+    ),
     whole("--seed", "seed of the searches", 0),
     results_folder("out/<case>-pareto"),
 )
@@ -31,7 +36,6 @@ def run(arguments: argparse.Namespace) -> int:
     from ...designs import pareto_report
 
     case = given_case(arguments)
-    between = parse_range("--between", arguments.between) if arguments.between else None
     folder = prepared(arguments, case.name, "-pareto")
     folder.write("case.yaml", case.to_yaml())
     with working(arguments) as step:
@@ -39,26 +43,24 @@ def run(arguments: argparse.Namespace) -> int:
             case,
             arguments.against,
             points=arguments.points,
-            between=between,
+            between=arguments.between,
             seed=arguments.seed,
             progress=step,
         )
     report = pareto_report(front)
-    written = [folder.write("pareto.csv", front.to_csv())] if report.sections else []
-    written += folder.draw(report.drawings)
-
-    def following() -> list[tuple[str, str]]:
-        if not front.points:
-            return []
-        words = case_words(arguments, str(folder.path / "case.yaml"))
+    if report.sections:
+        folder.write("pareto.csv", front.to_csv())
+    folder.draw(report.drawings)
+    following = []
+    if front.points:
+        words = case_words(arguments, folder)
         gains = gains_text({"A": front.amplifier, **front.knee.parameters})
         delayed = f" --set sensors.telemetry.delay={front.knee.bound:.6g}"
         late = delayed if front.against == "delay" else ""
         others = {"torque": "max_sensitivity", "max_sensitivity": "delay"}
         other = others.get(front.against, "torque")
-        return [
+        following = [
             ("the design at the knee", f"stillhook evaluate {words}{late} --gains {gains}"),
             (f"against {other}", f"stillhook pareto {words} --against {other}"),
         ]
-
-    return conclude(report, arguments, written=written, following=following)
+    return conclude(report, arguments, folder, following)

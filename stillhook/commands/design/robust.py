@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 from models.basics import InputError
 
 from ...text import OutputFolder, csv_text
-from ..declare import CASE, STRUCTURE, choice, repeated, results_folder, text, whole
+from ..declare import CASE, SEED, STRUCTURE, choice, repeated, results_folder, starts, text, whole
 from ..given import case_words, gains_text, given_case
-from ..vary import parse_range, parse_seas, parse_vary
+from ..lists import parse_range
+from ..vary import parse_seas, parse_vary
 from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
@@ -39,9 +40,14 @@ ARGUMENTS = (
         "worst",
     ),
     STRUCTURE,
-    text("--schedule", "LOW..HIGH", "gains over the rope's length [m] instead of one set"),
-    whole("--starts", "starts of the search", 8),
-    whole("--seed", "seed of the starts", 0),
+    text(
+        "--schedule",
+        "LOW..HIGH",
+        "gains over the rope's length [m] instead of one set",
+        read=parse_range,
+    ),
+    starts(8),
+    SEED,
     whole("--draws", "random plants to check with", 10_000),
     results_folder("out/<case>-robust"),
 )
@@ -77,13 +83,11 @@ def run(arguments: argparse.Namespace) -> int:
             draws=arguments.draws,
             progress=step,
         )
-    report, written = robust_report(design), []
+    report = robust_report(design)
     if design.scenarios:
-        written.append(folder.write("scenarios.csv", csv_text(scenario_table(design))))
-        written += folder.draw(report.drawings)
-    return conclude(
-        report, arguments, written=written, following=lambda: _next(design, arguments, folder)
-    )
+        folder.write("scenarios.csv", csv_text(scenario_table(design)))
+        folder.draw(report.drawings)
+    return conclude(report, arguments, folder, _next(design, arguments, folder))
 
 
 def _scheduled(case: Case, arguments: argparse.Namespace, folder: OutputFolder) -> int:
@@ -91,26 +95,23 @@ def _scheduled(case: Case, arguments: argparse.Namespace, folder: OutputFolder) 
 
     from ...designs import schedule_report
 
-    lengths = parse_range("--schedule", arguments.schedule)
     with working(arguments) as step:
-        schedule = schedule_gains(case, lengths, seed=arguments.seed, progress=step)
+        schedule = schedule_gains(case, arguments.schedule, seed=arguments.seed, progress=step)
     report = schedule_report(schedule)
-    written = [
-        folder.write("schedule.yaml", schedule.to_yaml()),
-        folder.write("schedule.csv", schedule.to_csv(101)),
-        *folder.draw(report.drawings),
-    ]
-    words = case_words(arguments, str(folder.path / "case.yaml"))
+    folder.write("schedule.yaml", schedule.to_yaml())
+    folder.write("schedule.csv", schedule.to_csv(101))
+    folder.draw(report.drawings)
+    words = case_words(arguments, folder)
     length = float(schedule.lengths[0])
     at = f"stillhook evaluate {words} --set rope.length={length:g}"
     again = ("the schedule at its shortest rope", f"{at} --gains {gains_text(schedule.at(length))}")
-    return conclude(report, arguments, written=written, following=lambda: [again])
+    return conclude(report, arguments, folder, [again])
 
 
 def _next(
     design: RobustDesign, arguments: argparse.Namespace, folder: OutputFolder
 ) -> list[tuple[str, str]]:
-    words = case_words(arguments, str(folder.path / "case.yaml"))
+    words = case_words(arguments, folder)
     rows = []
     if design.scenarios and design.structure == "payload-feedback":
         worst = design.family.case_at(design.worst.member)

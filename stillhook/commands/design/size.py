@@ -5,15 +5,14 @@ from __future__ import annotations
 import argparse
 import math
 import shlex
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from models.basics import InputError, check_range
+from models.basics import InputError
 
 from ...text import OutputFolder
-from ..declare import CASE, STRUCTURE, results_folder, switch, text, whole
+from ..declare import CASE, SEED, STRUCTURE, results_folder, starts, switch, text, whole
 from ..given import case_words, given_case
-from ..vary import parse_range
+from ..lists import parse_range
 from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
@@ -29,14 +28,24 @@ ARGUMENTS = (
         "rms that the payload may move: '20 mm', '5 %%' of the hook's rms, '26 dB' below it",
     ),
     text("--hs", "LENGTH", "significant wave height, as in '2.5 m' (default: the case's)"),
-    text("--gear", "LOW..HIGH", "gear ratios to look at (default: the case's over and times 2.5)"),
+    text(
+        "--gear",
+        "LOW..HIGH",
+        "gear ratios to look at (default: the case's over and times 2.5)",
+        read=parse_range,
+    ),
     whole("--points", "gears on the curve", 9),
     text("--motors", "FILE", "a catalogue of motors to choose from (.csv)"),
     switch("--co-design", "keep the motor and find the gear with which the payload is stillest"),
-    text("--radius", "LOW..HIGH", "with --co-design: drum radii to look at [m]"),
+    text(
+        "--radius",
+        "LOW..HIGH",
+        "with --co-design: drum radii to look at [m]",
+        read=parse_range,
+    ),
     STRUCTURE,
-    whole("--starts", "starts of the search", 4),
-    whole("--seed", "seed of the starts", 0),
+    starts(4),
+    SEED,
     results_folder("out/<case>-size"),
 )
 
@@ -45,9 +54,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Size, or co-design, show and save; return 0 if a verified design came out, 1 if not."""
     from synth.structures import structure_named
 
-    check_range("size", "--starts", arguments.starts, low=1, high=4096)
-    check_range("size", "--seed", arguments.seed, low=0)
-    gear = parse_range("--gear", arguments.gear) if arguments.gear else None
     if arguments.co_design == (arguments.target is not None):
         raise InputError(
             "size: give --target, as in --target '20 mm', to find the smallest motor, or "
@@ -57,12 +63,11 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("size: --motors and --hs go with --target, not with --co-design")
     if arguments.radius and not arguments.co_design:
         raise InputError("size: --radius goes with --co-design")
-    radius = parse_range("--radius", arguments.radius) if arguments.radius else None
     case = given_case(arguments)
     structure_named(arguments.structure, case)
     folder = prepared(arguments, case.name, "-size")
     if arguments.co_design:
-        return _co_designed(case, arguments, gear, radius, folder)
+        return _co_designed(case, arguments, folder)
     from synth.sizing import size_winch
 
     with working(arguments) as step:
@@ -71,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
             target=arguments.target,
             height=arguments.hs,
             structure=arguments.structure,
-            gear=gear,
+            gear=arguments.gear,
             points=arguments.points,
             motors=arguments.motors,
             starts=arguments.starts,
@@ -80,26 +85,24 @@ def run(arguments: argparse.Namespace) -> int:
         )
     from ...designs import size_report
 
-    report, written = size_report(sizing), [folder.write("case.yaml", sizing.case.to_yaml())]
-    for stale in ("size.csv", "size.svg", "size.png", "sized.yaml", "design.yaml"):
-        folder.discard(stale)
+    report = size_report(sizing)
+    folder.write("case.yaml", sizing.case.to_yaml())
     if sizing.points:
-        written.append(folder.write("size.csv", sizing.to_csv()))
-    written += folder.draw(report.drawings)
-    written += _sized(folder, sizing.sized_case, sizing.design)
-    return conclude(
-        report, arguments, written=written, following=lambda: _next(sizing, arguments, folder)
-    )
+        folder.write("size.csv", sizing.to_csv())
+    folder.draw(report.drawings)
+    _sized(folder, sizing.sized_case, sizing.design)
+    folder.discard("size.*", "sized.yaml", "design.yaml")
+    return conclude(report, arguments, folder, _next(sizing, arguments, folder))
 
 
-def _sized(folder: OutputFolder, case: Case | None, design: Design | None) -> list[Path]:
+def _sized(folder: OutputFolder, case: Case | None, design: Design | None) -> None:
     """Write the case with its new winch, and the design for it."""
     from ...designs import design_text
 
-    written = [] if case is None else [folder.write("sized.yaml", case.to_yaml())]
+    if case is not None:
+        folder.write("sized.yaml", case.to_yaml())
     if design is not None:
-        written.append(folder.write("design.yaml", design_text(design)))
-    return written
+        folder.write("design.yaml", design_text(design))
 
 
 def _next(
@@ -107,7 +110,7 @@ def _next(
 ) -> list[tuple[str, str]]:
     structure = f" --structure {sizing.structure}"
     sized = shlex.quote(str(folder.path / "sized.yaml"))
-    words = case_words(arguments, str(folder.path / "case.yaml"))
+    words = case_words(arguments, folder)
     rows = []
     if sizing.sized_case is not None:
         rows.append(("the chosen winch once more", f"stillhook optimise {sized}{structure}"))
@@ -121,13 +124,7 @@ def _next(
     return rows
 
 
-def _co_designed(
-    case: Case,
-    arguments: argparse.Namespace,
-    gear: tuple[float, float] | None,
-    radius: tuple[float, float] | None,
-    folder: OutputFolder,
-) -> int:
+def _co_designed(case: Case, arguments: argparse.Namespace, folder: OutputFolder) -> int:
     from synth.sizing import co_design
 
     from ...designs import co_design_report
@@ -135,20 +132,17 @@ def _co_designed(
     with working(arguments) as step:
         found = co_design(
             case,
-            gear=gear,
-            radius=radius,
+            gear=arguments.gear,
+            radius=arguments.radius,
             structure=arguments.structure,
             starts=arguments.starts,
             seed=arguments.seed,
             progress=step,
         )
-    written = [
-        folder.write("case.yaml", case.to_yaml()),
-        folder.write("gears.csv", found.to_csv()),
-        *_sized(folder, found.best_case, found.design),
-    ]
+    folder.write("case.yaml", case.to_yaml())
+    folder.write("gears.csv", found.to_csv())
+    _sized(folder, found.best_case, found.design)
     sized = shlex.quote(str(folder.path / "sized.yaml"))
     again = ("what would make it better", f"stillhook worth {sized} --structure {found.structure}")
     following = [] if found.best_case is None else [again]
-    report = co_design_report(found)
-    return conclude(report, arguments, written=written, following=lambda: following)
+    return conclude(co_design_report(found), arguments, folder, following)

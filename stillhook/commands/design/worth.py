@@ -7,10 +7,8 @@ import math
 import shlex
 from typing import TYPE_CHECKING
 
-from models.basics import check_range
-
 from ...text import OutputFolder
-from ..declare import CASE, STRUCTURE, results_folder, whole
+from ..declare import CASE, SEED, STRUCTURE, results_folder, starts
 from ..given import case_words, given_case
 from ..working import conclude, prepared, working
 
@@ -20,8 +18,8 @@ if TYPE_CHECKING:
 ARGUMENTS = (
     CASE,
     STRUCTURE,
-    whole("--starts", "starts of the search", 4),
-    whole("--seed", "seed of the starts", 0),
+    starts(4),
+    SEED,
     results_folder("out/<case>-worth"),
 )
 
@@ -31,8 +29,6 @@ def run(arguments: argparse.Namespace) -> int:
     from synth.sizing import worth
     from synth.structures import structure_named
 
-    check_range("worth", "--starts", arguments.starts, low=1, high=4096)
-    check_range("worth", "--seed", arguments.seed, low=0)
     case = given_case(arguments)
     structure_named(arguments.structure, case)
     folder = prepared(arguments, case.name, "-worth")
@@ -47,21 +43,19 @@ def run(arguments: argparse.Namespace) -> int:
         )
     from ...designs import worth_report
 
-    report, written = worth_report(result), []
-    for stale in ("worth.csv", "worth.svg", "worth.png"):
-        folder.discard(stale)
+    report = worth_report(result)
     if result.rows:
-        written = [folder.write("worth.csv", result.to_csv()), *folder.draw(report.drawings)]
-    status = conclude(
-        report, arguments, written=written, following=lambda: _next(result, arguments, folder)
-    )
+        folder.write("worth.csv", result.to_csv())
+        folder.draw(report.drawings)
+    folder.discard("worth.*")
+    status = conclude(report, arguments, folder, _next(result, arguments, folder))
     return status if result.rows else 1
 
 
 def _next(
     result: Worth, arguments: argparse.Namespace, folder: OutputFolder
 ) -> list[tuple[str, str]]:
-    words = case_words(arguments, str(folder.path / "case.yaml"))
+    words = case_words(arguments, folder)
     structure = f" --structure {result.structure}"
     target = shlex.quote(f"{1e3 * result.payload_rms:.3g} mm")
     size = f"stillhook size {words} --target {target}{structure}"

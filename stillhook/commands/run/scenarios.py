@@ -36,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
         key, option = next(iter(options.items()))
         command = f"stillhook simulate CASE --scenario {name} --option '{key}={_example(option)}'"
-        return conclude(report, arguments, following=lambda: [("with an option", command)])
+        return conclude(report, arguments, following=[("with an option", command)])
     from synth.controllers import CONTROLLERS
 
     texts = {name: CONTROLLER_TEXTS.get(name, "") for name in CONTROLLERS}
@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
         ("its simulation", "stillhook simulate landing --scenario landing"),
     ]
     report = Report(name="operations and controllers", sections=sections)
-    return conclude(report, arguments, following=lambda: following)
+    return conclude(report, arguments, following=following)
 
 
 def _text(option: Option | WordOption) -> str:

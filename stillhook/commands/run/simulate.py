@@ -43,13 +43,15 @@ from ..declare import (
     whole,
 )
 from ..given import case_words
-from ..working import Stop, figure_kinds, kept_in, place_for, stoppable, tidy
+from ..lists import numbers
+from ..working import Stop, kept_in, place_for, prepared, stoppable, tidy
 from .simulate_given import SimulationRequest, asked_of
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 _MEGABYTE = 1e6
+_MANY = 10_000  # seeds: more than anybody wants on purpose
 _Ticker = Callable[[str, float], None]  # takes what is being done, and how much is done [s]
 
 
@@ -76,10 +78,10 @@ ARGUMENTS = (
         repeated(
             "--option", "KEY=VALUE", "an option of the operation, as in 'height=6 m'", "options"
         ),
-        whole("--seeds", "how many seas", 1),
-        whole("--first-seed", "seed of the first", 0),
+        whole("--seeds", "how many seas", 1, low=1, high=_MANY),
+        whole("--first-seed", "seed of the first", 0, low=0),
         one_of(
-            real("--hours", "H", "length of a run in hours"),
+            real("--hours", "H", "length of a run in hours", low=0.0, high=1e4, open_low=True),
             text(
                 "--duration",
                 "TIME",
@@ -99,6 +101,7 @@ ARGUMENTS = (
             "X,Y,Z",
             "--hook holds heave, roll and pitch of the vessel; the crane's tip is so far "
             "forward, to port and up [m]",
+            read=numbers(3),
         ),
     ),
     group(
@@ -151,7 +154,7 @@ def run(arguments: argparse.Namespace) -> int:
     place = place_for(arguments, asked.case.name, f"-{asked.scenario.name}")
     several = len(asked.controllers) > 1
     with tidy(place), stoppable() as stop:
-        folder = OutputFolder.prepare(place, figure_kinds(arguments))
+        folder = prepared(arguments, place)
         target = RunFolder(folder=folder, format=arguments.traces, several=several)
         try:
             asked = _with_gains(asked, folder, stop, shown=not arguments.quiet)
@@ -351,7 +354,7 @@ def _next(
     asked: SimulationRequest, found: _Simulated, target: RunFolder, arguments: argparse.Namespace
 ) -> list[tuple[str, str]]:
     """Return commands to go on with, each with what it does."""
-    words = case_words(arguments, str(target.folder.path / "case.yaml"))
+    words = case_words(arguments, target.folder)
     own: dict[str, object] = {}
     if asked.design is not None and arguments.design is None:
         own["design"] = target.folder.path / "design.yaml"

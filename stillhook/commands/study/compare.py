@@ -8,18 +8,33 @@ from __future__ import annotations
 
 import argparse
 import shlex
-from dataclasses import replace
 from pathlib import Path
 
-from models.basics import InputError, check_range
-
 from ...comparison import Comparison, comparison_report, write_comparison
-from ...text import OutputFolder, Report, ReportSection, console, count, pairs, show
+from ...text import Report, ReportSection, console, count, pairs
 from ..declare import CASE, choice, switch, text, whole
-from ..given import case_words, given_case, split_numbers
-from ..working import conclude, counting, figure_kinds, place_for, tidy
+from ..given import case_words, given_case
+from ..lists import names, numbers
+from ..working import conclude, counting, place_for, prepared, tidy
 
 _MANY = 10_000  # seeds: more than anybody wants on purpose
+
+
+def _controllers(option: str, text: str) -> list[object]:
+    """Return the contenders of a text: names, and files of designs.
+
+    Raises
+    ------
+    InputError
+        If a file is no design; unknown names are told where they are looked up.
+    """
+    from ...designs import load_design
+
+    return [
+        (Path(name).stem, load_design(name)) if name.endswith((".yaml", ".yml")) else name
+        for name in names(option, text)
+    ]
+
 
 ARGUMENTS = (
     CASE,
@@ -28,10 +43,11 @@ ARGUMENTS = (
         "A,B,..",
         "who takes part (default: all that do anything here); see --list; a design file is "
         "one too, as in out/CASE/design.yaml",
+        read=_controllers,
     ),
     switch("--list", "say who they are, and end"),
-    whole("--seeds", "seas of each height", 10),
-    text("--hs", "H,H,..", "significant heights [m] (default: that of the case)"),
+    whole("--seeds", "seas of each height", 10, low=1, high=_MANY),
+    text("--hs", "H,H,..", "significant heights [m] (default: that of the case)", read=numbers()),
     text("--duration", "TIME", "of a run (default: 20 min)", "20 min"),
     text(
         "--mismatch",
@@ -64,18 +80,15 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.list:
         return conclude(_contenders(), arguments)
-    check_range("compare", "--seeds", arguments.seeds, low=1, high=_MANY)
-    wanted = _controllers(arguments.controllers)
-    heights = _heights(arguments.hs)
     case = given_case(arguments)
     place = place_for(arguments, case.name, "-compare")
     with tidy(place), counting(arguments) as step:
         found = compare(
             case,
-            wanted,
+            arguments.controllers,
             seeds=arguments.seeds,
             duration=arguments.duration,
-            heights=heights,
+            heights=arguments.hs,
             mismatch=arguments.mismatch,
             masses=arguments.masses,
             settle=arguments.settle,
@@ -92,18 +105,12 @@ def run(arguments: argparse.Namespace) -> int:
         for line in found.refused.values():
             console().print(line, soft_wrap=True)
         return 1
-    written = write_comparison(
-        OutputFolder.prepare(place, figure_kinds(arguments)), found, figures=arguments.figures
-    )
+    folder = prepared(arguments, place)
+    write_comparison(folder, found)
     report = comparison_report(found)
-    if arguments.quiet:  # what the numbers say is the verdict
-        brief = [part for part in report.sections if part.items and isinstance(part.items[0], str)]
-        show(replace(report, sections=brief), console())
-        status = 0 if report.ok else 1
-    else:
-        status = conclude(
-            report, arguments, written=written, following=lambda: _next(found, place, arguments)
-        )
+    # What the numbers say is the verdict.
+    brief = [part for part in report.sections if part.items and isinstance(part.items[0], str)]
+    status = conclude(report, arguments, folder, _next(found, place, arguments), brief=brief)
     if not found.complete:
         raise KeyboardInterrupt(
             f"{count(len(found.cells), 'run')} kept in {place}; the same command goes on"
@@ -130,34 +137,3 @@ def _contenders() -> Report:
         for name, each in CONTENDERS.items()
     ]
     return Report(name="contenders", sections=sections)
-
-
-def _controllers(text: str | None) -> list[object] | None:
-    """Return the contenders of a text: names, and files of designs.
-
-    Raises
-    ------
-    InputError
-        If a file is no design; unknown names are told where they are looked up.
-    """
-    if text is None:
-        return None
-    found: list[object] = []
-    for name in (part.strip() for part in text.split(",")):
-        if not name.endswith((".yaml", ".yml")):
-            found.append(name)
-            continue
-        from ...designs import load_design
-
-        found.append((Path(name).stem, load_design(name)))
-    return found
-
-
-def _heights(text: str | None) -> list[float] | None:
-    if text is None:
-        return None
-    if not (found := split_numbers(text)):
-        raise InputError(
-            f"--hs: must be heights [m] with commas between, as in 1.25,1.9,2.43; got {text!r}"
-        )
-    return list(found)

@@ -14,10 +14,11 @@ import numpy as np
 
 from models.basics import InputError, parse_quantity
 
-from ...text import OutputFolder, Progress
+from ...text import OutputFolder, Progress, csv_text
 from ..declare import CASE, DESIGN, group, results_folder, switch, text
 from ..given import case_words, gains_text, given_case
 from ..given_design import design_words, given_design
+from ..lists import axis
 from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
@@ -25,7 +26,13 @@ if TYPE_CHECKING:
     from synth.design import Design
     from synth.operability import Operability
 
-_FINEST = 400  # points of an axis
+
+def _length(option: str, text: str) -> float:
+    try:
+        return float(parse_quantity(text, "length"))
+    except (ValueError, TypeError) as error:
+        raise InputError(f"{option}: {error}") from None
+
 
 ARGUMENTS = (
     CASE,
@@ -40,12 +47,14 @@ ARGUMENTS = (
         "LOW..HIGH[/STEP]|A,B,..",
         "peak periods [s], as in 5..15, 5..15/0.5 or 6,8,10 (default: 4..18, or those of "
         "the scatter diagram)",
+        read=axis(1.0),
     ),
     text(
         "--headings",
         "LOW..HIGH[/STEP]|A,B,..",
         "headings [deg], where the waves travel to, 180 head sea, as in 0..345/15 or "
         "90,135,180 (default: 0..330/30 of a vessel with raos)",
+        read=axis(30.0),
     ),
     group(
         "how still the payload must be",
@@ -60,6 +69,7 @@ ARGUMENTS = (
         "--depths",
         "A,B,..",
         "lengths of rope paid out [m], as in 100,500,1000 (default: the case's)",
+        read=axis(None),
     ),
     text(
         "--scatter",
@@ -68,95 +78,49 @@ ARGUMENTS = (
         "made-up one",
     ),
     switch("--reoptimise", "also find the gains anew for each sea (seconds for each)"),
-    text("--highest", "LENGTH", "highest H_s looked at (default: 30 m)", "30 m"),
+    text("--highest", "LENGTH", "highest H_s looked at (default: 30 m)", 30.0, read=_length),
     results_folder("out/<case>-operability"),
 )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Find the contours, show and save them; return the exit status."""
-    periods = parse_axis("--tp", arguments.tp, 1.0) if arguments.tp else None
-    angles = parse_axis("--headings", arguments.headings, 30.0) if arguments.headings else None
-    depths = parse_axis("--depths", arguments.depths, None) if arguments.depths else None
     if arguments.held and (arguments.design or arguments.gains or arguments.reoptimise):
         raise InputError("operability: --held goes without --design, --gains and --reoptimise")
-    highest = _length("--highest", arguments.highest)
     case = given_case(arguments)
     folder = prepared(arguments, case.name, "-operability")
     from synth.operability import operability
 
-    from ...seas import operability_report, write_operability
+    from ...seas import FIGURES, netcdf, operability_report, workable_table
 
+    angles = arguments.headings
     with working(arguments) as step:
         source = case if arguments.held else _design(case, arguments, step)
         study = operability(
             source,
-            periods=periods,
+            periods=arguments.tp,
             headings=None if angles is None else [float(np.radians(a)) for a in angles],
             payload_rms=arguments.payload_rms,
             payload_significant=arguments.payload_significant,
             payload_max=arguments.payload_max,
             payload_speed=arguments.payload_speed,
-            depths=depths,
+            depths=arguments.depths,
             scatter=arguments.scatter,
             reoptimise=arguments.reoptimise,
-            highest=highest,
+            highest=arguments.highest,
             progress=step,
         )
         step("verify", 0, 1)
         checks = study.verify()
-        step("figures", 0, 1)
-        written = write_operability(folder.path, study)
-    report = operability_report(study, checks)
-    return conclude(
-        report, arguments, written=written, following=lambda: _next(study, arguments, folder)
-    )
-
-
-def parse_axis(name: str, text: str, step: float | None) -> list[float]:
-    """Return the values of LOW..HIGH[/STEP] or A,B,C.
-
-    Parameters
-    ----------
-    name
-        The option, for messages.
-    text
-        What was given.
-    step
-        The step of a range that gives none; None where a range must give its own.
-
-    Raises
-    ------
-    InputError
-        If the text is of neither form, or the values do not ascend.
-
-    Examples
-    --------
-    >>> parse_axis("--tp", "6..8", 1.0), parse_axis("--tp", "6..7/0.5", 1.0)
-    ([6.0, 7.0, 8.0], [6.0, 6.5, 7.0])
-    >>> parse_axis("--depths", "100, 500", None)
-    [100.0, 500.0]
-    """
-    form = "LOW..HIGH/STEP or A,B,C" if step is None else "LOW..HIGH[/STEP] or A,B,C"
-    wrong = InputError(f"{name}: must be {form} in ascending order, got {text!r}")
-    try:
-        if ".." in text:
-            ends, _, given = text.partition("/")
-            low, high = (float(part) for part in ends.split(".."))
-            stride = float(given) if given else step
-            if stride is None or not 0.0 < stride < np.inf or not low <= high < np.inf:
-                raise wrong
-            count = int((high - low) / stride + 1e-9) + 1
-            if count > _FINEST:
-                raise InputError(f"{name}: must be at most {_FINEST} values, got {count}")
-            values = [low + k * stride for k in range(count)]
-        else:
-            values = [float(part) for part in text.split(",")]
-    except ValueError as error:
-        raise (error if isinstance(error, InputError) else wrong) from None
-    if not np.all(np.isfinite(values)) or np.any(np.diff(values) <= 0.0):
-        raise wrong
-    return values
+        report = operability_report(study, checks)
+        folder.write("case.yaml", study.case.to_yaml())
+        folder.write("operability.csv", study.to_csv())
+        folder.write("operability.nc", netcdf(study.dataset))
+        if study.scatter is not None:
+            folder.write("workable.csv", csv_text(workable_table(study)))
+        folder.draw(report.drawings, progress=step)
+        folder.discard("workable.csv", *(f"{name}.*" for name in FIGURES))
+    return conclude(report, arguments, folder, _next(study, arguments, folder))
 
 
 def _design(case: Case, arguments: argparse.Namespace, step: Progress) -> Design:
@@ -171,7 +135,7 @@ def _design(case: Case, arguments: argparse.Namespace, step: Progress) -> Design
 def _next(
     study: Operability, arguments: argparse.Namespace, folder: OutputFolder
 ) -> list[tuple[str, str]]:
-    words = case_words(arguments, str(folder.path / "case.yaml"))
+    words = case_words(arguments, folder)
     given = design_words(arguments)
     if study.design is not None and not given:
         given = [f"--gains {shlex.quote(gains_text(study.design.parameters))}"]
@@ -189,10 +153,3 @@ def _next(
         rows.append(("at other depths", f"stillhook operability {words}{design} {again}"))
     rows.append(("other structures", f"stillhook structures {words}"))
     return rows
-
-
-def _length(name: str, text: str) -> float:
-    try:
-        return float(parse_quantity(text, "length"))
-    except (ValueError, TypeError) as error:
-        raise InputError(f"{name}: {error}") from None

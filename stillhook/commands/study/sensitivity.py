@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from models.basics import InputError, check_range, read_quantity
+from models.basics import InputError, read_quantity
 
 from ...text import Progress, csv_text
-from ..declare import CASE, DESIGN, group, repeated, results_folder, switch, text, whole
+from ..declare import CASE, DESIGN, checked, group, repeated, results_folder, switch, text, whole
 from ..given import case_words, given_case
 from ..given_design import design_words, given_design
 from ..working import conclude, prepared, working
@@ -18,16 +18,26 @@ if TYPE_CHECKING:
 
     from ...designs import Wide
 
+
+def _share(option: str, text: str) -> float:
+    try:
+        share = read_quantity(text, "ratio")
+    except InputError as error:
+        raise InputError(f"{option} must be a share, as in '10 %', got {error}") from None
+    return checked(option, share, low=-0.9, high=10.0)
+
+
 ARGUMENTS = (
     CASE,
     DESIGN,
-    whole("--second", "second derivatives of the N numbers with the largest effect", 6),
+    whole("--second", "second derivatives of the N numbers with the largest effect", 6, low=0),
     text(
         "--plus",
         "SHARE",
         "move each gain by this share and compute all anew, as Figure 32 of the 1975 thesis "
         "does (default: '10 %%')",
-        "10 %",
+        0.1,
+        read=_share,
     ),
     group(
         "over whole ranges: Sobol's indices and Morris's screening",
@@ -54,8 +64,6 @@ ARGUMENTS = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Study, show and save; return 0."""
-    check_range("sensitivity", "--second", arguments.second, low=0, high=1000)
-    share = _share(arguments.plus)
     case = given_case(arguments)
     design = given_design(case, arguments)
     folder = prepared(arguments, case.name, "-sensitivity")
@@ -63,18 +71,16 @@ def run(arguments: argparse.Namespace) -> int:
 
     with working(arguments) as step:
         study = sensitivity(design, second=arguments.second, progress=step)
-        moved = study.moved(share)
+        moved = study.moved(arguments.plus)
         wide = _over_ranges(design, arguments, step)
     from ...designs import indices_table, moved_table, sensitivity_report
 
     report = sensitivity_report(study, moved, wide)
-    written = [
-        folder.write("sensitivity.csv", study.to_csv()),
-        folder.write("moved.csv", csv_text(moved_table(moved))),
-    ]
+    folder.write("sensitivity.csv", study.to_csv())
+    folder.write("moved.csv", csv_text(moved_table(moved)))
     if wide is not None:
-        written.append(folder.write("indices.csv", csv_text(indices_table(wide))))
-    written += folder.draw(report.drawings)
+        folder.write("indices.csv", csv_text(indices_table(wide)))
+    folder.draw(report.drawings)
     words = " ".join([case_words(arguments), *design_words(arguments)])
     ranges = [] if wide else [("over whole ranges", f"stillhook sensitivity {words} --ranges")]
     following = [
@@ -82,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
         ("all of it at once, over ranges", f"stillhook sweep {words}"),
         ("how far the numbers may be off", f"stillhook margins {words}"),
     ]
-    return conclude(report, arguments, written=written, following=lambda: following)
+    return conclude(report, arguments, folder, following)
 
 
 def _over_ranges(design: Design, arguments: argparse.Namespace, step: Progress) -> Wide | None:
@@ -101,13 +107,3 @@ def _over_ranges(design: Design, arguments: argparse.Namespace, step: Progress) 
         for figure in ("payload_rms", "modulus_margin")
     ]
     return studies, morris_screening(design, spread, **options)
-
-
-def _share(text: str) -> float:
-    try:
-        share = read_quantity(text, "ratio")
-    except InputError as error:
-        raise InputError(
-            f"sensitivity: --plus must be a share, as in '10 %', got {error}"
-        ) from None
-    return check_range("sensitivity", "--plus", share, low=-0.9, high=10.0)

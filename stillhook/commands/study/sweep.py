@@ -9,12 +9,12 @@ from __future__ import annotations
 import argparse
 import json
 import shlex
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from models import Case
-from models.basics import InputError, check_range
+from models.basics import InputError
 from models.spread import Spread
 
 from ...sweeps import (
@@ -27,10 +27,11 @@ from ...sweeps import (
     worst_cases,
     write_sweep,
 )
-from ...text import OutputFolder, console, count, picture, show
+from ...text import OutputFolder, count, picture
 from ..declare import case_argument, choice, group, one_of, repeated, switch, text, whole
 from ..given import case_words, given_case, parse_options, split_pairs
 from ..given_design import design_words, given_design
+from ..lists import names
 from ..working import conclude, counting, place_for, tidy
 
 if TYPE_CHECKING:
@@ -76,6 +77,7 @@ ARGUMENTS = (
             "A,B,..",
             "vary what fails, with --mode time: dropouts, outages, delay-jumps, sensor-bias, "
             "mru-bias, limit-cuts",
+            read=names,
         ),
         whole("--samples", "number of cases (default: 10000; with --mode time 256)"),
         text(
@@ -117,7 +119,7 @@ ARGUMENTS = (
             "folder for the results (default: out/<case>-sweep); with --mode time the same "
             "command again goes on with what is there",
         ),
-        whole("--worst", "how many of the worst", 5),
+        whole("--worst", "how many of the worst", 5, low=0, high=_MOST),
     ),
 )
 
@@ -136,7 +138,6 @@ class Swept:
 
 def run(arguments: argparse.Namespace) -> int:
     """Sweep, show and save; return the exit status."""
-    check_range("sweep", "--worst", arguments.worst, low=0, high=_MOST)
     swept = _resumed(arguments) if arguments.resume else _swept(arguments)
     result = swept.result
     complete = int(result.attrs.get("complete", 1)) == 1
@@ -265,8 +266,7 @@ def given_spread(arguments: argparse.Namespace) -> Spread | None:
         parts.append(Spread(parse_ranges(arguments.vary)))
     faults = getattr(arguments, "faults", None)  # of the time domain
     if faults is not None:
-        names = [name.strip() for name in faults.split(",")]
-        parts.append(fault_spread(*names))
+        parts.append(fault_spread(*faults))
     if not parts:
         return None
     together: dict[str, Any] = {}
@@ -340,22 +340,19 @@ def _only_in_time(arguments: argparse.Namespace) -> None:
 def _concluded(swept: Swept, arguments: argparse.Namespace) -> int:
     """Write and print what the sweep says; return the exit status."""
     result, most = swept.result, arguments.worst
-    written = write_sweep(swept.folder, result, swept.case, swept.spread, worst=most)
+    folder = OutputFolder(swept.folder)
+    folder.keep(*write_sweep(swept.folder, result, swept.case, swept.spread, worst=most))
     if arguments.figures:
         # Clouds of ten thousand points: as pixels, unless asked otherwise.
-        written += _figures(swept, arguments.format or "png")
+        _figures(swept, folder, arguments.format or "png")
     report = sweep_report(result, swept.case.name, worst=most)
-    if arguments.quiet:
-        show(replace(report, sections=report.sections[:1]), console())
-        return 0 if report.ok else 1
     worst = worst_cases(result, most) if most else []
-    return conclude(
-        report, arguments, written=written, following=lambda: _next(swept, worst, arguments)
-    )
+    following = _next(swept, worst, arguments)
+    return conclude(report, arguments, folder, following, brief=report.sections[:1])
 
 
-def _figures(swept: Swept, kind: str) -> list[Path]:
-    """Draw and write the figures; return their files."""
+def _figures(swept: Swept, folder: OutputFolder, kind: str) -> None:
+    """Draw and write the figures."""
     from synth.design import Design
 
     linear = isinstance(swept.design, Design)
@@ -364,9 +361,8 @@ def _figures(swept: Swept, kind: str) -> list[Path]:
     result = swept.result
     if in_time:
         result = result.isel(case=result["status"].to_numpy() != STATUS["not run"])
-    figures = sweep_figures(result, design)
-    folder = OutputFolder(swept.folder)
-    return [folder.write(f"{n}.{kind}", picture(f, kind)) for n, f in figures.items()]
+    for name, figure in sweep_figures(result, design).items():
+        folder.write(f"{name}.{kind}", picture(figure, kind))
 
 
 def _next(swept: Swept, worst: list[int], arguments: argparse.Namespace) -> list[tuple[str, str]]:

@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
         following.append(("the gains in use", f"stillhook evaluate {words}"))
     sea = f"stillhook check {shlex.quote(arguments.case)} --set sea.significant_height=1.5"
     following.append(("another sea", sea))
-    return conclude(report, arguments, following=lambda: following)
+    return conclude(report, arguments, following=following)
 
 
 def check_report(case: Case, hook: HookMotion) -> Report:

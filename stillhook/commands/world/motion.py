@@ -9,16 +9,16 @@ from __future__ import annotations
 import argparse
 import math
 import shlex
-from dataclasses import replace
 
 from models import Case
 from models.basics import InputError
 from models.hook import HookSurvey
 
 from ...seas import motion_report, own_place
-from ...text import OutputFolder, console, show
+from ...text import OutputFolder
 from ..declare import CASE, real, results_folder, text
 from ..given import case_words, given_case
+from ..lists import axis
 from ..working import conclude, prepared
 
 ARGUMENTS = (
@@ -28,11 +28,13 @@ ARGUMENTS = (
         "A,B,.. or LOW..HIGH",
         "where the waves travel to, relative to the bow [deg]: 180 is a head sea, 90 comes "
         "from starboard (default: every 15 degrees)",
+        read=axis(15.0, -360.0, 360.0),
     ),
     text(
         "--tp",
         "A,B,.. or LOW..HIGH",
         "peak periods [s]; a range goes in steps of one second (default: 5..16)",
+        read=axis(1.0, 1.0, 40.0),
     ),
     real(
         "--fractile",
@@ -49,69 +51,30 @@ def run(arguments: argparse.Namespace) -> int:
     """Survey the hook's motion, show it and save it; return 0."""
     from models.hook import hook_motion
 
-    headings = periods = None
-    if arguments.headings is not None:
-        headings = parse_steps("--headings", arguments.headings, 15.0, -360.0, 360.0)
-    if arguments.tp is not None:
-        periods = parse_steps("--tp", arguments.tp, 1.0, 1.0, 40.0)
-    case = given_case(arguments)
+    headings, case = arguments.headings, given_case(arguments)
     if headings is not None and case.vessel.raos is None:
         raise InputError(
             f"--headings: {arguments.case} has vessel.heave_rao, the heave of one hook in one "
             "heading; give vessel.raos, hook and heading to look at others"
         )
-    survey = hook_motion(case, headings=headings, peak_periods=periods, fractile=arguments.fractile)
+    survey = hook_motion(
+        case, headings=headings, peak_periods=arguments.tp, fractile=arguments.fractile
+    )
     folder = prepared(arguments, case.name, "-motion")
     report = motion_report(survey)
-    written = [
-        folder.write("case.yaml", survey.case.to_yaml()),
-        folder.write("motion.csv", survey.to_csv()),
-        *folder.draw(report.drawings),
-    ]
-    if arguments.quiet:  # the first table is the verdict
-        show(replace(report, sections=report.sections[:1]), console())
-        return 0
-    return conclude(
-        report, arguments, written=written, following=lambda: _next(survey, arguments, folder)
-    )
-
-
-def parse_steps(option: str, text: str, step: float, low: float, high: float) -> tuple[float, ...]:
-    """Return numbers from `A,B,..` or from a range `LOW..HIGH` in steps.
-
-    Raises
-    ------
-    InputError
-        If the text is neither, or a number is out of range.
-
-    Examples
-    --------
-    >>> parse_steps("--tp", "6..9", 1.0, 1.0, 40.0), parse_steps("--tp", "6, 8.5", 1.0, 1.0, 40.0)
-    ((6.0, 7.0, 8.0, 9.0), (6.0, 8.5))
-    """
-    first, dots, last = text.partition("..")
-    try:
-        if dots:
-            ends = float(first), float(last)
-            if not ends[0] < ends[1] or not all(math.isfinite(v) for v in ends):
-                raise ValueError
-            count = math.floor((ends[1] - ends[0]) / step + 1e-9)
-            values = tuple(ends[0] + step * k for k in range(count + 1))
-        else:
-            values = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise InputError(f"{option}: must be numbers A,B,.. or LOW..HIGH, got {text!r}") from None
-    wrong = next((v for v in values if not low <= v <= high), None)
-    if wrong is not None:
-        raise InputError(f"{option}: must be in [{low:g}, {high:g}], got {wrong:g}")
-    return values
+    folder.write("case.yaml", survey.case.to_yaml())
+    folder.write("motion.csv", survey.to_csv())
+    folder.draw(report.drawings)
+    # The first table is the verdict.
+    following = _next(survey, arguments, folder)
+    return conclude(report, arguments, folder, following, brief=report.sections[:1])
 
 
 def _next(
     survey: HookSurvey, arguments: argparse.Namespace, folder: OutputFolder
 ) -> list[tuple[str, str]]:
     case: Case = survey.case
-    words = case_words(arguments, str(folder.path / "case.yaml"))
+    words = case_words(arguments, folder)
     rows = [("the gains for it", f"stillhook optimise {words}")]
     if survey.headings.size and survey.best != own_place(survey):
         side, heading = survey.best

@@ -25,7 +25,7 @@ def run(arguments: argparse.Namespace) -> int:
         ("the gains", f"stillhook optimise {file}"),
     ]
     status = "a case that runs as it is; change what is different on your vessel"
-    return conclude(Report(name=str(path), status=status), arguments, following=lambda: following)
+    return conclude(Report(name=str(path), status=status), arguments, following=following)
 
 
 def written(arguments: argparse.Namespace, text: str) -> Path:

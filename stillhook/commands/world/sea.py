@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from models import bundled_cases, load_case
-from models.basics import InputError, check_range
+from models.basics import InputError
 from models.sea import read_seas, write_scatter
 
 from ...seas import records_report, records_table, sea_report
@@ -23,6 +23,7 @@ from ..declare import choice, positional, real, results_folder, text, whole
 from ..working import conclude, prepared
 
 _CASES = {".yaml", ".yml", ".toml"}
+_STEP = {"low": 0.01, "high": 20.0}  # width of a class [m], [s]
 
 ARGUMENTS = (
     positional(
@@ -38,17 +39,14 @@ ARGUMENTS = (
         "what a spectrum is above its last frequency (default: decay, as 1/omega^5)",
         "decay",
     ),
-    real("--height-step", "M", "width of the scatter diagram's classes of H_s [m]", 0.5),
-    real("--period-step", "S", "width of its classes of T_p [s]", 1.0),
+    real("--height-step", "M", "width of the scatter diagram's classes of H_s [m]", 0.5, **_STEP),
+    real("--period-step", "S", "width of its classes of T_p [s]", 1.0, **_STEP),
     results_folder("out/<file>-sea"),
 )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, show and write; return 0."""
-    for name, unit in (("height_step", "m"), ("period_step", "s")):
-        option = f"--{name.replace('_', '-')}"
-        check_range("sea", option, getattr(arguments, name), low=0.01, high=20.0, unit=unit)
     named = {name for name, _ in bundled_cases()}
     if arguments.file in named or Path(arguments.file).suffix.lower() in _CASES:
         return _of_case(arguments)
@@ -60,9 +58,9 @@ def run(arguments: argparse.Namespace) -> int:
     steps = {"height_step": arguments.height_step, "period_step": arguments.period_step}
     report = records_report(records, chosen, sea, name=arguments.file, steps=steps)
     folder = prepared(arguments, Path(arguments.file).name, "-sea")
-    written = [folder.write("records.csv", csv_text(records_table(records)))]
-    write_scatter(folder.path / "scatter.csv", records.scatter(**steps))
-    written += [folder.path / "scatter.csv", *folder.draw(report.drawings)]
+    folder.write("records.csv", csv_text(records_table(records)))
+    folder.keep(write_scatter(folder.path / "scatter.csv", records.scatter(**steps)))
+    folder.draw(report.drawings)
     quoted = _quoted(arguments.file)
     file = shlex.quote(f"sea={{spectrum: measured, file: {quoted}, record: {chosen}}}")
     again = f"stillhook sea {shlex.quote(arguments.file)} --record 0"
@@ -71,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
         ("the gains for it", f"stillhook optimise subsea-crane --set {file}"),
         ("another record, or another sea of the scatter diagram", again),
     ]
-    return conclude(report, arguments, written=written, following=lambda: following)
+    return conclude(report, arguments, folder, following)
 
 
 def _of_case(arguments: argparse.Namespace) -> int:
@@ -83,9 +81,9 @@ def _of_case(arguments: argparse.Namespace) -> int:
     folder = prepared(arguments, case.name, "-sea")
     steepness = ("steepness", f"{case.sea.steepness:.3g}")
     report = sea_report(sea, name=case.name, extra=[steepness])
-    written = folder.draw(report.drawings)
+    folder.draw(report.drawings)
     again = ("the hook in it", f"stillhook motion {shlex.quote(arguments.file)}")
-    return conclude(report, arguments, written=written, following=lambda: [again])
+    return conclude(report, arguments, folder, [again])
 
 
 def _quoted(path: str) -> str:

@@ -15,8 +15,7 @@ from models.vessel.readers import check_long_waves, write_raos
 
 from ...seas import hull_report
 from ..declare import changed_words, choice, group, real, switch, text, whole
-from ..given import split_numbers
-from ..vary import parse_range
+from ..lists import numbers, parse_range
 from ..working import conclude, prepared_table, working
 
 _STAGE = "computing waves on the hull"
@@ -39,7 +38,8 @@ ARGUMENTS = (
             "--transom",
             "WIDTH,DEPTH",
             "of the transom over beam and draught (default: 0.9,0.3)",
-            "0.9,0.3",
+            (0.9, 0.3),
+            read=numbers(2),
         ),
         text("--mesh", "FILE", "a mesh: .stl, .gdf, .pnl, .hst, .mar; z up, x forward"),
         real("--scale", "F", "metres per unit of length of the mesh", 1.0),
@@ -52,6 +52,8 @@ ARGUMENTS = (
             "--radii",
             "ROLL,PITCH,YAW",
             "radii of gyration [m] (default: 0.37 beam, 0.25 length, 0.25 length)",
+            (None, None, None),
+            read=numbers(3),
         ),
         real(
             "--roll-damping",
@@ -70,14 +72,21 @@ ARGUMENTS = (
             "of the coefficients [rad/s] (default: 0.15..2.0)",
             "0.15..2.0",
         ),
-        whole("--count", "how many of them (default: 0.05 rad/s apart, closer for long ships)"),
-        real("--heading-step", "DEG", "between headings, all round [deg]", 15.0),
+        whole(
+            "--count",
+            "how many of them (default: 0.05 rad/s apart, closer for long ships)",
+            low=4,
+            high=400,
+        ),
+        real(
+            "--heading-step", "DEG", "between headings, all round [deg]", 15.0, low=1.0, high=90.0
+        ),
     ),
     group(
         "the computation",
         whole("--panels", "of our own hulls", 600),
         switch("--no-lid", "no lid against irregular frequencies"),
-        whole("--threads", "how many to use (default: one for each core)"),
+        whole("--threads", "how many to use (default: one for each core)", low=1, high=1024),
         switch("--no-cache", "compute it anew, and keep nothing"),
         text("--name", "NAME", "what the vessel is called"),
         text(
@@ -94,12 +103,6 @@ def run(arguments: argparse.Namespace) -> int:
     low, high = parse_range("--frequencies", arguments.frequencies)
     check_range("hull", "--frequencies", low, low=0.01, unit="rad/s")
     check_range("hull", "--frequencies", high, low=1.1 * low, high=10.0, unit="rad/s")
-    if arguments.count is not None:
-        check_range("hull", "--count", arguments.count, low=4, high=400)
-    check_range("hull", "--heading-step", arguments.heading_step, low=1.0, high=90.0, unit="deg")
-    if arguments.threads is not None:
-        check_range("hull", "--threads", arguments.threads, low=1, high=1024)
-    radii = _numbers("--radii", arguments.radii, 3) if arguments.radii else (None, None, None)
     hull = _hull(arguments)
     made = changed_words(arguments, ARGUMENTS, out=None, threads=None, cache=True)
     # Made and tried before anything long begins.
@@ -109,7 +112,7 @@ def run(arguments: argparse.Namespace) -> int:
             hull,
             kg=arguments.kg,
             gm=arguments.gm,
-            radii=(radii[0], radii[1], radii[2]),
+            radii=arguments.radii,
             roll_damping=arguments.roll_damping,
             omega=usual_frequencies(hull, low, high)
             if arguments.count is None
@@ -125,7 +128,8 @@ def run(arguments: argparse.Namespace) -> int:
             progress=lambda done, of: tell(_STAGE, done, of),
         )
         report = hull_report(vessel, check_long_waves(vessel.raos), stem=table.stem)
-        written = [write_raos(table, vessel.raos), *folder.draw(report.drawings)]
+        folder.keep(write_raos(table, vessel.raos))
+        folder.draw(report.drawings)
     file = shlex.quote(str(table))
     following = [
         (
@@ -135,7 +139,7 @@ def run(arguments: argparse.Namespace) -> int:
         ),
         ("the table again, with what it was made from", f"stillhook vessel import {file}"),
     ]
-    return conclude(report, arguments, written=written, following=lambda: following)
+    return conclude(report, arguments, folder, following)
 
 
 def _hull(arguments: argparse.Namespace) -> Hull:
@@ -160,7 +164,7 @@ def _hull(arguments: argparse.Namespace) -> Hull:
         return box_hull(**named, panels=arguments.panels, name=arguments.name)
     from models.vessel.hull import ShipLines
 
-    width, depth = _numbers("--transom", arguments.transom, 2)
+    width, depth = arguments.transom
     lines = ShipLines(
         **named,
         block=arguments.block,
@@ -169,10 +173,3 @@ def _hull(arguments: argparse.Namespace) -> Hull:
         transom_depth=depth,
     )
     return lines.hull(panels=arguments.panels, name=arguments.name)
-
-
-def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
-    found = split_numbers(text)
-    if len(found) != count:
-        raise InputError(f"hull: {option} must be {count} numbers with commas, got {text!r}")
-    return found

@@ -12,7 +12,7 @@ from models.vessel.readers import check_long_waves, read_raos, write_raos
 from ...seas import rao_report
 from ...text import told_once
 from ..declare import choice, positional, real, switch, text
-from ..given import split_numbers
+from ..lists import numbers
 from ..working import conclude, prepared_table
 
 ARGUMENTS = (
@@ -41,7 +41,12 @@ ARGUMENTS = (
         "of the vessel, to fill in headings, if the file is silent",
     ),
     real("--depth", "D", "water depth [m]"),
-    text("--origin", "X,Y,Z", "the point whose motions they are, if the file is silent"),
+    text(
+        "--origin",
+        "X,Y,Z",
+        "the point whose motions they are, if the file is silent",
+        read=numbers(3),
+    ),
     text("--vessel-type", "NAME", "which of an OrcaFlex file"),
     text("--draught", "NAME", "which of an OrcaFlex vessel type"),
     real("--roll-damping", "SHARE", "to add, over the critical (Capytaine)"),
@@ -60,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
             body=int(body) if body and body.isdigit() else body,
             length=arguments.length,
             depth=arguments.depth,
-            origin=_point(arguments.origin),
+            origin=arguments.origin,
             vessel_type=arguments.vessel_type,
             draught=arguments.draught,
             roll_damping=arguments.roll_damping,
@@ -72,7 +77,8 @@ def run(arguments: argparse.Namespace) -> int:
     if table.exists() and Path(arguments.file).exists() and table.samefile(arguments.file):
         raise InputError(f"{table}: is the file itself; --out must name another")
     report = rao_report(raos, check_long_waves(raos), stem=table.stem)
-    written = [write_raos(table, raos), *folder.draw(report.drawings)]
+    folder.keep(write_raos(table, raos))
+    folder.draw(report.drawings)
     file = shlex.quote(str(table))
     following = [
         (
@@ -82,13 +88,4 @@ def run(arguments: argparse.Namespace) -> int:
         ),
         ("a case file of your own, with `raos:` and `hook:`", "stillhook new my.yaml"),
     ]
-    return conclude(report, arguments, written=written, following=lambda: following)
-
-
-def _point(text: str | None) -> tuple[float, ...] | None:
-    if text is None:
-        return None
-    found = split_numbers(text)
-    if len(found) != 3:
-        raise InputError(f"vessel: --origin must be 3 numbers [m], as in -5.4,0,0; got {text!r}")
-    return found
+    return conclude(report, arguments, folder, following)

@@ -19,4 +19,4 @@ def run(arguments: argparse.Namespace) -> int:
     rows = [("look at one", f"stillhook vessel import {name}") for name, _ in found[:1]]
     rows.append(("a vessel from its main dimensions", "stillhook vessel hull --help"))
     report = Report(name="bundled vessels", sections=[ReportSection("", [pairs(found)])])
-    return conclude(report, arguments, following=lambda: rows)
+    return conclude(report, arguments, following=rows)

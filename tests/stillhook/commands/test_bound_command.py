@@ -34,8 +34,8 @@ def test_fewer_sensors_do_no_better(capsys: pytest.CaptureFixture[str]) -> None:
     ("arguments", "message"),
     [
         (["--sensors", "payload.colour"], "payload.colour"),
-        (["--sensors", ","], "--sensors: names of measurements"),
-        (["--faint", "0"], "--faint: noise must be"),
+        (["--sensors", ","], "--sensors: must be names"),
+        (["--faint", "0"], "bound: --faint must be"),
         (["--masses", "0"], "masses must be"),
     ],
 )

@@ -59,7 +59,7 @@ def test_the_same_command_again_computes_nothing(run, monkeypatch):
     ("words", "told"),
     [
         (("--controllers", "none,feed-backward"), "there is no controller 'feed-backward'; there"),
-        (("--hs", "1.25,high"), "--hs: must be heights [m] with commas between"),
+        (("--hs", "1.25,high"), "--hs must be numbers with commas between"),
         (("--hs", "-1"), "heights"),
         (("--seeds", "0"), "--seeds"),
         (("--duration", "soon"), "compare: duration must be a time"),

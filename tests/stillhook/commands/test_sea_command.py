@@ -84,7 +84,7 @@ def test_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (["none.txt"], "none.txt: no such file"),
         (["{buoy}", "--record", "27"], "record must be in [0, 26]"),
         (["{buoy}", "--read-as", "grib"], "the format must be one of ndbc,"),
-        (["{buoy}", "--height-step", "0"], "--height-step must be in [0.01, 20] m, got 0.0"),
+        (["{buoy}", "--height-step", "0"], "--height-step must be in [0.01, 20], got 0.0"),
         (["subsea-crane", "--record", "3"], "--record and --read-as are for a file of spectra"),
     ],
 )

@@ -359,7 +359,7 @@ WRONG = {
     ),
     "a flat tip": (
         "thesis-1975 --hook bad.csv --tip 1,2",
-        r"--tip: must be three numbers X,Y,Z \[m\], got '1,2'",
+        "simulate: --tip must be 3 numbers with commas between, got '1,2'",
     ),
     "no seeds": ("thesis-1975 --seeds 0", r"simulate: --seeds must be in \[1, 10000\], got 0"),
     "no hours": ("thesis-1975 --hours -1", r"simulate: --hours must be in \(0, 10000\], got -1.0"),

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from models import InputError, load_case
 from models.sea import Scatter, write_scatter
 from stillhook.cli import main
-from stillhook.commands.study.operability import parse_axis
+from stillhook.commands import axis
 from stillhook.seas import (
     capability_figure,
     contour_figure,
@@ -267,13 +267,14 @@ def test_roses_can_be_drawn_where_no_sea_can_be_worked_in() -> None:
 
 
 def test_axes_are_read_as_ranges_and_lists() -> None:
-    assert parse_axis("--tp", "5..7", 1.0) == [5.0, 6.0, 7.0]
-    assert parse_axis("--headings", "0..90/45", 30.0) == [0.0, 45.0, 90.0]
-    for text in ("7..5", "a,b", "5,5", "5..6/0", "1..2..3", "nan", "1..1e9/1e-3"):
+    assert axis(1.0)("--tp", "5..7") == [5.0, 6.0, 7.0]
+    assert axis(30.0)("--headings", "0..90/45") == [0.0, 45.0, 90.0]
+    assert axis(0.5, 1.0, 40.0)("--tp", "6..7.5") == [6.0, 6.5, 7.0, 7.5]
+    for text in ("7..5", "a,b", "5..6/0", "1..2..3", "nan", "1..1e9/1e-3"):
         with pytest.raises(InputError, match="--tp: must be"):
-            parse_axis("--tp", text, 1.0)
-    with pytest.raises(InputError, match="HIGH/STEP or A,B,C"):
-        parse_axis("--depths", "100..200", None)
+            axis(1.0)("--tp", text)
+    with pytest.raises(InputError, match="HIGH/STEP, at most"):
+        axis(None)("--depths", "100..200")
 
 
 @pytest.mark.ci
