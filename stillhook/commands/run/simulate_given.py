@@ -160,8 +160,6 @@ def _hook(arguments: argparse.Namespace) -> MotionSource | None:
     if arguments.hook is None:
         return None
     with told_once():
-        if arguments.tip is None:
-            return RecordMotion.read(arguments.hook)
         return RecordMotion.read(arguments.hook, tip=arguments.tip)
 
 
