@@ -24,18 +24,15 @@ from scipy.interpolate import CubicSpline
 from models.basics import FloatArray, InputError, check_range, one_thread, read_only
 from models.case import Case
 
-from ..design import tuning_of
 from ..question import FamilyProblem, Objective
-from ..search import KEPT, Found, Progress, search
+from ..search import KEPT, Progress, search
+from ..sizing import Answer, best_of_each
 from .family import Family, Member
 from .family_plants import FamilyPlants
 from .worst_case import exact_figures
 
 LENGTH = "rope.length"
 KEPT_BETWEEN = 1e-3  # relative excess over a limit that counts as kept between the nodes
-_STARTS = 6
-_STANDS_OUT = 0.02  # of a log cost above both neighbours', from which it is searched again
-_ALONE = 4  # starts of a length's own best, besides its neighbour's
 _MOST_NODES = 9
 _MOST_ROUNDS = 12
 _CLOSE = 0.10  # what a schedule may lose against gains of its own at any length, relatively
@@ -249,42 +246,18 @@ class _ScheduleSearch:
         self.middles = np.sqrt(lengths[1:] * lengths[:-1])
 
     @cached_property
-    def own(self) -> list[Found | None]:
-        """The best gains of each checked length alone, by continuation from its neighbour."""
-        found: list[Found | None] = []
-        guesses = [list(g) for g in self.plants.guesses]
-        for k, member in enumerate(self.members):
-            self._tell("the best of each length", k, len(self.members))
-            problem = self.plants.scenario(member).problem
-            starts = _STARTS if not found else _ALONE
-            one = search(problem, starts, self._seed, guesses)
-            good = one.solved is not None and one.excess <= KEPT
-            found.append(one if good else None)
-            if good and one.solved is not None:
-                guesses = [[float(v) for v in one.solved.values]]
-        for k in [*range(len(found) - 2, -1, -1), *range(1, len(found))]:
-            self._mend(found, k)
-        return found
-
-    def _mend(self, found: list[Found | None], index: int) -> None:
-        """Search again at a length whose cost stands out, from its neighbours' gains.
-
-        A search may end in a worse basin at one length of many; its neighbours tell.
-        """
-        beside = [k for k in (index - 1, index + 1) if 0 <= k < len(found)]
-        near = [f.solved for k in beside if (f := found[k]) is not None and f.solved is not None]
-        here = found[index]
-        if not near:
-            return
-        usual = max(s.objective for s in near) + _STANDS_OUT
-        if here is not None and here.solved is not None and here.solved.objective <= usual:
-            return
-        problem = self.plants.scenario(self.members[index]).problem
-        again = search(problem, _ALONE, self._seed, [[float(v) for v in s.values] for s in near])
-        if again.solved is None or again.excess > KEPT:
-            return
-        if here is None or here.solved is None or again.solved.objective < here.solved.objective:
-            found[index] = again
+    def own(self) -> list[Answer | None]:
+        """The best gains of each checked length alone, by continuation from its neighbours."""
+        problems = [self.plants.scenario(member).problem for member in self.members]
+        found = best_of_each(
+            problems,
+            self.plants.guesses,
+            harder=True,  # a longer rope is softer
+            seed=self._seed,
+            known={},
+            tell=self._tell,
+        )
+        return found or [None for _ in problems]
 
     def schedule(self, close: float) -> GainSchedule:
         """Return the schedule, its nodes added until it holds and costs little."""
@@ -329,7 +302,7 @@ class _ScheduleSearch:
             members |= {float(self.lengths[i]) for i in nodes}
         if best is None:
             status = f"no schedule of {_MOST_NODES} nodes keeps the limits at every length"
-            values = np.array([f.solved.values for f in own if f is not None and f.solved])
+            values = np.array([f.solved.values for f in own if f is not None])
             return self._made(nodes, values[nodes], [], False, status)
         return self._finished(*best, close)
 
@@ -381,7 +354,7 @@ class _ScheduleSearch:
         """Return the gains at the nodes that serve some lengths best together."""
         parameters = self.plants.law.parameters
         count = len(parameters)
-        starts = np.array([f.solved.values for f in self.own if f is not None and f.solved])
+        starts = np.array([f.solved.values for f in self.own if f is not None])
         scenarios = []
         for length in members:
             weights = blend_of(self.lengths[list(nodes)], length)
@@ -423,7 +396,7 @@ class _ScheduleSearch:
 
     def _best(self, length: float) -> float:
         """Return what gains of its own do at a length [m], between those looked at in between."""
-        costs = [float(f.solved.objective) for f in self.own if f is not None and f.solved]
+        costs = [float(f.solved.objective) for f in self.own if f is not None]
         return float(np.exp(np.interp(np.log(length), np.log(self.lengths), costs)))
 
     def _verified(self, nodes: Sequence[int], gains: FloatArray, index: int) -> bool:
@@ -431,13 +404,11 @@ class _ScheduleSearch:
         problem = self.plants.scenario(self.members[index]).problem
         own = self.own[index]
         assert own is not None
-        assert own.solved is not None
         values = blend_of(self.lengths[list(nodes)], float(self.lengths[index])) @ gains
         assessment = problem.assess(values)
         drag = assessment.coefficient if problem.drag is not None else None
         solved = replace(own.solved, values=np.asarray(values), coefficients=(drag,))
-        tuning = tuning_of(problem, Found(solved=solved, assessments=(assessment,), excess=0.0))
-        failed = tuning.verify().failed
+        failed = replace(own, solved=solved, assessment=assessment).tuning.verify().failed
         return not [name for name in failed if not name.startswith("limits")]
 
 

@@ -24,7 +24,7 @@ from ..question import Problem, pose
 from ..search import KEPT, Found, Progress, search
 from ..verify import Verification
 from .follow import Answer, with_bound
-from .pareto_walk import walked
+from .pareto_walk import STARTS, best_of_each
 
 #: What a front can be drawn against: name -> (limit's name, unit).
 AGAINST: Mapping[str, tuple[str, str]] = {
@@ -34,9 +34,6 @@ AGAINST: Mapping[str, tuple[str, str]] = {
     "delay_margin": ("delay_margin", "s"),
     "delay": ("telemetry delay", "s"),
 }
-_STARTS = 6  # of the searches at the ends and in the middle
-_ENDS = 2  # distinct answers of each that a walk begins from
-_OTHER = 1e-3  # difference of log costs that tells two ends apart
 _FROM, _TO = 1.15, 3.0  # of M_s, where the user does not say
 _LONGER = 4.0  # that of the best motion, which a front of delay margins ends at
 _LONGEST = 0.2  # of a telemetry delay [s]
@@ -218,15 +215,10 @@ def pareto_front(
     guesses = [[case.gains.a, case.gains.a1, case.gains.a2]] if case.gains is not None else []
     tell("ends of the front", 0, 4)
     bounds, problems, known = _posed(case, against, int(points), between, seed, guesses)
-    begins: list[tuple[int, Answer | FloatArray]] = []
-    for n, k in enumerate((0, len(bounds) // 2, len(bounds) - 1)):
-        tell("ends of the front", n + 1, 4)
-        found = known.get(k) or search(problems[k], _STARTS, seed, guesses)
-        begins += [(k, begin) for begin in _begins(problems[k], found)]
-    if not begins:
-        raise SynthesisError(f"pareto: no gains keep the limits for any {name} in the range")
     harder = against in ("delay", "delay_margin")
-    best = walked(problems, begins, harder=harder, tell=tell)
+    best = best_of_each(problems, guesses, harder=harder, seed=seed, known=known, tell=tell)
+    if best is None:
+        raise SynthesisError(f"pareto: no gains keep the limits for any {name} in the range")
     return _checked(case, against, list(zip(bounds, best, strict=True)), checks, tell)
 
 
@@ -270,14 +262,14 @@ def _ends(
     """
     if against == "max_sensitivity":
         return (_FROM, _TO), {}
-    best = search(problem, _STARTS, seed, guesses)
+    best = search(problem, STARTS, seed, guesses)
     if best.solved is None or best.assessment is None or best.excess > KEPT:
         raise SynthesisError("pareto: no gains keep the limits, whatever the other quantity")
     if against == "delay_margin":
         most = best.assessment.margins.delay
         return (most, _LONGER * most), {0: best}
     output = f"motor.{against}"
-    least = search(replace(problem, minimise={output: 1.0}), _STARTS, seed, guesses)
+    least = search(replace(problem, minimise={output: 1.0}), STARTS, seed, guesses)
     top = best.assessment.sigma(output)
     if least.assessment is None or least.excess > KEPT:
         return (0.1 * top, top), {count - 1: best}
@@ -292,17 +284,6 @@ def _spaced(low: float, high: float, count: int, against: str) -> FloatArray:
     if against == "max_sensitivity":  # even in 1/M_s, the module margin
         return np.asarray(1.0 / np.linspace(1.0 / low, 1.0 / high, count))
     return np.geomspace(low, high, count) if low > 0.0 else np.linspace(low, high, count)
-
-
-def _begins(problem: Problem, found: Found) -> list[Answer | FloatArray]:
-    """Return the best answer of a search, and its best distinct ends."""
-    chosen: list[tuple[FloatArray, float]] = []
-    for start in sorted((s for s in found.starts if s.converged), key=lambda s: s.cost):
-        if all(abs(np.log(start.cost / cost)) > _OTHER for _, cost in chosen):
-            chosen.append((start.end, start.cost))
-    answer = Answer.of(problem, found)
-    ends = [values for values, _ in chosen[:_ENDS]]
-    return [*ends] if answer is None else [answer, *ends]
 
 
 def _checked(

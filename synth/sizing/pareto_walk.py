@@ -1,49 +1,90 @@
-"""Continuation along a Pareto front: from bound to bound, each descent at its neighbour's answer.
+"""Continuation along a row of problems, each descent at its neighbour's answer: `best_of_each`.
 
-    answers of searches -> descent at the next bound, both ways ... -> best answer at each bound
+    searches at the ends and in the middle -> descent at the next problem, both ways ...
+                                           -> best answer to each
 
-Walks begin at the answers of multi-start searches, go both ways and end where another walk has
-been with a better answer: a front may change basins.
+Bounds of a Pareto front and lengths of a rope make such rows.  Walks begin at the answers of
+multi-start searches, go both ways and end where another walk has been with a better answer: a row
+may change basins.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from models.basics import FloatArray
 
 from ..question import Problem
-from ..search import Progress
+from ..search import Found, Progress, search
 from .follow import Answer, follow
 
+STARTS = 6  # of the searches at the ends and in the middle
+_ENDS = 2  # distinct answers of each that a walk begins from
+_OTHER = 1e-3  # difference of log costs that tells two ends apart
 _SAME = 1e-6  # log costs that differ by less are the same answer
 
 
-def walked(
+def best_of_each(
     problems: Sequence[Problem],
-    begins: Sequence[tuple[int, Answer | FloatArray]],
+    guesses: Sequence[Sequence[float]],
     *,
     harder: bool,
+    seed: int,
+    known: Mapping[int, Found],
     tell: Progress,
-) -> list[Answer | None]:
-    """Return the best answer to each problem of a front, None where there is none.
+) -> list[Answer | None] | None:
+    """Return the best answer to each problem of a row, None where there is none.
+
+    None alone where the searches at the ends and in the middle find nothing.
 
     Parameters
     ----------
     problems
-        In the order of the front.
-    begins
-        Where walks begin: the index of a problem, and an answer or parameters close to it.
+        In the order of the row.
+    guesses
+        Parameters that the searches begin with, besides their own.
     harder
         Whether the problems get harder from the first to the last, or easier.
+    seed
+        Of the searches.
+    known
+        Searches that were made already, by the index of their problem.
     tell
         Called as tell(stage, done, total).
     """
+    begins: list[tuple[int, Answer | FloatArray]] = []
+    for n, k in enumerate((0, len(problems) // 2, len(problems) - 1)):
+        tell("searches at the ends", n, 3)
+        found = known.get(k) or search(problems[k], STARTS, seed, guesses)
+        begins += [(k, begin) for begin in _begins(problems[k], found)]
+    return _walked(problems, begins, harder, tell) if begins else None
+
+
+def _begins(problem: Problem, found: Found) -> list[Answer | FloatArray]:
+    """Return the best answer of a search, and its best distinct ends."""
+    chosen: list[tuple[FloatArray, float]] = []
+    for start in sorted((s for s in found.starts if s.converged), key=lambda s: s.cost):
+        if all(abs(np.log(start.cost / cost)) > _OTHER for _, cost in chosen):
+            chosen.append((start.end, start.cost))
+    answer = Answer.of(problem, found)
+    ends = [values for values, _ in chosen[:_ENDS]]
+    return [*ends] if answer is None else [answer, *ends]
+
+
+def _walked(
+    problems: Sequence[Problem],
+    begins: Sequence[tuple[int, Answer | FloatArray]],
+    harder: bool,
+    tell: Progress,
+) -> list[Answer | None]:
+    """Return the best answers along walks from the index of a problem and what is close to it."""
     every = range(len(problems))
     best: list[Answer | None] = [None for _ in every]
     for k, (at, begin) in enumerate(begins):
-        tell("walking along the front", k, len(begins))
+        tell("walking from one to the next", k, len(begins))
         own = _along(problems, best, every[at:], begin)
         _along(problems, best, every[:at][::-1], own or begin)
     # Once more where a point is missing or worse than its harder neighbour: what serves a tight
