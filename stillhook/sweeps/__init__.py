@@ -11,10 +11,10 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .figures import sweep_figures
     from .report import place_of, sweep_data, sweep_report, write_sweep
-    from .store import ATTRIBUTE, stored_question
+    from .store import stored_question
     from .sweeping import resume_sweep, spread_of, sweep
     from .time_metrics import STATUS
     from .usual import fault_spread, usual_spread
-    from .words import SweepSummary, case_at, varied_paths, worst_cases
+    from .words import SweepSummary, varied_paths, worst_cases
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

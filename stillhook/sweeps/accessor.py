@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 import xarray as xr
 
 from models.case import Case
+from synth.sweeps import case_of
 
 from .export import table_of, write_result
-from .words import SweepSummary, case_at, worst_cases
+from .words import SweepSummary, worst_cases
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped]
@@ -43,9 +44,9 @@ class SweepAccessor:
         """Return the numbers of the worst cases: those not stable first, then by a variable."""
         return worst_cases(self._result, count, by=by)
 
-    def case(self, number: int, nominal: Case) -> Case:
+    def case(self, number: int) -> Case:
         """Return a case of the sweep, to be designed for or run again."""
-        return case_at(self._result, number, nominal)
+        return case_of(self._result, number)
 
     def table(self) -> pd.DataFrame:
         """Return a table with a row for each case."""

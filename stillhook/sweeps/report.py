@@ -5,13 +5,11 @@ xarray.Dataset --> Report --> summary.json, worst.yaml, spread.yaml, cases, figu
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from models.case import Case
-from models.spread import Spread
+from synth.sweeps import case_of, spread_of
 
 from ..text import (
     Item,
@@ -28,9 +26,8 @@ from ..text import (
     scale,
 )
 from .export import write_result
-from .store import ATTRIBUTE
 from .time_metrics import STATUS
-from .words import SweepSummary, case_at, varied_paths, worst_cases
+from .words import SweepSummary, varied_paths, worst_cases
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,9 +77,7 @@ def sweep_report(result: xr.Dataset, name: str, *, worst: int = 0) -> Report:
     )
 
 
-def write_sweep(
-    folder: str | Path, result: xr.Dataset, case: Case, spread: Spread, *, worst: int = 0
-) -> list[Path]:
+def write_sweep(folder: str | Path, result: xr.Dataset, *, worst: int = 0) -> list[Path]:
     """Write a sweep into a folder; return the files, the case file of the worst first.
 
     Parameters
@@ -91,8 +86,6 @@ def write_sweep(
         The folder; it is made if need be.
     result
         What `sh.sweep` returned.
-    case, spread
-        The nominal case, and what varied.
     worst
         How many of the worst cases become case files.
 
@@ -104,15 +97,12 @@ def write_sweep(
     place = OutputFolder.prepare(folder)
     written = []
     numbers = worst_cases(result, worst) if worst else []
-    for stale in place.path.glob("worst*.yaml"):
-        place.discard(stale.name)
+    place.discard("worst*.yaml")
     for rank, case_number in enumerate(numbers):
         name = "worst.yaml" if rank == 0 else f"worst-{rank + 1}.yaml"
-        text = _heading(result, case_number) + case_at(result, case_number, case).to_yaml()
+        text = _heading(result, case_number) + case_of(result, case_number).to_yaml()
         written.append(place.write(name, text))
-    if ATTRIBUTE in result.attrs:  # in plain numbers, as it was drawn
-        spread = Spread.from_dict(json.loads(result.attrs[ATTRIBUTE])["spread"])
-    written.append(place.write("spread.yaml", spread.to_yaml()))
+    written.append(place.write("spread.yaml", spread_of(result).to_yaml()))
     written.append(place.write("summary.json", json_text(sweep_data(result, numbers))))
     written.append(write_result(result, place.path / "cases.parquet"))
     if result.sizes["case"] <= _FEW:

@@ -23,6 +23,7 @@ import numpy as np
 from models.basics import BoolArray, InputError
 from models.case import Case
 from models.spread import Spread
+from synth.sweeps import ATTRIBUTE
 
 from ..controllers import recipe_from
 from ..keeper import Journal, question_in, versions
@@ -32,9 +33,6 @@ from .time_metrics import STATUS
 
 if TYPE_CHECKING:
     import xarray as xr
-
-ATTRIBUTE = "stillhook_sweep"
-"""Name of the attribute."""
 
 JOURNAL, RESULT = "journal.jsonl", "result.nc"
 """Names of the files in the folder of a sweep."""

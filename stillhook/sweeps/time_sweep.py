@@ -21,11 +21,12 @@ import numpy.typing as npt
 from models.basics import FloatArray, InputError, check_range
 from models.operation import FAULTS, PREFIX, scenario_named
 from models.spread import Spread
+from synth.sweeps import ATTRIBUTE, coordinates_of
 
 from ..keeper import Alone, Cluster, Died, Pool, Processes
 from ..text import OutputFolder, Progress
 from .export import write_result
-from .store import ATTRIBUTE, Draw, Results, header_of, places_of, text_of
+from .store import Draw, Results, header_of, places_of, text_of
 from .time_cases import CaseResult, CaseTask, TimeQuestion, seed_of
 from .time_metrics import METRICS, STATUS
 
@@ -150,22 +151,12 @@ def template_of(question: TimeQuestion, spread: Spread, draw: Draw, rows: FloatA
     """Return the result with nothing in it yet: coordinates, variables, units, attributes."""
     import xarray as xr
 
-    n, units = len(rows), spread.units
-    cases = draw.first + np.arange(n)
-    coordinates: dict[str, object] = {
-        "case": ("case", cases, {"long_name": "number of the case"}),
-        "seed": (
-            "case",
-            np.array(
-                [seed_of(draw.seed, int(i), common=draw.common_seed) for i in cases], np.int64
-            ),
-            {"long_name": "seed of the run"},
-        ),
+    n = len(rows)
+    seeds = [seed_of(draw.seed, draw.first + k, common=draw.common_seed) for k in range(n)]
+    coordinates = {
+        "seed": ("case", np.array(seeds, np.int64), {"long_name": "seed of the run"}),
+        **coordinates_of(spread, rows, draw.first),
     }
-    for j, path in enumerate(spread.paths):
-        about: dict[str, object] = {"long_name": f"{path}, varied", "units": units[path] or "1"}
-        about["nominal"] = spread.nominal[path]
-        coordinates[path] = ("case", rows[:, j].copy(), about)
     flags = {
         "long_name": "what became of the case",
         "flag_values": list(STATUS.values()),

@@ -1,6 +1,6 @@
 """Summary and worst cases of a sweep: how many hold, and how their numbers are distributed.
 
-    Dataset --> SweepSummary.of, worst_cases, case_at --> the command line, reports, the next case
+    Dataset --> SweepSummary.of, worst_cases --> the command line, reports
 
 Cases that are not stable are counted, with the exact interval of Clopper and Pearson, and never
 averaged in: every quantile is of those that hold.
@@ -8,7 +8,6 @@ averaged in: every quantile is of those that hold.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -17,10 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.basics import InputError, Share, check_range, pick, share
-from models.case import Case
-from models.spread import Samples, Spread
 
-from .store import ATTRIBUTE
 from .time_metrics import STATUS
 
 if TYPE_CHECKING:
@@ -168,34 +164,3 @@ def worst_cases(result: xr.Dataset, count: int, *, by: str = "payload_rms") -> l
 def varied_paths(result: xr.Dataset) -> tuple[str, ...]:
     """Return what varied in a sweep, by path."""
     return tuple(str(name) for name in result.coords if str(name) not in ("case", "seed"))
-
-
-def case_at(result: xr.Dataset, number: int, nominal: Case) -> Case:
-    """Return a case of a sweep, with the design's gains in it where they are the three.
-
-    Faults and what else is no part of a case are left out.
-
-    Raises
-    ------
-    InputError
-        If there is none of that number, or it is not valid.
-    """
-    there = np.flatnonzero(result["case"].to_numpy() == number)
-    if there.size == 0:
-        last = int(result["case"].to_numpy().max())
-        raise InputError(f"sweep: case must be one of 0 to {last}, got {number}")
-    if result.attrs.get("mode") == "frequency":
-        from synth.sweeps import case_of
-
-        return case_of(result, number)
-    values = {p: float(result[p].to_numpy()[there[0]]) for p in varied_paths(result)}
-    law = json.loads(result.attrs[ATTRIBUTE])["controller"].get("law") or {}
-    gains = dict(law.get("parameters", {}))
-    spread = Spread({path: Samples([value]) for path, value in values.items()})
-    own = spread.on(nominal, gains or None)
-    changes = {**own.changes(list(values.values()))}
-    gains |= own.gains(list(values.values()))
-    if law.get("structure") == "payload-feedback":
-        changes["gains"] = gains
-    changes["name"] = f"{nominal.name} ({number})"[:100]
-    return nominal.variant(changes)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .dataset import case_of, spread_of
+    from .dataset import ATTRIBUTE, case_of, coordinates_of, law_of, spread_of
     from .design_rows import DesignRows, SolvedRows
     from .frequency import FrequencyEngine, frequency_sweep
     from .metrics import METRICS

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 from models import Case
 from models.basics import InputError
 from models.spread import Spread
+from synth.sweeps import ATTRIBUTE, law_of
 
 from ...sweeps import (
-    ATTRIBUTE,
     STATUS,
     place_of,
     sweep_figures,
@@ -126,11 +126,10 @@ ARGUMENTS = (
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Swept:
-    """A sweep that was made: its case, what varied, and what came of it."""
+    """A sweep that was made: its case, and what came of it."""
 
     case: Case
     design: object
-    spread: Spread
     result: xr.Dataset
     folder: Path
     words: str
@@ -154,7 +153,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _swept(arguments: argparse.Namespace) -> Swept:
     """Return the sweep that was asked for."""
-    from ...sweeps import spread_of, sweep
+    from ...sweeps import sweep
 
     if arguments.case is None:
         raise InputError("sweep: say which case, or --resume and the folder of a sweep")
@@ -196,7 +195,6 @@ def _swept(arguments: argparse.Namespace) -> Swept:
     return Swept(
         case=case,
         design=design,
-        spread=spread_of(spread, case, arguments.mode),
         result=result,
         folder=folder,
         words=case_words(arguments),
@@ -216,7 +214,7 @@ def _resumed(arguments: argparse.Namespace) -> Swept:
             f"sweep: --resume takes case and all else from {arguments.resume}; give no CASE"
         )
     warnings.simplefilter("ignore", PhysicsWarning)  # told when it was begun
-    question, spread, _ = stored_question(arguments.resume)
+    question, _, _ = stored_question(arguments.resume)
     with counting(arguments) as step:
         result = resume_sweep(
             arguments.resume, engine=arguments.cluster, jobs=arguments.jobs, progress=step
@@ -224,7 +222,6 @@ def _resumed(arguments: argparse.Namespace) -> Swept:
     return Swept(
         case=question.case,
         design=None,
-        spread=spread,
         result=result,
         folder=Path(arguments.resume),
         words="",
@@ -341,14 +338,31 @@ def _concluded(swept: Swept, arguments: argparse.Namespace) -> int:
     """Write and print what the sweep says; return the exit status."""
     result, most = swept.result, arguments.worst
     folder = OutputFolder(swept.folder)
-    folder.keep(*write_sweep(swept.folder, result, swept.case, swept.spread, worst=most))
+    folder.keep(*write_sweep(swept.folder, result, worst=most))
+    worst = worst_cases(result, most) if most else []
+    law = _worst_design(swept, folder, worst)
     if arguments.figures:
         # Clouds of ten thousand points: as pixels, unless asked otherwise.
         _figures(swept, folder, arguments.format or "png")
     report = sweep_report(result, swept.case.name, worst=most)
-    worst = worst_cases(result, most) if most else []
-    following = _next(swept, worst, arguments)
+    following = _next(swept, worst, law, arguments)
     return conclude(report, arguments, folder, following, brief=report.sections[:1])
+
+
+def _worst_design(swept: Swept, folder: OutputFolder, worst: list[int]) -> Path | None:
+    """Write the design of the worst case in time, where its parameters stand in no case file."""
+    from synth import evaluate_gains
+
+    from ...designs import design_text
+
+    if not worst or swept.result.attrs["mode"] != "time":
+        return None
+    structure, parameters = law_of(swept.result, worst[0])
+    if structure in ("", "payload-feedback"):
+        return None
+    return folder.write(
+        "worst-design.yaml", design_text(evaluate_gains(swept.case, parameters, structure))
+    )
 
 
 def _figures(swept: Swept, folder: OutputFolder, kind: str) -> None:
@@ -365,19 +379,21 @@ def _figures(swept: Swept, folder: OutputFolder, kind: str) -> None:
         folder.write(f"{name}.{kind}", picture(figure, kind))
 
 
-def _next(swept: Swept, worst: list[int], arguments: argparse.Namespace) -> list[tuple[str, str]]:
-    """Return the commands to go on with."""
+def _next(
+    swept: Swept, worst: list[int], law: Path | None, arguments: argparse.Namespace
+) -> list[tuple[str, str]]:
+    """Return the commands to go on with; `law` is the file of the worst case's design."""
     folder = swept.folder
     found = []
     if worst:
         file = shlex.quote(str(folder / "worst.yaml"))
-        structure = getattr(swept.design, "structure", "payload-feedback")
-        other = "" if structure == "payload-feedback" else f" --structure {structure}"
+        structure = law_of(swept.result, worst[0])[0]
+        other = "" if structure in ("", "payload-feedback") else f" --structure {structure}"
         found.append(("what the worst case would take", f"stillhook optimise {file}{other}"))
         if swept.result.attrs.get("mode") == "time":
             at = place_of(swept.result, worst[0])
             seed = int(swept.result["seed"].to_numpy()[at])
-            words = ["stillhook simulate", file, *_controller_words(swept, arguments)]
+            words = ["stillhook simulate", file, *_controller_words(swept, law)]
             words.append(f"--first-seed {seed} --duration '{_duration(swept.result):g} s'")
             found.append(("see the worst case again", " ".join(words)))
     if swept.words and swept.result.attrs.get("mode") != "time":
@@ -396,9 +412,10 @@ def _duration(result: xr.Dataset) -> float:
     return float(json.loads(result.attrs[ATTRIBUTE])["duration"])
 
 
-def _controller_words(swept: Swept, arguments: argparse.Namespace) -> list[str]:
-    """Return the words for `stillhook simulate`; gains of a design stand in the case file."""
+def _controller_words(swept: Swept, law: Path | None) -> list[str]:
+    """Return the words for `stillhook simulate`; three gains stand in the case file."""
+    if law is not None:
+        return ["--design", shlex.quote(str(law))]
     header = json.loads(swept.result.attrs[ATTRIBUTE])["controller"]
-    if header["kind"] == "name":
-        return [] if header["name"] == "feedback" else [f"--controller {header['name']}"]
-    return [] if header["law"]["structure"] == "payload-feedback" else design_words(arguments)
+    by_name = header["kind"] == "name" and header["name"] != "feedback"
+    return ["--controller", header["name"]] if by_name else []

@@ -44,6 +44,28 @@ def test_a_sweep_in_time_is_written_and_told(tmp_path, capsys):
     assert f"{rms:.10g}"[:8] in text
 
 
+@pytest.mark.ci
+@pytest.mark.parametrize("resumed", [False, True])
+def test_the_worst_case_of_a_structure_carries_its_own_parameters(resumed, tmp_path, capsys):
+    folder = tmp_path / "out"
+    gains = (
+        "heave.gain=0.9,heave.lead=0.02,heave.bandwidth=9,drum.speed_gain=9,drum.position_gain=1"
+    )
+    run(
+        "thesis-1975", *CALM, *TIME, "--samples", 4, "--vary", "payload.mass=10 %",
+        "--structure", "feed-forward", "--gains", gains,
+        "--vary", "gains.heave.gain=20 %", "--no-figures", "--out", folder,
+    )  # fmt: skip
+    if resumed:
+        capsys.readouterr()
+        main(["sweep", "--resume", str(folder), "--jobs", "1", "--no-figures"])
+    out = capsys.readouterr().out
+    command = next(line.strip() for line in out.splitlines() if "stillhook simulate" in line)
+    assert main([*shlex.split(command)[1:], "--out", str(tmp_path / "again")]) == 0
+    rms = json.loads((folder / "summary.json").read_text())["quantiles"]["payload_rms"]
+    assert f"{rms['largest']:.10g}"[:8] in (tmp_path / "again" / "summary.json").read_text()
+
+
 def test_a_sweep_in_the_frequency_domain_is_written_and_told(tmp_path, capsys):
     folder = tmp_path / "out"
     assert run("thesis-1975", "--samples", 64, "--seed", 1, "--no-figures", "--out", folder) in (

@@ -54,7 +54,7 @@ def test_a_sweep_is_the_single_runs_to_the_bit(alone):
     nominal = LinearFeedback(CASE, GAINS)
     static = static_of(CASE)
     for case_number in range(4):
-        case = alone.sweep.case(case_number, CASE)
+        case = alone.sweep.case(case_number)
         controller = trimmed(nominal, shift_between(static, static_of(case)))
         seed = int(alone["seed"][case_number])
         (run,) = simulate(case, controller, seeds=[seed], duration=40.0)

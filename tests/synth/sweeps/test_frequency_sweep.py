@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from designs import THESIS_GAINS, thesis_design, unstable_design
+from designs import thesis_design, unstable_design
 from solved_loops import solved_variance
 
 from models import load_case
@@ -28,6 +27,7 @@ from synth.sweeps import (
     FrequencyEngine,
     case_of,
     frequency_sweep,
+    law_of,
     spread_of,
 )
 from synth.sweeps.metrics import DEFAULT
@@ -256,7 +256,7 @@ def test_dataset_says_what_it_holds_and_unstable_cases_have_no_numbers() -> None
     for name in METRICS:
         assert result[name].attrs["long_name"]
         assert np.array_equal(np.isnan(result[name].values), unstable), name
-    assert json.loads(result.attrs["gains"]) == THESIS_GAINS
+    assert law_of(result, 0)[0] == "payload-feedback"
     np.testing.assert_allclose(
         spread_of(result).sample(300), np.stack([result[p] for p in SPRING.paths], axis=1)
     )
@@ -266,6 +266,9 @@ def test_worst_case_runs_again_alone_with_the_same_numbers() -> None:
     result = frequency_sweep(thesis_design(), SPRING, samples=200)
     worst = int(result["case"][int(np.nanargmax(result["payload_rms"].values))])
     case = case_of(result, worst)
+    parameters = law_of(result, worst)[1]
+    assert parameters == {name: getattr(case.gains, name) for name in ("A", "a", "a1", "a2")}
+    assert parameters["a"] == result["gains.a"][worst]
     again = evaluate_gains(case, {n: getattr(case.gains, n) for n in ("A", "a", "a1", "a2")})
     assert again.payload_rms == pytest.approx(float(result["payload_rms"][worst]), rel=1e-6)
     assert Case.from_dict(case.to_dict()) == case
