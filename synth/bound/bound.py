@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -97,36 +96,14 @@ class Bound:
         """Number of states of the controller."""
         return len(self.controller.A)
 
-    def excess(self, rms: float) -> float:
-        """Return how far a design's rms lies above the bound, over the bound."""
-        return rms / self.value - 1.0 if self.value > 0.0 else math.inf
-
-    def sentence(self, rms: float) -> str:
-        """Return "within x % of the best possible with these sensors" for a design's rms."""
-        if not self.feasible:
-            return "no linear controller keeps the limits"
-        if self.value <= 0.0:
-            return "how far the best possible is from it is not known: the bound is zero"
-        above = 100.0 * self.excess(rms)
-        if above < 300.0:
-            return f"within {above:.2g} % of the best possible with these sensors"
-        return f"{rms / self.value:.3g} times the best possible with these sensors"
-
-    @cached_property
-    def whole(self) -> str:
-        """What is minimised, in words."""
-        return ", ".join(
-            name if weight == 1.0 else f"{weight:g} {name}"
-            for name, weight in self.minimise.items()
-        )
-
     def __str__(self) -> str:
         """Return a small tree."""
+        whole = ", ".join(n if w == 1.0 else f"{w:g} {n}" for n, w in self.minimise.items())
         unit = (
             self.plant.units.get(next(iter(self.minimise)), "") if len(self.minimise) == 1 else ""
         )
         lines = [
-            f"Bound: no linear controller has less than {self.value:.5g} {unit} rms of {self.whole}"
+            f"Bound: no linear controller has less than {self.value:.5g} {unit} rms of {whole}"
             if self.feasible
             else "Bound: no linear controller keeps the limits",
             f"├ attained {self.attained:.5g} {unit} by LQG of order {self.order}",

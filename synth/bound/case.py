@@ -47,23 +47,18 @@ from ..loop import (
     Disturbance,
     LinearController,
     Margins,
-    closed_loop_poles,
     disturbances,
-    loop_margins,
 )
 from ..question import PAYLOAD, DesignQuestion, pose
-from ..verify import LawMatrices, Loop, moments
 from .bode_integral import BodeEstimate, bode_estimate
 from .bound import Bound, lqg_bound
 from .dual import with_input_outputs
 from .high_order import SPARE, HighOrder, high_order
-from .truth import banded
-from .youla import AffineLoop, SlowMotion, Truth, gain_disk, margin_grid, youla_design
+from .truth import controller_rms
+from .youla import Truth, gain_disk, youla_design
 
 _FAINT = 1e-3  # noise of an exact sensor, see `bound_for`
 _LONGER = 2.0  # T_z of any signal over that of the hook, at most
-_RTOL = 1e-7  # of the design's own variances
-_PADE = 6  # of the delays, for the design's poles: marks of its quadrature
 _PROPER = 1e4  # corner of the low-pass before a direct gain [rad/s]
 _SIGNALS = ("acceleration", "velocity", "displacement")
 _SAMPLE = 0.01  # of the faint noise [s]
@@ -75,28 +70,19 @@ _TIGHTER = 0.98  # of a disk of S, for what the truncation moves
 _NUMBERS, _FEWEST, _MOST = 120, 12, 24  # free numbers of Q, and its functions a measurement
 
 
-class JudgedDesign(Protocol):
-    """What of a design the best possible is told beside."""
+class _Judged(Protocol):
+    """What of a design the best possible is told beside, see `synth.design.Design`."""
 
     @property
-    def sea_case(self) -> Case:
-        """The case in the sea that its figures hold for."""
-
+    def sea_case(self) -> Case: ...
     @property
-    def controller(self) -> LinearController:
-        """Its controller, u = +C y."""
-
+    def controller(self) -> LinearController: ...
     @property
-    def margins(self) -> Margins | None:
-        """Its margins; None if the loop is unstable."""
-
+    def margins(self) -> Margins | None: ...
     @property
-    def masses(self) -> int:
-        """Rope masses of its plant."""
-
+    def masses(self) -> int: ...
     @property
-    def drag(self) -> float:
-        """Linear drag coefficient [N s/m]."""
+    def drag(self) -> float: ...
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,11 +100,9 @@ class BestPossible:
         bound hangs on the faint noise, and means little.
     max_sensitivity
         M_s of the best found: the case's limit, or the design's own where it is more.
-    rms
-        The design's payload rms on these terms [m]: with the noise of all sensors that it hears, a
-        faint one where they are exact; None without a design.
-    controller, margins
-        The design's; None without one.
+    own
+        The design's controller, and its payload rms on these terms [m]: with the noise of all
+        sensors that it hears, a faint one where they are exact; None without a design.
     bode
         What Bode's integral says of the design's loop; None without one.
     """
@@ -127,11 +111,14 @@ class BestPossible:
     free: Bound
     exact: tuple[str, ...]
     max_sensitivity: float
-    rms: float | None = None
-    controller: LinearController | None = None
-    margins: Margins | None = None
+    own: HighOrder | None = None
     bode: BodeEstimate | None = None
     terms: _Terms = field(repr=False)
+
+    @property
+    def rms(self) -> float | None:
+        """The design's payload rms on these terms [m]; None without a design."""
+        return None if self.own is None else self.own.rms
 
     @property
     def factor(self) -> float:
@@ -146,17 +133,7 @@ class BestPossible:
     @cached_property
     def free_sensitivity(self) -> float:
         """M_s of the LQG controller that comes next to the bound, with the exact delays."""
-        loop = AffineLoop(self.free, np.ones(1))
-        plant = self.free.plant
-
-        def distance(omega: Any) -> Any:
-            blocks = loop.at(omega)
-            off = plant.response(omega).yu[:, :, 0] - blocks.yu
-            late = 1.0 - np.sum(blocks.X * off, axis=1)
-            return late / (1.0 + np.sum(blocks.X * blocks.yu, axis=1)) - 1.0
-
-        grid = margin_grid(loop.marks)
-        return loop_margins(distance, grid, distance(grid)).max_sensitivity
+        return Assessment(self.free.plant, self.free.controller, ()).max_sensitivity
 
     @cached_property
     def found(self) -> HighOrder | str:
@@ -164,9 +141,7 @@ class BestPossible:
 
         Other margins than M_s are not imposed.  It holds on a finer rope than its own.
         """
-        own = None
-        if self.rms is not None and self.controller is not None and self.margins is not None:
-            own = HighOrder(rms=self.rms, controller=self.controller, margins=self.margins)
+        own = self.own
         try:
             made = _high_order(self.terms, self.max_sensitivity, begin=self.free.multipliers)
         except (SynthesisError, SolverError) as error:
@@ -176,8 +151,7 @@ class BestPossible:
     @property
     def is_own(self) -> bool:
         """Whether the best found is the design itself."""
-        found = self.found
-        return isinstance(found, HighOrder) and found.controller is self.controller
+        return self.found is self.own
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -293,7 +267,7 @@ class _Terms:
 
 @one_thread()
 def bound_for(
-    subject: Case | JudgedDesign,
+    subject: Case | _Judged,
     *,
     measurements: Sequence[str] | None = None,
     masses: int | None = None,
@@ -328,39 +302,41 @@ def bound_for(
         If a Riccati equation has no stabilising solution.
     """
     check_range("bound", "faint", faint, low=0.0, open_low=True)
-    design = None if isinstance(subject, Case) else subject
-    case = subject if isinstance(subject, Case) else subject.sea_case
-    if design is not None and design.margins is None:
+    if isinstance(subject, Case):
+        question = pose(subject, masses=masses)
+        heard = aboard(subject) if measurements is None else measurements
+        terms = _terms(question, heard, question.drag_before, faint)
+        return _beside(terms, subject.limits.max_sensitivity)
+    case, controller, margins = subject.sea_case, subject.controller, subject.margins
+    if margins is None:
         raise InputError("bound: the design's loop must be stable")
-    if masses is None and design is not None:
-        masses = design.masses
-    question = pose(case, masses=masses)
-    controller = design.controller if design is not None else None
-    heard = measurements
-    if heard is None:
-        heard = aboard(case) if controller is None else (*controller.measurements, *ENCODER)
-    terms = _terms(question, heard, question.drag_before if design is None else design.drag, faint)
-    rms = None
-    if controller is not None:
-        made = _rms(terms, controller)
-        # What the design itself uses is allowed: else it might not be among those compared with.
-        room = {
-            name: max(bound, made[name]) if math.isfinite(bound) else made[name]
-            for name, bound in terms.limits.items()
-        }
-        terms, rms = replace(terms, limits=room), made[PAYLOAD]
-    most = case.limits.max_sensitivity
-    if design is not None and design.margins is not None:
-        most = max(design.margins.max_sensitivity, most)
+    question = pose(case, masses=subject.masses if masses is None else masses)
+    heard = (*controller.measurements, *ENCODER) if measurements is None else measurements
+    terms = _terms(question, heard, subject.drag, faint)
+    plant, sources = _loop(terms, controller)
+    bode = bode_estimate(Assessment(plant, controller, sources))
+    names = list(dict.fromkeys([PAYLOAD, *terms.limits]))
+    made = controller_rms(plant, sources, _proper(controller), names)
+    # What the design itself uses is allowed: else it might not be among those compared with.
+    room = {
+        name: max(bound, made[name]) if math.isfinite(bound) else made[name]
+        for name, bound in terms.limits.items()
+    }
+    own = HighOrder(rms=made[PAYLOAD], controller=controller, margins=margins)
+    most = max(margins.max_sensitivity, case.limits.max_sensitivity)
+    return _beside(replace(terms, limits=room), most, own, bode)
+
+
+def _beside(
+    terms: _Terms, most: float, own: HighOrder | None = None, bode: BodeEstimate | None = None
+) -> BestPossible:
     return BestPossible(
-        case=case,
+        case=terms.case,
         free=terms.bound(terms.masses),
-        exact=exact_sensors(case, terms.heard),
+        exact=exact_sensors(terms.case, terms.heard),
         max_sensitivity=most,
-        rms=rms,
-        controller=controller,
-        margins=design.margins if design is not None else None,
-        bode=_bode(terms, controller) if controller is not None else None,
+        own=own,
+        bode=bode,
         terms=terms,
     )
 
@@ -400,27 +376,15 @@ def high_order_for(
     """
     question = pose(case)
     terms = _terms(question, measurements, question.drag_before if drag is None else drag, _FAINT)
-    given = rooms or {}
+    given, limits = rooms or {}, case.limits
     room = {n: min(limit, given.get(n, math.inf)) for n, limit in terms.limits.items()}
-    limits, slow, roll_off = case.limits, None, None
-    for limit in question.limits:
-        if isinstance(limit, LowFrequency):
-            slow = SlowMotion(
-                output=limit.output,
-                disturbance=limit.disturbance,
-                bound=limit.bound,
-                below=limit.below,
-            )
-        if isinstance(limit, RollOff):
-            roll_off = limit.bound, limit.above
     disk = gain_disk(limits.max_sensitivity, limits.gain_margin_up, limits.gain_margin_down)
     return _high_order(
         replace(terms, limits=room),
         limits.max_sensitivity,
         states=states,
         disk=(disk[0], _TIGHTER * disk[1]),
-        slow=slow,
-        roll_off=roll_off,
+        shapes=[m for m in question.limits if isinstance(m, LowFrequency | RollOff)],
     )
 
 
@@ -585,29 +549,6 @@ def _loop(
     )
     heard = _heard_by(spectra, controller.measurements)
     return plant, disturbances(heard, plant.independent_disturbances)
-
-
-def _rms(terms: _Terms, controller: LinearController) -> dict[str, float]:
-    """Return the rms of the payload and of what is limited in a design's loop."""
-    plant, sources = _loop(terms, controller)
-    controller = _proper(controller)
-    law = LawMatrices.of(controller, plant)
-    poles = closed_loop_poles(plant.without_delays(_PADE), controller)
-    loop = Loop(
-        plant=plant.response_at,
-        law=law,
-        marks=np.concatenate([poles, plant.poles(), np.linalg.eigvals(law.A)]),
-    )
-    names = list(dict.fromkeys([PAYLOAD, *terms.limits]))
-    inside = [banded(source) for source in sources]
-    found = moments(loop, names, inside, orders=(0,), rtol=_RTOL)
-    return {name: math.sqrt(value[0]) for name, value in found.items()}
-
-
-def _bode(terms: _Terms, controller: LinearController) -> BodeEstimate:
-    """Return Bode's integral of a design's loop."""
-    plant, sources = _loop(terms, controller)
-    return bode_estimate(Assessment(plant, controller, sources))
 
 
 def _scales(case: Case, hook: HookMotion) -> dict[str, float]:

@@ -32,8 +32,7 @@ from models.basics import (
 )
 
 from ..loop import LinearController, Margins, closed_loop_poles, loop_margins
-from .check import controller_rms
-from .truth import densities, filter_plant, frequencies
+from .truth import controller_rms, densities, filter_plant, frequencies
 from .youla import Truth, YoulaDesign, margin_grid, upper_triangle
 
 _LOST = 0.02  # of the rms, by the truncation
@@ -166,7 +165,7 @@ def high_order(
             continue
         if any(closed_loop_poles(p, controller).real.max() >= 0.0 for p in plants):
             continue
-        made = controller_rms(bound, controller, names)
+        made = controller_rms(bound.plant, bound.sources, controller, names)
         rms = math.sqrt(sum(w * made[name] ** 2 for name, w in bound.minimise.items()))
         kept = all(made[name] <= _EXCESS * limit for name, limit in bound.limits.items())
         if rms > (1.0 + _LOST) * design.value or not kept:

@@ -24,17 +24,18 @@ makes it low, never wrong.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from models.basics import ComplexArray, FloatArray, IndexArray
+from models.basics import ComplexArray, FloatArray, IndexArray, SynthesisError, one_thread
 from models.plant import LinearPlant, PlantResponse, ShapingFilter
 
-from ..loop import Disturbance
+from ..loop import Disturbance, LinearController
 from ..structures import LqgEstimator, LqgRegulator
-from ..verify import Source, panels
+from ..verify import LawMatrices, Loop, Source, closed_matrices, moments, panels
 from .dual import Dual, DualPoint
 from .spectral_factor import SpectralFactor
 
@@ -42,6 +43,8 @@ _ORDER = 12  # Gauss-Legendre nodes a panel
 _TAIL = 8  # panels of 1/omega above all features
 _BELOW = 1e-3  # of the slowest pole: from there on to zero the densities are constant
 _BEYOND = 30.0  # ... which begin this far above the fastest pole
+_PADE = 6  # of the delays, where a controller's poles are looked at
+_QUADRATURE = 1e-7  # of the variances of a controller
 _LOYAL, _FAINT = 0.3, 1e-5  # weight of a spectrum's own fit, and its floor over the peak
 
 
@@ -208,6 +211,36 @@ def banded(source: Disturbance) -> Source:
 def densities(sources: tuple[Disturbance, ...], omega: FloatArray) -> FloatArray:
     """Return the densities of all sources, zero outside their bands, (nw, k)."""
     return np.stack([banded(source).density(omega) for source in sources])
+
+
+@one_thread()
+def controller_rms(
+    plant: LinearPlant,
+    sources: Sequence[Disturbance],
+    controller: LinearController,
+    names: Sequence[str],
+) -> dict[str, float]:
+    """Return what a controller makes of outputs on true spectra and exact delays, rms by name.
+
+    Raises
+    ------
+    SynthesisError
+        If its loop is unstable.
+    """
+    law = LawMatrices.of(controller, plant)
+    rational = plant.without_delays(_PADE, at="measurements")
+    poles = np.linalg.eigvals(closed_matrices(rational, law)[0])
+    if poles.real.max(initial=-1.0) >= 0.0:
+        raise SynthesisError(
+            f"bound: the controller's loop is unstable (growth rate {poles.real.max():.3g} 1/s)"
+        )
+    marks = np.concatenate([poles, plant.poles(), np.linalg.eigvals(law.A)])
+    loop = Loop(plant=plant.response_at, law=law, marks=marks)
+    # Only a controller with a direct path makes a delayed loop ring.
+    late = max(plant.delays, default=0.0) if np.any(law.D) else 0.0
+    inside = [banded(source) for source in sources]
+    found = moments(loop, names, inside, orders=(0,), delay=late, rtol=_QUADRATURE)
+    return {name: math.sqrt(value[0]) for name, value in found.items()}
 
 
 def truth_of(

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -46,6 +46,7 @@ from models.basics import (
 )
 from models.plant import LinearPlant
 
+from ..limits import LowFrequency, RollOff
 from ..loop import LinearController, frequency_grid
 from .bound import Bound
 from .truth import densities, filter_plant, frequencies, lqg_poles
@@ -212,14 +213,6 @@ class YoulaDesign:
             inputs=plant.inputs,
         )
 
-    def __str__(self) -> str:
-        """Return a small tree."""
-        return (
-            f"YoulaDesign: {self.value:.5g} rms of {self.bound.whole}, "
-            f"{self.bound.sentence(self.value)}\n"
-            f"└ order {len(self.controller.A)}, {self.loop.poles.size} functions a measurement"
-        )
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Truth:
@@ -242,16 +235,6 @@ class Truth:
         return self.plant.response(omega).yu[:, :, 0] if self.line is None else self.line(omega)
 
 
-@dataclass(frozen=True, kw_only=True)
-class SlowMotion:
-    """A limit on |output / disturbance|, at most `bound` up to the frequency `below` [rad/s]."""
-
-    output: str
-    disturbance: str
-    bound: float
-    below: float
-
-
 def gain_disk(max_sensitivity: float, up: float | None, down: float | None) -> tuple[float, float]:
     """Return centre and radius of a disk of S in which M_s and the gain margins hold.
 
@@ -268,9 +251,8 @@ def youla_design(
     bound: Bound,
     *,
     max_sensitivity: float = math.inf,
-    roll_off: tuple[float, float] | None = None,
     disk: tuple[float, float] | None = None,
-    slow: SlowMotion | None = None,
+    shapes: Sequence[LowFrequency | RollOff] = (),
     functions: int = 16,
     truth: Truth | None = None,
 ) -> YoulaDesign:
@@ -282,13 +264,11 @@ def youla_design(
         The question: plant with one input, spectra, weights, rms limits.
     max_sensitivity
         Limit on M_s of the loop, broken at the input.
-    roll_off
-        (bound, above): |L| at most `bound` from the frequency `above` on [rad/s].
     disk
         (centre, radius): S within this disk at every frequency, as gain margins ask for
         (`gain_disk`).
-    slow
-        A limit on a slow response.
+    shapes
+        Limits on a slow response, and on |L| from some frequency on.
     functions
         Functions of each measurement.
     truth
@@ -324,15 +304,7 @@ def youla_design(
         for n, b in bound.limits.items()
     ]
     true = truth or Truth(plant=bound.plant)
-    if roll_off is not None:
-        level, above = roll_off
-        at = np.geomspace(above, 100.0 * above, 100)
-        blocks = loop.at(at)
-        base, moved = _affine(blocks, blocks.yu, scale)
-        # |L| <= b wherever |T| <= b/(1 + b), and T = 1 - S is affine.
-        limits.append(_size(base, moved, q) <= _INSIDE * level / (1.0 + level))
-    if slow is not None:
-        limits.append(_slow(bound, loop, slow, scale, q))
+    limits += [_shape(bound, loop, shape, scale, q) for shape in shapes]
     dense = margin_grid(np.concatenate([loop.marks, true.plant.poles()]))
     blocks = loop.at(dense)
     base, moved = _affine(blocks, blocks.yu, scale)
@@ -397,8 +369,15 @@ def _variances(bound: Bound, loop: AffineLoop) -> dict[str, tuple[FloatArray, Fl
     return found
 
 
-def _slow(bound: Bound, loop: AffineLoop, limit: SlowMotion, scale: FloatArray, q: Any) -> Any:
-    """Return the limit on a slow response as cones."""
+def _shape(
+    bound: Bound, loop: AffineLoop, limit: LowFrequency | RollOff, scale: FloatArray, q: Any
+) -> Any:
+    """Return a limit on a slow response or on a roll-off as cones."""
+    if isinstance(limit, RollOff):
+        blocks = loop.at(np.geomspace(limit.above, 100.0 * limit.above, 100))
+        base, moved = _affine(blocks, blocks.yu, scale)
+        # |L| <= b wherever |T| <= b/(1 + b), and T = 1 - S is affine.
+        return _size(base, moved, q) <= _INSIDE * limit.bound / (1.0 + limit.bound)
     omega = np.geomspace(_LOWEST, limit.below, _SLOW)
     plant = bound.plant.response(omega).select(
         outputs=[limit.output], disturbances=[limit.disturbance]

@@ -8,32 +8,26 @@ above.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
-from models.basics import FloatArray, SynthesisError, one_thread
-
-from ..loop import LinearController
-from ..verify import (
+from models.basics import FloatArray, one_thread
+from synth.bound import Bound
+from synth.bound.dual import DualPoint
+from synth.bound.truth import banded, controller_rms, densities, lqg_poles, optimal_response
+from synth.loop import LinearController
+from synth.verify import (
     LawMatrices,
-    Loop,
     Verification,
     agreement,
     bounded,
-    closed_matrices,
     lyapunov_variances,
-    moments,
     panels,
 )
-from .bound import Bound
-from .dual import DualPoint
-from .truth import banded, densities, lqg_poles, optimal_response
 
-_PADE = 5  # of the delays, where another controller's stability is looked at
 _TIME = 1e-3  # cost by a Lyapunov equation, in which much cancels
 _SPECTRAL = 3e-4  # variance by another quadrature
-_QUADRATURE = 1e-7
 _NEAR, _FAR = 2e-3, 1e3  # times the slowest and the fastest pole
 _RIVAL = 3.0  # by which the rival's multipliers differ
 
@@ -93,37 +87,6 @@ def verify_bound(bound: Bound) -> Verification:
     return Verification.of(checks, f"verified: {len(checks)} checks passed")
 
 
-@one_thread()
-def controller_rms(
-    bound: Bound, controller: LinearController, names: Sequence[str]
-) -> dict[str, float]:
-    """Return what another controller makes of outputs on a bound's terms, rms by name.
-
-    Raises
-    ------
-    SynthesisError
-        If its loop is unstable.
-    """
-    model = bound.plant.without_delays(_PADE, at="measurements")
-    law = LawMatrices.of(controller, bound.plant)
-    poles = np.linalg.eigvals(closed_matrices(model, law)[0])
-    if poles.real.max(initial=-1.0) >= 0.0:
-        raise SynthesisError(
-            f"bound: the controller's loop is unstable (growth rate {poles.real.max():.3g} 1/s)"
-        )
-    loop = Loop(
-        plant=bound.plant.response_at,
-        law=law,
-        marks=np.concatenate([poles, bound.plant.poles()]),
-        inputs=len(bound.plant.inputs),
-    )
-    # Only a controller with a direct path makes a delayed loop ring.
-    late = max(bound.plant.delays) if np.any(law.D) else 0.0
-    sources = [banded(source) for source in bound.sources]
-    found = moments(loop, names, sources, orders=(0,), delay=late, rtol=_QUADRATURE)
-    return {name: math.sqrt(found[name][0]) for name in names}
-
-
 def weighted_rms(bound: Bound, controller: LinearController) -> float:
     """Return the root of the weighted variance of another controller on a bound's terms.
 
@@ -132,7 +95,7 @@ def weighted_rms(bound: Bound, controller: LinearController) -> float:
     SynthesisError
         If its loop is unstable.
     """
-    found = controller_rms(bound, controller, list(bound.minimise))
+    found = controller_rms(bound.plant, bound.sources, controller, list(bound.minimise))
     return math.sqrt(sum(w * found[name] ** 2 for name, w in bound.minimise.items()))
 
 

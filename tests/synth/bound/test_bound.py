@@ -9,6 +9,7 @@ import cvxpy
 import numpy as np
 import numpy.typing as npt
 import pytest
+from bound_check import verify_bound, weighted_rms
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -17,7 +18,7 @@ from models.plant import LinearPlant
 from models.sea import SeaSpectrum
 from models.sensing import MEASURED
 from stillhook import load_case
-from synth.bound import Bound, bound_for, verify_bound, weighted_rms
+from synth.bound import Bound, bound_for
 from synth.bound.bound import lqg_bound
 from synth.bound.case import rms_limits
 from synth.bound.dual import Dual
@@ -243,10 +244,8 @@ def test_designs_of_a_structure_are_above() -> None:
     assert design.ok
     assert design.controller is not None
     assert bound.value <= design.cost
-    assert bound.excess(design.cost) == pytest.approx(design.cost / bound.value - 1.0)
     # The same controller on the bound's terms: what lies outside the sea's band is left out.
     assert bound.value <= weighted_rms(bound, design.controller) <= design.cost * (1.0 + 1e-6)
-    assert "best possible with these sensors" in bound.sentence(design.cost)
 
 
 def test_limits_that_nothing_can_keep_are_told() -> None:

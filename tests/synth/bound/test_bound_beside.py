@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from bound_check import verify_bound
 
 import stillhook as sh
 from models.basics import InputError, SolverError, SynthesisError
@@ -19,7 +20,7 @@ from stillhook.designs.bound_text import bound_cell, bound_figure, bounds_note
 from stillhook.designs.structures import structures
 from stillhook.designs.summary import facts
 from stillhook.text import markdown
-from synth.bound import BestPossible, HighOrder, bound_for, exact_sensors, verify_bound
+from synth.bound import BestPossible, HighOrder, bound_for, exact_sensors
 from synth.loop import Assessment, LinearController, Margins, closed_loop_poles
 from synth.question import pose
 
