@@ -204,7 +204,8 @@ def truncation_of_roots(
 def _whole(B: FloatArray, Q: FloatArray, given: FloatArray) -> float:
     """Return a size of X as a whole; a weight that a cross term takes away leaves its rounding."""
     weight = max(np.abs(Q).max(initial=0.0), 1e-12 * np.abs(given).max(initial=0.0), 1e-300)
-    return float(np.sqrt(weight / max(np.abs(B @ B.T).max(initial=0.0), 1e-300)))
+    reached = float(np.abs(B @ B.T).max(initial=0.0))
+    return float(np.sqrt(weight / reached)) if reached > 1e-200 * weight else 1.0
 
 
 def _state_scales(A: FloatArray, B: FloatArray, Q: FloatArray, given: FloatArray) -> FloatArray:
@@ -212,7 +213,10 @@ def _state_scales(A: FloatArray, B: FloatArray, Q: FloatArray, given: FloatArray
     n = len(A)
     size = _whole(B, Q, given)
     matrix = np.block([[A, -size * B @ B.T], [-Q / size, -A.T]])
-    _, (scale, _) = scipy.linalg.matrix_balance(matrix, permute=False, separate=True)
+    with np.errstate(invalid="ignore"):
+        _, (scale, _) = scipy.linalg.matrix_balance(matrix, permute=False, separate=True)
+    if not np.all(np.isfinite(scale) & (scale > 0.0)):
+        raise SolverError("Riccati equation: its weights are too far apart")
     # A symplectic scaling has 1/d for the costate of d: the nearest one, by powers of two.
     halves = 0.5 * (np.log2(scale[:n]) - np.log2(scale[n:]))
     return np.asarray(np.exp2(np.round(halves)), dtype=np.float64)

@@ -26,10 +26,10 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import minimize
 
-from models.basics import FloatArray, InputError, SolverError, solve_lyapunov, solve_riccati
+from models.basics import FloatArray, InputError, SolverError, solve_lyapunov
 from models.plant import LinearPlant, ShapingFilter
 
-from ..structures import LqgEstimator, LqgRegulator, shaped, weighing
+from ..structures import LqgEstimator, LqgRegulator, estimator, regulator, shaped, weighing
 
 _LEAST = 1e-6  # of a multiplier, as a price: lambda b^2 over the cost
 _MOST = 1e6
@@ -124,7 +124,6 @@ class Dual:
         self.weights = np.array([minimise.get(name, 0.0) for name in plant.outputs])
         self.rows = [plant.outputs.index(name) for name in limits]
         self.squares = np.array(list(limits.values()), dtype=np.float64) ** 2
-        self.evaluations = 0
         charged = self.weights.copy()
         charged[self.rows] = 1.0
         for k, name in enumerate(plant.inputs):
@@ -150,15 +149,13 @@ class Dual:
     def estimator(self) -> LqgEstimator:
         """The Kalman filter, the same for all multipliers."""
         E, F = self.plant.E, self.plant.F
-        V = F @ F.T
         try:
-            found = solve_riccati(self.plant.A.T, self.plant.C.T, E @ E.T, V, E @ F.T)
+            return estimator(self.plant, E @ E.T, F @ F.T, E @ F.T)
         except SolverError as error:
             raise SolverError(
                 "bound: the filter's Riccati equation has no stabilising solution: every "
                 "measurement needs white noise, and every undamped mode something that shakes it"
             ) from error
-        return LqgEstimator(gain=-found.gain.T, V=V, Y=found.X)
 
     def at(self, multipliers: FloatArray) -> DualPoint:
         """Return the LQG optimum for multipliers, (m,).
@@ -168,13 +165,11 @@ class Dual:
         SolverError
             If the regulator's Riccati equation has no stabilising solution.
         """
-        self.evaluations += 1
         plant, kalman = self.plant, self.estimator
         charge = self.charge(multipliers)
-        Q, R, S = weighing(plant.Cz, plant.Dz, charge)
-        found = solve_riccati(plant.A, plant.B, Q, R, S)
-        K = found.gain
-        cost = np.sum(plant.E * (found.X @ plant.E)) + np.sum((K.T @ R @ K) * kalman.Y)
+        feedback = regulator(plant, *weighing(plant.Cz, plant.Dz, charge))
+        K = feedback.gain
+        cost = np.sum(plant.E * (feedback.X @ plant.E)) + np.sum((K.T @ feedback.R @ K) * kalman.Y)
         # The estimate is shaken by the innovations; the error is independent of it.
         L = kalman.gain
         estimate = solve_lyapunov(plant.A + plant.B @ K, L @ kalman.V @ L.T)
@@ -183,7 +178,7 @@ class Dual:
         variances += np.sum((plant.Cz @ kalman.Y) * plant.Cz, axis=1)
         return DualPoint(
             multipliers=multipliers,
-            regulator=LqgRegulator(gain=K, R=R, X=found.X),
+            regulator=feedback,
             cost=float(cost),
             variances=np.asarray(variances, dtype=np.float64),
         )
@@ -207,8 +202,7 @@ class Dual:
 
         sum lambda |J - b^2|, with the excess over a limit counted at its price.
         """
-        slack = point.multipliers * np.abs(point.variances[self.rows] - self.squares)
-        return float(np.sum(slack) / max(self.primal(point), 1e-300))
+        return self._open(point, np.full(len(self.rows), -np.inf))
 
     def maximise(self, start: FloatArray | None = None) -> DualPoint:
         """Return the multipliers of the highest bound."""

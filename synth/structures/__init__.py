@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .drum_speed import DrumSpeedLoop, SteadyMotion
     from .fixed import Fixed
     from .low_order import LowOrder, LowOrderFeedback, LowOrderLaw
-    from .lqg import LqgEstimator, LqgRegulator, reduced, weighing
+    from .lqg import LqgEstimator, LqgRegulator, estimator, reduced, regulator, weighing
     from .recursive import RecursiveController, Signals, checked_sample_time, make_recursion
     from .sampled_controller import Matrices, low_pass_matrices, sampled, tracking_gain
     from .sampling import SampledLoop, sampled_loop

@@ -35,7 +35,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.stats import qmc
 from typing_extensions import override
 
-from models.basics import ComplexArray, FloatArray, InputError, SynthesisError
+from models.basics import ComplexArray, FloatArray, InputError, SolverError
 from models.plant import LinearPlant
 
 from ..loop import LinearController
@@ -249,20 +249,21 @@ class LowOrderLaw(ParametrisedController):
     @override
     def draw(self, points: FloatArray, omega: FloatArray, yu: ComplexArray) -> FloatArray:
         plant = self._plant.without_delays(_PADE)
-        sizes = np.abs(yu) ** 2 + 1e-12 * np.max(np.abs(yu) ** 2, axis=0) + 1e-300
+        sizes = np.abs(yu) ** 2
+        sizes += 1e-12 * sizes.max(axis=0) + 1e-60 * sizes.max()
         at = np.minimum((points[:, :2] * omega.size).astype(int), omega.size - 1)
         tilt = 10.0 ** (2.0 * points[:, 2:4] - 1.0)
         uneven = np.linspace(-1.0, 1.0, self._form.ny)
         regulators, filters = [], []
-        for k in range(min(_SIDE, len(points))):
+        for k in range(min(_SIDE, len(points)) if np.any(yu) else 0):
             # Bandwidths are drawn: with such weights the loop crosses over near that frequency.
             weights = tilt[k, 0] ** uneven / sizes[at[k, 0]].mean(axis=1)
             effort = weights @ sizes[at[k, 0]]
             noise = tilt[k, 1] ** uneven * sizes[at[k, 1]].sum(axis=1)
-            with contextlib.suppress(SynthesisError):
+            with contextlib.suppress(SolverError):
                 Q, R, S = weighing(plant.C, plant.D, weights)
                 regulators.append(regulator(plant, Q, R + np.diag(effort), S))
-            with contextlib.suppress(SynthesisError):
+            with contextlib.suppress(SolverError):
                 W = plant.B @ plant.B.T
                 filters.append(estimator(plant, W, np.diag(noise), np.zeros_like(plant.C.T)))
         known = self._family(plant, regulators, filters)[: len(points)]

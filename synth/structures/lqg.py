@@ -1,9 +1,9 @@
 """Linear quadratic Gaussian designs, and their reduction to a few states or to a static gain.
 
-A good place to start a search of free controllers from: two Riccati equations, solved by SciPy,
-and a balanced truncation of what the controller makes of the innovations, in the manner of Liu
-and Anderson, "Controller reduction via stable factorization and balancing" (Int. J. Control 44,
-1986).
+A good place to start a search of free controllers from, and what a bound is made of: two Riccati
+equations and a balanced truncation of what the controller makes of the innovations, in the manner
+of Liu and Anderson, "Controller reduction via stable factorization and balancing" (Int. J. Control
+44, 1986).
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
+from scipy.linalg import solve_continuous_lyapunov
 
-from models.basics import BoolArray, FloatArray, SynthesisError, balanced_truncation
+from models.basics import BoolArray, FloatArray, SolverError, balanced_truncation, solve_riccati
 from models.plant import LinearPlant
 
 from ..loop import LinearController
@@ -44,11 +44,11 @@ def regulator(plant: LinearPlant, Q: FloatArray, R: FloatArray, S: FloatArray) -
 
     Raises
     ------
-    SynthesisError
-        If R is singular or the Riccati equation has no stabilising solution.
+    SolverError
+        If R is singular (an input is free of charge) or no feedback stabilises the plant.
     """
-    X, gain = _riccati("regulator", plant.A, plant.B, Q, R, S)
-    return LqgRegulator(gain=gain, R=R, X=X)
+    found = solve_riccati(plant.A, plant.B, Q, R, S)
+    return LqgRegulator(gain=found.gain, R=R, X=found.X)
 
 
 def estimator(plant: LinearPlant, W: FloatArray, V: FloatArray, U: FloatArray) -> LqgEstimator:
@@ -56,11 +56,11 @@ def estimator(plant: LinearPlant, W: FloatArray, V: FloatArray, U: FloatArray) -
 
     Raises
     ------
-    SynthesisError
-        If V is singular or the Riccati equation has no stabilising solution.
+    SolverError
+        If V is singular (a measurement has no noise) or no filter is stable.
     """
-    Y, gain = _riccati("estimator", plant.A.T, plant.C.T, W, V, U)
-    return LqgEstimator(gain=-gain.T, V=V, Y=Y)
+    found = solve_riccati(plant.A.T, plant.C.T, W, V, U)
+    return LqgEstimator(gain=-found.gain.T, V=V, Y=found.X)
 
 
 def state_covariance(plant: LinearPlant, feedback: LqgRegulator) -> FloatArray:
@@ -156,28 +156,8 @@ def designs(
         # From the highest frequency, where the least is added, down.
         charge = np.diag(effort[-1 - k] + 1e-9 * effort.max()) if k >= 0 else 0.0
         noise = np.diag(heard[-1 - k] + 1e-9 * heard.max()) if k >= 0 else 0.0
-        with contextlib.suppress(SynthesisError):
+        with contextlib.suppress(SolverError):
             regulators.append(regulator(plant, Q, R + charge, S))
-        with contextlib.suppress(SynthesisError):
+        with contextlib.suppress(SolverError):
             filters.append(estimator(plant, W, V + noise, U))
     return regulators, filters
-
-
-def _riccati(
-    what: str, A: FloatArray, B: FloatArray, Q: FloatArray, R: FloatArray, S: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the solution X and the gain -R^-1 (B'X + S')."""
-    if np.linalg.cond(R) > 1e14:
-        free = "an input is free of charge" if what == "regulator" else "a measurement has no noise"
-        raise SynthesisError(f"LQG: the {what}'s weight is singular: {free}")
-    message = f"LQG: the {what}'s Riccati equation has no stabilising solution"
-    try:
-        X = solve_continuous_are(A, B, Q, R, s=S)
-    except (np.linalg.LinAlgError, ValueError) as error:
-        raise SynthesisError(message) from error
-    gain = -np.linalg.solve(R, B.T @ X + S.T)
-    # Far out of scale, or with an undamped mode that is not seen, it may not stabilise.
-    poles = np.linalg.eigvals(A + B @ gain)
-    if poles.real.max(initial=-1.0) > -1e-12 * np.abs(poles).max(initial=1.0):
-        raise SynthesisError(message)
-    return np.asarray(0.5 * (X + X.T)), np.asarray(gain, dtype=np.float64)
