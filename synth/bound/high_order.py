@@ -33,7 +33,7 @@ from models.basics import (
 
 from ..loop import LinearController, Margins, closed_loop_poles, loop_margins
 from .truth import controller_rms, densities, filter_plant, frequencies
-from .youla import Truth, YoulaDesign, margin_grid, upper_triangle
+from .youla import Truth, YoulaDesign, margin_grid, realised_basis, upper_triangle
 
 _LOST = 0.02  # of the rms, by the truncation
 SPARE = 0.97  # of the M_s above one, asked of the full order
@@ -93,7 +93,7 @@ def roots(design: YoulaDesign) -> tuple[FloatArray, FloatArray]:
     through = blocks.estimated.swapaxes(1, 2) @ loop.K[0] + blocks.M[:, None] * Q
     of_observer = loop.feedback.response(omega).yu[:, 0] + (through[:, None] @ blocks.error)[:, 0]
     count = loop.poles.size
-    A = -np.diag(loop.poles) - 2.0 * np.tril(np.sqrt(np.outer(loop.poles, loop.poles)), -1)
+    A, _ = realised_basis(loop.poles, 1)
     inside = filter_plant(A, np.eye(count), np.eye(count), np.zeros((count, count)))
     of_functions = gains @ inside.response(omega).yu * blocks.M[:, None, None]
     row = np.concatenate([of_observer, of_functions.reshape(len(omega), -1)], axis=1)
