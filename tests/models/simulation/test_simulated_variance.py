@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 import pytest
+from sampled_response import sampled_response
 
 from models import Case, HookMotion, build_plant, load_case
 from models.plant import DriveLimits
@@ -71,7 +72,7 @@ def sampled_rms(case: Case, controller: LinearFeedback, drag: float) -> dict[str
     T = controller.sample_time
     loop = sampled_loop(case, build_plant(case), controller.recursion, T, drag=drag)
     omega = np.geomspace(*hook.band, 3001)
-    rows = loop.response("hook.heave", OUTPUTS, omega)
+    rows = sampled_response(case, loop, OUTPUTS, omega)
     motor = case.winch.motor
     if motor.type == "dc" and motor.inductance == 0.0:
         # The torque jumps with the voltage; a run logs it just after, not before the jump.

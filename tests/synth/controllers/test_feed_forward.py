@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from linear_runs import linear_run, sine_part, still, swell
+from sampled_response import sampled_response
 
 from models import Case, load_case
 from models.basics import InputError, SynthesisError
@@ -34,7 +35,7 @@ def short_filter() -> Case:
 def residual(controller: VelocityFeedForward, case: Case, omega: float) -> complex:
     """1 + X/Z: what the upper end of the rope still moves."""
     loop = sampled_loop(case, build_plant(case), controller.recursion, controller.sample_time)
-    return 1.0 + complex(loop.response("hook.heave", ["drum.haul"], [omega])["drum.haul"][0])
+    return 1.0 + complex(sampled_response(case, loop, ["drum.haul"], [omega])["drum.haul"][0])
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -43,7 +44,7 @@ def test_slow_heave_is_left_but_for_its_share(name: str, share: float) -> None:
     case = without_filter(name)
     controller = VelocityFeedForward(case, share=share)
     loop = sampled_loop(case, build_plant(case), controller.recursion, 0.02)
-    found = loop.response("hook.heave", ["payload.displacement"], [0.05])
+    found = sampled_response(case, loop, ["payload.displacement"], [0.05])
     assert abs(found["payload.displacement"][0]) == pytest.approx(1.0 - share, abs=0.004)
 
 
@@ -62,7 +63,7 @@ def test_on_a_long_rope_the_payload_resonates_with_what_is_left() -> None:
     case = load_case("thesis-1975-rope")
     controller = VelocityFeedForward(case)
     loop = sampled_loop(case, build_plant(case), controller.recursion, 0.02, drag=5e3)
-    found = loop.response("hook.heave", ["payload.displacement", "drum.haul"], [1.0])
+    found = sampled_response(case, loop, ["payload.displacement", "drum.haul"], [1.0])
     assert abs(1.0 + found["drum.haul"][0]) < 0.12
     assert abs(found["payload.displacement"][0]) > 1.0
 
@@ -86,7 +87,7 @@ def test_lead_makes_up_for_a_late_mru() -> None:
 
     def haul(controller: VelocityFeedForward) -> complex:
         loop = sampled_loop(late, build_plant(late), controller.recursion, 0.02)
-        return complex(loop.response("hook.heave", ["drum.haul"], [omega])["drum.haul"][0])
+        return complex(sampled_response(late, loop, ["drum.haul"], [omega])["drum.haul"][0])
 
     # X/Z is to be -0.9; what is late turns it, what looks ahead turns it back.
     angle = omega * (0.25 + DrumSpeedLoop.from_case(late).delay_at(omega))

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linear_runs import linear_run, still
+from sampled_response import sampled_response
 
 from models import Case, load_case
 from models.basics import InputError, SynthesisError
@@ -34,9 +35,10 @@ def test_bandwidth_is_that_asked_for(case: Case) -> None:
     loop = DrumSpeedLoop.from_case(case, sample_time=5e-4, bandwidth=10.0)
     assert loop.bandwidth == 10.0
     omega = np.array([6.0, 10.0, 20.0, 40.0])
-    found = sampled_loop(case, build_plant(case), loop.recursion(), 5e-4).response(
-        "reference.displacement", ["drum.haul"], omega
-    )["drum.haul"]
+    made = sampled_loop(case, build_plant(case), loop.recursion(), 5e-4)
+    found = sampled_response(case, made, ["drum.haul"], omega, source="reference.displacement")[
+        "drum.haul"
+    ]
     s = 1j * omega
     assert np.abs(found - (10.0 * s + 25.0) / (s + 5.0) ** 2).max() < 0.02
 
@@ -112,9 +114,10 @@ def test_the_delay_is_that_of_the_sampled_loop(sample_time: float) -> None:
     case = torque_commanded()
     loop = DrumSpeedLoop.from_case(case, sample_time=sample_time)
     omega = np.array([6.0, 9.0])
-    found = sampled_loop(case, build_plant(case), loop.recursion(), sample_time).response(
-        "reference.displacement", ["drum.haul"], omega
-    )["drum.haul"]
+    made = sampled_loop(case, build_plant(case), loop.recursion(), sample_time)
+    found = sampled_response(case, made, ["drum.haul"], omega, source="reference.displacement")[
+        "drum.haul"
+    ]
     expected = [loop.delay_at(w) for w in omega]
     assert -np.angle(found) / omega == pytest.approx(expected, rel=0.05)
 
