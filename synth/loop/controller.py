@@ -116,7 +116,15 @@ def closed_loop_matrix(plant: LinearPlant, controller: LinearController) -> Floa
 
     Delays of the plant are ignored: replace them first (`LinearPlant.without_delays`).
     """
-    return closed_loop_plant(plant, controller).A
+    inverse = np.linalg.inv(np.eye(len(plant.inputs)) - controller.D @ plant.D)
+    on_plant, on_states = inverse @ controller.D @ plant.C, inverse @ controller.C
+    heard = plant.C + plant.D @ on_plant
+    return np.block(
+        [
+            [plant.A + plant.B @ on_plant, plant.B @ on_states],
+            [controller.B @ heard, controller.A + controller.B @ plant.D @ on_states],
+        ]
+    )
 
 
 def closed_loop_poles(plant: LinearPlant, controller: LinearController) -> ComplexArray:

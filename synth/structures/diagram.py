@@ -24,7 +24,7 @@ import numpy.typing as npt
 from models.basics import ComplexArray, FloatArray, pick
 from models.plant import LinearPlant
 
-from ..loop import LinearController
+from ..loop import LinearController, closed_loop_matrix
 from .blocks import FilterSection, Matrices, series
 from .structure import Bounds, Parameter, ParametrisedController, check_bounds
 
@@ -118,34 +118,19 @@ class DiagramLaw(ParametrisedController):
         return start
 
     def controller(self, values: Sequence[float]) -> LinearController:
-        """Return the controller in state space; measurements that are not heard are left out."""
-        A, B, C, D = self.matrices(values)
-        heard = [self._columns[name] for name in self.heard]
-        unheard = np.zeros((len(A), len(self._plant.measurements)))
-        through = np.zeros((1, len(self._plant.measurements)))
-        unheard[:, heard], through[:, heard] = B, D
-        return LinearController(
-            A=A,
-            B=unheard,
-            C=C,
-            D=through,
-            measurements=self._plant.measurements,
-            inputs=self._plant.inputs,
-        )
-
-    def matrices(self, values: Sequence[float]) -> Matrices:
-        """Return A, B, C, D from what is heard (`heard`) to the command."""
+        """Return the controller in state space; it has zeros for what it does not hear."""
         gains = dict(zip(self._gains, values[: len(self._gains)], strict=True))
-        summed = [self._group(group, values, gains) for group in self._groups]
-        return _parallel(summed)
+        A, B, C, D = _parallel([self._group(group, values, gains) for group in self._groups])
+        names = self._plant.measurements, self._plant.inputs
+        return LinearController(A=A, B=B, C=C, D=D, measurements=names[0], inputs=names[1])
 
     def _group(self, group: Group, values: Sequence[float], gains: Mapping[str, float]) -> Matrices:
-        parts = []
+        parts, ny = [], len(self._plant.measurements)
         for branch in group.branches:
-            row = np.zeros((1, len(self.heard)))
+            row = np.zeros((1, ny))
             for name, weight in branch.weights.items():
-                row[0, self.heard.index(name)] += weight(gains)
-            empty = np.zeros((0, 0)), np.zeros((0, len(self.heard))), np.zeros((1, 0)), row
+                row[0, self._columns[name]] += weight(gains)
+            empty = np.zeros((0, 0)), np.zeros((0, ny)), np.zeros((1, 0)), row
             parts.append(self._behind(empty, branch.sections, values))
         return self._behind(_parallel(parts), group.sections, values)
 
@@ -164,20 +149,9 @@ class DiagramLaw(ParametrisedController):
         the controller does not hear (sensors that it has no use for) keep their own poles,
         which `_looped` has checked.
         """
-        A, B, C, D = self.matrices(values)
-        keep = self._looped(plant)
-        heard = [plant.measurements.index(name) for name in self.heard]
-        Ap, Bp = plant.A[np.ix_(keep, keep)], plant.B[keep]
-        Cp, Dp = plant.C[heard][:, keep], plant.D[heard]
-        n = len(Ap)
-        factor = 1.0 / (1.0 - float((D @ Dp)[0, 0]))  # one command: a scalar
-        on_plant, on_states = factor * (D @ Cp), factor * C
-        loop = np.empty((n + len(A), n + len(A)))
-        loop[:n, :n] = Ap + Bp @ on_plant
-        loop[:n, n:] = Bp @ on_states
-        loop[n:, :n] = B @ (Cp + Dp @ on_plant)
-        loop[n:, n:] = A + B @ Dp @ on_states
-        return loop
+        whole = closed_loop_matrix(plant, self.controller(values))
+        inside = np.append(self._looped(plant), np.arange(len(plant.A), len(whole)))
+        return np.asarray(whole[np.ix_(inside, inside)])
 
     def _looped(self, plant: LinearPlant) -> npt.NDArray[np.intp]:
         """Return the states of the plant that are part of the loop."""

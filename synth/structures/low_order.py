@@ -164,33 +164,12 @@ class LowOrderLaw(ParametrisedController):
 
     @override
     def controller(self, values: Sequence[float]) -> LinearController:
-        A, B, C, D = self._matrices(values)
-        names = self._plant.measurements, self._plant.inputs
-        return LinearController(A=A, B=B, C=C, D=D, measurements=names[0], inputs=names[1])
-
-    @override
-    def closed_loop_matrix(self, plant: LinearPlant, values: Sequence[float]) -> FloatArray:
-        # The optimiser asks for this at every step: no checks, no objects.
-        A, B, C, D = self._matrices(values)
-        n, m = len(plant.A), len(plant.A) + len(A)
-        loop = np.zeros((m, m))
-        on_plant, on_states = D @ plant.C, C  # u = on_plant x + on_states xk
-        if np.any(D) and np.any(plant.D):
-            inverse = np.linalg.inv(np.eye(len(D)) - D @ plant.D)
-            on_plant, on_states = inverse @ on_plant, inverse @ on_states
-        loop[:n, :n] = plant.A + plant.B @ on_plant
-        loop[:n, n:] = plant.B @ on_states
-        loop[n:, :n] = B @ (plant.C + plant.D @ on_plant)
-        loop[n:, n:] = A + B @ plant.D @ on_states
-        return loop
-
-    def _matrices(
-        self, values: Sequence[float]
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         numbers = np.asarray(values, dtype=np.float64)
+        A, B, C = self._form.matrices(numbers)
         D = np.zeros((self._form.nu, self._form.ny))
         D.flat[: numbers[self._direct].size] = numbers[self._direct]
-        return *self._form.matrices(numbers), D
+        names = self._plant.measurements, self._plant.inputs
+        return LinearController(A=A, B=B, C=C, D=D, measurements=names[0], inputs=names[1])
 
     def values(self, controller: LinearController) -> FloatArray:
         """Return the parameters of a controller, whose order may be lower than the law's."""

@@ -228,21 +228,10 @@ class _GainLaw(ParametrisedController):
         return gain
 
     def controller(self, values: Sequence[float]) -> LinearController:
-        gain = self._gain(values)
-        return LinearController.static(gain, self._plant.measurements, self._plant.inputs)
-
-    def closed_loop_matrix(self, plant: LinearPlant, values: Sequence[float]) -> FloatArray:
-        # The optimiser asks for this at every step: no checks, no objects.
-        gain = self._gain(values)
-        if np.any(plant.D):
-            gain = np.array(np.linalg.solve(np.eye(len(gain)) - gain @ plant.D, gain), float)
-        return np.asarray(plant.A + plant.B @ gain @ plant.C)
-
-    def _gain(self, values: Sequence[float]) -> FloatArray:
         gain = np.zeros((len(self._plant.inputs), len(self._plant.measurements)))
         for k, (i, j) in enumerate(self._entries):
             gain[i, j] = values[k] * self._factors[k]
-        return gain
+        return LinearController.static(gain, self._plant.measurements, self._plant.inputs)
 
     def guesses(self, problem: GeneralisedPlant, omega: FloatArray) -> FloatArray:
         """Return state feedback, projected on what is measured.
