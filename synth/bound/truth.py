@@ -235,7 +235,7 @@ def controller_rms(
             f"bound: the controller's loop is unstable (growth rate {poles.real.max():.3g} 1/s)"
         )
     marks = np.concatenate([poles, plant.poles(), np.linalg.eigvals(law.A)])
-    loop = Loop(plant=plant.response_at, law=law, marks=marks)
+    loop = Loop(plant=plant, law=law, marks=marks)
     # Only a controller with a direct path makes a delayed loop ring.
     late = max(plant.delays, default=0.0) if np.any(law.D) else 0.0
     inside = [banded(source) for source in sources]

@@ -118,12 +118,18 @@ class Demand:
         room = tolerance * abs(self.bound)
         return value >= self.bound - room if self.at_least else value <= self.bound + room
 
-    def measured(self, loop: Loop, margins: CurveMargins, moments: Moments) -> float:
-        """Return what a loop, its margins and its m0 (and m2) make of the limit."""
+    def measured(
+        self,
+        loop: Loop,
+        margins: CurveMargins,
+        region: tuple[ComplexArray, ComplexArray],
+        moments: Moments,
+    ) -> float:
+        """Return what a loop, its margins, its poles and its m0 (and m2) make of the limit."""
         if self.kind in _MARGINS:
             return float(getattr(margins, self.kind))
         if self.kind in _POLES:
-            return _pole_figure(self.kind, loop.closed, loop.models)
+            return _pole_figure(self.kind, *region)
         if self.kind in ("low_frequency", "weighted"):
 
             def drift(omega: FloatArray) -> FloatArray:
@@ -137,7 +143,7 @@ class Demand:
             ends = min(1e-4, 0.01 * float(marks.min())), 100.0 * float(marks.max())
             return largest(drift, *ends, loop.marks)
         if self.kind == "roll_off":
-            loops = [loop.broken(i) for i in range(loop.inputs)]
+            loops = [loop.broken(i) for i in range(len(loop.plant.inputs))]
 
             def gain(omega: FloatArray) -> FloatArray:
                 s = imaginary(omega)

@@ -67,15 +67,12 @@ class Curve:
 
     def __init__(self, difference: Function, marks: ComplexArray, low: float, high: float) -> None:
         self._difference = difference
-        found = trace(
-            difference,
-            lambda t: 1j * np.exp(t),
-            np.log(lively(low, high, marks)),
-            loop_floor=_FLOOR,
-        )
-        if found.failure:
-            raise SolverError(f"verification: the Nyquist curve: {found.failure}")
-        self.t, self.values = found.t, found.values
+        start = np.log(lively(low, high, marks))
+        try:
+            found = trace(difference, lambda t: 1j * np.exp(t), start, loop_floor=_FLOOR)
+        except SolverError as error:
+            raise SolverError(f"verification: the Nyquist curve: {error}") from error
+        self.t, self.values = found
         self._add_hidden_crossings()
 
     @property

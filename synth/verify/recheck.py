@@ -13,11 +13,11 @@ import numpy.typing as npt
 from models.basics import ComplexArray, SolverError, StillhookError
 from models.plant import LinearPlant, PlantResponse
 
-from .claims import LimitClaim, SpectralSource
+from .claims import ControllerMatrices, LimitClaim, SpectralSource
 from .demands import Demand
 from .nyquist import CurveMargins, curve_margins
 from .recompute import LawMatrices, Loop, closed_matrices, moments
-from .verification import Check, agreement, failure
+from .verification import Check, Verification, agreement, failure
 from .winding import Winding, count_unstable, open_loop_poles
 
 PADE = 8  # order of the delay models: those of the optimiser have five or six
@@ -26,12 +26,22 @@ _LATE, _LATE_PADE = 0.2, 12  # delay beyond which that is too little [s], and th
 TIGHT = 1e-4  # of margins, drag and limits on the design's own plant
 
 
-def guarded(name: str, make: Callable[[], list[Check]]) -> list[Check]:
-    """Return some checks, or one that failed if they cannot be computed at all."""
-    try:
-        return make()
-    except (StillhookError, np.linalg.LinAlgError, ValueError, ArithmeticError, KeyError) as error:
-        return [failure(name, f"could not be computed: {error}")]
+def looked_at(steps: Mapping[str, Callable[[], list[Check]]], on: str) -> Verification:
+    """Return the verification of checks by name, those that cannot be computed among the failed.
+
+    `on` is what the loop was found stable on; without that, by the first checks, the others mean
+    nothing and are not made.
+    """
+    checks: list[Check] = []
+    for name, make in steps.items():
+        try:
+            checks += make()
+        except (StillhookError, np.linalg.LinAlgError, ValueError, ArithmeticError, KeyError) as e:
+            checks.append(failure(name, f"could not be computed: {e}"))
+        if name == "stability" and not all(check.ok for check in checks):
+            break
+    count = sum(check.counts for check in checks)
+    return Verification.of(checks, f"verified{on}, {count} checks passed")
 
 
 def winding_of_plant(plant: LinearPlant, law: LawMatrices, marks: npt.ArrayLike = ()) -> Winding:
@@ -47,7 +57,7 @@ def winding_of_plant(plant: LinearPlant, law: LawMatrices, marks: npt.ArrayLike 
         Further points [1/s] near which the loop is lively, such as its closed-loop poles.
     """
     poles = np.concatenate([open_loop_poles(plant.A), open_loop_poles(law.A)])
-    loop = Loop(plant=plant.response_at, law=law, marks=poles)
+    loop = Loop(plant=plant, law=law, marks=poles)
     # A direct path that is late turns for ever; one that is not ends at a number.
     through = np.eye(len(plant.inputs)) - law.D @ plant.D
     limit = 1.0 if any(plant.delays) else float(np.linalg.det(through))
@@ -102,48 +112,39 @@ def closed_loop_marks(plant: LinearPlant, law: LawMatrices) -> ComplexArray:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CheckedLoop:
-    """A controller around a plant, put together again.
+class CheckedLoop(Loop):
+    """A loop put together again, and what shakes it, the `sources`."""
 
-    Attributes
-    ----------
-    plant
-        The plant, its drag in it.
-    law
-        The controller's matrices.
-    sources
-        What shakes it.
-    exact
-        Points s -> the plant's blocks, where they are not those of `plant` (a distributed rope).
-    marks
-        Further points [1/s] near which something happens.
-    """
-
-    plant: LinearPlant
-    law: LawMatrices
     sources: Sequence[SpectralSource]
-    exact: Callable[[ComplexArray], PlantResponse] | None = None
-    marks: Sequence[complex] = ()
+
+    @classmethod
+    def of(
+        cls,
+        plant: LinearPlant,
+        controller: ControllerMatrices,
+        sources: Sequence[SpectralSource],
+        exact: Callable[[ComplexArray], PlantResponse] | None = None,
+    ) -> CheckedLoop:
+        """Return the loop of a controller around a plant."""
+        law = LawMatrices.of(controller, plant)
+        marks = closed_loop_marks(plant, law)
+        return cls(plant=plant, law=law, marks=marks, exact=exact, sources=sources)
 
     @cached_property
-    def loop(self) -> Loop:
-        """The closed loop by its responses."""
-        marks = closed_loop_marks(self.plant, self.law)
+    def region(self) -> tuple[ComplexArray, ComplexArray]:
+        """Poles [1/s] of the closed loop and of its delay models, where limits on them hold."""
         rational = self.plant.without_delays(pade_order(self.plant, _COUNTED_PADE))
         own = len(self.plant.states)
-        return Loop(
-            plant=self.exact or self.plant.response_at,
-            law=self.law,
-            marks=np.concatenate([marks, np.asarray(self.marks, dtype=np.complex128)]),
-            inputs=len(self.plant.inputs),
-            closed=np.linalg.eigvals(closed_matrices(rational, self.law)[0]).astype(np.complex128),
-            models=np.linalg.eigvals(rational.A[own:, own:]).astype(np.complex128),
-        )
+        closed = closed_matrices(rational, self.law)[0], rational.A[own:, own:]
+        poles, models = (np.linalg.eigvals(A).astype(np.complex128) for A in closed)
+        return poles, models
 
     @cached_property
     def margins(self) -> CurveMargins:
-        """Its margins, root by root."""
-        return loop_margins(self.loop)
+        """Its margins, root by root: the worst over all loops broken at an input."""
+        count = len(self.plant.inputs)
+        pieces = (curve_margins(self.broken(i), self.marks) for i in range(count))
+        return reduce(CurveMargins.worse, pieces)
 
     def moments(
         self, outputs: Sequence[str], orders: tuple[int, ...] = (0, 2)
@@ -151,11 +152,11 @@ class CheckedLoop:
         """Return spectral moments of outputs, by name."""
         delay = max(self.plant.delays, default=0.0)
         if all(source.band is not None for source in self.sources):
-            return moments(self.loop, outputs, self.sources, orders=orders, delay=delay)
+            return moments(self, outputs, self.sources, orders=orders, delay=delay)
         found: dict[str, tuple[float, ...]] = {}
         for name in outputs:  # to infinity, where one output may have no variance
             try:
-                found |= moments(self.loop, [name], self.sources, orders=orders, delay=delay)
+                found |= moments(self, [name], self.sources, orders=orders, delay=delay)
             except SolverError:
                 found[name] = (math.inf,) * len(orders)
         return found
@@ -175,6 +176,10 @@ class CheckedLoop:
         for wanted in sorted(set(orders.values())):
             found |= self.moments(sorted(n for n, o in orders.items() if o == wanted), wanted)
         return found
+
+    def measured(self, demand: Demand, moments: Mapping[str, tuple[float, ...]]) -> float:
+        """Return what the loop makes of a limit, its spectral moments given by output."""
+        return demand.measured(self, self.margins, self.region, moments)
 
     def limit_checks(
         self,
@@ -208,7 +213,7 @@ class CheckedLoop:
                 note = f"the {by} states it, the {on} does not"
                 checks.append(failure(f"limits.{name}", note))
                 continue
-            value = demand.measured(self.loop, self.margins, moments)
+            value = self.measured(demand, moments)
             check = limit_check(demand, use.value, value)
             note = ""
             if not math.isclose(use.bound, demand.bound, rel_tol=1e-9):
@@ -221,12 +226,6 @@ class CheckedLoop:
         for name in sorted(set(claims) - set(demands)):
             checks.append(failure(f"limits.{name}", f"the {by} has no such limit"))
         return checks
-
-
-def loop_margins(loop: Loop) -> CurveMargins:
-    """Return the worst margins over all loops broken at an input."""
-    pieces = (curve_margins(loop.broken(i), loop.marks) for i in range(loop.inputs))
-    return reduce(CurveMargins.worse, pieces)
 
 
 def margin_checks(claimed: object | None, found: CurveMargins) -> list[Check]:

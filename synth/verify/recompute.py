@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -61,38 +61,38 @@ class LawMatrices:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Loop:
-    """A plant, known by its responses, with a controller around it.
+    """A plant with a controller around it, known by their responses.
 
     Attributes
     ----------
     plant
-        Points s [1/s] -> its four blocks, delays exact.
+        The plant, its drag in it and its delays exact.
     law
-        Points s [1/s] -> C(s), (k, nu, ny), for u = +C y.
+        The controller's matrices, for u = +C y.
     marks
         Poles [1/s] near which something happens: of the open and of the closed loop.
-    inputs
-        Number of inputs, that is of loops to break.
-    closed, models
-        Poles [1/s] of the closed loop and of its delay models, where limits on them are measured.
+    exact
+        Points s -> the plant's blocks, where they are not those of `plant` (a distributed rope).
     """
 
-    plant: Callable[[ComplexArray], PlantResponse]
-    law: Callable[[ComplexArray], ComplexArray]
+    plant: LinearPlant
+    law: LawMatrices
     marks: ComplexArray
-    inputs: int = 1
-    closed: ComplexArray = field(default_factory=lambda: np.zeros(0, dtype=np.complex128))
-    models: ComplexArray = field(default_factory=lambda: np.zeros(0, dtype=np.complex128))
+    exact: Callable[[ComplexArray], PlantResponse] | None = None
+
+    def blocks(self, s: ComplexArray) -> PlantResponse:
+        """Return the plant's four blocks at points s [1/s]."""
+        return self.plant.response_at(s) if self.exact is None else self.exact(s)
 
     def difference(self, s: ComplexArray) -> ComplexArray:
         """Return det(I - C P_yu), (k,)."""
-        return np.asarray(np.linalg.det(self._matrix(s, self.plant(s))), dtype=np.complex128)
+        return np.asarray(np.linalg.det(self._matrix(s, self.blocks(s))), dtype=np.complex128)
 
     def broken(self, index: int) -> Function:
         """Return 1 + L of loop `index`, all others closed, as a function of s."""
 
         def difference(s: ComplexArray) -> ComplexArray:
-            matrix = self._matrix(s, self.plant(s))
+            matrix = self._matrix(s, self.blocks(s))
             if matrix.shape[1] == 1:
                 return matrix[:, 0, 0]
             return np.asarray(1.0 / np.linalg.inv(matrix)[:, index, index])
@@ -103,7 +103,7 @@ class Loop:
         self, s: ComplexArray, outputs: Sequence[str], disturbances: Sequence[str]
     ) -> ComplexArray:
         """Return the closed-loop responses, (k, outputs, disturbances)."""
-        blocks = self.plant(s).select(outputs=outputs, disturbances=disturbances)
+        blocks = self.blocks(s).select(outputs=outputs, disturbances=disturbances)
         heard = self.law(s) @ blocks.yw
         command = np.linalg.solve(self._matrix(s, blocks), heard)
         return np.asarray(blocks.zw + blocks.zu @ command, dtype=np.complex128)

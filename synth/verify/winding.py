@@ -28,7 +28,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from models.basics import ComplexArray, FloatArray
+from models.basics import ComplexArray, FloatArray, SolverError
 
 Function = Callable[[ComplexArray], ComplexArray]
 
@@ -39,26 +39,6 @@ _AT_ORIGIN = 1e-5  # ... and over the smallest pole's, for the one around the or
 _TAIL, _LOOSE_TAIL = 0.1, 0.9  # |D/D(inf) - 1| beyond the contour: wanted, and enough
 _MOST_POINTS = 200_000
 _PER_DECADE = 40
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PhaseTrace:
-    """A complex function along a path, on points close enough to follow its phase.
-
-    Attributes
-    ----------
-    t, values
-        Path coordinates, ascending (k,), and the function there (k,).
-    turn
-        Change of its phase from the first point to the last [rad].
-    failure
-        Why the phase could not be followed; empty if it could.
-    """
-
-    t: FloatArray
-    values: ComplexArray
-    turn: float
-    failure: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +84,7 @@ def trace(
     start: npt.ArrayLike,
     *,
     loop_floor: float | None = None,
-) -> PhaseTrace:
+) -> tuple[FloatArray, ComplexArray]:
     """Follow a function along a path, on as many points as its phase needs.
 
     Parameters
@@ -118,35 +98,56 @@ def trace(
         resonance, which is what `lively` is for.
     loop_floor
         If given, L = D - 1 is followed in the same way wherever |L| is above this.
+
+    Returns
+    -------
+    tuple
+        Path coordinates, ascending (k,), and the function there (k,).
+
+    Raises
+    ------
+    SolverError
+        If the phase cannot be followed.
     """
     t = np.unique(np.asarray(start, dtype=np.float64))
     values = function(path(t))
     confirmed = np.zeros(t.size - 1, dtype=np.bool_)
     while True:
         if not np.all(np.isfinite(values)) or np.any(values == 0.0):
-            return PhaseTrace(t=t, values=values, turn=np.nan, failure="a pole lies on the contour")
+            raise SolverError("a pole lies on the contour")
         smooth = _smooth(values)
         if loop_floor is not None:
             small = np.maximum(np.abs(values[1:] - 1.0), np.abs(values[:-1] - 1.0)) < loop_floor
             smooth &= small | _smooth(values - 1.0)
         cut = np.flatnonzero(~(smooth & confirmed))
         if not cut.size:
-            steps = np.angle(values[1:] / values[:-1])
-            return PhaseTrace(t=t, values=values, turn=float(steps.sum()))
+            return t, values
         width = np.abs(path(t[cut + 1]) - path(t[cut]))
         if np.any((width < 1e-13 * np.abs(path(t[cut]))) & ~smooth[cut]):
             where = complex(path(t[cut[[int(np.argmin(width))]]])[0])
-            text = f"a pole lies on the contour at s = {where:.6g} 1/s"
-            return PhaseTrace(t=t, values=values, turn=np.nan, failure=text)
+            raise SolverError(f"a pole lies on the contour at s = {where:.6g} 1/s")
         if t.size + cut.size > _MOST_POINTS:
-            text = f"the phase cannot be followed with {_MOST_POINTS} points"
-            return PhaseTrace(t=t, values=values, turn=np.nan, failure=text)
+            raise SolverError(f"the phase cannot be followed with {_MOST_POINTS} points")
         middle = 0.5 * (t[cut] + t[cut + 1])
         # Both halves of an interval that looked smooth are its proof, if they are smooth too.
         confirmed[cut] = smooth[cut]
         confirmed = np.insert(confirmed, cut, smooth[cut])
         values = np.insert(values, cut + 1, function(path(middle)))
         t = np.insert(t, cut + 1, middle)
+
+
+def turn(
+    function: Function, path: Callable[[FloatArray], ComplexArray], start: FloatArray
+) -> float:
+    """Return the change of a function's phase along a path [rad], followed as by `trace`.
+
+    Raises
+    ------
+    SolverError
+        If the phase cannot be followed.
+    """
+    _, values = trace(function, path, start)
+    return float(np.angle(values[1:] / values[:-1]).sum())
 
 
 def count_unstable(
@@ -193,41 +194,41 @@ def count_unstable(
 
     radius, tail = _radius(scaled, 10.0 * largest)
 
-    def failed(why: str) -> Winding:
-        return Winding(open_loop=open_loop, radius=radius, tail=tail, points=points, failure=why)
-
-    if tail > _LOOSE_TAIL:
-        return failed(f"the loop gain does not fall off: |D/D(inf) - 1| is still {tail:.3g}")
-    # Circles first: closed-loop poles that the indented contour leaves out.
     discs = [(0.0, origin, int(np.sum(inside))), *clusters]
-    marginal = 0
-    for at, size, count in discs:
-        stretch = np.pi if at == 0.0 else 2.0 * np.pi  # at the origin, half is the mirror image
-        circle = trace(scaled, _arc(at, size), np.linspace(0.0, stretch, 17))
-        if circle.failure:
-            return failed(circle.failure)
-        zeros = count + circle.turn / stretch
-        if abs(zeros - round(zeros)) > 0.05:
-            return failed(f"the circle around {at:.4g} rad/s does not close: {zeros:.3f} poles")
-        marginal += round(zeros) * (1 if at == 0.0 else 2)
-    turn = 0.0
-    for path, start in _contour(discs, radius, marks, per_decade):
-        piece = trace(scaled, path, start)
-        if piece.failure:
-            return failed(piece.failure)
-        turn += piece.turn
-    # Clockwise, and both halves turn alike: Z - P = -(2 turn) / (2 pi).
-    zeros = open_loop - turn / np.pi
-    if abs(zeros - round(zeros)) > 0.05:
-        return failed(f"the contour does not close: {zeros:.3f} poles")
+    unstable, marginal, failure = -1, 0, ""
+    try:
+        if tail > _LOOSE_TAIL:
+            raise SolverError(
+                f"the loop gain does not fall off: |D/D(inf) - 1| is still {tail:.3g}"
+            )
+        # Circles first: closed-loop poles that the indented contour leaves out.
+        for at, size, count in discs:
+            stretch = np.pi if at == 0.0 else 2.0 * np.pi  # at the origin, half is the mirror image
+            around = turn(scaled, _arc(at, size), np.linspace(0.0, stretch, 17)) / stretch
+            zeros = _whole(count + around, f"the circle around {at:.4g} rad/s")
+            marginal += zeros * (1 if at == 0.0 else 2)
+        pieces = _contour(discs, radius, marks, per_decade)
+        turned = sum(turn(scaled, path, start) for path, start in pieces)
+        # Clockwise, and both halves turn alike: Z - P = -(2 turn) / (2 pi).
+        unstable = _whole(open_loop - turned / np.pi, "the contour")
+    except SolverError as error:
+        failure = str(error)
     return Winding(
-        unstable=round(zeros),
+        unstable=unstable,
         marginal=marginal,
         open_loop=open_loop,
         radius=radius,
         tail=tail,
         points=points,
+        failure=failure,
     )
+
+
+def _whole(zeros: float, what: str) -> int:
+    """Return a number of poles that a closed path has counted."""
+    if abs(zeros - round(zeros)) > 0.05:
+        raise SolverError(f"{what} does not close: {zeros:.3f} poles")
+    return round(zeros)
 
 
 def open_loop_poles(A: npt.ArrayLike) -> ComplexArray:

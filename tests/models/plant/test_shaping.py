@@ -107,7 +107,7 @@ def test_white_noise_through_an_oscillator(zeta: float) -> None:
     assert by_time["x"] == pytest.approx(0.25 / zeta, rel=1e-9)
     assert by_time["v"] == pytest.approx(0.25 / zeta, rel=1e-9)
     source = Source(name="w", density=lambda w: np.full(w.shape, 1 / np.pi), band=None)
-    loop = Loop(plant=plant.response_at, law=law, marks=plant.poles())
+    loop = Loop(plant=plant, law=law, marks=plant.poles())
     found = moments(loop, ["x", "v"], [source], orders=(0,))
     assert found["x"][0] == pytest.approx(0.25 / zeta, rel=1e-7)
     assert found["v"][0] == pytest.approx(0.25 / zeta, rel=1e-7)
@@ -121,7 +121,7 @@ def test_delay_in_the_loop_agrees_with_its_pade_model() -> None:
         A=np.array([[-2.0]]), B=np.array([[1.0]]), C=np.array([[1.5]]), D=np.array([[-0.3]])
     )
     source = Source(name="w", density=lambda w: np.full(w.shape, 2 / np.pi), band=None)
-    loop = Loop(plant=plant.response_at, law=law, marks=plant.poles())
+    loop = Loop(plant=plant, law=law, marks=plant.poles())
     spectral = moments(loop, ["x", "u"], [source], orders=(0,), delay=0.4)
     rational = plant.without_delays(10, at="measurements")
     by_time = lyapunov_variances(rational, law, {"w": 2.0})
@@ -143,7 +143,7 @@ def test_white_noise_straight_through_has_no_variance() -> None:
     assert found["x"] == pytest.approx(1.5)
     assert found["n"] == np.inf
     source = Source(name="w1", density=np.ones_like, band=None)
-    loop = Loop(plant=plant.response_at, law=no_law(plant), marks=plant.poles())
+    loop = Loop(plant=plant, law=no_law(plant), marks=plant.poles())
     with pytest.raises(SolverError, match="does not converge"):
         moments(loop, ["n"], [source], orders=(0,))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from models.plant import LinearPlant, PlantData, build_plant, line_response
 from synth.verify import LawMatrices, Loop, closed_matrices, winding_of_plant
 from synth.verify.nyquist import curve_margins, largest
 from synth.verify.recheck import closed_loop_marks
-from synth.verify.winding import count_unstable, lively, open_loop_poles, trace
+from synth.verify.winding import count_unstable, lively, open_loop_poles, trace, turn
 
 
 @pytest.mark.parametrize(
@@ -160,7 +162,8 @@ def test_the_distributed_rope_is_counted_as_its_masses_are() -> None:
         gains = scale * np.array([[10000.0, 20000.0, 20000.0]])
         law = LawMatrices(A=np.zeros((0, 0)), B=np.zeros((0, 3)), C=np.zeros((1, 0)), D=-gains)
         marks = closed_loop_marks(plant, law)
-        rope = Loop(plant=lambda s: line_response(data, s, drag=5000.0), law=law, marks=marks)
+        line = partial(line_response, data, drag=5000.0)
+        rope = Loop(plant=plant, exact=line, law=law, marks=marks)
         found = count_unstable(rope.difference, poles=[0.0], marks=marks)
         closed = np.linalg.eigvals(closed_matrices(plant, law)[0])
         assert found.unstable == int(np.sum(closed.real > 0.0))
@@ -170,10 +173,11 @@ def test_the_distributed_rope_is_counted_as_its_masses_are() -> None:
 
 
 def test_trace_follows_a_phase_through_many_turns() -> None:
-    path = trace(lambda s: np.exp(-40.0 * s), lambda t: 1j * t, np.array([0.0, 1.0]))
+    path = lambda s: np.exp(-40.0 * s), lambda t: 1j * t, np.array([0.0, 1.0])
+    _, values = trace(*path)
     # Two points 40 rad apart look like 40 - 12 pi; every interval is cut, so nothing is lost.
-    assert path.turn == pytest.approx(-40.0, abs=1e-9)
-    assert np.all(np.abs(np.angle(path.values[1:] / path.values[:-1])) <= 0.5)
+    assert turn(*path) == pytest.approx(-40.0, abs=1e-9)
+    assert np.all(np.abs(np.angle(values[1:] / values[:-1])) <= 0.5)
 
 
 def test_lively_has_points_inside_every_resonance() -> None:
