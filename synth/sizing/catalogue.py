@@ -28,7 +28,7 @@ from models.rig import ACMotor, DCMotor, Drive
 
 from ..question import Goal
 from ..search import Progress
-from .follow import Answer, Posed, follow
+from .follow import Answer, follow, posed
 from .motor import MotorData, motor_changes
 from .point import with_target
 
@@ -158,10 +158,10 @@ def choose(
         for i in range(_GEARS):
             gear = float(f"{gears[0] * step**i:.3g}")
             put = case.variant({**motor.changes, "winch.gearbox.ratio": gear})
-            posed = Posed.of(put, structure, masses)
-            problem = posed.problem(with_target(posed, target))
+            question = posed(put, structure, masses)
+            problem = with_target(question, target)
             relaxed = [
-                m.name for m in posed.drive if not m.at_least and not m.name.startswith("rope.")
+                m.name for m in question.drive if not m.at_least and not m.name.startswith("rope.")
             ]
             begins = dict.fromkeys((answer, near))
             tried = (follow(problem, [b], goal=Goal.RELAX, relaxed=relaxed) for b in begins)

@@ -20,7 +20,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -28,8 +27,9 @@ from models.basics import InputError, check_range, one_thread
 from models.case import Case
 
 from ..design import Design, optimise_gains
+from ..question import Problem
 from ..search import Progress
-from .follow import Answer, Posed, begin_from, designed, follow, least_between, slope
+from .follow import Answer, answer_of, asked_by, designed, follow, least_between, posed, slope
 
 _GRID = 7  # gears that are tried before the Brent's method
 _FINE = 2e-3  # of the logarithm of the gear
@@ -106,13 +106,12 @@ class _Gears:
     tell: Progress
     answers: dict[tuple[float, float], Answer | None] = field(default_factory=dict)
 
-    def problem(self, gear: float, radius: float) -> Any:
+    def problem(self, gear: float, radius: float) -> Problem:
         """Return the problem behind a gear."""
         case = self.case.variant(
             {"limits.drive": "report", **gear_changes(self.case, gear, radius)}
         )
-        posed = Posed.of(case, self.structure, self.masses)
-        return posed.asked_by(self.case)
+        return asked_by(self.case, posed(case, self.structure, self.masses))
 
     def at(self, gear: float, radius: float) -> Answer | None:
         """Return the optimum behind a gear, from the nearest that is known."""
@@ -179,7 +178,7 @@ def co_design(
         case=case,
         structure=structure,
         masses=first.masses,
-        begin=_begin(first),
+        begin=answer_of(first),
         tell=tell,
     )
     given = search.cost(own, r0)
@@ -205,17 +204,6 @@ def gear_changes(case: Case, gear: float, radius: float | None = None) -> dict[s
             case.winch.drum.inertia * (radius / case.drum_radius) ** _DRUM
         )
     return changes
-
-
-def _begin(first: Design) -> Answer | None:
-    posed = Posed.of(first.case, first.structure, first.masses)
-    problem = (
-        posed.asked_by(first.case)
-        if first.drive_kept and first.feasible
-        else posed.problem(posed.loop)
-    )
-    coefficient = first.drag if problem.drag is not None else None
-    return follow(problem, [begin_from(problem, first)], coefficient=coefficient)
 
 
 def _best_gear(

@@ -1,6 +1,6 @@
 r"""Optima followed from case to case: each solved again from its neighbour's answer.
 
-    Posed (case, structure) + neighbour's Answer -> descent on true margins -> Answer
+    case, structure + neighbour's Answer -> descent on true margins -> Answer
 
 A sweep over gear ratios, motors or seas solves nearly the same problem again and again.  Each
 descent begins at its neighbour's answer, where a few steps suffice.  `slope` gives the derivative
@@ -24,7 +24,7 @@ from models.basics import FloatArray
 from models.case import Case
 
 from ..design import Design, Tuning, design_of, tuning_of, verified
-from ..limits import Limit, drive_limits
+from ..limits import drive_limits
 from ..loop import Assessment
 from ..question import PAYLOAD, DesignQuestion, Goal, Problem, pose
 from ..search import (
@@ -45,44 +45,21 @@ _FRESH = 3  # starts where no neighbour's answer is stable
 _PER_DECADE = 60  # margin nodes of a slope
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Posed:
-    """A case and a structure with all limits of the drive, whether the case enforces them or not.
+def posed(case: Case, structure: str, masses: int | None = None) -> DesignQuestion:
+    """Return the question of a case and a structure with all limits of the drive.
 
-    Attributes
-    ----------
-    question
-        As `synth.design.optimise_gains` sees it.
-    loop, drive
-        Limits of the loop, and those of motor, drive and rope.
+    Whether the case enforces them or not.
     """
+    # Posed as one that reports: a motor may be too small for the load at rest.
+    question = pose(case.variant({"limits.drive": "report"}), structure, masses)
+    return replace(question, drive=drive_limits(question.case, question.plant), reported=())
 
-    question: DesignQuestion
-    loop: tuple[Limit, ...]
-    drive: tuple[Limit, ...]
 
-    @classmethod
-    def of(cls, case: Case, structure: str, masses: int | None = None) -> Posed:
-        """Return a case posed for a structure on a number of rope masses."""
-        # Posed as one that reports: a motor may be too small for the load at rest.
-        reporting = case.variant({"limits.drive": "report"})
-        question = pose(reporting, structure, masses)
-        drive = drive_limits(reporting, question.plant)
-        return cls(question=question, loop=question.loop, drive=drive)
-
-    @property
-    def masses(self) -> int:
-        """Rope masses of the plant."""
-        return self.question.masses
-
-    def problem(self, limits: Sequence[Limit]) -> Problem:
-        """Return the problem with some limits."""
-        return self.question.problem_with(limits)
-
-    def asked_by(self, case: Case) -> Problem:
-        """Return the problem with the limits that a case enforces."""
-        drive = self.drive if case.limits.drive == "enforce" else ()
-        return self.problem((*self.loop, *drive))
+def asked_by(case: Case, question: DesignQuestion) -> Problem:
+    """Return the problem of a posed question with the limits that a case enforces."""
+    return question.problem_with(
+        question.limits if case.limits.drive == "enforce" else question.loop
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -153,12 +130,6 @@ def with_bound(problem: Problem, name: str, bound: float) -> Problem:
     return replace(problem, limits=limits)
 
 
-def begin_from(problem: Problem, design: Design) -> FloatArray:
-    """Return a design's parameters as a start for a problem."""
-    values = [design.parameters[p.name] for p in problem.law.parameters]
-    return problem.law.clipped(np.array(values))
-
-
 def follow(
     problem: Problem,
     begins: Sequence[Answer | FloatArray],
@@ -225,12 +196,25 @@ def _arrived(
     return Answer(problem=problem, solved=solved, assessment=assessments[0], excess=excess)
 
 
+def answer_of(design: Design) -> Answer | None:
+    """Return a design as the optimum that others are followed from; None if it cannot be had.
+
+    Of a design that does not keep the limits of its drive: the optimum without them.
+    """
+    question = posed(design.case, design.structure, design.masses)
+    problem = question.problem_with(question.loop)
+    if design.drive_kept and design.feasible:
+        problem = asked_by(design.case, question)
+    values = np.array([design.parameters[p.name] for p in problem.law.parameters])
+    drag = design.drag if problem.drag is not None else None
+    return follow(problem, [problem.law.clipped(values)], coefficient=drag)
+
+
 def designed(
     case: Case, structure: str, near: Answer, masses: int, tell: Progress
 ) -> Design | None:
     """Return the best gains of a case close to a known answer, verified; None if none keep it."""
-    problem = Posed.of(case, structure, masses).asked_by(case)
-    answer = follow(problem, [near])
+    answer = follow(asked_by(case, posed(case, structure, masses)), [near])
     if answer is None:
         return None
     return verified(design_of(pose(case, structure, masses), answer.tuning), tell)

@@ -1,6 +1,6 @@
 r"""Smallest motor behind one gear that meets a target, and what limits it.
 
-    Posed -> least factor on the motor's ratings -> larger rotor -> again -> SizePoint
+    case -> least factor on the motor's ratings -> larger rotor -> again -> SizePoint
 
 For a rotor of fixed inertia the least factor f on torque, current and power with which target and
 all other limits can be kept is one programme (`Goal.RELAX`).  A motor that much larger has a
@@ -19,10 +19,10 @@ from models.basics import InputError, check_range, parse_quantity
 from models.case import Case
 from models.hook import HookMotion
 
-from ..limits import Limit, Rms
-from ..question import Goal, Problem
+from ..limits import Rms
+from ..question import PAYLOAD, DesignQuestion, Goal, Problem
 from ..search import Progress
-from .follow import Answer, Posed, follow
+from .follow import Answer, follow, posed
 from .motor import MotorData, with_motor
 
 TARGET = "payload.displacement.rms"
@@ -89,9 +89,9 @@ class SmallestMotor:
     answer: Answer | None
 
 
-def with_target(posed: Posed, target: float) -> tuple[Limit, ...]:
-    """Return all limits of a case and that of the payload's rms [m]."""
-    return (*posed.loop, *posed.drive, Rms(bound=target, output="payload.displacement"))
+def with_target(question: DesignQuestion, target: float) -> Problem:
+    """Return the problem with all limits of a case and that of the payload's rms [m]."""
+    return question.problem_with((*question.limits, Rms(bound=target, output=PAYLOAD)))
 
 
 def least_motor(
@@ -123,8 +123,8 @@ def least_motor(
     rest = math.log(_at_rest(case, gear))
     size, answer = max(math.log(scale), rest), near
     while len(known) < _STEPS:
-        posed = Posed.of(with_motor(case, math.exp(size), gear), structure, masses)
-        problem = posed.problem(with_target(posed, target))
+        sized = with_motor(case, math.exp(size), gear)
+        problem = with_target(posed(sized, structure, masses), target)
         ratings = [m.name for m in problem.limits if m.name in RATINGS]
         found = follow(problem, [answer], goal=Goal.RELAX, relaxed=ratings)
         if found is None:
@@ -300,8 +300,7 @@ def highest_sea(
         height = asked * math.exp(size)
         sea = case.variant({"sea.significant_height": height})
         aim = target_of(target, float(HookMotion.from_case(sea).displacement.rms))
-        posed = Posed.of(sea, structure, masses)
-        problem = posed.problem(with_target(posed, aim))
+        problem = with_target(posed(sea, structure, masses), aim)
         relaxed = [m.name for m in problem.limits if m.drive and not m.at_least]
         # At a factor of one or less (`extra` at most 0) the winch meets the target there.
         found = follow(problem, [answer], goal=Goal.RELAX, relaxed=relaxed)

@@ -14,8 +14,10 @@ good and the gains are optimised once more: what stillness that buys is what the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 from models.basics import InputError, one_thread
 from models.case import Case
@@ -24,13 +26,28 @@ from ..design import Design, optimise_gains
 from ..limits import Limit
 from ..question import Problem
 from ..search import Progress
-from .follow import Answer, Posed, begin_from, follow, slope, with_bound
+from .follow import Answer, answer_of, asked_by, follow, posed, slope, with_bound
 from .motor import motor_changes
 
 _RPM = 0.10471975511965977
-_NOISE = ("acceleration", "velocity", "displacement")
 #: Natural steps of a limit by its unit [SI].
 _STEPS = {"N m": 1e3, "rad/s": 100.0 * _RPM, "W": 1e5, "V": 100.0, "A": 100.0, "N": 1e4}
+#: Sensors and link: name, path under `sensors`, unit, whether more is better, natural step (a tenth
+#: of it where none is given), and the beginning of the measurements that it tells on.
+_PARTS: tuple[tuple[str, str, str, int, float | None, str], ...] = (
+    ("telemetry delay", "telemetry.delay", "s", -1, 0.01, "payload."),
+    ("telemetry bandwidth", "telemetry.bandwidth", "rad/s", 1, 10.0, "payload."),
+    ("payload sensor bandwidth", "payload.bandwidth", "rad/s", 1, 10.0, "payload."),
+    *(
+        (f"payload {signal} noise", f"payload.{signal}_noise", "", -1, None, f"payload.{signal}")
+        for signal in ("acceleration", "velocity", "displacement")
+    ),
+    ("MRU error", "mru.noise_floor", "m", -1, 0.01, "mru."),
+    ("MRU delay", "mru.delay", "s", -1, 0.01, "mru."),
+    ("MRU heave filter", "mru.heave_filter_period", "s", 0, 10.0, "mru."),
+    ("load cell noise", "load_cell.noise_fraction", "", -1, 0.01, "rope.tension"),
+    ("load cell bandwidth", "load_cell.bandwidth", "rad/s", 1, 10.0, "rope.tension"),
+)
 _STEP = 0.05  # of the logarithm, for the elasticity
 _SMALL = 1e-5  # of the logarithm, for the price
 _FREE = 1e-6  # price below which a limit is one that does not bind
@@ -84,26 +101,23 @@ class Item:
 
 def limit_items(limits: Sequence[Limit]) -> list[Item]:
     """Return the limits of a programme as items."""
-    found = []
-    for limit in limits:
-        kind = "margin"
-        if limit.drive:
-            kind = "rope" if limit.name.startswith("rope.") else "drive"
-        found.append(
-            Item(
-                name=limit.name,
-                kind=kind,
-                value=limit.bound,
-                unit=limit.unit,
-                better=-1 if limit.at_least else 1,
-                step=_STEPS.get(limit.unit, 0.1 * limit.bound),
-                limit=limit.name,
-            )
+    return [
+        Item(
+            name=limit.name,
+            kind=("rope" if limit.name.startswith("rope.") else "drive")
+            if limit.drive
+            else "margin",
+            value=limit.bound,
+            unit=limit.unit,
+            better=-1 if limit.at_least else 1,
+            step=_STEPS.get(limit.unit, 0.1 * limit.bound),
+            limit=limit.name,
         )
-    return found
+        for limit in limits
+    ]
 
 
-def part_items(case: Case, heard: Sequence[str], posed: Posed) -> list[Item]:
+def part_items(case: Case, heard: Sequence[str], heave: float) -> list[Item]:
     """Return gear, motor, sensors and delays that a structure's design depends on.
 
     Parameters
@@ -112,100 +126,65 @@ def part_items(case: Case, heard: Sequence[str], posed: Posed) -> list[Item]:
         The case.
     heard
         Measurements that the structure hears.
-    posed
-        The case posed for it.
+    heave
+        Rms of the hook's heave [m].
     """
-    ratio = case.winch.gearbox.ratio
-    items = [_scaled("gear ratio", "gear", "winch.gearbox.ratio", ratio, "", 0, 0.1 * ratio)]
-    if case.limits.drive == "enforce":
-        torque = case.winch.drive.torque_continuous
-        items.append(
-            Item(
-                name="motor, all of it",
-                kind="drive",
-                value=torque,
-                unit="N m",
-                better=1,
-                step=1e3,
-                changes=lambda f: motor_changes(case, f),
+    ratio, torque = case.winch.gearbox.ratio, case.winch.drive.torque_continuous
+    found = [
+        Item(
+            name="gear ratio",
+            kind="gear",
+            value=ratio,
+            unit="",
+            better=0,
+            step=0.1 * ratio,
+            changes=lambda factor: {"winch.gearbox.ratio": ratio * factor},
+        ),
+        Item(
+            name="motor, all of it",
+            kind="drive",
+            value=torque,
+            unit="N m",
+            better=1,
+            step=1e3,
+            changes=partial(motor_changes, case),
+        ),
+    ]
+    for name, place, unit, better, step, signal in _PARTS:
+        path = f"sensors.{place}"
+        value = _number_at(case, path)
+        # A sensor that is perfect is not for sale, nor is one that nobody listens to.
+        if value is None or not any(y.startswith(signal) for y in heard):
+            continue
+        given, mru = {path: value}, case.sensors.mru
+        if mru is not None and name == "MRU error":
+            given["sensors.mru.noise_fraction"] = mru.noise_fraction
+            value = max(mru.noise_floor, mru.noise_fraction * heave)
+        if value > 0.0 or not name.endswith(("noise", "error")):
+            found.append(
+                Item(
+                    name=name,
+                    kind="link" if place.startswith("telemetry") else "sensor",
+                    value=value,
+                    unit=unit,
+                    better=better,
+                    step=step or 0.1 * value,
+                    changes=partial(_scaled, given),
+                )
             )
-        )
-    if any(name.startswith("payload.") for name in heard):
-        items += _payload_items(case, heard)
-    if any(name.startswith("mru.") for name in heard) and case.sensors.mru is not None:
-        items += _mru_items(case, posed)
-    cell = case.sensors.load_cell
-    if "rope.tension" in heard and cell is not None:
-        share = cell.noise_fraction
-        path = "sensors.load_cell.noise_fraction"
-        items.append(_scaled("load cell noise", "sensor", path, share, "", -1, 0.01))
-        width = cell.bandwidth
-        path = "sensors.load_cell.bandwidth"
-        items.append(_scaled("load cell bandwidth", "sensor", path, width, "rad/s", 1, 10.0))
-    return items
+    return found if case.limits.drive == "enforce" else [found[0], *found[2:]]
 
 
-def _payload_items(case: Case, heard: Sequence[str]) -> list[Item]:
-    link, sensor = case.sensors.telemetry, case.sensors.payload
-    delay = "sensors.telemetry.delay"
-    items = [_scaled("telemetry delay", "link", delay, link.delay, "s", -1, 0.01)]
-    if link.bandwidth is not None:
-        path = "sensors.telemetry.bandwidth"
-        items.append(_scaled("telemetry bandwidth", "link", path, link.bandwidth, "rad/s", 1, 10.0))
-    if sensor.bandwidth != "perfect":
-        path = "sensors.payload.bandwidth"
-        width = float(sensor.bandwidth)
-        items.append(_scaled("payload sensor bandwidth", "sensor", path, width, "rad/s", 1, 10.0))
-    for name in _NOISE:
-        value = float(getattr(sensor, f"{name}_noise"))
-        if value > 0.0 and f"payload.{name}" in heard:
-            path = f"sensors.payload.{name}_noise"
-            step = 0.1 * value
-            items.append(_scaled(f"payload {name} noise", "sensor", path, value, "", -1, step))
-    return items
+def _scaled(given: Mapping[str, float], factor: float) -> dict[str, float]:
+    return {path: value * factor for path, value in given.items()}
 
 
-def _mru_items(case: Case, posed: Posed) -> list[Item]:
-    mru = case.sensors.mru
-    assert mru is not None
-    heave = float(posed.question.hook.displacement.rms)
-    error = max(mru.noise_floor, mru.noise_fraction * heave)
-    floor, share = mru.noise_floor, mru.noise_fraction
-    items = []
-    if error > 0.0:
-        items.append(
-            Item(
-                name="MRU error",
-                kind="sensor",
-                value=error,
-                unit="m",
-                better=-1,
-                step=0.01,
-                changes=lambda f: {
-                    "sensors.mru.noise_floor": floor * f,
-                    "sensors.mru.noise_fraction": share * f,
-                },
-            )
-        )
-    items.append(_scaled("MRU delay", "sensor", "sensors.mru.delay", mru.delay, "s", -1, 0.01))
-    if mru.heave_filter_period is not None:
-        path, period = "sensors.mru.heave_filter_period", mru.heave_filter_period
-        items.append(_scaled("MRU heave filter", "sensor", path, period, "s", 0, 10.0))
-    return items
-
-
-def _scaled(
-    name: str, kind: str, path: str, value: float, unit: str, better: int, step: float
-) -> Item:
-    return Item(
-        name=name,
-        kind=kind,
-        value=value,
-        unit=unit,
-        better=better,
-        step=step,
-        changes=lambda factor: {path: value * factor},
-    )
+def _number_at(case: Case, path: str) -> float | None:
+    """Return the number at a dotted path of a case; None where there is none."""
+    value: Any = case
+    for name in path.split("."):
+        value = getattr(value, name, None)
+    return float(value) if isinstance(value, int | float) else None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -319,15 +298,12 @@ def worth(
     )
     if not (design.parameters and design.drive_kept and design.feasible):
         return result
-    posed = Posed.of(design.case, design.structure, design.masses)
-    problem = posed.asked_by(design.case)
-    coefficient = design.drag if problem.drag is not None else None
-    here = follow(problem, [begin_from(problem, design)], coefficient=coefficient)
+    here = answer_of(design)
     if here is None:
         return replace(result, status="the optimum could not be followed")
     items = [
-        *limit_items(problem.limits),
-        *part_items(design.case, design.measurements, posed),
+        *limit_items(here.problem.limits),
+        *part_items(design.case, design.measurements, design.hook_rms),
     ]
     rows = []
     for k, item in enumerate(items):
@@ -402,7 +378,7 @@ def _changed(design: Design, here: Answer, item: Item, factor: float) -> Problem
     case = item.case(design.case, factor)
     if case is None:
         return None
-    return Posed.of(case, design.structure, design.masses).asked_by(design.case)
+    return asked_by(design.case, posed(case, design.structure, design.masses))
 
 
 def _sentence(result: Worth) -> str:

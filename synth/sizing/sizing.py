@@ -26,10 +26,10 @@ from models.plant import MAX_MASSES
 
 from ..design import SOURCE_NAMES, Design, gains_in_use
 from ..loop import Assessment
-from ..question import HOOK, PAYLOAD
+from ..question import HOOK, PAYLOAD, Problem
 from ..search import KEPT, Progress, search
 from .catalogue import ChosenMotor, choose, read_catalogue
-from .follow import Answer, Posed, designed, follow, least_between
+from .follow import Answer, designed, follow, least_between, posed
 from .motor import MotorData, with_motor
 from .point import SizePoint, SmallestMotor, highest_sea, least_motor, target_of
 
@@ -218,12 +218,12 @@ def _sized(
     seed: int,
     tell: Progress,
 ) -> tuple[Sizing, int, Answer | None]:
-    posed = Posed.of(base, structure, masses)
-    hook = float(posed.question.hook.displacement.rms)
+    question = posed(base, structure, masses)
+    hook = float(question.hook.displacement.rms)
     aim = target_of(target, hook)
-    rope = [lim for lim in posed.drive if lim.name.startswith("rope.")]
-    problem = posed.problem((*posed.loop, *rope))
-    found = search(problem, starts, seed, gains_in_use(posed.question), tell)
+    rope = [lim for lim in question.drive if lim.name.startswith("rope.")]
+    problem = question.problem_with((*question.loop, *rope))
+    found = search(problem, starts, seed, gains_in_use(question), tell)
     free = Answer.of(problem, found)
     empty = Sizing(
         case=base,
@@ -241,33 +241,33 @@ def _sized(
         highest_height=0.0,
     )
     if free is None:
-        return empty, posed.masses, None
+        return empty, question.masses, None
     walk = _Search(
         case=base,
         structure=structure,
         target=aim,
-        masses=posed.masses,
+        masses=question.masses,
         free=free,
         tell=tell,
         found={},
     )
     if free.payload_rms <= aim:
         _walked(walk, np.geomspace(*gears, count))
-    given = _given(walk, posed)
+    given = _given(walk, question.problem)
     result = replace(
         empty,
         points=tuple(walk.found[g].point for g in sorted(walk.found)),
         given_rms=given.payload_rms if given is not None else math.inf,
         highest_height=highest_sea(
-            base, structure, target, masses=posed.masses, near=given or free, tell=tell
+            base, structure, target, masses=question.masses, near=given or free, tell=tell
         ),
     )
     feasible = [g for g, least in walk.found.items() if least.point.feasible]
     if not feasible:
-        return replace(result, status=_why_not(result, free)), posed.masses, free
+        return replace(result, status=_why_not(result, free)), question.masses, free
     best = min(feasible, key=lambda g: walk.found[g].point.scale)
     least = walk.found[best]
-    return _chosen(result, walk, least), posed.masses, least.answer
+    return _chosen(result, walk, least), question.masses, least.answer
 
 
 def _walked(walk: _Search, grid: FloatArray) -> None:
@@ -306,10 +306,9 @@ def _walked(walk: _Search, grid: FloatArray) -> None:
     least_between(size, *ends, _FINE)
 
 
-def _given(walk: _Search, posed: Posed) -> Answer | None:
+def _given(walk: _Search, problem: Problem) -> Answer | None:
     """Return the best that the case's own winch does, or None if its limits cannot be kept."""
     walk.tell("the winch as it is", 0, 1)
-    problem = posed.problem((*posed.loop, *posed.drive))
     own = walk.case.winch.gearbox.ratio
     gears = sorted(walk.found, key=lambda g: abs(g / own - 1.0))
     known = [a for g in gears if (a := walk.found[g].answer) is not None]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 import stillhook as sh
 from models.basics import InputError
 from synth.sizing import CoDesign
 from synth.sizing.codesign import gear_changes
-from synth.sizing.follow import Answer, Posed, begin_from, follow, slope
+from synth.sizing.follow import Answer, asked_by, follow, posed, slope
 
 pytestmark = pytest.mark.ci  # whole optimisations in fixtures
 
@@ -18,12 +19,10 @@ STRUCTURE = "payload-feedback"
 
 
 def answer(case: sh.Case, near: Answer | None = None) -> Answer:
-    posed = Posed.of(case, STRUCTURE, 1)
-    drive = posed.drive if case.limits.drive == "enforce" else ()
-    problem = posed.problem((*posed.loop, *drive))
+    problem = asked_by(case, posed(case, STRUCTURE, 1))
     if near is None:
         design = sh.optimise_gains(case, STRUCTURE, starts=2)
-        found = follow(problem, [begin_from(problem, design)])
+        found = follow(problem, [np.array(design.question.values(design.parameters))])
     else:
         found = follow(problem, [near])
     assert found is not None
@@ -76,9 +75,9 @@ def test_slope_is_that_of_gains_optimised_again(case: sh.Case, changes: dict[str
     central = (logs[1] - logs[0]) / (2.0 * step)
     tiny = 1e-4
     beside = case.replace({**changes, "winch.gearbox.ratio": 37.0 * math.exp(tiny)})
-    posed = Posed.of(beside, STRUCTURE, 1)
-    drive = () if changes else posed.drive
-    envelope = slope(here, posed.problem((*posed.loop, *drive)), tiny)
+    question = posed(beside, STRUCTURE, 1)
+    problem = question.problem_with(question.loop) if changes else question.problem
+    envelope = slope(here, problem, tiny)
     assert envelope == pytest.approx(central, rel=0.05, abs=2e-3)
 
 

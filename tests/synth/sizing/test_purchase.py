@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import stillhook as sh
 from synth.sizing import Worth, purchase
-from synth.sizing.follow import Posed, begin_from, follow
+from synth.sizing.follow import follow, posed
 from synth.sizing.purchase import limit_items, part_items
 from synth.structures import structure_named
 
@@ -31,13 +32,12 @@ def late() -> Worth:
 def test_prices_are_what_optimising_again_gives_where_the_optimum_is_smooth(late: Worth) -> None:
     case = sh.load_case("thesis-1975").replace(HARD)
     design = sh.optimise_gains(case, "payload-feedback", starts=2)
-    posed = Posed.of(case, "payload-feedback", design.masses)
-    problem = posed.problem((*posed.loop, *posed.drive))
-    here = follow(problem, [begin_from(problem, design)])
+    problem = posed(case, "payload-feedback", design.masses).problem
+    here = follow(problem, [np.array(design.question.values(design.parameters))])
     assert here is not None
     items = [
         *limit_items(problem.limits),
-        *part_items(case, design.question.structure.measurements, posed),
+        *part_items(case, design.question.structure.measurements, design.hook_rms),
     ]
     step = 0.01
     for name in ("gear ratio", "motor, all of it", "motor.current.peak"):
@@ -82,9 +82,8 @@ def test_what_is_for_sale_is_what_the_structure_hears() -> None:
     case = sh.load_case("subsea-crane")
     names = {}
     for name in ("payload-feedback", "feed-forward", "constant-tension"):
-        posed = Posed.of(case, name)
         heard = structure_named(name, case).measurements
-        names[name] = {item.name for item in part_items(case, heard, posed)}
+        names[name] = {item.name for item in part_items(case, heard, 0.5)}
     assert "telemetry delay" in names["payload-feedback"]
     assert "MRU error" not in names["payload-feedback"]
     assert {"MRU error", "MRU delay"} <= names["feed-forward"]
