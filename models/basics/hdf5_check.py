@@ -46,15 +46,10 @@ except Exception as error:
 """
 
 
-def check_hdf5(path: str | Path, *, seconds: float | None = None) -> None:
+def check_hdf5(path: str | Path) -> None:
     """Read an HDF5 file through in a child process; other files are left alone.
 
-    Parameters
-    ----------
-    path
-        The file.
-    seconds
-        Time limit; 10 s, and 0.2 s more for each MB, if left out.
+    It has 10 s for that, and 0.2 s more for each MB.
 
     Raises
     ------
@@ -66,7 +61,7 @@ def check_hdf5(path: str | Path, *, seconds: float | None = None) -> None:
         with open(place, "rb") as file:
             if file.read(len(HDF5)) != HDF5:
                 return
-        limit = seconds or _SECONDS + place.stat().st_size / _BYTES_PER_SECOND
+        limit = _SECONDS + place.stat().st_size / _BYTES_PER_SECOND
     except OSError:
         return  # whoever opens it says why it cannot be
     command = [sys.executable, "-I", "-c", _READ_THROUGH, str(place)]

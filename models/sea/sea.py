@@ -167,10 +167,8 @@ class SeaSpectrum:
         density: npt.ArrayLike,
         *,
         beyond: str = "decay",
-        significant_height: float = math.nan,
-        spreading: Spreading | None = None,
     ) -> SeaSpectrum:
-        """Return a measured sea.
+        """Return a measured sea; :meth:`scaled` gives it another height.
 
         Parameters
         ----------
@@ -178,16 +176,9 @@ class SeaSpectrum:
             Frequencies (k,) [rad/s] and variance densities (k,) [m^2 s/rad].
         beyond
             What is above the last row: `decay`, falling as omega^-5, or `zero`.
-        significant_height
-            H_s to scale it to [m]; its own if left out.
-        spreading
-            How its energy divides over headings.
         """
         rows, values = (tuple(np.ravel(column).tolist()) for column in (omega, density))
-        table = SpectrumTable(omega=rows, density=values, beyond=beyond)
-        return cls(
-            kind="measured", table=table, significant_height=significant_height, spreading=spreading
-        )
+        return cls(kind="measured", table=SpectrumTable(omega=rows, density=values, beyond=beyond))
 
     def density(self, omega: npt.ArrayLike) -> FloatArray:
         """Return the variance density of the surface elevation.

@@ -18,7 +18,7 @@ from models.basics import FloatArray, read_only
 from ..forecast import Forecast
 from ..programme import Condensed
 from ..winch import PredictionModel
-from .winch_programme import WATCHED, path_of_sea, sea_at_end
+from .winch_programme import WATCHED, by_chi, path_of_sea, sea_at_end
 
 _NONE = np.zeros(0)
 _WIDE = 1e20  # no limit, for the solver
@@ -73,7 +73,7 @@ class Products:
         believed
             The estimator's model, whose A it is.
         """
-        p, winch, nb = programme, model.winch, len(programme.blocks)
+        p, h, winch, nb = programme, programme.horizon, model.winch, len(programme.blocks)
         # A violation of one per cent is to cost the same whatever is limited: rows in units of
         # their larger bound.
         names = [WATCHED[k] for k in p.kind]
@@ -82,30 +82,25 @@ class Products:
         scale = 1.0 / np.maximum(size, 1e-9)
         to_path = path_of_sea(model, p.steps)
         ahead = np.linalg.matrix_power(model.A[model.sea_at, model.sea_at], p.steps)
-        constants = slice(model.constants_at.start, model.constants_at.start + 2)
-        gradient, free = np.zeros((nb, model.size)), np.zeros((len(names), model.size))
-        gradient[:, : winch.size], free[:, : winch.size] = p.from_state, p.rows_state
-        gradient[:, constants], free[:, constants] = p.from_constants, p.rows_constants
-        path_gradient = p.from_path
+        gradient, free = by_chi(model, h, p.gradient), by_chi(model, h, p.rows)
+        path_gradient = p.gradient[:, h.path]
         if covariance is not None:
             from_path, from_sea = sea_at_end(model, p.steps, covariance)
             path_gradient = path_gradient + p.from_end @ from_path
             gradient[:, model.sea_at] = p.from_end @ from_sea
         else:
-            gradient[:, model.sea_at] = p.from_path @ to_path + p.from_end @ ahead
-            free[:, model.sea_at] = p.rows_path @ to_path
+            gradient[:, model.sea_at] = path_gradient @ to_path + p.from_end @ ahead
+            free[:, model.sea_at] = p.rows[:, h.path] @ to_path
         # A heavier load has stretched the rope before the payload's zero was set: what the tension
         # then has over the case's is its estimated bias (`mpc.winch.prediction`).
         for k, name in enumerate(names):
             if name == "tension":
                 free[k, model.constants_at.start + 3] = 1.0
-        speed_known = np.zeros((nb, model.size))
-        speed_known[:, : winch.size] = p.speeds[:, p.horizon.state]
-        speed_known[:, model.sea_at] = p.speeds[:, p.horizon.path] @ to_path
-        speed_known[:, constants] = p.speeds[:, p.horizon.constants]
+        speed_known = by_chi(model, h, p.speeds)
+        speed_known[:, model.sea_at] = p.speeds[:, h.path] @ to_path
         # A load that is to be elsewhere, or to move: everything is counted from there, but the
         # limits on speed and command are not.
-        moved_free = p.rows_state @ winch.moved
+        moved_free = p.rows[:, h.state] @ winch.moved
         own = winch.speed @ winch.moved
         for k, name in enumerate(names):
             if name in ("speed", "command"):
@@ -114,13 +109,13 @@ class Products:
             size=model.size,
             moves=nb,
             matrix=np.ascontiguousarray(np.vstack([believed.A, gradient, free * scale[:, None]])),
-            rows=np.ascontiguousarray(p.rows * scale[:, None]),
+            rows=np.ascontiguousarray(p.rows[:, h.moves] * scale[:, None]),
             scale=read_only(scale),
             low=read_only(np.maximum(bounds[:, 0] * scale, -_WIDE)),
             high=read_only(np.minimum(bounds[:, 1] * scale, _WIDE)),
             path_gradient=np.ascontiguousarray(path_gradient),
-            path_free=np.ascontiguousarray(p.rows_path * scale[:, None]),
-            moved_gradient=p.from_state @ winch.moved,
+            path_free=np.ascontiguousarray(p.rows[:, h.path] * scale[:, None]),
+            moved_gradient=p.gradient[:, h.state] @ winch.moved,
             moved_free=moved_free * scale[:, None],
             speed_known=speed_known,
             speed_moves=np.ascontiguousarray(p.speeds[:, -nb:]),

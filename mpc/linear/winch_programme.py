@@ -75,6 +75,17 @@ def winch_programme(
     )
 
 
+def by_chi(model: PredictionModel, horizon: Horizon, rows: FloatArray) -> FloatArray:
+    """Return rows by the horizon's columns as rows by chi, (., n): of the winch and the constants.
+
+    The path is left out, as it may be another than that of the model's own sea.
+    """
+    found, at = np.zeros((len(rows), model.size)), model.constants_at.start
+    found[:, : model.winch.size] = rows[:, horizon.state]
+    found[:, at : at + 2] = rows[:, horizon.constants]
+    return found
+
+
 def path_of_sea(model: PredictionModel, steps: int) -> FloatArray:
     """Return the path that the sea's state lets expect, (2 (steps + 1), nh)."""
     at = model.sea_at

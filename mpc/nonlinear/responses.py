@@ -21,7 +21,7 @@ from .stage import Stage
 def with_drift(p: Condensed, stage: Stage) -> Condensed:
     """Return the programme with the command at the start of a sample, though moves are means."""
     drift, horizon = stage.drift, p.horizon
-    rows = np.hstack([p.rows_state, p.rows_path, p.rows_constants, p.rows])
+    rows = np.array(p.rows)
     for j, S in zip(range(p.steps), horizon.states(), strict=False):
         over = drift.state @ S
         over[horizon.ends(j)] += drift.hook
@@ -29,13 +29,7 @@ def with_drift(p: Condensed, stage: Stage) -> Condensed:
         over[horizon.move(j)] += drift.mean * p.unit
         for k in np.flatnonzero((p.at == j) & (p.kind == WATCHED.index("command"))):
             rows[k] += over / stage.winch.gain
-    return replace(
-        p,
-        rows_state=rows[:, horizon.state],
-        rows_path=rows[:, horizon.path],
-        rows_constants=rows[:, horizon.constants],
-        rows=rows[:, horizon.moves],
-    )
+    return replace(p, rows=rows)
 
 
 def linear_response(p: Condensed, stage: Stage) -> tuple[FloatArray, FloatArray]:

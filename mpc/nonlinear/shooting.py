@@ -37,7 +37,7 @@ from scipy.linalg.blas import dtrsm
 
 from models.basics import FloatArray, read_only
 
-from ..linear import Products, path_of_sea, sea_at_end
+from ..linear import Products, by_chi, path_of_sea, sea_at_end
 from ..programme import Condensed, LQRegulator
 from ..winch import PredictionModel
 from .responses import forced_response, linear_response
@@ -131,11 +131,10 @@ class Shooting:
         G, Theta = forced_response(p, stage, products.scale)
 
         # What is known comes as chi, and as a path if that is not of chi's own sea.
-        path, constants = p.horizon.path, p.horizon.constants
+        path = p.horizon.path
         both, size = np.vstack([y, o]), model.size
         of = slice(model.constants_at.start, model.constants_at.start + 2)
-        chi = np.zeros((len(both), size))
-        chi[:, :n], chi[:, of] = both[:, :n], both[:, constants]
+        chi = by_chi(model, p.horizon, both)
         nh = model.sea.order
         beyond = np.zeros((n, size))
         beyond[:, of] = weights.N[:, nh:]

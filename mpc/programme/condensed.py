@@ -57,15 +57,15 @@ class Condensed(ReadOnlyArrays):
         Plant, blocks and unit of the moves.
     H
         (nb, nb), per unit of a move.
-    from_state, from_path, from_constants, from_end
-        Gradient f of the plant's state, of the path, of the constants, and of the disturbance's
-        state at the end of the horizon, (nb, nx), (nb, nw (N + 1)), (nb, nc), (nb, nh).
+    gradient, from_end
+        Gradient f of the horizon's columns but the moves, (nb, columns), and of the disturbance's
+        state at the end of the horizon, (nb, nh).
     at
         Sample of each row, (nr,).
     kind
         What each row is: a number of the caller's, (nr,).
-    rows, rows_state, rows_path, rows_constants
-        R and r_0, (nr, nb), (nr, nx), (nr, nw (N + 1)), (nr, nc).
+    rows
+        r_0 and R, by the horizon's columns, (nr, columns).
     speeds
         Signal on which the bounds of the moves depend (the motor's speed) at the start of each
         block, by the horizon's columns, (nb, columns).
@@ -75,16 +75,11 @@ class Condensed(ReadOnlyArrays):
 
     horizon: Horizon
     H: FloatArray
-    from_state: FloatArray
-    from_path: FloatArray
-    from_constants: FloatArray
+    gradient: FloatArray
     from_end: FloatArray
     at: IntArray
     kind: IntArray
     rows: FloatArray
-    rows_state: FloatArray
-    rows_path: FloatArray
-    rows_constants: FloatArray
     speeds: FloatArray
     cost: float
 
@@ -161,20 +156,14 @@ def condense(
     gradient[:, constants] += end.T @ regulator.N[:, nh:]
 
     cost = N * scale
-    G = np.array(rows).reshape(len(rows), moves.stop)
     return Condensed(
         horizon=horizon,
         H=(H + H.T) / cost,
-        from_state=2.0 * gradient[:, horizon.state] / cost,
-        from_path=2.0 * gradient[:, horizon.path] / cost,
-        from_constants=2.0 * gradient[:, constants] / cost,
+        gradient=2.0 * gradient / cost,
         from_end=2.0 * end.T @ regulator.N[:, :nh] / cost,
         at=np.array(at),
         kind=np.array(kind),
-        rows=G[:, moves],
-        rows_state=G[:, horizon.state],
-        rows_path=G[:, horizon.path],
-        rows_constants=G[:, constants],
+        rows=np.array(rows).reshape(len(rows), moves.stop),
         speeds=np.array(speeds),
         cost=cost,
     )

@@ -201,10 +201,9 @@ def prediction_model(
     sample_time: float = 0.05,
     masses: int | None = None,
     drag: float | None = None,
-    noise: ProcessNoise | None = None,
     off: Mapping[str, float] | None = None,
 ) -> PredictionModel:
-    """Return the prediction model of a case.
+    """Return the prediction model of a case, next to certain of the world: see `with_noise`.
 
     Parameters
     ----------
@@ -216,8 +215,6 @@ def prediction_model(
         Masses along the rope; by default those of the case.
     drag
         Linear drag coefficient of the payload [N s/m]; see `mpc.winch.sampled.sampled_winch`.
-    noise
-        What the model does not know of the world; by default next to nothing.
     off
         Factors on the plant's numbers; see `mpc.winch.sampled.sampled_winch`.
 
@@ -294,7 +291,7 @@ def prediction_model(
         R=np.ones(len(MEASURED)),
         hook=hook_rows,
     )
-    return with_noise(model, ProcessNoise(unit=0.0) if noise is None else noise)
+    return with_noise(model, ProcessNoise(unit=0.0))
 
 
 def with_noise(model: PredictionModel, noise: ProcessNoise) -> PredictionModel:

@@ -132,13 +132,13 @@ class Unsaturated:
         back = Cc @ np.linalg.solve(_pencil(Ac, z), np.broadcast_to(Bc, (z.size, *Bc.shape))) + Dc
         return np.asarray(1.0 / (1.0 - (back @ through)[:, 0, 0]))
 
-    def max_sensitivity(self, *, at: str = "torque") -> float:
-        """Return M_s = max |S|; infinite if the loop is not stable."""
+    def max_sensitivity(self) -> float:
+        """Return M_s = max |S|, broken at the torque; infinite if the loop is not stable."""
         if self.growth() >= 1.0:
             return np.inf
         nyquist = np.pi / self.model.winch.sample_time
         omega = np.geomspace(_LOWEST, nyquist, _NODES)
-        return float(np.abs(self.sensitivity(omega, at=at)).max())
+        return float(np.abs(self.sensitivity(omega)).max())
 
     def forecast_error(self, ahead: float) -> float:
         """Return the standard deviation of the hook's forecast, `ahead` [s] from now [m]."""

@@ -215,9 +215,8 @@ def test_torsethaugen_is_the_librarys_with_its_height_put_right(height, period):
 def any_sea(kind: str, height: float = 3.0, period: float = 9.0) -> SeaSpectrum:
     if kind == "measured":
         omega = 2.0 * math.pi / period * np.array([0.5, 0.8, 1.0, 1.1, 1.5, 2.0, 3.0])
-        return SeaSpectrum.from_table(
-            omega, [0.0, 1.0, 4.0, 3.0, 1.5, 0.7, 0.1], significant_height=height
-        )
+        table = SeaSpectrum.from_table(omega, [0.0, 1.0, 4.0, 3.0, 1.5, 0.7, 0.1])
+        return table.scaled(height)
     if kind == "sum":
         wind = SeaSpectrum(kind="jonswap", significant_height=0.8 * height, peak_period=period)
         swell = any_sea("gaussian-swell", 0.6 * height, 1.8 * period)

@@ -126,7 +126,7 @@ def test_the_states_of_a_horizon_are_those_of_the_plant(horizon, rng):
 def test_the_programme_is_the_cost_summed_along_the_motion(horizon, regulator, output, rng):
     p = condensed(horizon, regulator, output)
     x, path, c, end = (matrix(rng, *n) for n in ((NX,), (N + 1, NW), (NC,), (NH,)))
-    f = p.from_state @ x + p.from_path @ path.ravel() + p.from_constants @ c + p.from_end @ end
+    f = p.gradient @ np.concatenate([x, path.ravel(), c]) + p.from_end @ end
     asked = horizon, regulator, output, x, path, c
     for v in matrix(rng, 5, len(BLOCKS)):
         more = cost(*asked, v, end) - cost(*asked, np.zeros(len(BLOCKS)), end)
@@ -140,7 +140,7 @@ def test_its_rows_are_the_signals_and_its_speeds_those_at_the_blocks(
     x, path, c = matrix(rng, NX), matrix(rng, N + 1, NW), matrix(rng, NC)
     v = matrix(rng, len(BLOCKS))
     states = motion(horizon, x, path, c, v)
-    found = p.rows @ v + p.rows_state @ x + p.rows_path @ path.ravel() + p.rows_constants @ c
+    found = p.rows @ np.concatenate([x, path.ravel(), c, v])
     signals = np.column_stack([states[:, 0], states[:, 1] - states[:, 2]])
     np.testing.assert_allclose(found, signals[p.at, p.kind], atol=1e-12)
     assert p.at.tolist() == [0, 0, 2, 2, 4, 4, 6, 6, 8, 8]
@@ -156,7 +156,7 @@ def test_without_blocks_and_limits_its_first_move_is_the_regulators(
     x, c, h = matrix(rng, NX), matrix(rng, NC), matrix(rng, NH)
     path = free_outputs(*sea, N) @ h
     end = np.linalg.matrix_power(sea[0], N) @ h
-    f = p.from_state @ x + p.from_path @ path + p.from_constants @ c + p.from_end @ end
+    f = p.gradient @ np.concatenate([x, path, c]) + p.from_end @ end
     v = -np.linalg.solve(p.H, f)
     wanted = -regulator.K @ x - regulator.K_disturbance @ np.concatenate([h, c])
     assert UNIT * v[0] == pytest.approx(wanted, rel=1e-9)
