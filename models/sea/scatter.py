@@ -84,14 +84,9 @@ class Scatter:
                 f"{self.source}: must have at least one row with an occurrence above 0"
             )
         columns = {name: column[happens] for name, column in columns.items()}
-        _check_all(self.source, "significant_height", columns["significant_height"], 0.0, 30.0, "m")
-        _check_all(self.source, "peak_period", columns["peak_period"], 0.0, 60.0, "s")
-        for name in ("significant_height", "peak_period"):
-            zero = np.flatnonzero(columns[name] <= 0.0)
-            if zero.size:
-                raise InputError(
-                    f"{self.source}: {name} must be above 0, got 0 in row {zero[0] + 1}"
-                )
+        for name, high, unit in (("significant_height", 30.0, "m"), ("peak_period", 60.0, "s")):
+            limits = {"low": 0.0, "high": high, "open_low": True}
+            _check_all(self.source, name, columns[name], unit=unit, **limits)
         total = float(columns["occurrence"].sum())
         if not math.isfinite(total):
             raise InputError(f"{self.source}: the occurrences must have a finite sum, got {total}")
@@ -231,10 +226,7 @@ class Scatter:
         return heights, periods, table
 
 
-def _check_all(
-    owner: str, name: str, values: FloatArray, low: float, high: float = math.inf, unit: str = ""
-) -> None:
+def _check_all(owner: str, name: str, values: FloatArray, **limits: Any) -> None:
     """Check a column, naming the first row that is out of range."""
     for row, value in enumerate(values.tolist(), start=1):
-        if not low <= value <= high:
-            check_range(f"{owner}: row {row}", name, value, low=low, high=high, unit=unit)
+        check_range(f"{owner}: row {row}", name, value, **limits)
