@@ -31,7 +31,7 @@ import casadi as ca
 import numpy as np
 import scipy.linalg
 
-from models.basics import FloatArray, InputError, ReadOnlyArrays, SolverError, check_range
+from models.basics import FloatArray, InputError, ReadOnlyArrays, check_range
 from models.plant import DrumTravel, build_plant, displacement_names, zero_order_hold
 from models.simulation import Kernel
 
@@ -40,8 +40,6 @@ from ..winch import SampledWinch
 from .mean_torque import Drift, mean_torque
 
 _OWNER = "nonlinear predictive control"
-_NEWTON = 50  # iterations for the forces of one sample
-_EXACT = 1e-12  # of those forces, over the static tension
 _NOTHING = np.zeros(0)
 
 _SMOOTH = 0.002  # eps of a tension, over that at rest
@@ -112,41 +110,6 @@ class Stage(ReadOnlyArrays):
         m = len(self.channels)
         _, out = self.kernel.run(_NOTHING, y, _NOTHING)
         return out[:, :m], out[:, m:].reshape(len(y), m, len(self.arguments))
-
-    def advance(self, x: FloatArray, d: float, ends: FloatArray, c: FloatArray) -> FloatArray:
-        """Return the state a sample later, the forces found by Newton's method.
-
-        Parameters
-        ----------
-        x
-            State, (n,).
-        d
-            Input [N m].
-        ends
-            z, z' of the hook at the start and at the end of the sample, (4,).
-        c
-            Constants, (2,).
-
-        Raises
-        ------
-        SolverError
-            If the forces are not found.
-        """
-        M, winch = self.substeps, self.winch
-        ahead = winch.A @ x + winch.B[:, 0] * d + winch.from_hook @ ends + winch.from_constants @ c
-        if not self.channels:
-            return np.asarray(ahead)
-        known = self.C @ x + self.D * d + self.C_hook @ ends + self.C_constants @ c
-        known += np.tile(self.rest, M)
-        n = np.zeros(self.own.shape[1])
-        for _ in range(_NEWTON):
-            found, J = self.forces((known + self.own @ n).reshape(M, -1))
-            slope = scipy.linalg.block_diag(*J)
-            step = np.linalg.solve(np.eye(n.size) - slope @ self.own, found.ravel() - n)
-            n += step
-            if np.abs(step).max() <= _EXACT * winch.rest_tension:
-                return np.asarray(ahead + self.from_forces @ n)
-        raise SolverError(f"{_OWNER}: the forces of a sample were not found")
 
 
 def make_stage(

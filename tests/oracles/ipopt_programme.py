@@ -15,6 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
+from one_sample import advanced
 
 from models.basics import SolverError
 from mpc.linear import WATCHED
@@ -223,5 +224,5 @@ def _roll_out(
     x, n = x0, len(x0)
     for j in range(len(of)):
         ends = np.concatenate([path[j], path[j + 1]])
-        x = controller.stage.advance(x, controller.programme.unit * float(moves[of[j]]), ends, c)
+        x = advanced(controller.stage, x, controller.programme.unit * float(moves[of[j]]), ends, c)
         into[j * n : (j + 1) * n] = x / unit

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from ipopt_programme import nlp_oracle
+from one_sample import advanced
 
 import stillhook as sh
 from models.plant import MEAN_LOSSES, DriveLimits, PlantData, build_plant
@@ -130,7 +131,7 @@ def test_a_sample_is_that_of_fine_steps_of_the_plant(name: str) -> None:
             slack=range(winch.masses),
             compiled=False,
         )
-        errors.append(error(stage.advance(x, d, ends, np.zeros(2))))
+        errors.append(error(advanced(stage, x, d, ends, np.zeros(2))))
     # What is left of the last is the smoothing of the slack rope.
     assert errors[1] < 0.3 * errors[0] < 0.15 * linear
     assert errors[2] < 0.02 * linear
@@ -200,7 +201,7 @@ def test_without_nonlinearities_it_is_the_linear_controller(name: str) -> None:
 
 
 def test_condensed_linearisation_is_the_slope_of_a_simulation(thesis: sh.Case) -> None:
-    """Outputs of moves that are a little different, sample by sample through `Stage.advance`."""
+    """Outputs of moves that are a little different, sample by sample through `advanced`."""
     controller = NonlinearMPC(thesis, weights=WEIGHTS, horizon=3.0, minimum_tension=0.0)
     chi, p, stage = a_sea(controller, 1.0, 5), controller.programme, controller.stage
     moves = controller.optimise(chi)
@@ -215,7 +216,7 @@ def test_condensed_linearisation_is_the_slope_of_a_simulation(thesis: sh.Case) -
         x, seen = chi[:n], []
         for j in range(p.steps):
             ends = np.concatenate([path[j], path[j + 1]])
-            x = stage.advance(x, p.unit * float(v[of[j]]), ends, np.zeros(2))
+            x = advanced(stage, x, p.unit * float(v[of[j]]), ends, np.zeros(2))
             seen.append(stage.winch.payload @ x)
         return np.array([*seen[:-1], *x])
 
