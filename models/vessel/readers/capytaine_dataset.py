@@ -11,12 +11,13 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ...basics import GRAVITY, FloatArray, InputError
+from ...basics import GRAVITY, FloatArray, InputError, wave_frequency
 from ..assemble import decoded
 from ..raos import MODES
 
@@ -24,6 +25,7 @@ LARGEST = 20_000_000
 """Most numbers in a variable that is read; Capytaine's files have some ten thousand."""
 
 _FREQUENCIES = ("omega", "freq", "period", "wavenumber", "wavelength")
+_DOFS = ("influenced_dof", "radiating_dof")
 _SINGLES = {"water_depth": "m", "rho": "kg/m3", "g": "m/s2", "forward_speed": "m/s"}
 
 
@@ -122,8 +124,12 @@ class CapytaineData:
         """Return the variables, for a message."""
         return _listed(self._dataset.variables)
 
-    def dofs(self, axis: str = "influenced_dof") -> tuple[str, ...]:
-        """Return the degrees of freedom along an axis."""
+    @cached_property
+    def dofs(self) -> tuple[str, ...]:
+        """The degrees of freedom, in the order that every table has them."""
+        return self._along(next((a for a in _DOFS if a in self._dataset.coords), _DOFS[0]))
+
+    def _along(self, axis: str) -> tuple[str, ...]:
         if axis not in self._dataset.coords:
             raise InputError(f"{self.owner}: there is no coordinate {axis}: {self.names()}")
         found = tuple(decoded(v) for v in np.atleast_1d(self._dataset[axis].values))
@@ -145,17 +151,15 @@ class CapytaineData:
             )
         return found
 
-    def table(self, name: str, axes: Sequence[str], dofs: Sequence[str]) -> npt.NDArray[Any]:
-        """Return a variable with its axes in a given order, degrees of freedom in another.
+    def table(self, name: str, axes: Sequence[str]) -> npt.NDArray[Any]:
+        """Return a variable with its axes in a given order, degrees of freedom as in `dofs`.
 
         Parameters
         ----------
         name
             The variable.
         axes
-            Wanted axes; `frequency` stands for the file's own.
-        dofs
-            Order wanted along `radiating_dof` and `influenced_dof`.
+            Wanted axes; `frequency` stands for the file's own, `dof` for that of the motions.
 
         Raises
         ------
@@ -166,7 +170,8 @@ class CapytaineData:
             raise InputError(f"{self.owner}: the variable {name} is missing; it has {self.names()}")
         array = self._dataset[name]
         pairs = "complex" in array.dims
-        wanted = [self._axis if axis == "frequency" else axis for axis in axes]
+        own = next((axis for axis in reversed(_DOFS) if axis in array.dims), _DOFS[0])
+        wanted = [{"frequency": self._axis, "dof": own}.get(axis, axis) for axis in axes]
         for axis in wanted:
             if axis not in array.dims and axis in array.coords:
                 array = array.expand_dims(axis)
@@ -176,16 +181,16 @@ class CapytaineData:
                 f"{self.owner}: {name} must have the axes {', '.join(wanted)}, got "
                 f"{', '.join(str(d) for d in array.dims) or 'none'}"
             )
-        for axis in ("radiating_dof", "influenced_dof"):
+        for axis in _DOFS:
             if axis in wanted:
-                order = self.dofs(axis)
-                missing = [d for d in dofs if d not in order]
+                order = self._along(axis)
+                missing = [d for d in self.dofs if d not in order]
                 if missing:
                     raise InputError(
                         f"{self.owner}: {name} lacks {', '.join(missing)} along {axis}, which has "
                         f"{', '.join(order)}"
                     )
-                array = array.isel({axis: [order.index(d) for d in dofs]})
+                array = array.isel({axis: [order.index(d) for d in self.dofs]})
         array = array.transpose(*wanted, *(["complex"] if pairs else []))
         values = np.asarray(array.values)
         if pairs:
@@ -227,7 +232,7 @@ class CapytaineData:
             depth = self.number("water_depth")
             depth = math.inf if depth is None else depth
             gravity = self.number("g") or GRAVITY
-            return axis, np.sqrt(gravity * k * (1.0 if math.isinf(depth) else np.tanh(k * depth)))
+            return axis, math.sqrt(gravity / GRAVITY) * wave_frequency(k, depth)
 
     def _floats(self, name: str, values: Any) -> FloatArray:
         array = np.asarray(values)

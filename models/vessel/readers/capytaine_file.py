@@ -111,14 +111,8 @@ def _stored(
     data: CapytaineData, name: str, body: str | None, notes: list[str]
 ) -> tuple[FloatArray, FloatArray, ComplexArray]:
     """Return frequencies, headings and motions as they stand in the file."""
-    axis = "radiating_dof"
-    try:
-        data.dofs(axis)
-    except InputError:
-        axis = "influenced_dof"
-    dofs = data.dofs(axis)
-    place = _places(data, dofs, body)
-    values = data.table(name, ("frequency", "wave_direction", axis), dofs)
+    place = _places(data, body)
+    values = data.table(name, ("frequency", "wave_direction", "dof"))
     order = _kept_rows(data, values)
     found = np.zeros((order.size, values.shape[1], 6), dtype=np.complex128)
     for mode, column in place.items():
@@ -139,42 +133,35 @@ def _computed(
     notes: list[str],
 ) -> tuple[FloatArray, FloatArray, ComplexArray]:
     """Return frequencies, headings and motions, from the coefficients."""
-    missing = [n for n in ("added_mass", "radiation_damping") if not data.has(n)]
-    if missing:
-        raise InputError(
-            f"{data.owner}: the motions cannot be computed: {' and '.join(missing)} missing; the "
-            f"file has {data.names()}"
-        )
-    dofs = data.dofs()
-    place = _places(data, dofs, body)
-    square = ("influenced_dof", "radiating_dof")
-    added = data.table("added_mass", ("frequency", *square), dofs)
-    damping = data.table("radiation_damping", ("frequency", *square), dofs)
-    force = _wave_force(data, dofs)
+    _need(data, ("added_mass", "radiation_damping"))
+    place = _places(data, body)
+    added, damping = (
+        data.table(name, ("frequency", "influenced_dof", "radiating_dof"))
+        for name in ("added_mass", "radiation_damping")
+    )
+    force = _wave_force(data)
     order = _kept_rows(data, force, added, damping)
     heading, first = _turned_headings(data)
     omega, force = data.omega[order], np.conj(force[order][:, first])
     added, damping = added[order].real, damping[order].real
-    mass = _square_matrix(data, "inertia_matrix", inertia, "inertia", dofs, place)
-    spring = _square_matrix(data, "hydrostatic_stiffness", stiffness, "stiffness", dofs, place)
+    mass = _square_matrix(data, "inertia_matrix", inertia, "inertia", place)
+    spring = _square_matrix(data, "hydrostatic_stiffness", stiffness, "stiffness", place)
     columns = [place.get(mode) for mode in MODES]
     share = 0.0 if roll_damping is None else roll_damping
     six = _six(mass, spring, added, damping, columns, omega, heading, share, point, force)
-    if len(dofs) > len(place) or None in columns:
-        # Other bodies, modes that bend, or a body that is held: the equation of them all.
-        if share:
-            column = place.get("roll")
-            if column is None:
-                raise InputError(f"{data.owner}: roll_damping is given, but nothing rolls")
-            damping = damping.copy()
-            damping[:, column, column] += share * six.critical_roll_damping
-        solved = solved_motions(omega, mass + added, damping, spring, force, owner=data.owner)
-        values = np.zeros((omega.size, heading.size, 6), dtype=np.complex128)
-        for mode, column in place.items():
-            values[:, :, MODES.index(mode)] = solved[:, :, column]
-        _tell_missing(place, notes)
-    else:
-        values = six.motions()
+    if share:
+        column = place.get("roll")
+        if column is None:
+            raise InputError(f"{data.owner}: roll_damping is given, but nothing rolls")
+        damping = damping.copy()
+        damping[:, column, column] += share * six.critical_roll_damping
+    # Other bodies, and modes that bend, are in the equation too.
+    solved = solved_motions(omega, mass + added, damping, spring, force, owner=data.owner)
+    values = np.zeros((omega.size, heading.size, 6), dtype=np.complex128)
+    for mode, column in place.items():
+        values[:, :, MODES.index(mode)] = solved[:, :, column]
+    _tell_missing(place, notes)
+    if len(data.dofs) == len(place) == len(MODES):
         notes.extend(_missed(six))
     notes.append(
         "computed from the file's coefficients"
@@ -263,20 +250,20 @@ def _tell_missing(place: dict[str, int], notes: list[str]) -> None:
         notes.append(f"the file has no {', '.join(missing)}: taken as held")
 
 
-def _places(data: CapytaineData, dofs: tuple[str, ...], body: str | None) -> dict[str, int]:
+def _places(data: CapytaineData, body: str | None) -> dict[str, int]:
     """Return where each motion of the body stands."""
     bodies: dict[str, dict[str, int]] = {}
-    for column, dof in enumerate(dofs):
+    for column, dof in enumerate(data.dofs):
         name, mode = mode_of(dof)
         if mode is None:
             continue
         if mode in bodies.setdefault(name, {}):
-            raise InputError(f"{data.owner}: {mode} is there twice: {', '.join(dofs)}")
+            raise InputError(f"{data.owner}: {mode} is there twice: {', '.join(data.dofs)}")
         bodies[name][mode] = column
     if not bodies:
         raise InputError(
             f"{data.owner}: none of the degrees of freedom is one of {', '.join(MODES)}: "
-            f"{', '.join(dofs)}"
+            f"{', '.join(data.dofs)}"
         )
     if body is None:
         if len(bodies) > 1:
@@ -315,19 +302,24 @@ def _turned_headings(data: CapytaineData) -> tuple[FloatArray, npt.NDArray[np.in
     return turned[first], first
 
 
-def _wave_force(data: CapytaineData, dofs: tuple[str, ...]) -> ComplexArray:
-    """Return the wave force (k, h, n), in the file's convention."""
-    axes = ("frequency", "wave_direction", "influenced_dof")
-    if data.has("excitation_force"):
-        return data.table("excitation_force", axes, dofs).astype(np.complex128)
-    parts = ("diffraction_force", "Froude_Krylov_force")
-    missing = [n for n in parts if not data.has(n)]
+def _need(data: CapytaineData, names: tuple[str, ...], instead: str = "") -> None:
+    """Refuse a file that lacks a variable without which there is no equation of motion."""
+    missing = [name for name in names if not data.has(name)]
     if missing:
         raise InputError(
-            f"{data.owner}: the motions cannot be computed: {' and '.join(missing)} missing, and "
-            f"no excitation_force; the file has {data.names()}"
+            f"{data.owner}: the motions cannot be computed: {' and '.join(missing)} missing"
+            f"{instead}; the file has {data.names()}"
         )
-    return np.asarray(sum(data.table(n, axes, dofs) for n in parts), dtype=np.complex128)
+
+
+def _wave_force(data: CapytaineData) -> ComplexArray:
+    """Return the wave force (k, h, n), in the file's convention."""
+    parts = ("diffraction_force", "Froude_Krylov_force")
+    if data.has("excitation_force"):
+        parts = ("excitation_force",)
+    _need(data, parts, ", and no excitation_force")
+    axes = ("frequency", "wave_direction", "influenced_dof")
+    return np.asarray(sum(data.table(n, axes) for n in parts), dtype=np.complex128)
 
 
 def _square_matrix(
@@ -335,16 +327,15 @@ def _square_matrix(
     name: str,
     given: npt.ArrayLike | None,
     argument: str,
-    dofs: tuple[str, ...],
     place: dict[str, int],
 ) -> FloatArray:
     """Return mass or stiffness over all degrees of freedom, from the caller or the file."""
     if given is not None:
         six = check_finite(data.owner, argument, given)
-        if six.shape != (6, 6) or len(place) != len(dofs):
+        if six.shape != (6, 6) or len(place) != len(data.dofs):
             raise InputError(
                 f"{data.owner}: {argument} must be 6 by 6, for a file of one rigid body; got "
-                f"{six.shape} and {len(dofs)} degrees of freedom"
+                f"{six.shape} and {len(data.dofs)} degrees of freedom"
             )
         modes = sorted(place, key=lambda mode: place[mode])
         index = [MODES.index(mode) for mode in modes]
@@ -355,7 +346,7 @@ def _square_matrix(
             f"variable {name}; give it as {argument}=, or add it with Capytaine's "
             "assemble_dataset of a body with a centre of mass"
         )
-    found = data.table(name, ("influenced_dof", "radiating_dof"), dofs)
+    found = data.table(name, ("influenced_dof", "radiating_dof"))
     if not np.all(np.isfinite(found)):
         raise InputError(f"{data.owner}: {name} must be finite numbers")
     return np.asarray(found.real, dtype=np.float64)
