@@ -126,25 +126,7 @@ def reason(error: OSError) -> str:
 
 
 def write_text_atomically(path: str | Path, text: str) -> Path:
-    """Write a text file under a temporary name beside it, then rename.
-
-    Parameters
-    ----------
-    path
-        The file to write; its folder must exist.
-    text
-        What to write, as UTF-8.
-
-    Returns
-    -------
-    Path
-        The file written.
-
-    Raises
-    ------
-    InputError
-        If the folder does not exist, cannot be written to, or is full.
-    """
+    """Write a text as UTF-8 by :func:`replace_atomically`, and return the file written."""
     return replace_atomically(
         path, lambda place: place.write_text(text, encoding="utf-8", newline="\n")
     )

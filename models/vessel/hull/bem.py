@@ -61,7 +61,7 @@ KEPT = 64
 """Computations kept; the ones longest unused go first."""
 
 _ARRAYS = ("omega", "heading", "added_mass", "damping", "excitation")
-_FORMAT = 3  # goes up when what is computed from the same inputs changes
+_FORMAT = 4  # goes up when what is computed from the same inputs changes
 
 
 def capytaine() -> Any:
@@ -298,25 +298,8 @@ def froude_krylov(
     integrated by a rule that is exact for polynomials of the second degree, as the hydrostatics
     are, so that long waves roll the ship as they must, whatever the panels.
 
-    Parameters
-    ----------
-    hull
-        Its wetted surface.
-    omega
-        Frequency [rad/s].
-    heading
-        Where the waves travel towards (h,) [rad].
-    point
-        About which the moments are [m].
-    depth
-        Water depth [m].
-    density
-        Of the water [kg/m3].
-
-    Returns
-    -------
-    ComplexArray
-        Time factor e^{+i omega t}, against the elevation at the frame's origin.
+    Parameters are those of :func:`solve_hull`, at one frequency; the time factor is e^{+i omega t},
+    against the elevation at the frame's origin.
     """
     k = float(wave_number(omega, depth))
     direction = np.atleast_1d(np.asarray(heading, dtype=np.float64))
@@ -367,68 +350,45 @@ def _limited(threads: int | None) -> Iterator[None]:
 def cached_hydrodynamics(
     hull: Hull,
     *,
-    omega: FloatArray,
-    heading: FloatArray,
-    depth: float = math.inf,
-    density: float,
-    lid: bool = True,
     threads: int | None = None,
     progress: Progress | None = None,
     cache: bool = True,
+    **asked: Any,
 ) -> tuple[Hydrodynamics, bool]:
     """Return the coefficients of :func:`models.vessel.hull.bem.solve_hull`, and if they were kept.
 
     Parameters
     ----------
-    hull, omega, heading, depth, density, lid, threads, progress
+    hull, threads, progress
         As there.
     cache
         Whether to look into the cache and to add to it.
+    asked
+        What the coefficients depend on: frequencies, headings, depth, density, lid.
     """
     folder = cache_folder() / "hulls"
-    inputs = {"depth": float(depth), "density": float(density), "lid": bool(lid)}
-    name = f"{_digest(hull, omega, heading, inputs)}.npz"
+    place = folder / f"{_digest(hull, asked)}.npz"
     if cache:
-        found = _read(folder / name)
+        found = _read(place)
         if found is not None:
             with contextlib.suppress(OSError):
-                os.utime(folder / name)
+                os.utime(place)
             return found, True
-    solved = solve_hull(
-        hull,
-        omega=omega,
-        heading=heading,
-        depth=depth,
-        density=density,
-        lid=lid,
-        threads=threads,
-        progress=progress,
-    )
+    solved = solve_hull(hull, **asked, threads=threads, progress=progress)
     if cache:
         with contextlib.suppress(OSError, InputError):
             folder.mkdir(parents=True, exist_ok=True)
-            replace_atomically(folder / name, lambda place: _write(place, solved))
+            replace_atomically(place, lambda path: _write(path, solved))
             _tidy(folder)
     return solved, False
 
 
-def _digest(hull: Hull, omega: FloatArray, heading: FloatArray, inputs: Mapping[str, float]) -> str:
+def _digest(hull: Hull, asked: Mapping[str, Any]) -> str:
     """Return the digest of everything that the coefficients depend on."""
-    words = json.dumps(
-        {
-            "format": _FORMAT,
-            "hull": hull.digest,
-            "point": [0.0, 0.0, 0.0],
-            "gravity": GRAVITY,
-            **inputs,
-            "versions": versions(),
-        },
-        sort_keys=True,
-    )
-    found = hashlib.sha256(words.encode())
-    for array in (omega, heading):
-        found.update(np.ascontiguousarray(array, dtype=np.float64).tobytes())
-    return found.hexdigest()[:40]
+    inputs = {name: np.asarray(value).tolist() for name, value in asked.items()}
+    about = {"format": _FORMAT, "hull": hull.digest, "gravity": GRAVITY, "versions": versions()}
+    words = json.dumps(about | inputs, sort_keys=True)
+    return hashlib.sha256(words.encode()).hexdigest()[:40]
 
 
 def _write(place: Path, solved: Hydrodynamics) -> None:
