@@ -53,7 +53,7 @@ class Horizon:
         self.stage = controller.stage if isinstance(controller, NonlinearMPC) else None
         self.forces, self.winch = 0, winch
         if self.stage is not None:
-            self.forces = len(self.stage.channels) * self.stage.substeps
+            self.forces = len(self.stage.channels)
             self.winch = self.stage.winch
         self.kinds = sorted(set(p.kind.tolist()))
         scale, watched = {}, np.zeros((self.N + 1, len(self.kinds)), dtype=np.bool_)
@@ -124,10 +124,8 @@ class Horizon:
             asked += ca.dot(ca.DM(s.drift.state), real) / p.unit
             after += ca.DM(s.from_forces / unit[:, None]) @ force
             y = ca.DM(s.C) @ real + ca.DM(s.D) * p.unit * v + more
-            y += ca.DM(np.tile(s.rest, s.substeps)) + ca.DM(s.own) @ force
-            my = len(s.arguments)
-            law = [s.law.function(y[i * my : (i + 1) * my]) for i in range(s.substeps)]
-            gap = f - ca.vertcat(*law) / winch.rest_tension
+            y += ca.DM(np.asarray(s.rest)) + ca.DM(s.own) @ force
+            gap = f - s.law.function(y) / winch.rest_tension
         self.after = ca.Function("after", [x, v, f, q], [after])
         self.gap = ca.Function("gap", [x, v, f, q], [gap])
         payload = ca.dot(ca.DM(winch.payload), real)

@@ -69,8 +69,6 @@ class NonlinearMPC(WinchMPC):
         As for `LinearMPC`; the deadline is that of the feedback.
     iterations
         Gauss-Newton steps in a sample.
-    substeps
-        Shares of a sample over each of which the forces are held.
     drag, slack, losses, travel
         What is nonlinear, as for `mpc.nonlinear.stage.make_stage`.  Losses of the gear are left out
         unless asked for: they cost three times the time of all else and gained three per cent.
@@ -114,7 +112,6 @@ class NonlinearMPC(WinchMPC):
         case: Case,
         *,
         iterations: int = 1,
-        substeps: int = 1,
         drag: bool = True,
         slack: Sequence[int] | None = None,
         losses: bool = False,
@@ -130,7 +127,6 @@ class NonlinearMPC(WinchMPC):
         self.iterations = int(iterations)
         self.stage = make_stage(
             self.model.winch,
-            substeps=substeps,
             drag=drag,
             slack=slack,
             losses=losses,

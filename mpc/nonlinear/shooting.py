@@ -121,7 +121,7 @@ class Shooting:
         p, winch = programme, model.winch
         self.stage, self.programme = stage, p
         N, nb, n, nr = p.steps, len(p.blocks), winch.size, len(p.at)
-        self.nodes, self._my = N * stage.substeps, len(stage.arguments)
+        self.nodes, self._my = N, len(stage.arguments)
         self._m = len(stage.channels)
         ends = np.cumsum([0, N - 1, n, nb, nr]).tolist()
         parts = [slice(a, b) for a, b in itertools.pairwise(ends)]
@@ -264,8 +264,7 @@ class Shooting:
 
     def later(self, y: FloatArray) -> FloatArray:
         """Return the arguments a sample later, those of the last sample twice."""
-        size = self._my * self.stage.substeps
-        return np.concatenate([y[size:], y[-size:]])
+        return np.concatenate([y[self._my :], y[-self._my :]])
 
 
 class _Solver:

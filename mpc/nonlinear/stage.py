@@ -8,7 +8,7 @@ r"""One sample of the nonlinear winch, `Stage`: the exact linear part, and force
 A rope of fifteen masses has axial modes up to 60 rad/s, and yet next to nothing of it is nonlinear:
 the drag of the payload, the tension of a rope that goes slack, the losses of the gear,
 the layers of the drum (`force_law`).  So the linear plant is sampled exactly, by its matrix
-exponential, and the forces n that it lacks are held over a share of a sample at their value in its
+exponential, and the forces n that it lacks are held over a sample at their value in its
 middle, where the few numbers y decide on them: the implicit midpoint rule for the nonlinear part
 alone, of second order and stable however stiff the rope is.  phi with its derivative is one CasADi
 function that is mapped over the horizon and compiled where there is a compiler.
@@ -29,9 +29,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-import scipy.linalg
 
-from models.basics import FloatArray, InputError, ReadOnlyArrays, check_range
+from models.basics import FloatArray, InputError, ReadOnlyArrays
 from models.plant import DrumTravel, build_plant, displacement_names, zero_order_hold
 from models.simulation import Kernel
 
@@ -49,7 +48,7 @@ _VELOCITY, _SPEED, _ANGLE = "payload.velocity", "motor.speed", "motor.angle"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stage(ReadOnlyArrays):
-    """One sample of M sub-steps, m forces and my arguments; `make_stage` makes it.
+    """One sample with m forces and my arguments; `make_stage` makes it.
 
     Attributes
     ----------
@@ -63,14 +62,12 @@ class Stage(ReadOnlyArrays):
         Which force depends on which argument, positions in n and y.
     rest
         y of a load that hangs at rest, (my,).
-    substeps
-        M.
     from_forces
-        F, (n, M m).
+        F, (n, m).
     C, D, C_hook, C_constants, own
-        y in the middle of each sub-step, less that at rest, of the state at the start of the
-        sample, the input, the hook's (z, z') at both ends of the sample, the constants and the
-        forces of the sample: (M my, n), (M my,), (M my, 4), (M my, 2), (M my, M m).
+        y in the middle of the sample, less that at rest, of the state at its start, the input, the
+        hook's (z, z') at both ends, the constants and the forces: (my, n), (my,), (my, 4), (my, 2),
+        (my, m).
     kernel
         What evaluates forces and derivatives.
     """
@@ -80,7 +77,6 @@ class Stage(ReadOnlyArrays):
     law: ForceLaw
     pairs: tuple[tuple[int, int], ...]
     rest: FloatArray
-    substeps: int
     from_forces: FloatArray
     C: FloatArray
     D: FloatArray
@@ -115,7 +111,6 @@ class Stage(ReadOnlyArrays):
 def make_stage(
     winch: SampledWinch,
     *,
-    substeps: int = 1,
     drag: bool = True,
     slack: Sequence[int] | None = None,
     losses: bool = False,
@@ -129,8 +124,6 @@ def make_stage(
     ----------
     winch
         The sampled winch.
-    substeps
-        Shares of a sample over each of which the forces are held.
     drag
         Whether the payload's drag is quadratic.
     slack
@@ -152,7 +145,6 @@ def make_stage(
     SolverError
         If C was demanded and there is no compiler.
     """
-    M = int(check_range(_OWNER, "substeps", substeps, low=1, high=50))
     springs = (0, winch.masses - 1) if slack is None else tuple(slack)
     if any(k not in range(winch.masses) for k in springs):
         raise InputError(
@@ -181,58 +173,34 @@ def make_stage(
         law=law,
         pairs=tuple((int(a), int(b)) for a, b in np.argwhere(pattern != 0.0)),
         rest=np.array([argument.rest for argument in law.arguments.values()]),
-        substeps=M,
         kernel=Kernel(mapped, compiled=compiled),
-        **_sampled(winch, law, drift, M),
+        **_sampled(winch, law, drift),
     )
 
 
-def _sampled(winch: SampledWinch, law: ForceLaw, drift: Drift, M: int) -> dict[str, FloatArray]:
-    """Return the matrices of one sample of M sub-steps."""
+def _sampled(winch: SampledWinch, law: ForceLaw, drift: Drift) -> dict[str, FloatArray]:
+    """Return the matrices of one sample."""
     plant, T, n = winch.plant, winch.sample_time, winch.size
-    h, m, my = T / M, len(law.columns), len(law.arguments)
     known = {name: k for k, name in enumerate(plant.disturbances)}
     columns = np.column_stack([np.zeros((n, 0)), *law.columns.values()])
     rows = np.vstack([np.zeros((0, n)), *(a.row for a in law.arguments.values())])
     felt = np.vstack([np.zeros((0, 2)), *(a.hook for a in law.arguments.values())])
     held = np.column_stack([plant.B[:, 0], plant.E[:, known["payload.force"]], columns])
     motion = plant.E[:, [known["hook.heave"], known["hook.heave_rate"]]]
-
-    def pushed(age: float, length: float) -> FloatArray:
-        """Return the effect of forces that were there for a time and end so long ago, (n, m)."""
-        over, added = zero_order_hold(plant.A, held, length)
-        del over
-        return np.asarray(scipy.linalg.expm(plant.A * age) @ added[:, 2:])
-
-    C, D = np.zeros((M * my, n)), np.zeros(M * my)
-    C_hook, C_constants = np.zeros((M * my, 4)), np.zeros((M * my, 2))
-    own = np.zeros((M * my, M * m))
-    for i in range(M):
-        at = (i + 0.5) * h
-        here = slice(i * my, (i + 1) * my)
-        over, added = zero_order_hold(plant.A, held, at)
-        # The command is held at u = back omega(start) + d / gain.
-        C[here] = rows @ (over + winch.back * np.outer(added[:, 0], winch.speed))
-        D[here] = rows @ added[:, 0] / winch.gain
-        C_constants[here] = rows @ np.column_stack([added[:, 1], added[:, 0] / winch.gain])
-        moved, hook = hermite_within(plant.A, motion, T, at)
-        C_hook[here] = rows @ moved + felt @ hook
-        for k in range(i):
-            own[here, k * m : (k + 1) * m] = rows @ pushed(at - (k + 1) * h, h)
-        own[here, i * m : (i + 1) * m] = rows @ pushed(0.0, 0.5 * h)
-    # The command that gives the input: the mean torque, and what the start is over it.
-    C += np.outer(D, drift.state)
-    C_hook += np.outer(D, drift.hook)
-    C_constants += np.outer(D, drift.constants)
-    D = D * (1.0 + drift.mean)
-    forced = [pushed(T - (i + 1) * h, h) for i in range(M)]
+    over, added = zero_order_hold(plant.A, held, 0.5 * T)
+    moved, hook = hermite_within(plant.A, motion, T, 0.5 * T)
+    # The command is held at u = back omega(start) + d / gain, with d what gives the input: the mean
+    # torque, and what the start is over it.
+    D = rows @ added[:, 0] / winch.gain
+    constants = np.column_stack([added[:, 1], added[:, 0] / winch.gain])
     return {
-        "from_forces": np.column_stack([np.zeros((n, 0)), *forced]),
-        "C": C,
-        "D": D,
-        "C_hook": C_hook,
-        "C_constants": C_constants,
-        "own": own,
+        "from_forces": zero_order_hold(plant.A, held, T)[1][:, 2:],
+        "C": rows @ (over + winch.back * np.outer(added[:, 0], winch.speed))
+        + np.outer(D, drift.state),
+        "D": D * (1.0 + drift.mean),
+        "C_hook": rows @ moved + felt @ hook + np.outer(D, drift.hook),
+        "C_constants": rows @ constants + np.outer(D, drift.constants),
+        "own": rows @ added[:, 2:],
     }
 
 

@@ -39,7 +39,7 @@ class NlpAnswer:
     states
         The winch's state at every sample, (N + 1, n).
     forces
-        What the linear plant lacks in every sample, (N, M m).
+        What the linear plant lacks in every sample, (N, m).
     slack
         Largest violation of a soft row, over its limit.
     iterations
@@ -76,8 +76,7 @@ def nlp_oracle(
         controller.model, controller.programme, controller.stage, controller.regulator,
     )  # fmt: skip
     winch, N, nb = stage.winch, p.steps, len(p.blocks)
-    n, M, m = winch.size, stage.substeps, len(stage.channels)
-    my = len(stage.arguments)
+    n, m = winch.size, len(stage.channels)
     over = model.A[model.sea_at, model.sea_at]
     sea = [chi[model.sea_at]]
     for _ in range(N):
@@ -92,7 +91,7 @@ def nlp_oracle(
     unit = np.maximum(np.abs(winch.moved).max(axis=1), 1e-9)
     unit[unit == 1e-9] = 1.0
     force = winch.rest_tension
-    X, F, V = ca.MX.sym("X", n, N), ca.MX.sym("F", M * m, N), ca.MX.sym("V", nb)
+    X, F, V = ca.MX.sym("X", n, N), ca.MX.sym("F", m, N), ca.MX.sym("V", nb)
     states = [ca.DM(x0)] + [ca.DM(unit) * X[:, j] for j in range(N)]
     d = [p.unit * V[int(of[j])] for j in range(N)]
     gaps: list[ca.MX] = []
@@ -103,13 +102,10 @@ def nlp_oracle(
         if m > 0:
             n_j = force * F[:, j]
             after += ca.mtimes(ca.DM(stage.from_forces), n_j)
-            shown = stage.C_hook @ ends + stage.C_constants @ c + np.tile(stage.rest, M)
+            shown = stage.C_hook @ ends + stage.C_constants @ c + stage.rest
             y = ca.mtimes(ca.DM(stage.C), states[j]) + ca.DM(stage.D) * d[j] + ca.DM(shown)
             y += ca.mtimes(ca.DM(stage.own), n_j)
-            gaps += [
-                (n_j[i * m : (i + 1) * m] - stage.law.function(y[i * my : (i + 1) * my])) / force
-                for i in range(M)
-            ]
+            gaps.append((n_j - stage.law.function(y)) / force)
         gaps.append((states[j + 1] - after) / ca.DM(unit))
 
     cost = ca.MX(0)
@@ -137,7 +133,7 @@ def nlp_oracle(
     count = g.numel() - 2 * len(rows)
     lbg = np.concatenate([np.zeros(count), np.full(len(rows), -np.inf), lows])
     ubg = np.concatenate([np.zeros(count), highs, np.full(len(rows), np.inf)])
-    free = np.full((n + M * m) * N, np.inf)
+    free = np.full((n + m) * N, np.inf)
     lbx = np.concatenate([-free, low, np.zeros(len(rows))])
     ubx = np.concatenate([free, high, np.full(len(rows), np.inf)])
     options: dict[str, Any] = {
@@ -156,19 +152,19 @@ def nlp_oracle(
     first = np.zeros(variables.numel())
     moves = np.zeros(nb) if start is None else start
     _roll_out(controller, x0, path, c, of, moves, unit, first[: n * N])
-    first[(n + M * m) * N : (n + M * m) * N + nb] = moves
+    first[(n + m) * N : (n + m) * N + nb] = moves
     answer = solver(x0=first, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg)
     if not solver.stats()["success"]:
         raise SolverError(f"{_OWNER}: IPOPT found no optimum: {solver.stats()['return_status']}")
     found = np.asarray(answer["x"]).ravel()
     after = found[: n * N].reshape(N, n) * unit
-    forces = found[n * N : (n + M * m) * N].reshape(N, M * m) * force
-    v = found[(n + M * m) * N :][:nb]
+    forces = found[n * N : (n + m) * N].reshape(N, m) * force
+    v = found[(n + m) * N :][:nb]
     return NlpAnswer(
         v=v,
         states=np.vstack([x0, after]),
         forces=forces,
-        slack=float(found[(n + M * m) * N + nb :].max(initial=0.0)),
+        slack=float(found[(n + m) * N + nb :].max(initial=0.0)),
         iterations=int(solver.stats()["iter_count"]),
     )
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg
 
 from models.basics import SolverError
 from mpc.nonlinear.stage import Stage
@@ -20,17 +19,16 @@ def advanced(stage: Stage, x: FloatArray, d: float, ends: FloatArray, c: FloatAr
 
     The ends are z, z' of the hook at the start and at the end of the sample, (4,); constants (2,).
     """
-    M, winch = stage.substeps, stage.winch
+    winch = stage.winch
     ahead = winch.A @ x + winch.B[:, 0] * d + winch.from_hook @ ends + winch.from_constants @ c
     if not stage.channels:
         return np.asarray(ahead)
     known = stage.C @ x + stage.D * d + stage.C_hook @ ends + stage.C_constants @ c
-    known += np.tile(stage.rest, M)
+    known += stage.rest
     n = np.zeros(stage.own.shape[1])
     for _ in range(_NEWTON):
-        found, J = stage.forces((known + stage.own @ n).reshape(M, -1))
-        slope = scipy.linalg.block_diag(*J)
-        step = np.linalg.solve(np.eye(n.size) - slope @ stage.own, found.ravel() - n)
+        found, J = stage.forces((known + stage.own @ n)[None])
+        step = np.linalg.solve(np.eye(n.size) - J[0] @ stage.own, found[0] - n)
         n += step
         if np.abs(step).max() <= _EXACT * winch.rest_tension:
             return np.asarray(ahead + stage.from_forces @ n)
