@@ -314,9 +314,8 @@ def _need(data: CapytaineData, names: tuple[str, ...], instead: str = "") -> Non
 
 def _wave_force(data: CapytaineData) -> ComplexArray:
     """Return the wave force (k, h, n), in the file's convention."""
-    parts = ("diffraction_force", "Froude_Krylov_force")
-    if data.has("excitation_force"):
-        parts = ("excitation_force",)
+    whole = data.has("excitation_force")
+    parts = ("excitation_force",) if whole else ("diffraction_force", "Froude_Krylov_force")
     _need(data, parts, ", and no excitation_force")
     axes = ("frequency", "wave_direction", "influenced_dof")
     return np.asarray(sum(data.table(n, axes) for n in parts), dtype=np.complex128)
