@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from models.basics import mean_interval
+from models.basics import Interval, mean_interval
 
 from ..text import Column, Table, Written, columns, count, duration, listed, number, quantity, scale
 from .comparison import Comparison
@@ -26,6 +26,7 @@ LEGEND = (
 
 _NOTHING = 1e-12  # [m]
 _EVEN = math.log(1.25)  # an interval of the log ratio within this says "no difference"
+_UNSURE = "cannot be told from so few seeds"
 _MANY = 1000.0  # beyond that a ratio says no more
 
 
@@ -151,17 +152,25 @@ def _against(found: Comparison, name: str, other: str, height: float, what: str)
         side = "less" if factor < 1.0 else "more"
         times = number(max(factor, 1.0 / factor), 2)
         return f"{label} moves the load {times} times {side} than {other}, in a single sea"
+    verdict, ends = _verdict(mean), (mean.low, mean.high)
+    if mean.high < 0.0:  # as many times less
+        ends = (-mean.high, -mean.low)
+    band = " to ".join(number(math.exp(end), 2) for end in ends)
     if mean.low <= 0.0 <= mean.high:
-        band = f"{number(math.exp(mean.low), 2)} to {number(math.exp(mean.high), 2)} times"
-        if max(-mean.low, mean.high) <= _EVEN:
-            return f"{label} does not help: {band} the rms of {other}"
-        seeds = count(len(ratios), "seed")
-        return f"whether {label} helps cannot be told from {seeds}: {band} the rms of {other}"
+        than = f"{band} times the rms of {other}"
+    else:
+        than = f"{band} times {'less' if mean.high < 0.0 else 'more'} rms than {other}"
+    if verdict == _UNSURE:
+        return f"whether {label} helps cannot be told from {count(len(ratios), 'seed')}: {than}"
+    return f"{label} {verdict}: {than}"
+
+
+def _verdict(mean: Interval) -> str:
+    """Return what an interval of the mean log ratio says."""
     if mean.high < 0.0:
-        low, high = number(math.exp(-mean.high), 2), number(math.exp(-mean.low), 2)
-        return f"{label} helps: {low} to {high} times less rms than {other}"
-    low, high = number(math.exp(mean.low), 2), number(math.exp(mean.high), 2)
-    return f"{label} does not help: {low} to {high} times more rms than {other}"
+        return "helps"
+    told = mean.low > 0.0 or max(-mean.low, mean.high) <= _EVEN
+    return "does not help" if told else _UNSURE
 
 
 def _log_ratios(found: Comparison, name: str, other: str, height: float) -> list[float]:
@@ -186,25 +195,13 @@ def _lost(found: Comparison, height: float) -> str:
 
 def _overall(found: Comparison) -> Sequence[str]:
     """Return at which heights prediction helps and at which it does not."""
-    verdicts: dict[str, list[float]] = {
-        "helps": [],
-        "does not help": [],
-        "cannot be told from so few seeds": [],
-    }
+    verdicts: dict[str, list[float]] = {"helps": [], "does not help": [], _UNSURE: []}
     for height in found.heights:
         linear, best = found.best(height, ("linear",)), found.best(height, ("predictive",))
         if linear is None or best is None:
             continue
         ratios = _log_ratios(found, best, linear, height)
-        mean = mean_interval(ratios) if ratios else None
-        if mean is None or math.isnan(mean.low):
-            verdicts["cannot be told from so few seeds"].append(height)
-        elif mean.high < 0.0:
-            verdicts["helps"].append(height)
-        elif mean.low > 0.0 or max(-mean.low, mean.high) <= _EVEN:
-            verdicts["does not help"].append(height)
-        else:
-            verdicts["cannot be told from so few seeds"].append(height)
+        verdicts[_verdict(mean_interval(ratios)) if ratios else _UNSURE].append(height)
     parts = [
         f"it {verdict} at H_s {listed([f'{h:.4g}' for h in heights])} m"
         for verdict, heights in verdicts.items()
