@@ -33,9 +33,10 @@ class _Reading(argparse.Action):
         values: Any,
         option_string: str | None = None,
     ) -> None:
-        """Keep what the value means under the option's name."""
+        """Keep what the value means under the option's name, and the value in ``given``."""
         owner = parser.prog.rpartition(" ")[2]
         setattr(namespace, self.dest, self.read(f"{owner}: {self.option_strings[0]}", values))
+        namespace.given = {**getattr(namespace, "given", {}), self.dest: values}
 
 
 def _argument(*names: str, read: Read | None = None, **settings: Any) -> Declaration:
@@ -146,17 +147,14 @@ def changed_words(
     """
     parser = argparse.ArgumentParser(add_help=False)
     declared(parser, declarations)
-    words = []
+    words, known = [], vars(arguments) | getattr(arguments, "given", {}) | changes
     for action in parser._actions:
-        value = changes.get(action.dest, getattr(arguments, action.dest))
+        value = known[action.dest]
         if action.option_strings and value not in (None, action.default):
             for one in value if isinstance(value, list) else [value]:
                 words.append(action.option_strings[0])
                 if action.nargs != 0:
-                    parts = one if isinstance(one, tuple) else (one,)
-                    words.append(
-                        ",".join(f"{x:g}" if isinstance(x, float) else str(x) for x in parts)
-                    )
+                    words.append(f"{one:g}" if isinstance(one, float) else str(one))
     return words
 
 

@@ -15,7 +15,6 @@ from ..text import OutputFolder, told_once
 
 if TYPE_CHECKING:
     from models import Case
-    from models.casefile import Quantity
 
 _NAMES = ("A", "a", "a1", "a2")
 
@@ -90,17 +89,6 @@ def split_pairs(
     return found
 
 
-def read_quantity_of(option: str, name: str, text: str, wanted: Quantity) -> float:
-    """Return a quantity as in a case file; `name` begins what the message says of it."""
-    from models.casefile import read_yaml
-
-    value, _ = read_yaml(text, option)
-    try:
-        return float(wanted.read(value))
-    except InputError as error:
-        raise InputError(f"{option}: {name}{error}") from None
-
-
 def read_pairs(option: str, form: str, texts: Sequence[str]) -> dict[str, Any]:
     """Return values by name as `split_pairs` does, each read as in a case file."""
     from models.casefile import read_yaml
@@ -123,15 +111,12 @@ def parse_gains(text: str, structure: str = "payload-feedback") -> dict[str, flo
     >>> parse_gains("A=200, a=50, a1=100, a2=1e2")
     {'A': 200.0, 'a': 50.0, 'a1': 100.0, 'a2': 100.0}
     """
-    gains: dict[str, float] = {}
     plain = structure == "payload-feedback"
     form = "numbers for A, a, a1 and a2, as in A=1,a=0,a1=0,a2=0.5" if plain else "NAME=NUMBER,.."
-    for part in text.split(","):
-        name, sign, value = (piece.strip() for piece in part.partition("="))
-        if not sign or (plain and name not in _NAMES):
-            raise InputError(f"--gains: must be {form}; got {part.strip()!r}")
-        if name in gains:
-            raise InputError(f"--gains: {name} is given twice")
+    gains: dict[str, float] = {}
+    for name, value in split_pairs("--gains", form, text.split(","), empty=True).items():
+        if plain and name not in _NAMES:
+            raise InputError(f"--gains: must be {form}, got {f'{name}={value}'!r}")
         try:
             gains[name] = float(value)
         except ValueError:

@@ -1,4 +1,4 @@
-"""Lists and ranges as an option is given them: names, numbers, two ends, an axis.
+"""Quantities, lists and ranges as an option is given them: names, numbers, two ends, an axis.
 
 Each returns what was meant from the option's name, for messages, and its text
 (`stillhook.commands.declare.Read`).
@@ -12,6 +12,23 @@ from collections.abc import Callable
 from models.basics import InputError
 
 _FINEST = 400  # points of an axis
+
+
+def quantity(
+    kind: str, low: float, high: float, *, open_low: bool = False
+) -> Callable[[str, str], float]:
+    """Return what reads a quantity of a kind with its unit, as in a case file [SI]."""
+
+    def read(name: str, text: str) -> float:
+        from models.casefile import Quantity, read_yaml
+
+        try:
+            value = Quantity(kind, low, high, open_low=open_low).read(read_yaml(text, name)[0])
+        except InputError as error:
+            raise InputError(f"{name} {error}") from None
+        return float(value)
+
+    return read
 
 
 def names(name: str, text: str) -> tuple[str, ...]:

@@ -26,6 +26,7 @@ from ..text import (
     json_data,
     json_text,
     markdown,
+    pictures,
 )
 from .comparison import COLUMNS, Comparison
 from .figures import heights, worst_moment
@@ -94,7 +95,7 @@ def write_comparison(
     drawn = place.draw(report.drawings) if figures else []
     text = markdown(_with_contenders(report, found), [path.stem for path in drawn])
     place.write("summary.md", f"{text}\n{_SAME}\n")
-    place.discard("traces.csv", *(f"{drawing.name}.*" for drawing in report.drawings))
+    place.discard("traces.csv", *pictures(*(drawing.name for drawing in report.drawings)))
     return place.written
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from synth.design import Design
 
-from ..text import Drawing, OutputFolder, Report, ReportSection, markdown, pairs
+from ..text import Drawing, OutputFolder, Report, ReportSection, markdown, pairs, pictures
 from .design_file import design_text
 from .figures import limits, nyquist, payload_spectrum, responses
 from .summary import (
@@ -123,9 +123,7 @@ def write_report(
     ]
     drawings = design_report(design, bound=False).drawings
     written += target.draw(drawings, progress=progress)
-    for name in set(_FIGURES) - {drawing.name for drawing in drawings}:
-        for kind in ("svg", "png"):
-            target.discard(f"{name}.{kind}")
+    target.discard(*pictures(*_FIGURES))
     if bound and progress is not None and design.margins is not None:
         progress("bound", 0, 1)
     text = markdown(design_report(design, bound=bound))

@@ -9,7 +9,7 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .data import runs_data
-    from .report import RunFolder, runs_report, write_runs
+    from .report import TraceFormat, runs_report, write_runs, write_summary, write_traces
     from .runs import TRIPS, Runs, headline_of, keep_worst, tree
     from .simulation import Series, seconds_of, seeds_of, simulate
     from .window import error_of

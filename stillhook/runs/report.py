@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Literal
@@ -35,12 +35,13 @@ from ..text import (
     json_text,
     markdown,
     number,
+    pictures,
     quantity,
 )
 from .data import runs_data
 from .figures import comparison, exceedance
 from .runs import Runs, headline_of, speed_of
-from .strip import strip
+from .strip import animation, strip
 from .table import tables_of
 from .trace_figure import traces
 
@@ -91,131 +92,95 @@ def runs_report(compared: Sequence[Runs]) -> Report:
     )
 
 
-@dataclass(kw_only=True)
-class RunFolder:
-    """A folder that runs are written into as they come.
+def write_traces(
+    folder: OutputFolder, run: Run, format: TraceFormat = "csv", *, several: bool = False
+) -> None:
+    """Write the time traces of a run.
 
     Parameters
     ----------
     folder
-        The folder, made and known to be writable.
+        The folder.
+    run
+        The run.
     format
-        Of the files with time traces.
+        Of the file.
     several
         Whether there are several controllers, each with a folder of its own.
-    written
-        What has been written so far.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written, as on a disk that is full, or the format takes a
+        package that is not installed.
     """
+    if format == "none" or not run.time.size:
+        return
+    suffix, write = FORMATS[format]
+    place = folder.at(f"{_own(run.controller, several)}runs/seed-{run.seed:03d}.{suffix}")
+    try:
+        folder.keep(write(run, place))
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"format {format}: the package {error.name} is not installed; use csv"
+        ) from error
 
-    folder: OutputFolder
-    format: TraceFormat = "csv"
-    several: bool = False
-    written: list[Path] = field(default_factory=list)
 
-    def add(self, run: Run) -> None:
-        """Write the time traces of a run.
+def write_summary(
+    folder: OutputFolder,
+    compared: Sequence[Runs],
+    *,
+    case: Case | None = None,
+    question: Mapping[str, object] | None = None,
+    animate: bool = False,
+    progress: Callable[[str, float], None] | None = None,
+) -> None:
+    """Write the summary of runs, their events and their figures.
 
-        Raises
-        ------
-        InputError
-            If the file cannot be written, as on a disk that is full, or the format takes a
-            package that is not installed.
-        """
-        if self.format == "none" or not run.time.size:
-            return
-        suffix, write = FORMATS[self.format]
-        place = OutputFolder.prepare(self.place_of(run.controller).path / "runs")
-        try:
-            path = write(run, place.path / f"seed-{run.seed:03d}.{suffix}")
-        except ModuleNotFoundError as error:
-            raise InputError(
-                f"format {self.format}: the package {error.name} is not installed; use csv"
-            ) from error
-        self.written.append(path)
+    Parameters
+    ----------
+    folder
+        The folder, which may hold the traces of the runs already.
+    compared
+        Runs of one controller, or of several.
+    case
+        The case as it was given; by default that of the runs, as it is in the scenario.
+    question
+        What was asked, to be kept beside the answer; plain data.
+    animate
+        Whether to draw a moving picture.
+    progress
+        Called with what is being done, and the share of it that is.
 
-    def place_of(self, controller: str) -> OutputFolder:
-        """Return the folder of a controller."""
-        if not self.several:
-            return self.folder
-        return OutputFolder(self.folder.path / folder_name(controller))
-
-    def finish(
-        self,
-        compared: Sequence[Runs],
-        *,
-        case: Case | None = None,
-        question: Mapping[str, object] | None = None,
-        figures: bool = True,
-        animate: bool = False,
-        progress: Callable[[str, float], None] | None = None,
-    ) -> None:
-        """Write the summary of runs, their events and their figures.
-
-        Parameters
-        ----------
-        compared
-            Runs of one controller, or of several.
-        case
-            The case as it was given; by default that of the runs, as it is in the scenario.
-        question
-            What was asked, to be kept beside the answer; plain data.
-        figures, animate
-            Whether to draw figures, and a moving picture.
-        progress
-            Called with what is being done, and the share of it that is.
-
-        Raises
-        ------
-        InputError
-            If a file cannot be written.
-        """
-        tell = progress or (lambda what, share: None)
-        report = runs_report(compared)
-        own = compared[0].case if case is None else case
-        self._put("case.yaml", own.to_yaml())
-        self._put("summary.json", json_text(runs_data(compared, question)))
-        self._put("events.csv", csv_text(_event_table(compared)))
-        drawn: list[Path] = []
-        if figures:
-            for runs in compared:
-                OutputFolder.prepare(self.place_of(runs.controller).path)
-            drawn = self.folder.draw(
-                report.drawings, progress=lambda what, done, of: tell("drawing", done / of)
-            )
-            self.written += drawn
-        if animate:
-            self._animate(compared, tell)
-        names = [p.relative_to(self.folder.path).with_suffix("").as_posix() for p in drawn]
-        text = markdown(_with_each(report, compared), names)
-        self._put("summary.md", f"{text}\n{_READ}\n")
-        self._clean(compared)
-
-    def _put(self, name: str, content: str | bytes) -> None:
-        self.written.append(self.folder.write(name, content))
-
-    def _animate(self, compared: Sequence[Runs], tell: Callable[[str, float], None]) -> None:
-        from .strip import animation
-
-        for runs in compared:
-            if runs.worst.time.size < 2:
-                continue
-            place = OutputFolder.prepare(self.place_of(runs.controller).path)
+    Raises
+    ------
+    InputError
+        If a file cannot be written.
+    """
+    tell = progress or (lambda what, share: None)
+    report = runs_report(compared)
+    folder.write("case.yaml", (case or compared[0].case).to_yaml())
+    folder.write("summary.json", json_text(runs_data(compared, question)))
+    folder.write("events.csv", csv_text(_event_table(compared)))
+    drawn = folder.draw(report.drawings, progress=lambda what, done, of: tell("drawing", done / of))
+    own = [_own(runs.controller, len(compared) > 1) for runs in compared]
+    for place, runs in zip(own, compared, strict=True):
+        if animate and runs.worst.time.size >= 2:
             what = f"animating {runs.controller}"
             film = animation(runs.worst, runs.scenario, progress=partial(tell, what))
-            self.written.append(place.write(_MOVIE, film))
+            folder.write(place + _MOVIE, film)
+    names = [p.relative_to(folder.path).with_suffix("").as_posix() for p in drawn]
+    text = markdown(_with_each(report, compared), names)
+    folder.write("summary.md", f"{text}\n{_READ}\n")
+    # What an earlier simulation has left here and this one does not have.
+    traces = [f"runs/seed-[0-9]*.{suffix}" for suffix, _ in FORMATS.values()]
+    stale = [*pictures(*_FIGURES), _MOVIE, *traces]
+    folder.discard(*(place + name for place in ("", *own) for name in stale))
 
-    def _clean(self, compared: Sequence[Runs]) -> None:
-        """Remove what an earlier simulation has left here and this one does not have."""
-        mine = {path.resolve() for path in self.written}
-        places = {self.folder.path, *(self.place_of(runs.controller).path for runs in compared)}
-        suffixes = [suffix for suffix, _ in FORMATS.values()]
-        for place in places:
-            old = [place / f"{name}.{kind}" for name in _FIGURES for kind in ("svg", "png")]
-            old += [place / _MOVIE]
-            old += [path for s in suffixes for path in (place / "runs").glob(f"seed-[0-9]*.{s}")]
-            for path in old:
-                if path.resolve() not in mine:
-                    OutputFolder(path.parent).discard(path.name)
+
+def _own(controller: str, several: bool) -> str:
+    """Return what the names of a controller's files begin with."""
+    return f"{folder_name(controller)}/" if several else ""
 
 
 def write_runs(
@@ -264,13 +229,11 @@ def write_runs(
         raise InputError(
             f"write_runs: controllers must have different names, got {', '.join(names)}"
         )
-    target = RunFolder(
-        folder=OutputFolder.prepare(folder), format=format, several=len(compared) > 1
-    )
+    target = OutputFolder.prepare(folder, ("svg", "png") if figures else ())
     for runs in compared:
         for run in runs:
-            target.add(run)
-    target.finish(compared, question=question, figures=figures, animate=animate)
+            write_traces(target, run, format, several=len(compared) > 1)
+    write_summary(target, compared, question=question, animate=animate)
     return target.written
 
 
@@ -278,7 +241,7 @@ def _drawings(runs: Runs, *, several: bool) -> list[Drawing]:
     """Return the figures of one controller; of several each has a folder of its own."""
     if runs.worst.time.size < 2:
         return []
-    own = f"{folder_name(runs.controller)}/" if several else ""
+    own = _own(runs.controller, several)
     whole = "Time traces: the whole run, and a close-up"
     moments = "Hook, drum, rope and payload at some moments"
     return [

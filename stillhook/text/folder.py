@@ -72,7 +72,9 @@ class OutputFolder:
             If that folder cannot be made.
         """
         path = self.path / name
-        return self.prepare(path.parent).path / path.name if "/" in name else path
+        if not path.parent.is_dir():
+            self.prepare(path.parent)
+        return path
 
     def write(self, name: str, content: str | bytes) -> Path:
         """Write a file under a temporary name, then rename it; return its path.
@@ -128,8 +130,7 @@ class OutputFolder:
             try:
                 figure = drawing.draw()
             except InputError:  # a run that was cut short, say, has nothing to show
-                for kind in kinds:
-                    self.discard(f"{drawing.name}.{kind}")
+                self.discard(*pictures(drawing.name))
                 continue
             for kind in kinds:
                 written.append(self.write(f"{drawing.name}.{kind}", style.picture(figure, kind)))
@@ -141,6 +142,11 @@ class OutputFolder:
             if path not in self.written:
                 with contextlib.suppress(OSError):
                     path.unlink(missing_ok=True)
+
+
+def pictures(*names: str) -> list[str]:
+    """Return the files of figures, of every kind."""
+    return [f"{name}.{kind}" for name in names for kind in ("svg", "png")]
 
 
 def folder_name(text: str) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from models.basics import InputError
 
-from ...text import OutputFolder
+from ...text import OutputFolder, pictures
 from ..declare import CASE, SEED, STRUCTURE, results_folder, starts, switch, text, whole
 from ..given import case_words, given_case
 from ..lists import parse_range
@@ -91,7 +91,7 @@ def run(arguments: argparse.Namespace) -> int:
         folder.write("size.csv", sizing.to_csv())
     folder.draw(report.drawings)
     _sized(folder, sizing.sized_case, sizing.design)
-    folder.discard("size.*", "sized.yaml", "design.yaml")
+    folder.discard("size.csv", *pictures("size"), "sized.yaml", "design.yaml")
     return conclude(report, arguments, folder, _next(sizing, arguments, folder))
 
 

@@ -7,7 +7,7 @@ import math
 import shlex
 from typing import TYPE_CHECKING
 
-from ...text import OutputFolder
+from ...text import OutputFolder, pictures
 from ..declare import CASE, SEED, STRUCTURE, results_folder, starts
 from ..given import case_words, given_case
 from ..working import conclude, prepared, working
@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     if result.rows:
         folder.write("worth.csv", result.to_csv())
         folder.draw(report.drawings)
-    folder.discard("worth.*")
+    folder.discard("worth.csv", *pictures("worth"))
     status = conclude(report, arguments, folder, _next(result, arguments, folder))
     return status if result.rows else 1
 

@@ -9,15 +9,25 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from functools import partial
 
 from models.basics import StillhookError, SynthesisError
-from models.run import Run
 
 from ...controllers import controller_of
-from ...runs import RunFolder, Runs, Series, headline_of, keep_worst, runs_data, runs_report, tree
+from ...runs import (
+    Runs,
+    Series,
+    TraceFormat,
+    headline_of,
+    keep_worst,
+    runs_data,
+    runs_report,
+    tree,
+    write_summary,
+    write_traces,
+)
 from ...text import (
     OutputFolder,
     ReportSection,
@@ -43,23 +53,19 @@ from ..declare import (
     whole,
 )
 from ..given import case_words
-from ..lists import numbers
+from ..lists import numbers, quantity
 from ..working import Stop, kept_in, place_for, prepared, stoppable, tidy
-from .simulate_given import SimulationRequest, asked_of
-
-if TYPE_CHECKING:
-    from rich.console import Console
+from .simulate_given import TIME, SimulationRequest, asked_of, sine
 
 _MEGABYTE = 1e6
 _MANY = 10_000  # seeds: more than anybody wants on purpose
-_Ticker = Callable[[str, float], None]  # takes what is being done, and how much is done [s]
 
 
 @dataclass(kw_only=True)
 class _Simulated:
     """What came of it: runs by controller, those left out and why."""
 
-    compared: list[Runs] = field(default_factory=list)
+    compared: dict[str, Runs] = field(default_factory=dict)
     left_out: dict[str, StillhookError] = field(default_factory=dict)
 
 
@@ -86,6 +92,7 @@ ARGUMENTS = (
                 "--duration",
                 "TIME",
                 "length of a run, as in '20 min' (default: the operation's own)",
+                read=TIME,
             ),
         ),
         one_of(
@@ -94,7 +101,7 @@ ARGUMENTS = (
                 "FILE",
                 "the hook's motion from a CSV file with the columns time and displacement",
             ),
-            text("--sine", "AMPLITUDE,PERIOD", "a sine instead, as in '0.5 m, 8 s'"),
+            text("--sine", "AMPLITUDE,PERIOD", "a sine instead, as in '0.5 m, 8 s'", read=sine),
         ),
         text(
             "--tip",
@@ -113,15 +120,21 @@ ARGUMENTS = (
     ),
     group(
         "how",
-        text("--sample-time", "TIME", "of the controller, as in '20 ms'"),
-        text("--step", "TIME", "integration step (default: the longest)"),
+        text("--sample-time", "TIME", "of the controller, as in '20 ms'", read=TIME),
+        text("--step", "TIME", "integration step (default: the longest)", read=TIME),
         whole("--masses", "masses along the rope (default: the case's)"),
-        text("--settle", "TIME", "when statistics begin (default: after some waves)"),
+        text(
+            "--settle",
+            "TIME",
+            "when statistics begin (default: after some waves)",
+            read=quantity("time", 0.0, 1e8),
+        ),
         text(
             "--lock-limit",
             "LENGTH",
             "error of the payload that counts as lost lock (default: the hook's significant "
             "height)",
+            read=quantity("length", 0.0, 1e5, open_low=True),
         ),
         switch(
             "--no-compile",
@@ -142,6 +155,7 @@ ARGUMENTS = (
             "--store-step",
             "TIME",
             "time between two rows of them (default: so that there are at most 40 000)",
+            read=TIME,
         ),
         switch("--animate", "make a moving picture (GIF) of the worst run"),
     ),
@@ -152,10 +166,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulate, show and save; return the exit status."""
     asked = asked_of(arguments)
     place = place_for(arguments, asked.case.name, f"-{asked.scenario.name}")
-    several = len(asked.controllers) > 1
+    found = _Simulated()
     with tidy(place), stoppable() as stop:
         folder = prepared(arguments, place)
-        target = RunFolder(folder=folder, format=arguments.traces, several=several)
         try:
             asked = _with_gains(asked, folder, stop, shown=not arguments.quiet)
             total = len(asked.controllers) * len(asked.seeds) * asked.duration
@@ -163,35 +176,48 @@ def run(arguments: argparse.Namespace) -> int:
                 shown=not arguments.quiet, pace=lambda speed: f"{number(speed, 2)} x real time"
             ) as tell:
 
-                def tick(what: str, done: float) -> None:
-                    tell(what, done, total)
+                def tick(what: str, before: float, span: float = 0.0, share: float = 0.0) -> None:
+                    tell(what.format(share), before + span * share, total)
+                    if stop():
+                        raise KeyboardInterrupt  # ends a run, and is told by its status
 
-                found = _simulated(asked, target, stop, tick)
+                try:
+                    _simulate(asked, found, folder, arguments.traces, tick)
+                except KeyboardInterrupt:
+                    if not stop():
+                        raise
                 if found.compared:
-                    _finish(target, asked, found.compared, arguments, tick, total)
+                    write_summary(
+                        folder,
+                        [*found.compared.values()],
+                        case=asked.case,
+                        question=_question(asked, arguments),
+                        animate=arguments.animate,
+                        progress=lambda what, share: tell(what, share * total, total),
+                    )
         except KeyboardInterrupt:
             raise KeyboardInterrupt(_kept(folder)) from None
         stopped = stop()
-    out = console()
-    if not found.compared:
+    compared = [*found.compared.values()]
+    if not compared:
         if not stopped:
             raise next(iter(found.left_out.values()))
         raise KeyboardInterrupt(f"nothing was simulated; {_kept(folder)}")
     if arguments.json:
-        sys.stdout.write(json_text(runs_data(found.compared)))
+        sys.stdout.write(json_text(runs_data(compared)))
     elif arguments.quiet:
-        for runs in found.compared:
-            out.print(f"{headline_of(runs)}; {tree(runs)[0]}", soft_wrap=True)
+        for runs in compared:
+            console().print(f"{headline_of(runs)}; {tree(runs)[0]}", soft_wrap=True)
     else:
-        _show(asked, found, target, arguments, out)
+        _show(asked, found, folder, arguments)
     if stopped:
-        done = sum(run.completed for runs in found.compared for run in runs)
+        done = sum(run.completed for runs in compared for run in runs)
         wanted = len(asked.controllers) * len(asked.seeds)
         raise KeyboardInterrupt(
             f"{done} of {count(wanted, 'run')} went to the end; all there is was written to "
             f"{folder.path}"
         )
-    return 0 if all(runs.completed for runs in found.compared) else 1
+    return 0 if all(runs.completed for runs in compared) else 1
 
 
 def _with_gains(
@@ -219,52 +245,32 @@ def _with_gains(
     return replace(asked, design=design)
 
 
-def _simulated(
-    asked: SimulationRequest, target: RunFolder, stop: Stop, tick: _Ticker
-) -> _Simulated:
-    """Run every controller with every seed, until all are done or the user asks to stop."""
-    found = _Simulated()
+def _simulate(
+    asked: SimulationRequest,
+    found: _Simulated,
+    folder: OutputFolder,
+    traces: TraceFormat,
+    tick: Callable[..., None],
+) -> None:
+    """Run every controller with every seed, and keep each run as soon as it is there."""
     before = 0.0
     for name in asked.controllers:
-        if stop():
-            break
         tick(f"preparing {name}", before)
-
-        def tune(share: float, what: str = f"tuning {name}", at: float = before) -> None:
-            tick(f"{what}, {100.0 * share:.0f} %", at)
-            if stop():
-                raise KeyboardInterrupt
-
         try:
-            series = _prepared(asked, name, tune)
-        except KeyboardInterrupt:
-            if stop():
-                break  # what was simulated before is shown
-            raise
+            series = _prepared(asked, name, partial(tick, f"tuning {name}, {{:.0%}}", before, 0.0))
         except StillhookError as error:
-            if stop():
-                break  # the compiler was interrupted too
+            tick(name, before)  # the compiler may have been interrupted too
             if not asked.every:
                 raise
             found.left_out[name] = error
-            series = None
-        runs: list[Run] = []
-        for seed in asked.seeds if series is not None else ():
-            if series is None or stop():
-                break
-
-            def tell(share: float, what: str = f"{name}, seed {seed}", at: float = before) -> None:
-                tick(what, at + share * asked.duration)
-                if stop():
-                    raise KeyboardInterrupt  # which ends the run, and is told by its status
-
-            one = series.run(seed, tell)
-            target.add(one)
-            runs = keep_worst([*runs, one])
+            continue
+        for seed in asked.seeds:
+            what = f"{name}, seed {seed}"
+            tick(what, before)
+            one = series.run(seed, partial(tick, what, before, asked.duration))
+            write_traces(folder, one, traces, several=len(asked.controllers) > 1)
+            found.compared[name] = series.runs(keep_worst([*found.compared.get(name, ()), one]))
             before += asked.duration
-        if series is not None and runs:
-            found.compared.append(series.runs(runs))
-    return found
 
 
 def _prepared(asked: SimulationRequest, name: str, tune: Callable[[float], None]) -> Series:
@@ -284,66 +290,48 @@ def _prepared(asked: SimulationRequest, name: str, tune: Callable[[float], None]
     return Series.prepare(asked.case, controller, asked.scenario, asked.how)
 
 
-def _finish(
-    target: RunFolder,
-    asked: SimulationRequest,
-    compared: Sequence[Runs],
-    arguments: argparse.Namespace,
-    tick: _Ticker,
-    total: float,
-) -> None:
-    hook = "the case's own sea" if asked.how.hook is None else asked.how.hook.description
-    design = asked.design
-    question = {
+def _question(asked: SimulationRequest, arguments: argparse.Namespace) -> dict[str, object]:
+    """Return what was asked, as plain data."""
+    hook, design = asked.how.hook, asked.design
+    return {
         "controllers": list(asked.controllers),
         "scenario": asked.scenario.name,
         "options": list(arguments.options),
-        "hook": hook,
+        "hook": "the case's own sea" if hook is None else hook.description,
         "seeds": list(asked.seeds),
         "gains": dict(design.parameters) if design is not None else asked.gains,
         "command": _again(arguments, case_words(arguments)),
     }
-    target.finish(
-        compared,
-        case=asked.case,
-        question=question,
-        figures=arguments.figures,
-        animate=arguments.animate,
-        progress=lambda what, share: tick(what, share * total),
-    )
 
 
 def _show(
     asked: SimulationRequest,
     found: _Simulated,
-    target: RunFolder,
+    folder: OutputFolder,
     arguments: argparse.Namespace,
-    out: Console,
 ) -> None:
-    design = asked.design
+    out, design = console(), asked.design
     if design is not None and arguments.design is None:
         mark = "ok" if design.ok else "NOT OK"
         out.print(f"The case has no gains in use, so they were optimised: {mark}: {design.status}")
         out.print()
-    report = runs_report(found.compared)
+    report = runs_report([*found.compared.values()])
     left = [
         f"left out: {error if name in str(error) else f'{name}: {error}'}"
         for name, error in found.left_out.items()
     ]
     show(replace(report, sections=[*report.sections, ReportSection("", left)]), out)
     out.print()
-    out.print(_written(target), soft_wrap=True)
-    commands(_next(asked, found, target, arguments), out)
+    out.print(_written(folder), soft_wrap=True)
+    commands(_next(asked, folder, arguments), out)
 
 
-def _written(target: RunFolder) -> str:
+def _written(folder: OutputFolder) -> str:
     """Return what was written where, and how much it is."""
-    traces = [path for path in target.written if path.parent.name == "runs"]
-    text = f"Written to {target.folder.path}: summary.md, summary.json, events.csv"
-    if any(path.suffix == ".svg" for path in target.written):
-        text += ", figures"
-    if any(path.suffix == ".gif" for path in target.written):
-        text += ", animation.gif"
+    traces = [path for path in folder.written if path.parent.name == "runs"]
+    suffixes = {path.suffix for path in folder.written}
+    text = f"Written to {folder.path}: summary.md, summary.json, events.csv"
+    text += ", figures" * (".svg" in suffixes) + ", animation.gif" * (".gif" in suffixes)
     if traces:
         size = sum(path.stat().st_size for path in traces) / _MEGABYTE
         text += f", {count(len(traces), 'time trace')} of {size:.1f} MB"
@@ -351,19 +339,19 @@ def _written(target: RunFolder) -> str:
 
 
 def _next(
-    asked: SimulationRequest, found: _Simulated, target: RunFolder, arguments: argparse.Namespace
+    asked: SimulationRequest, folder: OutputFolder, arguments: argparse.Namespace
 ) -> list[tuple[str, str]]:
     """Return commands to go on with, each with what it does."""
-    words = case_words(arguments, target.folder)
+    words = case_words(arguments, folder)
     own: dict[str, object] = {}
     if asked.design is not None and arguments.design is None:
-        own["design"] = target.folder.path / "design.yaml"
+        own["design"] = folder.path / "design.yaml"
     rows = []
     if len(asked.controllers) == 1:
         rows.append(
             ("every controller in the same sea", _again(arguments, words, controller="all", **own))
         )
-    if len(asked.seeds) < 10 and not found.compared[0][0].duration > 1e5:
+    if len(asked.seeds) < 10 and not asked.duration > 1e5:
         rows.append(("ten seas", _again(arguments, words, seeds=10, **own)))
     if not arguments.animate:
         rows.append(("a moving picture", _again(arguments, words, animate=True, **own)))

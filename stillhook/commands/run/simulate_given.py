@@ -5,35 +5,22 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from models import Case
 from models.basics import InputError
-from models.casefile import Quantity
 
 from ...text import told_once
-from ..given import (
-    given_case,
-    parse_gains,
-    parse_options,
-    read_quantity_of,
-)
+from ..given import given_case, parse_gains, parse_options
+from ..lists import quantity
 
 if TYPE_CHECKING:
     from models.operation import MotionSource, Scenario
     from models.simulation import SimulationOptions
     from synth.design import Design
 
-_TIME = Quantity("time", 0.0, 1e8, open_low=True)
-_LENGTH = Quantity("length", 0.0, 1e5, open_low=True)
-_QUANTITIES = {
-    "duration": _TIME,
-    "sample_time": _TIME,
-    "step": _TIME,
-    "settle": Quantity("time", 0.0, 1e8),
-    "store_step": _TIME,
-    "lock_limit": _LENGTH,
-}
+TIME = quantity("time", 0.0, 1e8, open_low=True)
+"""Reads a time span [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,17 +69,16 @@ def asked_of(arguments: argparse.Namespace) -> SimulationRequest:
     from models.simulation import SimulationOptions
 
     names = parse_controllers(arguments.controller)
-    given: dict[str, Any] = {name: _quantity(arguments, name) for name in _QUANTITIES}
     options = parse_options(arguments.options)
     gains = None if arguments.gains is None else parse_gains(arguments.gains)
     case = given_case(arguments)
     scenario = scenario_named(arguments.scenario, case, **options)
-    if arguments.hours is not None:
-        given["duration"] = 3600.0 * arguments.hours
     hook = _hook(arguments)
-    lasting, sample_time = given.pop("duration"), given.pop("sample_time")
+    lasting = arguments.duration
+    if arguments.hours is not None:
+        lasting = 3600.0 * arguments.hours
     if lasting is None:
-        lasting = _fitting(scenario.duration, hook, sample_time)
+        lasting = _fitting(scenario.duration, hook, arguments.sample_time)
     first = arguments.first_seed
     return SimulationRequest(
         case=case,
@@ -103,13 +89,16 @@ def asked_of(arguments: argparse.Namespace) -> SimulationRequest:
         duration=lasting,
         gains=gains,
         design=_design(arguments, case),
-        sample_time=sample_time,
+        sample_time=arguments.sample_time,
         how=SimulationOptions(
             hook=hook,
             duration=lasting,
             masses=arguments.masses,
             compiled=None if arguments.compiled else False,  # as the machine can
-            **given,
+            step=arguments.step,
+            settle=arguments.settle,
+            store_step=arguments.store_step,
+            lock_limit=arguments.lock_limit,
         ),
     )
 
@@ -138,27 +127,25 @@ def parse_controllers(text: str) -> tuple[str, ...]:
     return names
 
 
-def _quantity(arguments: argparse.Namespace, name: str) -> float | None:
-    text, option = getattr(arguments, name), f"--{name.replace('_', '-')}"
-    return None if text is None else read_quantity_of(option, "", text, _QUANTITIES[name])
+def sine(option: str, text: str) -> MotionSource:
+    """Return a sine from a text AMPLITUDE,PERIOD."""
+    from models.operation import SineMotion
+
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise InputError(f"{option}: must be AMPLITUDE,PERIOD, as in '0.5 m, 8 s', got {text!r}")
+    amplitude = quantity("length", 0.0, 1e5, open_low=True)(f"{option}: amplitude", parts[0])
+    return SineMotion(amplitude=amplitude, period=TIME(f"{option}: period", parts[1]))
 
 
 def _hook(arguments: argparse.Namespace) -> MotionSource | None:
-    from models.operation import RecordMotion, SineMotion
+    from models.operation import RecordMotion
 
     if arguments.tip is not None and arguments.hook is None:
         raise InputError("--tip: belongs to --hook, a file with heave, roll and pitch")
-    if arguments.sine is not None:
-        parts = arguments.sine.split(",")
-        if len(parts) != 2:
-            raise InputError(
-                f"--sine: must be AMPLITUDE,PERIOD, as in '0.5 m, 8 s', got {arguments.sine!r}"
-            )
-        amplitude = read_quantity_of("--sine", "amplitude ", parts[0], _LENGTH)
-        period = read_quantity_of("--sine", "period ", parts[1], _TIME)
-        return SineMotion(amplitude=amplitude, period=period)
     if arguments.hook is None:
-        return None
+        found: MotionSource | None = arguments.sine
+        return found
     with told_once():
         return RecordMotion.read(arguments.hook, tip=arguments.tip)
 

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics import InputError, parse_quantity
+from models.basics import InputError
 
-from ...text import OutputFolder, Progress, csv_text
+from ...text import OutputFolder, Progress, csv_text, pictures
 from ..declare import CASE, DESIGN, group, results_folder, switch, text
 from ..given import case_words, gains_text, given_case
 from ..given_design import design_words, given_design
-from ..lists import axis
+from ..lists import axis, quantity
 from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
@@ -26,13 +26,7 @@ if TYPE_CHECKING:
     from synth.design import Design
     from synth.operability import Operability
 
-
-def _length(option: str, text: str) -> float:
-    try:
-        return float(parse_quantity(text, "length"))
-    except (ValueError, TypeError) as error:
-        raise InputError(f"{option}: {error}") from None
-
+_HEIGHT = quantity("length", 0.0, 1e3, open_low=True)
 
 ARGUMENTS = (
     CASE,
@@ -78,7 +72,7 @@ ARGUMENTS = (
         "made-up one",
     ),
     switch("--reoptimise", "also find the gains anew for each sea (seconds for each)"),
-    text("--highest", "LENGTH", "highest H_s looked at (default: 30 m)", 30.0, read=_length),
+    text("--highest", "LENGTH", "highest H_s looked at (default: 30 m)", 30.0, read=_HEIGHT),
     results_folder("out/<case>-operability"),
 )
 
@@ -119,7 +113,7 @@ def run(arguments: argparse.Namespace) -> int:
         if study.scatter is not None:
             folder.write("workable.csv", csv_text(workable_table(study)))
         folder.draw(report.drawings, progress=step)
-        folder.discard("workable.csv", *(f"{name}.*" for name in FIGURES))
+        folder.discard("workable.csv", *pictures(*FIGURES))
     return conclude(report, arguments, folder, _next(study, arguments, folder))
 
 

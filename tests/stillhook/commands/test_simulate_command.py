@@ -347,11 +347,11 @@ WRONG = {
     ),
     "half a sine": (
         "thesis-1975 --sine '0.5 m'",
-        "--sine: must be AMPLITUDE,PERIOD, as in '0.5 m, 8 s', got '0.5 m'",
+        "simulate: --sine: must be AMPLITUDE,PERIOD, as in '0.5 m, 8 s', got '0.5 m'",
     ),
     "a sine of another kind": (
         "thesis-1975 --sine '0.5 m, 8 kg'",
-        r"--sine: period must be a time in .*, got '8 kg', which is a mass",
+        r"simulate: --sine: period must be a time in .*, got '8 kg', which is a mass",
     ),
     "a tip without motions": (
         "thesis-1975 --tip 1,2,3",
@@ -365,7 +365,7 @@ WRONG = {
     "no hours": ("thesis-1975 --hours -1", r"simulate: --hours must be in \(0, 10000\], got -1.0"),
     "duration of another kind": (
         "thesis-1975 --duration '3 m'",
-        r"--duration: must be a time in .*, got '3 m', which is a length",
+        r"simulate: --duration must be a time in .*, got '3 m', which is a length",
     ),
     "too many masses": (
         "thesis-1975 --masses 100",
