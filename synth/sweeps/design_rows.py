@@ -3,9 +3,9 @@
     rows (n, d) -> numbers, controllers, densities -> loops -> drag, variances, stability, M_s
 
 Everything goes through the rope's recursion (`synth.sweeps.chain`) but variances and stability of
-three gains on one spring without delay and noise, for which polynomials (`synth.sweeps.kernel`)
-are a hundred times faster.
-Rows whose variances two rules disagree on begin again on finer nodes.
+three gains on one spring without delay, noise and quadratic drag, for which polynomials
+(`synth.sweeps.kernel`) are a hundred times faster.  Rows whose variances two rules disagree on
+begin again on finer nodes.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ..question import DesignQuestion, SampledNoise
 from .chain import BLOCK, VELOCITY, Chain, ChainLoops, Shaken
 from .kernel import SpringLoops
 from .law_rows import DesignLaw, LawColumns
-from .numbers import NOISE_OF, PlantNumbers, at_rows, numbers_of
+from .numbers import NOISE_OF, PlantNumbers, numbers_of
 from .sea_rows import SeaRows
 from .sweep_nodes import Panel, SweepNodes, halved, sweep_nodes, sweep_panels
 from .winding_count import calming_drag, light_poles, survey
@@ -173,7 +173,8 @@ class DesignRows:
         self._second, self._peaks, self._start = tuple(second), peaks, start
         delayed = case.sensors.telemetry.delay > 0.0 or "sensors.telemetry.delay" in spread.paths
         three = question.structure.name == "payload-feedback"
-        self.spring = self.lumps.masses.size == 1 and three and not delayed and not self._noisy
+        alone = self.lumps.masses.size == 1 and not (delayed or consistent or self._noisy)
+        self.spring = alone and three
 
     @property
     def block(self) -> int:
@@ -290,11 +291,11 @@ class DesignRows:
         numbers, self.columns = made
         return _Batch(rows=rows, numbers=numbers, law=self.law.columns(self.spread, rows))
 
-    def _spring(self, batch: _Batch, drag: FloatArray) -> SpringLoops:
+    def _springs(self, batch: _Batch) -> SpringLoops:
         return SpringLoops(
             batch.numbers,
             self.law.amplifier * np.stack(np.broadcast_arrays(*batch.law.values), axis=1),
-            np.where(np.isfinite(drag), drag, 0.0),
+            batch.numbers.fixed_drag,
             mass_share=float(self.lumps.masses[0]),
             reference=_REFERENCE,
         )
@@ -338,7 +339,13 @@ class DesignRows:
         )
         found.drag[:] = batch.numbers.fixed_drag
         if self.spring:
-            self._solve_springs(batch, nodes, shaken, found)
+            springs = self._springs(batch)
+            found.stable[:] = springs.stable
+            with np.errstate(all="ignore"):
+                orders = 2 if self._second else 1
+                several = springs.moments(self._outputs, nodes, shaken, orders=orders)
+            for name, columns in several.items():
+                found.moments[name][:, :orders] = columns
             return found
         loops = self._chains(batch, np.zeros(1))
         at = np.arange(len(batch))
@@ -386,51 +393,6 @@ class DesignRows:
                 moments = chain.moments(self._outputs, nodes, shaken, drag)
                 for name, column in moments.items():
                     found.moments[name][rows] = column
-
-    def _solve_springs(
-        self, batch: _Batch, nodes: SweepNodes, shaken: Shaken, found: SolvedRows
-    ) -> None:
-        """Find the drag of springs, their stability and their moments."""
-        free = np.flatnonzero(np.isnan(found.drag))
-        if free.size:
-            own = batch.part(free)
-            quadratic = np.broadcast_to(batch.numbers["quadratic_drag"], (len(batch),))[free]
-
-            def velocity(some: IndexArray, C: FloatArray) -> FloatArray:
-                loops = self._spring(own.part(some), C)
-                seen = _spring_moments(loops, [VELOCITY], nodes, shaken, free[some])
-                return np.where(loops.stable, np.sqrt(seen[VELOCITY][:, 0]), np.inf)
-
-            agreed = _agreeing_drag(quadratic, self._start, velocity)
-            below = np.where(np.isfinite(agreed), agreed, 0.0) / _EDGE
-            found.drag[free] = np.where(self._spring(own, below).stable, agreed, np.inf)
-        loops = self._spring(batch, found.drag)
-        found.stable[:] = np.isfinite(found.drag) & loops.stable
-        with np.errstate(all="ignore"):
-            for order, outputs in enumerate((self._outputs, self._second)):
-                every = np.arange(len(batch))
-                several = _spring_moments(loops, outputs, nodes, shaken, every, second=order == 1)
-                for name, columns in several.items():
-                    found.moments[name][:, order] = columns
-
-
-def _spring_moments(
-    loops: SpringLoops,
-    outputs: Sequence[str],
-    nodes: SweepNodes,
-    shaken: Shaken,
-    rows: IndexArray,
-    *,
-    second: bool = False,
-) -> dict[str, FloatArray]:
-    """Return moments of outputs by all rules, (n, rules) each, of loops shaken as `rows` are."""
-    if not outputs:
-        return {}
-    ratios = None if shaken.ratios is None else shaken.ratios[rows]
-    weights = nodes.sea if ratios is None else nodes.weights
-    found = loops.moments(outputs, nodes.omega, weights, ratios, second=second)
-    factors = at_rows(shaken.factors, rows)
-    return {name: columns * factors for name, columns in found.items()}
 
 
 def _velocity_of(parts: Sequence[FloatArray], edge: FloatArray) -> Velocity:

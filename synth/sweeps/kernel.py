@@ -1,7 +1,7 @@
 r"""Loops of fourth order, thousands at once: coefficients, stability and variances.
 
-One spring, the payload feedback of three gains and no delay: then every response is a ratio of
-polynomials in s over one common denominator,
+One spring, the payload feedback of three gains, no delay and given drag: then every response is a
+ratio of polynomials in s over one common denominator,
 
     Den = Open B + h phi q kappa,     Open = W (kappa + D) + g h D kappa e,
 
@@ -17,13 +17,15 @@ cache.  All variances then are its products with a few powers of the frequency, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from models.basics import BoolArray, FloatArray
 
+from .chain import Shaken
 from .numbers import PlantNumbers
+from .sweep_nodes import SweepNodes
 
 Columns = list[FloatArray]  # coefficients of s^0, s^1, .., each (n,), or (1,) if all have the same
 
@@ -80,22 +82,23 @@ class SpringLoops:
         self.closed = self._scaled(total(free, [h * phi * c for c in heard]))
         moved = product(W, product(kappa, sensors))
         drum = total(pull, [phi * c for c in heard])
-        direct = product(shaft, [phi * c for c in heard])
-        torque = total(
-            [-c for c in direct],
-            product([zero, beta * load], product(D, product(kappa, sensors))),
-        )
-        command = product(W, heard)
-        self._numerators = {
-            "payload.displacement": moved,
-            "payload.velocity": [zero, *moved],
-            "motor.speed": [zero, *drum],
+
+        def torque() -> Columns:
+            direct = [-phi * c for c in product(shaft, heard)]
+            rest = product(D, product(kappa, sensors))
+            return total(direct, product([zero, beta * load], rest))
+
+        # Only what is asked for is multiplied out.
+        self._numerators: dict[str, Callable[[], Columns]] = {
+            "payload.displacement": lambda: moved,
+            "payload.velocity": lambda: [zero, *moved],
+            "motor.speed": lambda: [zero, *drum],
             "motor.torque": torque,
-            "motor.current": [c / n["torque_constant"] for c in torque],
-            "drum.haul": [h * c for c in drum],
-            "drive.command": command,
-            "motor.voltage": command,
-            "rope.tension": product(D, moved),
+            "motor.current": lambda: [c / n["torque_constant"] for c in torque()],
+            "drum.haul": lambda: [h * c for c in drum],
+            "drive.command": lambda: product(W, heard),
+            "motor.voltage": lambda: product(W, heard),
+            "rope.tension": lambda: product(D, moved),
         }
 
     def __len__(self) -> int:
@@ -107,53 +110,43 @@ class SpringLoops:
         return np.broadcast_to(hurwitz(self.closed), (len(self),))
 
     def moments(
-        self,
-        outputs: Sequence[str],
-        omega: FloatArray,
-        weights: FloatArray,
-        density: FloatArray | None = None,
-        *,
-        second: bool = False,
+        self, outputs: Sequence[str], nodes: SweepNodes, shaken: Shaken, *, orders: int
     ) -> dict[str, FloatArray]:
-        """Return the variance of outputs by the rules that `weights` holds, (n, rules) each.
+        """Return variances of outputs, and of their rates, by all rules, (n, orders, rules) each.
 
         Parameters
         ----------
-        outputs
-            Names of outputs.
-        omega
-            Nodes [rad/s], (k,).
-        weights
-            Weight times density at the nodes, (rules, k).
-        density
-            Further density of each loop at the nodes, (n, k), where loops differ in it.
-        second
-            The second moments instead, of the outputs' rates.
+        outputs, nodes, shaken
+            Names of outputs, the nodes, and what shakes the loops, without noise.
+        orders
+            2 with the rates, 1 without.
         """
         # Every variance is sum_m c_m int omega^2m S / |Den|^2, c_m of the output's |numerator|^2:
         # so 1/|Den|^2 is made once, and multiplied once with all powers, weights and rules.
-        x = (omega / self.reference) ** 2
-        squares = {name: squared(self._scaled(self._numerators[name])) for name in outputs}
-        highest = max(len(c) for c in squares.values()) + second
+        weights = nodes.sea if shaken.ratios is None else nodes.weights
+        x = (nodes.omega / self.reference) ** 2
+        squares = {name: squared(self._scaled(self._numerators[name]())) for name in outputs}
+        highest = max((len(c) for c in squares.values()), default=0) + orders - 1
         powers = np.stack([x**m for m in range(highest)])
-        right = (weights[:, None, :] * powers[None]).reshape(-1, omega.size).T.copy()
+        right = (weights[:, None, :] * powers[None]).reshape(-1, x.size).T.copy()
         sums = np.empty((len(self), right.shape[1]))
-        even, odd, y = self._halves(self.closed, omega)
-        step = max(1, CHUNK // omega.size)
+        even, odd, y = self._halves(self.closed, nodes.omega)
+        step = max(1, CHUNK // x.size)
         for at in range(0, len(self), step):
             part = slice(at, at + step)
             inverse = self._inverse(even[part], odd[part], y)
-            if density is not None:
-                inverse *= density[part]
+            if shaken.ratios is not None:
+                inverse *= shaken.ratios[part]
             np.matmul(inverse, right, out=sums[part])
         folded = sums.reshape(len(self), len(weights), highest)
         found = {}
         for name, square in squares.items():
-            columns = np.zeros((len(self), len(weights)))
+            columns = np.zeros((len(self), orders, len(weights)))
             for m, c in enumerate(square):
-                if _there(c):
-                    columns += c[:, None] * folded[:, :, m + second]
-            found[name] = columns * self.reference**2 if second else columns
+                for order in range(orders if _there(c) else 0):
+                    columns[:, order] += c[:, None] * folded[:, :, m + order]
+            columns[:, 1:] *= self.reference**2
+            found[name] = columns * shaken.factors[:, None, None]
         return found
 
     def _scaled(self, columns: Columns) -> Columns:
