@@ -181,8 +181,8 @@ class PlantData:
             inductance=dc.inductance if dc else 0.0,
             torque_bandwidth=ac.torque_bandwidth if ac else math.inf,
             speed_gain=ac.speed_gain if ac else 0.0,
-            sensor_bandwidth=math.inf if bandwidth == "perfect" else bandwidth,
-            telemetry_bandwidth=telemetry.bandwidth or math.inf,
+            sensor_bandwidth=math.inf if isinstance(bandwidth, str) else bandwidth,
+            telemetry_bandwidth=math.inf if telemetry.bandwidth is None else telemetry.bandwidth,
             delay=telemetry.delay,
         )
 

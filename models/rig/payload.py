@@ -115,7 +115,7 @@ class Payload(Section):
     def hydrodynamic_mass(self) -> float:
         """Added mass, given or from Table A-1 [kg]."""
         if self.shape is None:
-            return self.added_mass or 0.0
+            return 0.0 if self.added_mass is None else self.added_mass
         shape = self.shape
         return prism_added_mass(shape.prism_side, shape.prism_height, self.water_density)
 
@@ -129,7 +129,7 @@ class Payload(Section):
         """Drag coefficient C_D, given or from Table 4 [-]."""
         if self.drag_shape is not None:
             return DRAG_COEFFICIENTS[self.drag_shape]
-        return self.drag_coefficient or 0.0
+        return 0.0 if self.drag_coefficient is None else self.drag_coefficient
 
     @property
     def quadratic_drag(self) -> float:

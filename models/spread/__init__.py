@@ -14,6 +14,6 @@ if TYPE_CHECKING:
     from .distributions import Distribution, LogNormal, Normal, Samples, Triangular, Uniform
     from .fields import ALIASES, DRAG, GAINS, Field, field_of
     from .sampling import METHODS
-    from .spread import Spread
+    from .spread import Spread, with_payload
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -265,15 +265,8 @@ class Spread:
         own = self._named(row)
         plain = (p for p in own if p != DRAG and not p.startswith((GAINS, FAULTS)))
         found: dict[str, Any] = {path: own[path] for path in plain}
-        mass = found.get("payload.mass")
-        if mass is not None and self.case is not None:
-            payload = self.case.payload
-            together = {
-                "payload.added_mass": payload.hydrodynamic_mass,
-                "payload.submerged_weight": payload.submerged_weight,
-            }
-            for path, value in together.items():
-                found.setdefault(path, mass / payload.mass * value)
+        if self.case is not None:
+            found = with_payload(self.case, found)
         counts = {field.path for field in self.fields if field.kind == "count"}
         return {path: round(v) if path in counts else v for path, v in found.items()}
 
@@ -359,6 +352,23 @@ class Spread:
                     alone.case_at([end])
                 except InputError as error:
                     raise InputError(f"spread: {path} cannot be {end:g}: {error}") from None
+
+
+def with_payload(case: Case, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return changes of a case with what grows with the payload's mass, if that is changed.
+
+    Those are added mass and submerged weight, unless they are changed themselves.
+    """
+    if "payload.mass" not in changes:
+        return dict(changes)
+    payload = case.payload
+    share = changes["payload.mass"] / payload.mass
+    return {
+        **changes,
+        "payload.added_mass": share * payload.hydrodynamic_mass,
+        "payload.submerged_weight": share * payload.submerged_weight,
+        **changes,
+    }
 
 
 def _words(kind: str, values: Any) -> str:

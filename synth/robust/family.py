@@ -20,7 +20,7 @@ import numpy as np
 from models.basics import FloatArray, InputError, check_range
 from models.case import Case
 from models.sea import Scatter
-from models.spread import ALIASES, Samples, Spread, Uniform
+from models.spread import ALIASES, Samples, Spread, Uniform, with_payload
 
 _MOST_CORNERS = 4096
 
@@ -219,16 +219,7 @@ class Family:
     def changes(self, member: Member) -> dict[str, Any]:
         """Return a member's parameters by path, without its sea."""
         given = dict(zip((a.path for a in self.axes), member.point, strict=True))
-        mass = given.get("payload.mass")
-        if mass is not None:
-            payload = self.case.payload
-            share = mass / payload.mass
-            together = {
-                "payload.added_mass": payload.hydrodynamic_mass,
-                "payload.submerged_weight": payload.submerged_weight,
-            }
-            given |= {path: share * v for path, v in together.items() if path not in given}
-        return given
+        return with_payload(self.case, given)
 
     def kind(self, member: Member) -> tuple[Any, ...]:
         """Return what a member shares with those that differ from it in numbers alone."""

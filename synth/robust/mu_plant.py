@@ -31,11 +31,11 @@ from models.basics import ComplexArray, FloatArray, InputError, check_range
 from models.case import Case
 from models.plant import LinearPlant, PlantData
 from models.sensing import sensed_plant
-from models.spread import ALIASES
+from models.spread import ALIASES, with_payload
 
 from ..loop import LinearController
 from ..verify import LawMatrices
-from .family import Axis, Family, Member, value_at
+from .family import value_at
 from .mu_structured_value import UncertaintyBlock
 
 #: Paths of delays, and the measurements that they make late.
@@ -132,9 +132,7 @@ def plant_of(
     """Return the true plant at some deltas; the rope's damping time stays the nominal one."""
     values = {d.path: d.at(float(x)) for d, x in zip(doubts, delta, strict=True)}
     drag = values.pop(DRAG, drag)
-    axes = tuple(Axis(path=p, values=(v,), continuous=True) for p, v in values.items())
-    family = Family(case=case.variant({}), axes=axes, seas=Family.of(case, {}).seas)
-    changed = family.case_at(Member(point=tuple(values.values())))
+    changed = case.variant(with_payload(case, values))
     data, nominal = PlantData.from_case(changed), PlantData.from_case(case)
     if data.damping_time > 0.0:
         ratio = data.damping_ratio * nominal.damping_time / data.damping_time

@@ -1,15 +1,15 @@
 """The plant's numbers of many cases at once: columns of a spread -> columns of `PlantData`.
 
-A thousand checked cases take seconds, a thousand columns of arithmetic microseconds.  So what
-`models.plant.plant_data.PlantData.from_case` does to one case is done here to whole columns, for
-those paths that it is known for, and compared with the checked cases of some of the rows; any other
-path, and any difference, sends every row through its own checked case.
+A thousand checked cases take seconds, a thousand columns of arithmetic microseconds.  So the fields
+of a case are columns here, unchecked, from which `PlantData.from_case` makes columns; these are
+compared with the checked cases of some of the rows.  Where a formula asks which value it has, which
+columns refuse to answer, or there is any difference, every row goes through its own checked case.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -17,44 +17,15 @@ import numpy as np
 
 from models.basics import FloatArray, IndexArray, InputError
 from models.case import Case
+from models.operation import PREFIX as FAULTS
 from models.plant import PlantData
-from models.spread import DRAG, GAINS, Spread
+from models.spread import DRAG, GAINS, Spread, with_payload
 
 _AGREE = 1e-12
 _NEWTON = 30
 
-# Paths whose effect on the plant stands below; limits have none on a linear plant.
-_KNOWN = {
-    "rope.axial_stiffness",
-    "rope.damping_ratio",
-    "rope.length",
-    "rope.mass_per_length",
-    "rope.submerged_weight_per_length",
-    "payload.added_mass",
-    "payload.area",
-    "payload.drag.coefficient",
-    "payload.drag_coefficient",
-    "payload.mass",
-    "payload.submerged_weight",
-    "payload.water_density",
-    "winch.drum.inertia",
-    "winch.drum.radius",
-    "winch.gearbox.efficiency",
-    "winch.gearbox.inertia",
-    "winch.gearbox.ratio",
-    "winch.motor.back_emf_constant",
-    "winch.motor.inductance",
-    "winch.motor.inertia",
-    "winch.motor.resistance",
-    "winch.motor.speed_gain",
-    "winch.motor.torque_bandwidth",
-    "winch.motor.torque_constant",
-    "winch.motor.viscous_friction",
-    "sensors.payload.bandwidth",
-    "sensors.telemetry.bandwidth",
-    "sensors.telemetry.delay",
-}
-_ELSEWHERE = ("sea.", "vessel.", "limits.", "sensors.", GAINS)
+# Paths that nothing of a case's plant depends on.
+_ELSEWHERE = ("sea.", "vessel.", "limits.", FAULTS, GAINS, DRAG)
 # What the other sensors are made of, by path; nothing of a case's plant depends on them.
 _SENSED = {
     "acceleration_noise": "sensors.payload.acceleration_noise",
@@ -199,14 +170,14 @@ def numbers_of(
     InputError
         If a row is no valid case; its values are named.
     """
-    paths = {p for p in spread.paths if p in _KNOWN or not p.startswith((DRAG, *_ELSEWHERE))}
     drag = rows[:, spread.paths.index(DRAG)] if DRAG in spread.paths else None
     like = PlantData.from_case(case)
     if columns is None:
-        shaped = bool(case.payload.shape) and "payload.water_density" in paths
-        columns = paths <= _KNOWN and not shaped
-        columns = columns and _agree(_columns(case, like, spread, rows), spread, rows)
-    made = _columns(case, like, spread, rows) if columns else _one_by_one(like, spread, rows)
+        try:
+            columns = _agree(_columns(like, spread, rows), spread, rows)
+        except (TypeError, ValueError):
+            columns = False
+    made = _columns(like, spread, rows) if columns else _one_by_one(like, spread, rows)
     return made if drag is None else replace(made, fixed_drag=drag), columns
 
 
@@ -266,94 +237,48 @@ def _sensors(spread: Spread, rows: FloatArray) -> dict[str, FloatArray]:
     return {**found, "mru_error": np.maximum(found["mru_floor"], found["mru_fraction"])}
 
 
-def _columns(case: Case, like: PlantData, spread: Spread, rows: FloatArray) -> PlantNumbers:
-    """Return the plants of rows by column arithmetic."""
-    given = {path: rows[:, j] for j, path in enumerate(spread.paths)}
-    rope, payload, winch = case.rope, case.payload, case.winch
+def _columns(like: PlantData, spread: Spread, rows: FloatArray) -> PlantNumbers:
+    """Return the plants of rows by column arithmetic.
 
-    def of(path: str, own: float) -> FloatArray:
-        return given[path] if path in given else np.array([float(own)])
-
-    mass = of("payload.mass", payload.mass)
-    share = mass / payload.mass  # added mass and weight grow with it, as in `Spread.changes`
-    added = given.get("payload.added_mass", share * payload.hydrodynamic_mass)
-    weight = given.get("payload.submerged_weight", share * payload.submerged_weight)
-    length = of("rope.length", rope.length)
-    line = of("rope.mass_per_length", rope.mass_per_length)
-    if "rope.submerged_weight_per_length" in given or rope.submerged_weight_per_length is not None:
-        wet = of("rope.submerged_weight_per_length", rope.submerged_weight_per_length or 0.0)
-    else:  # that of steel, in proportion to its mass
-        wet = line * (rope.submerged_weight / rope.length / rope.mass_per_length)
-    density = of("payload.water_density", payload.water_density)
-    quadratic = (
-        0.5
-        * density
-        * of("payload.drag_coefficient", payload.c_d)
-        * of("payload.area", payload.area)
-    )
-    ratio = of("winch.gearbox.ratio", winch.gearbox.ratio)
-    inertia = (
-        of("winch.motor.inertia", winch.motor.inertia)
-        + of("winch.gearbox.inertia", winch.gearbox.inertia)
-        + of("winch.drum.inertia", winch.drum.inertia) / ratio**2
-    )
-    values = {name: np.array([float(getattr(like, name))]) for name in _PLAIN}
-    values |= {
-        "axial_stiffness": of("rope.axial_stiffness", rope.ea),
-        "rope_length": length,
-        "mass_per_length": line,
-        "rope_weight": wet,
-        "damping_ratio": of("rope.damping_ratio", rope.damping_ratio),
-        "payload_mass": mass + added,
-        "payload_weight": weight,
-        "quadratic_drag": quadratic,
-        "drum_radius": _radius(case, given, length),
-        "gear_ratio": ratio,
-        "gear_efficiency": of("winch.gearbox.efficiency", winch.gearbox.efficiency),
-        "inertia": inertia,
-        "viscous_friction": of("winch.motor.viscous_friction", winch.viscous_friction),
-        "delay": of("sensors.telemetry.delay", like.delay),
-        "sensor_bandwidth": of("sensors.payload.bandwidth", like.sensor_bandwidth),
-        "telemetry_bandwidth": of("sensors.telemetry.bandwidth", like.telemetry_bandwidth),
-    }
-    for name in (
-        "resistance",
-        "torque_constant",
-        "back_emf_constant",
-        "inductance",
-        "torque_bandwidth",
-        "speed_gain",
-    ):
-        values[name] = of(f"winch.motor.{name}", getattr(like, name))
-    drag = _fixed_drag(case, given, quadratic)
+    Raises
+    ------
+    TypeError, ValueError
+        If something on the way is no plain arithmetic.
+    """
+    case = spread.case
+    assert case is not None
+    pairs = zip(spread.paths, rows.T, strict=True)
+    given = {path: column for path, column in pairs if not path.startswith(_ELSEWHERE)}
+    if "rope.length" in given and case.winch.drum.radius is None:
+        given.setdefault("winch.drum.radius", _radius(case, given["rope.length"]))
+    changed: Any = case
+    for path, column in with_payload(case, given).items():
+        changed = _with(changed, path.split("."), column)
+    data, fixed = PlantData.from_case(changed), changed.payload.fixed_drag
     return PlantNumbers(
         count=len(rows),
-        values=values,
+        values={name: np.atleast_1d(getattr(data, name)) for name in _PLAIN},
         like=like,
-        fixed_drag=drag,
+        fixed_drag=np.atleast_1d(math.nan if fixed is None else fixed),
         sensors=_sensors(spread, rows),
     )
 
 
-def _fixed_drag(case: Case, given: Mapping[str, FloatArray], quadratic: FloatArray) -> FloatArray:
-    own = case.payload.fixed_drag
-    if own is None:
-        return np.array([math.nan])
-    if "payload.drag.coefficient" in given:
-        return given["payload.drag.coefficient"]
-    nominal = case.payload.quadratic_drag
-    # That of equal energy grows with the quadratic one; one that is given does not.
-    moved = case.payload.drag.method == "energy" and nominal > 0.0
-    return own / nominal * quadratic if moved else np.array([own])
+def _with(section: Any, keys: Sequence[str], value: Any) -> Any:
+    """Return a section with a field below it changed, and nothing checked."""
+    key = keys[0]
+    below = value if len(keys) == 1 else _with(getattr(section, key), keys[1:], value)
+    fields = {name: getattr(section, name) for name in type(section).model_fields}
+    for group in section.alternatives if len(keys) == 1 else ():
+        if key in group:
+            fields |= dict.fromkeys(group)
+    # Constructed anew and not copied: a copy would keep what was computed of the old fields.
+    return type(section).model_construct(**{**fields, key: below})
 
 
-def _radius(case: Case, given: Mapping[str, FloatArray], length: FloatArray) -> FloatArray:
+def _radius(case: Case, length: FloatArray) -> FloatArray:
     """Return the drum's radius of the layer in use, as `Drum.radius_at` does."""
     drum, diameter = case.winch.drum, case.rope.diameter
-    if "winch.drum.radius" in given:
-        return given["winch.drum.radius"]
-    if drum.radius is not None:
-        return np.array([drum.radius])
     total = drum.total(diameter)
     if np.any(length > total):
         raise InputError(
@@ -361,10 +286,8 @@ def _radius(case: Case, given: Mapping[str, FloatArray], length: FloatArray) -> 
             f"got {length.max():g} m"
         )
     lays = drum.lays(diameter)  # innermost first: from which length on a radius holds
-    found = np.full(length.size, lays[-1][1])
-    for start, radius in reversed(lays):
-        found = np.where(length >= start, radius, found)
-    return found
+    inside = [length >= start for start, _ in lays]
+    return np.select(inside, [radius for _, radius in lays], lays[-1][1])
 
 
 def _first_root(eps: FloatArray) -> FloatArray:
