@@ -142,8 +142,10 @@ class Scene:
 
 
 @drawn
-def strip(run: Run, scenario: Scenario | None = None, window: Window | None = None) -> Figure:
+def strip(run: Run, scenario: Scenario | None = None) -> Figure:
     """Return pictures of a run at some moments, side by side.
+
+    They are of some waves about the worst moment, or of all of an operation.
 
     Parameters
     ----------
@@ -151,8 +153,6 @@ def strip(run: Run, scenario: Scenario | None = None, window: Window | None = No
         The run, with its traces.
     scenario
         What was asked of it: says where the water's surface is.
-    window
-        What to show; by default some waves about the worst moment, or all of an operation.
 
     Returns
     -------
@@ -164,7 +164,9 @@ def strip(run: Run, scenario: Scenario | None = None, window: Window | None = No
     InputError
         If the run has no stored samples.
     """
-    window = _window(run) if window is None else window
+    period = run.statistics["hook.heave"].period
+    waves = max(_WAVES * (10.0 if math.isnan(period) else period), 5.0)
+    window = whole_of(run) if moves(run) else window_of(run, length=waves)
     scene = Scene.of(run, window, scenario)
     figure, axes = panel(10.4, 5.0)
     _background(axes, scene)
@@ -299,14 +301,6 @@ def _background(axes: Axes, scene: Scene) -> None:
     axes.grid(visible=False)
 
 
-def _window(run: Run) -> Window:
-    """Return some waves about the worst moment; all of it where the payload is moved."""
-    if moves(run):
-        return whole_of(run)
-    period = run.statistics["hook.heave"].period
-    return window_of(run, length=max(_WAVES * (10.0 if math.isnan(period) else period), 5.0))
-
-
 def _finding(scene: Scene) -> str:
     hook, payload = float(np.ptp(scene.hook)), float(np.ptp(scene.payload - scene.asked))
     text = f"The hook moves over {quantity(hook, 'm')}, the payload strays over"
@@ -326,10 +320,9 @@ _DOTS = 84.0  # per inch
 def animation(
     run: Run,
     scenario: Scenario | None = None,
-    window: Window | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> bytes:
-    """Return a run as the contents of an animated GIF.
+    """Return a run as the contents of an animated GIF: a minute, or all of an operation.
 
     Parameters
     ----------
@@ -337,8 +330,6 @@ def animation(
         The run, with its traces.
     scenario
         What was asked of it: says where the water's surface is.
-    window
-        What to show; by default a minute about the worst moment, or all of an operation.
     progress
         Called with the share that is done.
 
@@ -351,8 +342,7 @@ def animation(
     from matplotlib.figure import Figure
     from PIL import Image
 
-    if window is None:
-        window = whole_of(run) if moves(run) else window_of(run)
+    window = whole_of(run) if moves(run) else window_of(run)
     scene = Scene.of(run, window, scenario)
     span = window.end - window.start
     frames = round(min(max(span * _RATE / _FASTER, _FEWEST), _MOST))

@@ -140,7 +140,7 @@ def _by_heading(survey: HookSurvey) -> Figure:
     rose.set_theta_zero_location("N")
     order = np.argsort(survey.headings)
     angle = survey.headings[order] - math.pi
-    whole = survey.headings.size > 3 and _goes_round(survey.headings)
+    whole = goes_round(survey.headings)
     for k, name in enumerate(names):
         r = speeds[k, order, t]
         a = angle
@@ -217,9 +217,10 @@ def _where(side: str) -> str:
     return f"hook on the {side}" if side == "centre line" else f"hook to {side}"
 
 
-def _goes_round(headings: FloatArray) -> bool:
+def goes_round(headings: FloatArray) -> bool:
+    """Return whether headings (n,) [rad] go all round the ship, with no wide gap between."""
     gaps = np.diff(np.append(np.sort(headings), np.min(headings) + 2.0 * math.pi))
-    return bool(gaps.max() < 1.6 * np.median(gaps))
+    return bool(gaps.max() < math.radians(91.0))
 
 
 def _shown(hook: HookMotion) -> tuple[float, float]:

@@ -29,6 +29,7 @@ from ..text import (
     panel,
     quantity,
 )
+from .hook import goes_round
 
 # Colour and dashes of each limit: the same in every figure.
 _LINES: dict[str, tuple[str, Any]] = {
@@ -148,17 +149,15 @@ _HELD = (0, (2, 1))  # dashes of the drum held
 
 
 @drawn
-def contour_figure(study: Operability, at: AtDepth | None = None) -> Figure:
+def contour_figure(study: Operability) -> Figure:
     """Return H_s over T_p: a line for each limit, what is workable shaded, and the drum held.
 
     Parameters
     ----------
     study
         The study.
-    at
-        The length of rope; by default the first.
     """
-    at = study.depths[0] if at is None else at
+    at = study.depths[0]
     contour = at.main
     h = study.own_heading(contour)
     periods = contour.periods
@@ -187,17 +186,15 @@ def contour_figure(study: Operability, at: AtDepth | None = None) -> Figure:
 
 
 @drawn
-def capability_figure(study: Operability, at: AtDepth | None = None) -> Figure:
+def capability_figure(study: Operability) -> Figure:
     """Return the winch maker's lines, heave height over period, with what the sea asks for.
 
     Parameters
     ----------
     study
         The study.
-    at
-        The length of rope; by default the first.
     """
-    at = study.depths[0] if at is None else at
+    at = study.depths[0]
     lines, contour = at.capability, at.main
     h = study.own_heading(contour)
     asked = []
@@ -285,21 +282,18 @@ def _finding(study: Operability, at: AtDepth, h: int) -> str:
 
 
 @drawn
-def heading_figure(study: Operability, at: AtDepth | None = None) -> Figure:
+def heading_figure(study: Operability) -> Figure:
     """Return two roses over heading, the bow up: the limiting H_s, and the limit that binds.
 
     Parameters
     ----------
     study
         The study, of a vessel with headings.
-    at
-        The length of rope; by default the first.
     """
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.patches import Patch
 
-    at = study.depths[0] if at is None else at
-    contour = at.main
+    contour = study.depths[0].main
     assert contour.headings is not None
     # Where the waves come from, seen from the deck: head seas at the top.
     edges, rows = _around(contour.headings)
@@ -341,17 +335,15 @@ def heading_figure(study: Operability, at: AtDepth | None = None) -> Figure:
 
 
 @drawn
-def scatter_figure(study: Operability, at: AtDepth | None = None) -> Figure:
+def scatter_figure(study: Operability) -> Figure:
     """Return the scatter diagram with the limits across it, and the share of each month if known.
 
     Parameters
     ----------
     study
         The study, with a scatter diagram.
-    at
-        The length of rope; by default the first.
     """
-    at = study.depths[0] if at is None else at
+    at = study.depths[0]
     scatter = study.scatter
     assert scatter is not None
     months = at.workable["held"].by_month
@@ -421,17 +413,12 @@ def _around(headings: FloatArray) -> tuple[FloatArray, npt.NDArray[np.intp]]:
         half = math.radians(15.0)
         return np.array([headings[0] - half, headings[0] + half]) + math.pi, rows
     middle = 0.5 * (headings[:-1] + headings[1:])
-    if _goes_round(headings):
+    if goes_round(headings):
         seam = 0.5 * (headings[-1] + headings[0] + 2.0 * math.pi)
         return np.concatenate([[seam - 2.0 * math.pi], middle, [seam]]) + math.pi, rows
     first = headings[0] - 0.5 * (headings[1] - headings[0])
     last = headings[-1] + 0.5 * (headings[-1] - headings[-2])
     return np.concatenate([[first], middle, [last]]) + math.pi, rows
-
-
-def _goes_round(headings: FloatArray) -> bool:
-    gaps = np.diff(np.append(headings, headings[0] + 2.0 * math.pi))
-    return bool(gaps.max() < math.radians(91.0))
 
 
 def _edges(periods: FloatArray) -> FloatArray:

@@ -93,15 +93,14 @@ def spectrum_figure(sea: SeaSpectrum, *, name: str) -> Figure:
     name
         What it is, for the line under the title.
     """
-    from models.sea import SeaSpectrum as Spectrum
-
     peak, height = sea.peak_frequency, sea.significant_height
     period = 2.0 * math.pi / peak
     low, high = sea.band
     right = min(high, max(4.0 * peak, _holding(sea, 0.995)))
-    omega = np.unique(np.concatenate([np.linspace(low, right, 2000), *_inside(sea, right)]))
+    corners = [corner for corner in sea.splits if corner < right]  # of a measured spectrum
+    omega = np.union1d(np.linspace(low, right, 2000), corners)
     figure, axes = panel()
-    plain = Spectrum(kind="bretschneider", significant_height=height, peak_period=period)
+    plain = SeaSpectrum(kind="bretschneider", significant_height=height, peak_period=period)
     if sea.kind != "bretschneider":
         label = "Bretschneider of the same H_s and T_p"
         axes.plot(omega, plain(omega), color=HOOK, linewidth=1.2, label=typeset(label))
@@ -264,8 +263,3 @@ def _holding(sea: SeaSpectrum, share: float) -> float:
     q = sea.quadrature(rtol=1e-6)
     cumulated = np.cumsum(q.weights * sea(q.omega))
     return float(np.interp(share * cumulated[-1], cumulated, q.omega))
-
-
-def _inside(sea: SeaSpectrum, right: float) -> list[np.ndarray[tuple[int], np.dtype[np.float64]]]:
-    """Return the rows of a measured spectrum: its corners are to be corners."""
-    return [np.array([omega for omega in sea.splits if omega < right])]

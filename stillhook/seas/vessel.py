@@ -194,11 +194,8 @@ def _last(raos: VesselRaos, columns: list[int]) -> float:
     size = np.abs(raos.values[:, columns]).max(axis=1)
     largest = np.maximum(size.max(axis=0), 1e-12)
     moving = np.flatnonzero((size > _FAINT * largest).any(axis=1))
-    return (
-        float(raos.omega[min(moving[-1] + 1, raos.omega.size - 1)])
-        if moving.size
-        else float(raos.omega[-1])
-    )
+    beyond = moving[-1] + 1 if moving.size else raos.omega.size
+    return float(raos.omega[min(beyond, raos.omega.size - 1)])
 
 
 def _panel(top: Axes, below: Axes, raos: VesselRaos, mode: str, columns: list[int]) -> None:
@@ -217,7 +214,9 @@ def _panel(top: Axes, below: Axes, raos: VesselRaos, mode: str, columns: list[in
         }  # fmt: skip
         name = {0: " (following)", 90: " (to port)", 180: " (head)"}.get(round(degrees), "")
         top.plot(raos.omega, amplitude, label=f"{degrees:.0f}°{name}", **style)
-        x, y = _broken(raos.omega, shown)
+        # A gap where the phase leaves at one edge and comes back at the other.
+        across = np.flatnonzero(np.abs(np.diff(shown)) > 180.0) + 1
+        x, y = np.insert(raos.omega, across, raos.omega[across]), np.insert(shown, across, np.nan)
         below.plot(x, y, **style)
     top.set_title(mode, fontsize=10.0, fontweight="bold")
     top.set_ylabel("amplitude [deg/m]" if angle else "amplitude [m/m]", fontsize=9.0)
@@ -227,21 +226,6 @@ def _panel(top: Axes, below: Axes, raos: VesselRaos, mode: str, columns: list[in
     below.set_yticks([-180, -90, 0, 90, 180])
     below.set_ylabel("phase [deg]", fontsize=9.0)
     below.axhline(0.0, color=HOOK, linewidth=0.6)
-
-
-def _broken(
-    omega: np.ndarray[tuple[int], np.dtype[np.float64]],
-    phase: np.ndarray[tuple[int], np.dtype[np.float64]],
-) -> tuple[list[float], list[float]]:
-    """Return the phase with a gap where it leaves at one edge and comes back at the other."""
-    x, y = [float(omega[0])], [float(phase[0])]
-    for i in range(1, omega.size):
-        if abs(phase[i] - phase[i - 1]) > 180.0:
-            x.append(float(omega[i]))
-            y.append(math.nan)
-        x.append(float(omega[i]))
-        y.append(float(phase[i]))
-    return x, y
 
 
 @drawn
