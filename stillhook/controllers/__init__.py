@@ -10,7 +10,7 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .contenders import CONTENDERS, DEFAULTS, Contender, contenders_of
-    from .named import PREDICTIVE, controller_of, known_controllers
+    from .named import CONTROLLER_TEXTS, controller_of
     from .recipe import Recipe, recipe_from, recipe_of
     from .stored_design import StoredDesign, design_law
 else:

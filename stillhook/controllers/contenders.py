@@ -13,6 +13,7 @@ from types import MappingProxyType
 from models.basics import InputError, pick
 from synth.design import Design, Tuning
 
+from .named import CONTROLLER_TEXTS
 from .recipe import Make, Recipe, feedback, gains_in_use, recipe_of
 
 GROUPS = ("brake", "linear", "predictive", "own", "reference", "floor")
@@ -59,10 +60,10 @@ class Contender:
         return self.name if self.recipe is None else self.recipe.identity
 
 
-def _named(name: str, what: str, knows: str, group: str) -> Contender:
+def _named(name: str, knows: str, group: str) -> Contender:
     """Return the contender that has the name of a controller in time."""
     own = recipe_of(name, "compare")
-    return Contender(name=name, what=what, knows=knows, group=group, recipe=own)
+    return Contender(name=name, what=CONTROLLER_TEXTS[name], knows=knows, group=group, recipe=own)
 
 
 def _linear(name: str, needs: str, what: str, knows: str, make: Make | None = None) -> Contender:
@@ -81,16 +82,9 @@ _PAYLOAD = "payload by telemetry; plant and sea of the case when it was designed
 _BOTH = "payload and motion reference unit; plant and sea of the case when it was designed"
 _SEEN = "all sensors, up to now; plant of the case"
 _ALL = (
-    _named("none", "the drum held by its brake", "nothing", "brake"),
-    _named(
-        "constant-tension", "the drive keeps the rope's tension", "load cell and motor", "linear"
-    ),
-    _named(
-        "feed-forward",
-        "the drum pays out 0.9 of the hook's speed",
-        "motion reference unit",
-        "linear",
-    ),
+    _named("none", "nothing", "brake"),
+    _named("constant-tension", "load cell and motor", "linear"),
+    _named("feed-forward", "motion reference unit", "linear"),
     _linear(
         "thesis", "", "the gains that the case has in use", "payload by telemetry", gains_in_use
     ),
@@ -132,30 +126,10 @@ _ALL = (
     ),
     _linear("combined-eager", "combined-eager", "the same, as if the drive had no limits", _BOTH),
     _linear("combined-no-antiwindup", "combined-eager", "the eager one without anti-windup", _BOTH),
-    _named(
-        "mpc",
-        "linear MPC, the hook predicted by a Kalman filter",
-        f"{_SEEN}; the sea's spectrum",
-        "predictive",
-    ),
-    _named(
-        "mpc-ar",
-        "linear MPC, the hook predicted by an adaptive AR model",
-        f"{_SEEN}; nothing of the sea",
-        "predictive",
-    ),
-    _named(
-        "nonlinear-mpc",
-        "MPC on the nonlinear plant",
-        f"{_SEEN}, its limits and drag; the sea's spectrum",
-        "predictive",
-    ),
-    _named(
-        "mpc-preview",
-        "linear MPC that is told the hook's future, for reference",
-        f"{_SEEN}; the hook's motion to come",
-        "reference",
-    ),
+    _named("mpc", f"{_SEEN}; the sea's spectrum", "predictive"),
+    _named("mpc-ar", f"{_SEEN}; nothing of the sea", "predictive"),
+    _named("nonlinear-mpc", f"{_SEEN}, its limits and drag; the sea's spectrum", "predictive"),
+    _named("mpc-preview", f"{_SEEN}; the hook's motion to come", "reference"),
     Contender(
         name="clairvoyant",
         what="the least that any command within the drive's limits leaves: a floor, no controller",

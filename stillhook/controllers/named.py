@@ -24,22 +24,21 @@ PROTOCOL = ("name", "sample_time", "reset", "step")
 
 _FEEDBACK_SAMPLE = 0.01  # of a design, unless told otherwise [s]
 
-#: Predictive controllers and what each is, in a line.
-PREDICTIVE: Mapping[str, str] = MappingProxyType(
+CONTROLLER_TEXTS: Mapping[str, str] = MappingProxyType(
     {
-        "mpc": "predictive control, with the sea that its own filter expects",
-        "mpc-ar": "the same, with a forecast learnt from the record alone",
-        "mpc-preview": "the same, knowing what the hook will do: for reference only",
-        "nonlinear-mpc": "the same with drag, slack rope and the drive's limits in its model",
+        "feedback": "the gains of a design, on what comes up from the payload",
+        "feedback-no-antiwindup": "the same without anti-windup, for a controller with states",
+        "feed-forward": "the drum pays out 0.9 of the hook's speed",
+        "feed-forward-lead": "the same, with the delays of sensor and drive made up for",
+        "constant-tension": "the drive keeps the rope's tension within a dead band",
+        "none": "the drum held by its brake",
+        "mpc": "linear MPC, the hook predicted by a Kalman filter",
+        "mpc-ar": "linear MPC, the hook predicted by an adaptive AR model",
+        "mpc-preview": "linear MPC that is told the hook's future, for reference",
+        "nonlinear-mpc": "MPC on the nonlinear plant: drag, slack rope and the drive's limits",
     }
 )
-
-
-def known_controllers() -> tuple[str, ...]:
-    """Return the names of all controllers."""
-    from synth.controllers import CONTROLLERS
-
-    return (*CONTROLLERS, *PREDICTIVE)
+"""Every controller by its name, those of `synth.controllers` first, and what it is, in a line."""
 
 
 def controller_by_name(
@@ -55,7 +54,7 @@ def controller_by_name(
     Parameters
     ----------
     name
-        One of `known_controllers`.
+        One of `CONTROLLER_TEXTS`.
     case
         The case.
     design, gains
@@ -70,8 +69,8 @@ def controller_by_name(
     SolverError, SynthesisError
         If it cannot be made for the case.
     """
-    pick("controllers", "controller", known_controllers(), (name,))
-    if name not in PREDICTIVE:
+    pick("controllers", "controller", tuple(CONTROLLER_TEXTS), (name,))
+    if "mpc" not in name:
         from synth.controllers import controller_named
 
         return controller_named(name, case, design=design, gains=gains, sample_time=sample_time)

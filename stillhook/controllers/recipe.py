@@ -24,7 +24,7 @@ from models.sensing import Controller
 from synth.controllers import LinearFeedback
 from synth.design import Design, Tuning
 
-from .named import PROTOCOL, controller_by_name, known_controllers
+from .named import CONTROLLER_TEXTS, PROTOCOL, controller_by_name
 from .stored_design import EAGER, StoredDesign, design_law
 
 Make = Callable[[Case, StoredDesign | None], Controller]
@@ -120,7 +120,7 @@ def recipe_of(wanted: object, owner: str) -> Recipe:
     Parameters
     ----------
     wanted
-        The name of a controller (`known_controllers`); a `Design` or a `Tuning`; a controller; or
+        The name of a controller (`CONTROLLER_TEXTS`); a `Design` or a `Tuning`; a controller; or
         a pair of a name and a design, a controller or a function of the case that returns a
         controller.
     owner
@@ -132,7 +132,7 @@ def recipe_of(wanted: object, owner: str) -> Recipe:
         If it is none of these, or the name is unknown.
     """
     if isinstance(wanted, str):
-        pick(owner, "controller", known_controllers(), (wanted,))
+        pick(owner, "controller", tuple(CONTROLLER_TEXTS), (wanted,))
         make: Make = functools.partial(_named, wanted)
         return Recipe(name=wanted, kind="name", make=make, identity=wanted)
     name = None

@@ -37,10 +37,9 @@ class StoredDesign:
 
     Attributes
     ----------
-    kind
-        "controller", or "none" where no stable law was found.
     values
-        The matrices A, B, C, D and the names of the measurements and inputs.
+        The matrices A, B, C, D and the names of the measurements and inputs; empty where no
+        stable law was found.
     ok
         Whether it keeps every limit that it was designed for.
     drive
@@ -52,7 +51,6 @@ class StoredDesign:
         The structure and its parameters by name; empty where there is no structure of a winch.
     """
 
-    kind: str
     values: Mapping[str, Any]
     ok: bool
     drive: str = ""
@@ -63,7 +61,7 @@ class StoredDesign:
     @property
     def found(self) -> bool:
         """Whether there is a law at all."""
-        return self.kind != "none"
+        return bool(self.values)
 
     @property
     def law(self) -> LinearController:
@@ -88,7 +86,7 @@ class StoredDesign:
     @property
     def digest(self) -> str:
         """Digest of what it does, whatever was said about it."""
-        text = json.dumps({"kind": self.kind, "values": dict(self.values)}, sort_keys=True)
+        text = json.dumps(dict(self.values), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def to_dict(self) -> dict[str, Any]:
@@ -101,11 +99,11 @@ class StoredDesign:
         about: dict[str, Any] = {"ok": bool(design.ok), "drive": drive, "status": design.status}
         controller = design.controller if design.margins is not None else None
         if controller is None:
-            return cls(kind="none", values={}, **about)
+            return cls(values={}, **about)
         if isinstance(design, Design):
             parameters = {name: float(value) for name, value in design.parameters.items()}
             about |= {"structure": design.structure, "parameters": parameters}
-        return cls(kind="controller", values=_matrices(controller), **about)
+        return cls(values=_matrices(controller), **about)
 
 
 def _matrices(controller: LinearController) -> dict[str, Any]:
@@ -153,7 +151,7 @@ def design_law(
     if not design.drive_kept:
         # What was found ignores the limits: that is the eager one, and takes part as such.
         status = f"no law within the drive's limits: {law.status}"
-        return replace(law, kind="none", values={}, status=status)
+        return replace(law, values={}, status=status)
     return law
 
 

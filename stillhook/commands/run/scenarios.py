@@ -7,20 +7,10 @@ import argparse
 from models.basics import KINDS
 from models.operation import Option, WordOption, scenario_names, scenario_options
 
-from ...controllers import PREDICTIVE
+from ...controllers import CONTROLLER_TEXTS
 from ...text import Report, ReportSection, pairs, quantity
 from ..declare import positional
 from ..working import conclude
-
-CONTROLLER_TEXTS = {
-    "feedback": "the gains of a design, on what comes up from the payload",
-    "feedback-no-antiwindup": "the same without anti-windup, for a controller with states",
-    "feed-forward": "0.9 of the hook's speed from the motion reference unit, to the drum",
-    "feed-forward-lead": "the same, with the delays of sensor and drive made up for",
-    "constant-tension": "holds the rope's tension within a dead band",
-    "none": "the brake is on",
-}
-"""One line on each controller of `synth.controllers.controllers.CONTROLLERS`."""
 
 ARGUMENTS = (positional("name", "an operation, to see its options", optional=True),)
 
@@ -37,12 +27,9 @@ def run(arguments: argparse.Namespace) -> int:
         key, option = next(iter(options.items()))
         command = f"stillhook simulate CASE --scenario {name} --option '{key}={_example(option)}'"
         return conclude(report, arguments, following=[("with an option", command)])
-    from synth.controllers import CONTROLLERS
-
-    texts = {name: CONTROLLER_TEXTS.get(name, "") for name in CONTROLLERS}
     sections = [
         ReportSection("Scenarios (--scenario)", [pairs(list(scenario_names().items()))]),
-        ReportSection("Controllers (--controller)", [pairs(list({**texts, **PREDICTIVE}.items()))]),
+        ReportSection("Controllers (--controller)", [pairs(list(CONTROLLER_TEXTS.items()))]),
     ]
     following = [
         ("the options of one scenario", "stillhook scenarios landing"),

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from models import Case
-from models.basics import InputError
+from models.basics import InputError, pick
 
+from ...controllers import CONTROLLER_TEXTS
 from ...text import told_once
 from ..given import given_case, parse_gains, parse_options
 from ..lists import quantity
@@ -113,15 +114,11 @@ def parse_controllers(text: str) -> tuple[str, ...]:
     InputError
         If there is no such controller, or one is named twice.
     """
-    from models.basics import pick
-    from synth.controllers import CONTROLLERS
-
-    from ...controllers import known_controllers
-
+    known = tuple(CONTROLLER_TEXTS)
     if text == "all":
-        return tuple(CONTROLLERS)
+        return tuple(name for name in known if "mpc" not in name)
     names = tuple(name.strip() for name in text.split(","))
-    pick("--controller", "controller", known_controllers(), names)
+    pick("--controller", "controller", known, names)
     if len(set(names)) != len(names):
         raise InputError(f"--controller: each may be named once, got {text!r}")
     return names

@@ -353,7 +353,7 @@ def test_a_law_survives_json_to_the_last_bit():
     values |= {"C": rng.standard_normal((1, 2)).tolist(), "D": rng.standard_normal((1, 1)).tolist()}
     values["A"] = (np.array(values["A"]) - 5.0 * np.eye(2)).tolist()
     values |= {"measurements": ["payload.velocity"], "inputs": ["drive.command"]}
-    law = StoredDesign(kind="controller", values=values, ok=True)
+    law = StoredDesign(values=values, ok=True)
     again = StoredDesign(**json.loads(json.dumps(law.to_dict())))
     assert again.digest == law.digest
     for name in "ABCD":
