@@ -128,12 +128,13 @@ def compare(
     if jobs is not None:
         check_range("compare", "jobs", jobs, low=1, high=512)
     waves = EASE + 10.0 * case.sea.spectral_peak_period
-    asked = seconds_of("compare: settle", settle, high=_LONGEST, positive=False)
-    usual = max(min(waves, 0.1 * lasting), min(EASE, 0.5 * lasting))
+    start = max(min(waves, 0.1 * lasting), min(EASE, 0.5 * lasting))
+    if settle is not None:
+        start = seconds_of("compare: settle", settle, high=_LONGEST, positive=False)
     question = ComparisonQuestion(
         case=case,
         duration=lasting,
-        settle=usual if asked is None else asked,
+        settle=start,
         mismatch=Mismatch.read(mismatch),
         masses=masses,
         compiled=compiled,

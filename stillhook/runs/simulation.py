@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, overload
+from typing import Literal
 
 import numpy as np
 
@@ -145,7 +145,7 @@ def simulate(
     case
         Vessel, sea, rope, payload, winch and sensors.
     controller
-        The name of a controller (`stillhook.controllers.known_controllers`); a design, whose
+        The name of a controller (`stillhook.controllers.CONTROLLER_TEXTS`); a design, whose
         feedback is meant; or any object with ``name``, ``sample_time``, ``reset()`` and
         ``step(measurement, time)`` (`models.sensing.control.Controller`).
     scenario, options
@@ -214,7 +214,9 @@ def simulate(
         scenario,
         SimulationOptions(
             hook=hook,
-            duration=seconds_of("simulate: duration", duration, high=1e8),
+            duration=None
+            if duration is None
+            else seconds_of("simulate: duration", duration, high=1e8),
             step=step,
             masses=masses,
             limits=limits,
@@ -256,22 +258,14 @@ def seeds_of(owner: str, seeds: int | Sequence[int]) -> tuple[int, ...]:
     return found
 
 
-@overload
-def seconds_of(owner: str, value: None, *, high: float, positive: bool = ...) -> None: ...
-@overload
-def seconds_of(owner: str, value: float | str, *, high: float, positive: bool = ...) -> float: ...
-def seconds_of(
-    owner: str, value: float | str | None, *, high: float, positive: bool = True
-) -> float | None:
-    """Return a time that was given as a number [s] or as a text with a unit; None as it is.
+def seconds_of(owner: str, value: float | str, *, high: float, positive: bool = True) -> float:
+    """Return a time that was given as a number [s] or as a text with a unit.
 
     Raises
     ------
     InputError
         If it is none, or not above 0 (at least 0 unless `positive`) and up to the highest.
     """
-    if value is None:
-        return None
     try:
         return float(Quantity("time", 0.0, high, open_low=positive).read(value))
     except InputError as error:

@@ -178,7 +178,9 @@ def sweep(
         recipe=recipe,
         metrics=names_of(metrics),
         duration=lasting,
-        settle=seconds_of("sweep: settle", settle, high=_LONGEST, positive=False),
+        settle=None
+        if settle is None
+        else seconds_of("sweep: settle", settle, high=_LONGEST, positive=False),
         scenario=scenario,
         options=dict(options or {}),
         masses=masses,
