@@ -17,7 +17,6 @@ from models.simulation.integrate import (
     StepChoice,
     choose_step,
     hermite_midpoint,
-    rk4_stability_limit,
     rk4_step,
 )
 
@@ -186,24 +185,13 @@ def growth(A: FloatArray, h: float) -> float:
     return float(np.abs(np.linalg.eigvals(step)).max())
 
 
-@given(st.floats(0.5001 * math.pi, math.pi), st.floats(0.1, 1e4))
-def test_stability_limit_is_where_a_step_begins_to_grow(angle: float, size: float) -> None:
+@given(st.floats(0.5001 * math.pi, math.pi), st.floats(0.1, 1e4), st.floats(0.01, 1.0))
+def test_what_decays_in_truth_decays_in_an_allowed_step(
+    angle: float, size: float, part: float
+) -> None:
     value = complex(size * math.cos(angle), size * math.sin(angle))
-    limit = rk4_stability_limit(value)
     A = np.array([[value.real, -value.imag], [value.imag, value.real]])
-    assert growth(A, 1.0001 * limit) > 1.0
-    for part in (0.01, 0.3, 0.6, 0.9, 0.9999):
-        assert growth(A, part * limit) < 1.0
-
-
-def test_stability_limits_on_both_axes_are_those_of_the_textbook() -> None:
-    assert rk4_stability_limit(-2.0) == pytest.approx(2.7852935634 / 2.0, rel=1e-10)
-    assert rk4_stability_limit(2.0j) == pytest.approx(math.sqrt(8.0) / 2.0, rel=1e-15)
-    # undamped to rounding: on either side of the axis
-    for real in (-1e-15, 1e-15):
-        assert rk4_stability_limit(real + 50j) == pytest.approx(math.sqrt(8.0) / 50.0)
-    assert rk4_stability_limit(0.0) == math.inf
-    assert rk4_stability_limit(0.1 + 1.0j) == math.inf
+    assert growth(A, part * choose_step(A, 1e3 / size).largest) < 1.0
 
 
 def oscillator(omega: float) -> FloatArray:
@@ -217,9 +205,6 @@ def test_default_step_is_the_longest_that_divides_the_sample() -> None:
     assert choice.step == 0.025
     assert choice.largest == pytest.approx(1.0 / 35.0)
     assert choice.fastest == pytest.approx(35.0)
-    assert str(choice) == (
-        "4 integration steps of 0.025 s in a sample of 0.1 s (fastest mode 35 rad/s)"
-    )
     # h w = 1 to rounding is still one step, not two
     assert choose_step(oscillator(10.0), 0.1).substeps == 1
     assert choose_step(oscillator(10.001), 0.1).substeps == 2
@@ -238,14 +223,7 @@ def test_fastest_of_several_plants_and_rates_sets_the_step() -> None:
     assert choose_step(several, 0.1, extra_rates=(80.0, 3.0)).substeps == 8
 
 
-def test_looser_accuracy_is_still_held_to_stability() -> None:
-    # 2.5 < sqrt(8) < 2.785: within `accuracy` every ray of the left half-plane is stable
-    choice = choose_step(oscillator(10.0), 1.0, accuracy=2.5)
-    assert choice.largest == pytest.approx(0.25)
-    assert growth(oscillator(10.0), choice.largest) < 1.0
-
-
-def test_unstable_plant_is_held_to_accuracy_only() -> None:
+def test_unstable_plant_is_held_to_accuracy_too() -> None:
     assert choose_step([[4.0]], 1.0).largest == pytest.approx(0.25)
 
 
@@ -306,7 +284,6 @@ def test_bundled_plants_get_a_step() -> None:
             "integration: extra_rates must be at least 0 rad/s, got -1.0",
         ),
         ({"sample_time": -0.1}, "integration: sample_time must be above 0 s, got -0.1"),
-        ({"accuracy": 3.0}, "integration: accuracy must be in (0, 2.5], got 3.0"),
         ({"A": np.ones(3)}, "integration: A must be one square matrix or several, got shape (3,)"),
         (
             {"A": [[math.inf]]},
