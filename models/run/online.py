@@ -10,8 +10,7 @@ mean is large against the deviation, as a rope's tension is.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -162,24 +161,32 @@ class Cycles:
                 self._troughs.append(troughs.astype(np.float32))
         self._highs, self._lows, self._waiting = [], [], 0
 
+    def figures(self, sample_time: float) -> dict[str, Any]:
+        """Return what `SignalStatistics` says of the cycles, by its attributes."""
+        crests, troughs = self.crests, self.troughs
+        for array in (crests, troughs):
+            array.setflags(write=False)
+        found: dict[str, Any] = {
+            "level": self.level,
+            "cycles": self.count,
+            "crest": self.crest,
+            "trough": self.trough,
+            "height": self.height,
+            "crests": crests,
+            "troughs": troughs,
+        }
+        if self.count:
+            found["period"] = (self.last_at - self.first_at) * sample_time / self.count
+            if self.stored:
+                heights = np.sort(crests.astype(np.float64) - troughs)
+                found["significant"] = float(heights[-math.ceil(self.count / 3) :].mean())
+                found["significant_source"] = "cycles"
+        return found
+
     def _crossed_at(self, signal: FloatArray, i: int, first: int) -> float:
         before = self._before if i == 0 else float(signal[i - 1])
         here = float(signal[i])
         return first + i - (here - self.level) / (here - before)
-
-
-class Flow:
-    """Mean of what flows one way and of what flows back, as power does."""
-
-    def __init__(self) -> None:
-        self.samples = 0
-        self.forth = self.back = 0.0
-
-    def add(self, signal: FloatArray) -> None:
-        """Take samples `signal` (n,)."""
-        self.samples += signal.size
-        self.forth += float(np.maximum(signal, 0.0).sum())
-        self.back += float(np.maximum(-signal, 0.0).sum())
 
 
 class Slack:
@@ -195,7 +202,7 @@ class Slack:
 
     def __init__(self, limit: float, window: int) -> None:
         self.limit, self.window = limit, window
-        self.samples = self.slack = self.events = 0
+        self.slack = self.events = 0
         self.first_at = -1
         self.snap, self.snap_at = math.nan, -1
         self._last = -window - 1  # number of the last slack sample
@@ -205,7 +212,6 @@ class Slack:
         """Take smallest and largest tension along the rope (n,) [N], from sample `first` on."""
         n = smallest.size
         slack = smallest <= self.limit
-        self.samples += n
         count = int(np.count_nonzero(slack))
         if count == 0 and first - self._last > self.window:
             self._was_slack = False
@@ -225,21 +231,6 @@ class Slack:
             if not snaps[i] <= self.snap:
                 self.snap, self.snap_at = float(snaps[i]), first + i
         self._last, self._was_slack = int(last[-1]), bool(slack[-1])
-
-
-class FirstTime:
-    """The first sample at which the size of a signal exceeds a limit."""
-
-    def __init__(self, limit: float) -> None:
-        self.limit = limit
-        self.at = -1
-
-    def add(self, signal: FloatArray, first: int) -> None:
-        """Take samples `signal` (n,), the first of which is number `first` of the run."""
-        if self.at < 0:
-            beyond = ~(np.abs(signal) <= self.limit)  # a NaN is beyond any limit
-            if beyond.any():
-                self.at = first + int(beyond.argmax())
 
 
 class Touchdown:
@@ -282,8 +273,7 @@ class BlockExtremes:
 
     def __init__(self, signals: int, length: int) -> None:
         self.length = length
-        self._maxima: list[FloatArray] = []
-        self._minima: list[FloatArray] = []
+        self._whole: list[FloatArray] = []
         self._filled = 0
         self._high, self._low = np.full(signals, -math.inf), np.full(signals, math.inf)
 
@@ -298,20 +288,11 @@ class BlockExtremes:
             self._filled += stop - start
             start = stop
             if self._filled == self.length:
-                self._maxima.append(self._high)
-                self._minima.append(self._low)
+                self._whole.append(np.stack([self._high, self._low]))
                 self._high = np.full_like(self._high, -math.inf)
                 self._low = np.full_like(self._low, math.inf)
                 self._filled = 0
 
-    def maxima(self) -> FloatArray:
-        """Maxima of the whole blocks (blocks, signals)."""
-        return _stacked(self._maxima, self._high.size)
-
-    def minima(self) -> FloatArray:
-        """Minima of the whole blocks (blocks, signals)."""
-        return _stacked(self._minima, self._high.size)
-
-
-def _stacked(rows: Sequence[FloatArray], width: int) -> FloatArray:
-    return np.array(rows, dtype=np.float64).reshape(len(rows), width)
+    def found(self) -> FloatArray:
+        """Maxima and minima of the whole blocks (blocks, 2, signals)."""
+        return np.array(self._whole).reshape(len(self._whole), 2, self._high.size)

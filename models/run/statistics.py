@@ -23,8 +23,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..basics import FloatArray, InputError, check_range
-from .online import BlockExtremes, Cycles, FirstTime, Flow, Moments, Slack, Touchdown
-from .summary import ERROR, Blocks, SignalStatistics, Statistics, quantities_of
+from .online import BlockExtremes, Cycles, Moments, Slack, Touchdown
+from .summary import ERROR, Blocks, NamedQuantity, SignalStatistics, Statistics
 
 # Samples worked off at once: few enough to stay in the cache, many enough for numpy.
 _STRETCH = 4096
@@ -154,13 +154,14 @@ class Accumulator:
         self._blocks = BlockExtremes(len(kept), round(block / self.sample_time))
         self._block_rows = np.array([self._at[name] for name in kept], dtype=np.intp)
         self._block_names = tuple(kept)
-        self._power = Flow() if "motor.power" in self._at else None
+        self._power = np.zeros(2)  # sum of what flows out of the motor, and of what flows back
         self._slack = (
             Slack(slack_tension, round(snap_window / self.sample_time))
             if "rope.minimum_tension" in self._at
             else None
         )
-        self._lost = FirstTime(lock_limit) if lock_limit is not None and self._has_error else None
+        self._lock_limit = lock_limit if self._has_error else None
+        self._lost_at = -1
         self._touch = Touchdown() if {"contact.gap", "contact.force"} & set(self._at) else None
         self._thermal_time = thermal_time if "motor.torque" in self._at else None
         self._heat = self._hottest = static_torque**2
@@ -238,10 +239,13 @@ class Accumulator:
             cycles.add(values[self._at[name]], first)
         if self._block_names:
             self._blocks.add(values[self._block_rows])
-        if self._power:
-            self._power.add(values[self._at["motor.power"]])
-        if self._lost:
-            self._lost.add(values[self._at[ERROR]], first)
+        if "motor.power" in self._at:
+            power = values[self._at["motor.power"]]
+            self._power += np.maximum([power, -power], 0.0).sum(axis=1)
+        if self._lock_limit is not None and self._lost_at < 0:
+            beyond = ~(np.abs(values[self._at[ERROR]]) <= self._lock_limit)  # a NaN is beyond any
+            if beyond.any():
+                self._lost_at = first + int(beyond.argmax())
         if self._slack:
             smallest = values[self._at["rope.minimum_tension"]]
             ends = _present(("rope.tension", "rope.lower_tension"), self.names)
@@ -283,45 +287,98 @@ class Accumulator:
 
     def _statistics(self) -> Statistics:
         moments, found = self._moments, {}
-        deviation = moments.deviation
-        some = moments.samples > 0
         for i, name in enumerate(self.names):
-            found[name] = SignalStatistics.of(
-                name=name,
-                unit=self.units[name],
-                mean=float(moments.mean[i]) if some else math.nan,
-                standard_deviation=float(deviation[i]),
-                minimum=float(moments.low[i]) if some else math.nan,
-                minimum_time=self._time(float(moments.low_at[i])),
-                maximum=float(moments.high[i]) if some else math.nan,
-                maximum_time=self._time(float(moments.high_at[i])),
-                cycles=self._cycles.get(name),
-                sample_time=self.sample_time,
-            )
-        maxima, minima = self._blocks.maxima(), self._blocks.minima()
+            deviation = float(moments.deviation[i])
+            cycles = self._cycles.get(name)
+            about = {
+                "mean": float(moments.mean[i]) if moments.samples else math.nan,
+                "standard_deviation": deviation,
+                "minimum": float(moments.low[i]) if moments.samples else math.nan,
+                "minimum_time": self._time(float(moments.low_at[i])),
+                "maximum": float(moments.high[i]) if moments.samples else math.nan,
+                "maximum_time": self._time(float(moments.high_at[i])),
+                "significant": 4.0 * deviation,
+                **(cycles.figures(self.sample_time) if cycles else {}),
+            }
+            found[name] = SignalStatistics(name=name, unit=self.units[name], **about)
+        blocks = self._blocks.found()
         return Statistics(
             sample_time=self.sample_time,
             settle=self.settle,
             samples=moments.samples,
             end=self._time(self._first - 1),
             signals=found,
-            quantities=quantities_of(
-                found,
-                duration=moments.samples * self.sample_time,
-                time=self._time,
-                sample_time=self.sample_time,
-                power=self._power,
-                slack=self._slack,
-                lost=self._lost,
-                touch=self._touch,
-                hottest=None if self._thermal_time is None else self._hottest,
-            ),
+            quantities=self._quantities(found),
             block=self._blocks.length * self.sample_time,
             blocks={
-                name: Blocks(maxima=maxima[:, i], minima=minima[:, i])
+                name: Blocks(maxima=blocks[:, 0, i], minima=blocks[:, 1, i])
                 for i, name in enumerate(self._block_names)
             },
         )
+
+    def _quantities(self, signals: Mapping[str, SignalStatistics]) -> dict[str, NamedQuantity]:
+        """Return the named quantities that the signals at hand allow."""
+        found, samples = dict[str, NamedQuantity](), self._moments.samples
+
+        def put(name: str, value: float, unit: str) -> None:
+            found[name] = NamedQuantity(value=float(value), unit=unit)
+
+        hook, payload = signals.get("hook.heave"), signals.get("payload.displacement")
+        if hook:
+            put("hook rms", hook.standard_deviation, "m")
+        if payload:
+            error = signals[ERROR]
+            put("payload rms", payload.standard_deviation, "m")
+            put("payload significant", payload.significant, "m")
+            put("payload largest", payload.largest, "m")
+            put("tracking error rms", error.rms, "m")
+            put("tracking error largest", error.largest, "m")
+            if hook and hook.standard_deviation > 0.0:
+                ratio = error.standard_deviation / hook.standard_deviation
+                put("residual", 100.0 * ratio, "%")
+                put("attenuation", -20.0 * math.log10(ratio) if ratio > 0.0 else math.inf, "dB")
+        if self._lock_limit is not None:
+            put("lost lock at", self._time(self._lost_at), "s")
+        if "rope.tension" in signals:
+            put("rope tension largest", signals["rope.tension"].maximum, "N")
+        if (slack := self._slack) is not None:
+            put("rope tension smallest", signals["rope.minimum_tension"].minimum, "N")
+            put("slack time", slack.slack * self.sample_time, "s")
+            put("slack share", 100.0 * slack.slack / samples if samples else math.nan, "%")
+            put("slack events", slack.events, "")
+            put("first slack at", self._time(slack.first_at), "s")
+            put("snap load", slack.snap, "N")
+            put("snap load at", self._time(slack.snap_at), "s")
+        if "motor.torque" in signals:
+            put("motor torque rms", signals["motor.torque"].rms, "N m")
+            put("motor torque largest", signals["motor.torque"].largest, "N m")
+        if self._thermal_time is not None:
+            put("motor torque thermal equivalent", math.sqrt(self._hottest), "N m")
+        if "motor.speed" in signals:
+            put("motor speed largest", signals["motor.speed"].largest, "rad/s")
+        if "drive.saturated" in signals:
+            put("saturated share", 100.0 * signals["drive.saturated"].mean, "%")
+        if "motor.power" in signals:
+            forth, back = self._power / samples if samples else (math.nan, math.nan)
+            put("motor power mean", forth - back, "W")
+            put("motor power largest", max(signals["motor.power"].maximum, 0.0), "W")
+            put("regenerated power mean", back, "W")
+            put("regenerated power largest", max(0.0 - signals["motor.power"].minimum, 0.0), "W")
+            put("energy per hour, motoring", 3600.0 * forth, "J/h")
+            put("energy per hour, regenerated", 3600.0 * back, "J/h")
+            put("energy per hour, net", 3600.0 * (forth - back), "J/h")
+        if "motor.temperature" in signals:
+            put("motor temperature rise largest", signals["motor.temperature"].maximum, "K")
+        if "drum.haul" in signals:
+            put("drum haul lowest", signals["drum.haul"].minimum, "m")
+            put("drum haul highest", signals["drum.haul"].maximum, "m")
+        if (touch := self._touch) is not None:
+            put("touch-downs", touch.count, "")
+            put("touch-down at", self._time(touch.first_at), "s")
+            put("touch-down speed", touch.speed, "m/s")
+            put("hardest touch-down", touch.hardest, "m/s")
+        put("time counted", samples * self.sample_time, "s")
+        return found
 
 
 def _present(wanted: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:

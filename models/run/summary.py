@@ -9,16 +9,14 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ..basics import FloatArray, InputError, ReadOnlyArrays
-from .online import Cycles, FirstTime, Flow, Slack, Touchdown
 
 ERROR = "payload.error"
 """Name of the tracking error, payload.displacement less reference.displacement."""
@@ -88,42 +86,6 @@ class SignalStatistics:
     significant_source: str = "4 sigma"
     crests: npt.NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, np.float32))
     troughs: npt.NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, np.float32))
-
-    @classmethod
-    def of(
-        cls,
-        *,
-        standard_deviation: float,
-        cycles: Cycles | None,
-        sample_time: float,
-        **about: Any,
-    ) -> SignalStatistics:
-        """Return the statistics of a signal, with its cycles if they were counted.
-
-        Name, unit, mean and extremes are as the attributes.
-        """
-        about |= {"standard_deviation": standard_deviation, "significant": 4.0 * standard_deviation}
-        if cycles is None:
-            return cls(**about)
-        count, crests, troughs = cycles.count, cycles.crests, cycles.troughs
-        for array in (crests, troughs):
-            array.setflags(write=False)
-        about |= {
-            "level": cycles.level,
-            "cycles": count,
-            "crest": cycles.crest,
-            "trough": cycles.trough,
-            "height": cycles.height,
-            "crests": crests,
-            "troughs": troughs,
-        }
-        if count:
-            about["period"] = (cycles.last_at - cycles.first_at) * sample_time / count
-            if cycles.stored:
-                heights = np.sort(crests.astype(np.float64) - troughs)
-                about["significant"] = float(heights[-math.ceil(count / 3) :].mean())
-                about["significant_source"] = "cycles"
-        return cls(**about)
 
     @property
     def rms(self) -> float:
@@ -228,80 +190,3 @@ def unknown(owner: str, kind: str, name: str, names: Iterable[str]) -> str:
     else:
         hint = f"there are {', '.join(known)}" if known else "there are none"
     return f"{owner}: no {kind} {name!r}; {hint}"
-
-
-def quantities_of(
-    signals: Mapping[str, SignalStatistics],
-    *,
-    duration: float,
-    time: Callable[[float], float],
-    sample_time: float,
-    power: Flow | None,
-    slack: Slack | None,
-    lost: FirstTime | None,
-    touch: Touchdown | None,
-    hottest: float | None,
-) -> dict[str, NamedQuantity]:
-    """Return the named quantities that the signals at hand allow; `time` dates a sample."""
-    found: dict[str, NamedQuantity] = {}
-
-    def put(name: str, value: float, unit: str) -> None:
-        found[name] = NamedQuantity(value=float(value), unit=unit)
-
-    hook, payload = signals.get("hook.heave"), signals.get("payload.displacement")
-    if hook:
-        put("hook rms", hook.standard_deviation, "m")
-    if payload:
-        error = signals[ERROR]
-        put("payload rms", payload.standard_deviation, "m")
-        put("payload significant", payload.significant, "m")
-        put("payload largest", payload.largest, "m")
-        put("tracking error rms", error.rms, "m")
-        put("tracking error largest", error.largest, "m")
-        if hook and hook.standard_deviation > 0.0:
-            ratio = error.standard_deviation / hook.standard_deviation
-            put("residual", 100.0 * ratio, "%")
-            put("attenuation", -20.0 * math.log10(ratio) if ratio > 0.0 else math.inf, "dB")
-    if lost:
-        put("lost lock at", time(lost.at), "s")
-    if "rope.tension" in signals:
-        put("rope tension largest", signals["rope.tension"].maximum, "N")
-    if slack:
-        put("rope tension smallest", signals["rope.minimum_tension"].minimum, "N")
-        put("slack time", slack.slack * sample_time, "s")
-        put("slack share", 100.0 * slack.slack / slack.samples if slack.samples else math.nan, "%")
-        put("slack events", slack.events, "")
-        put("first slack at", time(slack.first_at), "s")
-        put("snap load", slack.snap, "N")
-        put("snap load at", time(slack.snap_at), "s")
-    if "motor.torque" in signals:
-        put("motor torque rms", signals["motor.torque"].rms, "N m")
-        put("motor torque largest", signals["motor.torque"].largest, "N m")
-    if hottest is not None:
-        put("motor torque thermal equivalent", math.sqrt(hottest), "N m")
-    if "motor.speed" in signals:
-        put("motor speed largest", signals["motor.speed"].largest, "rad/s")
-    if "drive.saturated" in signals:
-        put("saturated share", 100.0 * signals["drive.saturated"].mean, "%")
-    if power:
-        forth = power.forth / power.samples if power.samples else math.nan
-        back = power.back / power.samples if power.samples else math.nan
-        put("motor power mean", forth - back, "W")
-        put("motor power largest", max(signals["motor.power"].maximum, 0.0), "W")
-        put("regenerated power mean", back, "W")
-        put("regenerated power largest", max(0.0 - signals["motor.power"].minimum, 0.0), "W")
-        put("energy per hour, motoring", 3600.0 * forth, "J/h")
-        put("energy per hour, regenerated", 3600.0 * back, "J/h")
-        put("energy per hour, net", 3600.0 * (forth - back), "J/h")
-    if "motor.temperature" in signals:
-        put("motor temperature rise largest", signals["motor.temperature"].maximum, "K")
-    if "drum.haul" in signals:
-        put("drum haul lowest", signals["drum.haul"].minimum, "m")
-        put("drum haul highest", signals["drum.haul"].maximum, "m")
-    if touch:
-        put("touch-downs", touch.count, "")
-        put("touch-down at", time(touch.first_at), "s")
-        put("touch-down speed", touch.speed, "m/s")
-        put("hardest touch-down", touch.hardest, "m/s")
-    put("time counted", duration, "s")
-    return found
