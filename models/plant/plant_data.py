@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..basics import InputError, check_range
-from .rope import MAX_MASSES, damping_time, fixed_top_modes, lump_rope, lumped_modes
+from .rope import MAX_MASSES, fixed_top_modes, lump_rope, lumped_modes
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -116,14 +116,13 @@ class PlantData:
 
     @property
     def damping_time(self) -> float:
-        """Kelvin-Voigt time of the rope [s]."""
-        return damping_time(
-            self.damping_ratio,
-            self.axial_stiffness,
-            self.rope_length,
-            self.mass_per_length,
-            self.payload_mass,
-        )
+        """Kelvin-Voigt time tau of the rope, EA (strain + tau strain rate) [s].
+
+        tau = 2 zeta / omega_1, so that the first exact axial mode with the upper end held has
+        the fraction zeta of critical damping; higher modes have zeta omega_j / omega_1.
+        """
+        rope = (self.axial_stiffness, self.rope_length, self.mass_per_length)
+        return 2.0 * self.damping_ratio / float(fixed_top_modes(*rope, self.payload_mass, 1)[0])
 
     @property
     def mean_gear_factor(self) -> float:

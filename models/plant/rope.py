@@ -130,23 +130,6 @@ def fixed_top_modes(
     return np.array(roots) / length * math.sqrt(axial_stiffness / mass_per_length)
 
 
-def damping_time(
-    damping_ratio: float,
-    axial_stiffness: float,
-    length: float,
-    mass_per_length: float,
-    payload_mass: float,
-) -> float:
-    """Return the Kelvin-Voigt time tau of EA (strain + tau strain rate) [s].
-
-    tau = 2 zeta / omega_1, so that the first exact axial mode with the upper end held has
-    the fraction zeta of critical damping; higher modes have zeta omega_j / omega_1.
-    """
-    check_range("rope", "damping_ratio", damping_ratio, low=0.0, high=1.0)
-    first = fixed_top_modes(axial_stiffness, length, mass_per_length, payload_mass, 1)
-    return 2.0 * damping_ratio / float(first[0])
-
-
 def lumped_modes(
     lumps: RopeLumps,
     axial_stiffness: float,

@@ -14,7 +14,6 @@ from plant_numbers import MODERN, THESIS
 from models.basics import InputError
 from models.plant import PlantData, fixed_top_modes, lump_rope, lumped_modes, masses_for_bandwidth
 from models.plant.plant_data import MODE_TOLERANCE
-from models.plant.rope import damping_time
 
 ROPE = (1.6e8, 2000.0, 8.1, 73_688.0)  # the 1975 thesis: EA, L, mass per length, M_1
 BASE = replace(THESIS, lumping="distributed", masses=None)
@@ -94,10 +93,7 @@ def test_bad_ropes_are_named(arguments: tuple[float, ...], message: str) -> None
 
 def test_damping_time_is_that_of_the_first_mode() -> None:
     first = fixed_top_modes(*ROPE, 1)[0]
-    assert damping_time(0.03, *ROPE) == pytest.approx(0.06 / first)
     assert replace(BASE, damping_ratio=0.03).damping_time == pytest.approx(0.06 / first)
-    with pytest.raises(InputError, match=r"damping_ratio must be in \[0, 1\], got 2"):
-        damping_time(2.0, *ROPE)
 
 
 # ---- lumping
