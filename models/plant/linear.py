@@ -27,6 +27,7 @@ from ..basics import (
     FloatArray,
     InputError,
     ReadOnlyArrays,
+    check_choice,
     check_finite,
     check_range,
     pick,
@@ -355,32 +356,24 @@ class LinearPlant(ReadOnlyArrays):
         pade_order
             Order of each Pade model, 1 to 12; 0 drops the delays.
         at
-            ``"inputs"``: the models stand at the inputs, which needs equal delays and
-            fewest states.  What the loop does is the same: yu is that of the delayed plant
-            and every closed-loop response with it, while zu alone gains the delay and yw
-            alone loses it.  ``"measurements"``: one model for each delayed measurement, all
-            four blocks keep their meaning.  ``"auto"``: inputs if the delays are equal and
-            there are fewer inputs than measurements.
+            ``"measurements"``: one model for each delayed measurement, all four blocks keep
+            their meaning.  ``"auto"``: at the inputs if the delays are equal and there are
+            fewer inputs than measurements, for fewer states.  What the loop does is the same:
+            yu is that of the delayed plant and every closed-loop response with it, while zu
+            alone gains the delay and yw alone loses it.
 
         Raises
         ------
         InputError
-            If `pade_order` or `at` is out of range, or the delays differ at ``"inputs"``.
+            If `pade_order` or `at` is out of range.
         """
         check_range(_OWNER, "pade_order", pade_order, low=0, high=12)
-        if at not in ("auto", "inputs", "measurements"):
-            raise InputError(f"{_OWNER}: at must be 'auto', 'inputs' or 'measurements', got {at!r}")
+        check_choice(_OWNER, "at", at, ("auto", "measurements"))
         ny, nu = len(self.measurements), len(self.inputs)
-        equal = len(set(self.delays)) <= 1
-        if at == "inputs" and not equal:
-            raise InputError(
-                f"{_OWNER}: delays can stand at the inputs only if they are equal, got "
-                f"{self.delays} s"
-            )
         plain = self._with(delays=(0.0,) * ny)
         if pade_order == 0 or not any(self.delays):
             return plain
-        if at == "inputs" or (at == "auto" and equal and nu < ny):
+        if at == "auto" and len(set(self.delays)) == 1 and nu < ny:
             late = (self.delays[0],) * nu
             A2, B2, C2, D2 = pade_bank(late, pade_order)
             return plain._with(

@@ -212,9 +212,7 @@ def test_without_delays_can_drop_them() -> None:
 
 def test_without_delays_says_what_it_cannot_do() -> None:
     plant = random_plant(delays=(0.1, 0.2, 0.3))
-    with pytest.raises(InputError, match=r"only if they are equal, got \(0\.1, 0\.2, 0\.3\) s"):
-        plant.without_delays(4, at="inputs")
-    with pytest.raises(InputError, match="at must be 'auto', 'inputs' or 'measurements'"):
+    with pytest.raises(InputError, match="at must be one of auto, measurements; got 'outputs'"):
         plant.without_delays(4, at="outputs")
     with pytest.raises(InputError, match=r"pade_order must be in \[0, 12\], got 13"):
         plant.without_delays(13)
