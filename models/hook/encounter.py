@@ -24,6 +24,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +33,9 @@ import numpy.typing as npt
 from ..basics import GRAVITY, FloatArray, InputError, check_finite, read_only, wave_number
 from ..case import Case
 from ..vessel import HeaveRao, hook_operators, rao_of_hook, vessel_raos
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 # Spacing of the waves whose energy is mapped, and of the curve through E, relative to frequency.
 _FINE, _COARSE = 0.0015, 0.006
@@ -160,8 +165,7 @@ class Encounter:
         self,
         density: Callable[[FloatArray], FloatArray],
         band: tuple[float, float],
-        *,
-        rao: HeaveRao | None = None,
+        rao: HeaveRao,
         splits: tuple[float, ...] = (),
     ) -> MetSpectrum:
         """Return the spectrum of a motion as it is met.
@@ -173,21 +177,16 @@ class Encounter:
         band
             Band of the sea [rad/s]; the spectrum that is met ends at its upper end too.
         rao
-            Operator of the motion in every heading; those of the hook if left out.
+            Operator of the motion where it is one for all headings; else those of the hook count.
         splits
             Frequencies at which the density has a kink [rad/s].
         """
         wave = self._waves(band, splits)
         middle = np.sqrt(wave[1:] * wave[:-1])
-        ends, centre = density(wave), density(middle)
         energies = []
         for k, share in enumerate(self.weights):
-            own = (
-                rao if rao is not None else (None if self.operators is None else self.operators[k])
-            )
-            a, b = ends, centre
-            if own is not None:
-                a, b = own.gain(wave) ** 2 * ends, own.gain(middle) ** 2 * centre
+            own = rao if self.operators is None else self.operators[k]
+            a, b = own.gain(wave) ** 2 * density(wave), own.gain(middle) ** 2 * density(middle)
             # Simpson's rule over ln omega, in which the waves are evenly spaced.
             log_step = np.log(wave[1:] / wave[:-1])
             cells = log_step / 6.0 * (a[:-1] * wave[:-1] + 4.0 * b * middle + a[1:] * wave[1:])
@@ -227,19 +226,18 @@ class MetSpectrum:
     def density(self, omega: npt.ArrayLike) -> FloatArray:
         """Return the one-sided variance density, zero outside the knots [m^2 s/rad]."""
         frequency = np.asarray(omega, dtype=np.float64)
-        at = np.clip(np.searchsorted(self.knots, frequency, "right") - 1, 0, self.knots.size - 2)
-        step = self.knots[at + 1] - self.knots[at]
-        t = (frequency - self.knots[at]) / step
-        mean = (self.energy[at + 1] - self.energy[at]) / step
-        # Derivative of the cubic through both energies with both slopes.
-        found = (
-            6.0 * t * (1.0 - t) * mean
-            + (1.0 - t) * (1.0 - 3.0 * t) * self.slope[at]
-            + t * (3.0 * t - 2.0) * self.slope[at + 1]
-        )
-        inside = (frequency >= self.knots[0]) & (frequency <= self.knots[-1])
-        result: FloatArray = np.where(inside, np.maximum(found, 0.0), 0.0)
+        low, high = self.band
+        slope = self._curve(np.clip(frequency, low, high))
+        inside = (frequency >= low) & (frequency <= high)
+        result: FloatArray = np.where(inside, np.maximum(slope, 0.0), 0.0)
         return result
+
+    @cached_property
+    def _curve(self) -> PPoly:
+        """The slope of the cubic through the energies with the slopes at the knots."""
+        from scipy.interpolate import CubicHermiteSpline
+
+        return CubicHermiteSpline(self.knots, self.energy, self.slope).derivative()
 
     @property
     def band(self) -> tuple[float, float]:

@@ -147,21 +147,20 @@ class HookMotion:
 
     def velocity_density(self, omega: npt.ArrayLike) -> FloatArray:
         """Return the velocity's variance density [(m/s)^2 s/rad] at `omega` [rad/s]."""
-        return self._density(omega, 1)
+        frequency = np.asarray(omega, dtype=np.float64)
+        return frequency**2 * self.density(frequency)
 
     def acceleration_density(self, omega: npt.ArrayLike) -> FloatArray:
         """Return the acceleration's variance density [(m/s2)^2 s/rad] at `omega` [rad/s]."""
-        return self._density(omega, 2)
+        frequency = np.asarray(omega, dtype=np.float64)
+        return frequency**4 * self.density(frequency)
 
     @cached_property
     def met(self) -> MetSpectrum | None:
         """The displacement's spectrum over the frequency of encounter; None on a vessel at rest."""
         if self.encounter is None:
             return None
-        rao = self.rao if self.encounter.operators is None else None
-        return self.encounter.met(
-            self.sea.density, self.sea.band, rao=rao, splits=self._wave_splits
-        )
+        return self.encounter.met(self.sea.density, self.sea.band, self.rao, self._wave_splits)
 
     @property
     def band(self) -> tuple[float, float]:
@@ -300,10 +299,6 @@ class HookMotion:
             acceleration=series(2),
             seed=seed,
         )
-
-    def _density(self, omega: npt.ArrayLike, derivative: int) -> FloatArray:
-        frequency = np.asarray(omega, dtype=np.float64)
-        return frequency ** (2 * derivative) * self.density(frequency)
 
 
 def _transformable(length: int) -> int:
