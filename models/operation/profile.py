@@ -1,4 +1,4 @@
-"""Set-point profiles of the payload, moves from rest to rest, and periods of time.
+"""Set-point profiles of the payload, made of moves from rest to rest.
 
 Moves have a limited speed and acceleration.  Each starts at its own time, from rest to rest; moves
 that overlap add up.  `models.operation.scenario` is made of these.
@@ -6,18 +6,13 @@ that overlap add up.  `models.operation.scenario` is made of these.
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, InputError, check_range
-
-Period = tuple[float, float]
-"""Start (included) and end (not included) of a period of time [s]."""
+from ..basics import FloatArray, check_range
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,29 +97,3 @@ class Profile:
         for move in self.moves:
             result += move.at(times)
         return result
-
-
-def check_periods(owner: str, name: str, periods: Sequence[Period]) -> tuple[Period, ...]:
-    """Return periods in order of time.
-
-    Raises
-    ------
-    InputError
-        If one ends before it starts, or two overlap.
-    """
-    checked = []
-    for start, end in periods:
-        check_range(owner, f"start of {name}", start, low=0.0, unit="s")
-        if not end > start:
-            raise InputError(
-                f"{owner}: {name} must end after they start, got {start:g} s to {end:g} s"
-            )
-        checked.append((float(start), float(end)))
-    checked.sort()
-    for before, after in itertools.pairwise(checked):
-        if after[0] < before[1]:
-            raise InputError(
-                f"{owner}: {name} must not overlap, got {before[0]:g} s to {before[1]:g} s and "
-                f"{after[0]:g} s to {after[1]:g} s"
-            )
-    return tuple(checked)

@@ -21,9 +21,9 @@ import numpy.typing as npt
 from ..basics import FloatArray, InputError, check_range
 from ..case import Case
 from ..plant import Surroundings
-from ..sensing import BIAS, LATE, Bias, Late, check_intervals
+from ..sensing import BIAS, LATE, Bias, Interval, Late, check_intervals
 from .excitation import MotionSource
-from .profile import Period, Profile, check_periods
+from .profile import Profile
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,10 +84,10 @@ class Scenario:
     ramp: float = 0.0
     settle: float = 0.0
     disengage_at: float | None = None
-    brake_trips: tuple[Period, ...] = ()
-    telemetry_outages: tuple[Period, ...] = ()
-    sensor_failures: tuple[Period, ...] = ()
-    mru_outages: tuple[Period, ...] = ()
+    brake_trips: tuple[Interval, ...] = ()
+    telemetry_outages: tuple[Interval, ...] = ()
+    sensor_failures: tuple[Interval, ...] = ()
+    mru_outages: tuple[Interval, ...] = ()
     telemetry_delays: tuple[Late, ...] = ()
     mru_biases: tuple[Bias, ...] = ()
     parameter_changes: Mapping[float, Mapping[str, float | None]] = field(default_factory=dict)
@@ -106,7 +106,8 @@ class Scenario:
         if self.disengage_at is not None:
             check_range(owner, "disengage_at", self.disengage_at, low=self.warm_up, unit="s")
         for name in ("brake_trips", "telemetry_outages", "sensor_failures", "mru_outages"):
-            checked = check_periods(owner, name.replace("_", " "), getattr(self, name))
+            periods = getattr(self, name)
+            checked = check_intervals(owner, name.replace("_", " "), periods, apart=True)
             object.__setattr__(self, name, checked)
         late = check_intervals(owner, "telemetry delays", self.telemetry_delays, LATE)
         object.__setattr__(self, "telemetry_delays", late)

@@ -23,6 +23,6 @@ if TYPE_CHECKING:
         with_sensors,
     )
     from .sensing import NOISE, SensorModel
-    from .telemetry import LATE, Late, TelemetrySchedule, check_intervals
+    from .telemetry import LATE, Interval, Late, TelemetrySchedule, check_intervals
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

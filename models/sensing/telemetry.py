@@ -11,6 +11,7 @@ the signal at t - delay, not at the sample before it.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -267,15 +268,22 @@ class TelemetrySchedule:
 
 
 def check_intervals(
-    owner: str, name: str, intervals: Sequence[Sequence[float]], sizes: Sequence[Size] = ()
+    owner: str,
+    name: str,
+    intervals: Sequence[Sequence[float]],
+    sizes: Sequence[Size] = (),
+    *,
+    apart: bool = False,
 ) -> tuple[Any, ...]:
     """Return intervals of time, each (start, end) [s] and the sizes of what is wrong in it.
+
+    The start is included, the end is not.  Intervals that have to be `apart` come in order of time.
 
     Raises
     ------
     InputError
         If one is no such row, does not start before its end, which may be infinite, or has a size
-        out of its range.
+        out of its range; if two overlap that have to be apart.
     """
     checked = []
     for interval in intervals:
@@ -294,6 +302,15 @@ def check_intervals(
             for value, (size, low, high, unit) in more
         ]
         checked.append((start, end, *found))
+    if apart:
+        checked.sort()
+        check_range(owner, f"start of {name}", min(checked, default=(0.0,))[0], low=0.0, unit="s")
+        for (start, end, *_), (then, until, *_) in itertools.pairwise(checked):
+            if then < end:
+                raise InputError(
+                    f"{owner}: {name} must not overlap, got {start:g} s to {end:g} s and "
+                    f"{then:g} s to {until:g} s"
+                )
     return tuple(checked)
 
 

@@ -239,7 +239,7 @@ class TestScenario:
             ),
             (
                 {"brake_trips": ((5.0, 5.0),)},
-                "scenario mine: brake trips must end after they start, got 5 s to 5 s",
+                "scenario mine: brake trips must be pairs (start, end) in s with start < end",
             ),
             (
                 {"telemetry_outages": ((5.0, 7.0), (1.0, 6.0))},
