@@ -50,49 +50,50 @@ _HARDEST_LANDING = 2.0  # [m/s]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seabed:
-    """The seabed under the payload.
+class Ground:
+    """What the payload may touch.
 
     Attributes
     ----------
     below
-        Height of the payload's underside above it at the start [m], not negative.
+        Height of the payload's underside above it at the start [m].
     stiffness, damping
         k [N/m] and b [N s/m^1.5] of the contact force.
     """
 
     below: float
+    stiffness: float
+    damping: float
+
+    def __post_init__(self) -> None:
+        owner = type(self).__name__.lower()
+        check_range(owner, "below", self.below, unit="m")
+        check_range(owner, "stiffness", self.stiffness, low=0.0, unit="N/m", open_low=True)
+        check_range(owner, "damping", self.damping, low=0.0, unit="N s/m^1.5")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Seabed(Ground):
+    """The seabed under the payload, which does not begin below it."""
+
     stiffness: float = 1.8e6
     damping: float = 6.5e5
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         check_range("seabed", "below", self.below, low=0.0, unit="m")
-        _check_contact("seabed", self.stiffness, self.damping)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Deck:
-    """The deck of a second vessel, or a fixed platform.
+class Deck(Ground):
+    """The deck of a second vessel, or a fixed platform; it moves as the motion ``deck`` of the run.
 
-    Attributes
-    ----------
-    below
-        Height of the payload's underside above the deck at the start [m]; negative where the
-        payload stands on it, the deck pressed in by that much.
-    stiffness, damping
-        k [N/m] and b [N s/m^1.5] of the contact force.
-    moving
-        Whether it moves, as the motion ``deck`` of the run.
+    A payload that stands on it at the start has a negative `below`, the deck pressed in by that.
     """
 
-    below: float
     stiffness: float = 5e6
     damping: float = 2e6
     moving: bool = True
-
-    def __post_init__(self) -> None:
-        check_range("deck", "below", self.below, unit="m")
-        _check_contact("deck", self.stiffness, self.damping)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -315,11 +316,6 @@ class Surroundings:
             relative_velocity=relative,
             outputs=outputs,
         )
-
-
-def _check_contact(owner: str, stiffness: float, damping: float) -> None:
-    check_range(owner, "stiffness", stiffness, low=0.0, unit="N/m", open_low=True)
-    check_range(owner, "damping", damping, low=0.0, unit="N s/m^1.5")
 
 
 def _contact_force(penetration: ca.SX, rate: ca.SX, stiffness: ca.SX, damping: ca.SX) -> ca.SX:
