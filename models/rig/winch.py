@@ -36,7 +36,27 @@ class Gearbox(Section):
     """Moment of inertia of gears, couplings and brake at the motor's shaft."""
 
 
-class DCMotor(Section):
+class _Motor(Section):
+    """What every motor has."""
+
+    inertia: Annotated[float, Quantity("inertia", 0.0, 1e6, open_low=True)]
+    """Moment of inertia of the rotor (of all motors on the drum together)."""
+    viscous_friction: Annotated[float, Quantity("rotary damping", 0.0, 1e5)] = 0.0
+    """Viscous friction of the drive train at the motor's shaft."""
+    coulomb_friction: Annotated[float, Quantity("torque", 0.0, 1e6)] = 0.0
+    """Dry friction of the drive train at the motor's shaft, the same at every speed; for the
+    simulation only."""
+    friction_speed: Annotated[float, Quantity("angular speed", 0.0, 1000.0, open_low=True)] = 1.0
+    """Speed over which dry friction changes its sign, as tanh(speed/friction_speed)."""
+    thermal_time_constant: Annotated[float, Quantity("time", 0.0, 1e6, open_low=True)] = 1800.0
+    """Time constant of the motor's temperature (first order, driven by the torque squared)."""
+    temperature_rise: Annotated[
+        float, Quantity("temperature difference", 0.0, 1000.0, open_low=True)
+    ] = 80.0
+    """Temperature rise after hours at the continuous torque."""
+
+
+class DCMotor(_Motor):
     """A separately excited direct-current motor; the command is its armature voltage [V]."""
 
     type: Literal["dc"]
@@ -49,24 +69,9 @@ class DCMotor(Section):
     """Voltage per speed, K_omega."""
     inductance: Annotated[float, Quantity("inductance", 0.0, 10.0)] = 0.0
     """Armature inductance L; 0 neglects it."""
-    inertia: Annotated[float, Quantity("inertia", 0.0, 1e6, open_low=True)]
-    """Moment of inertia of the rotor."""
-    viscous_friction: Annotated[float, Quantity("rotary damping", 0.0, 1e5)] = 0.0
-    """Viscous friction of the drive train at the motor's shaft."""
-    coulomb_friction: Annotated[float, Quantity("torque", 0.0, 1e6)] = 0.0
-    """Dry friction of the drive train at the motor's shaft, the same at every speed; for the
-    simulation only."""
-    friction_speed: Annotated[float, Quantity("angular speed", 0.0, 1000.0, open_low=True)] = 1.0
-    """Speed over which dry friction changes its sign, as tanh(speed/friction_speed)."""
-    thermal_time_constant: Annotated[float, Quantity("time", 0.0, 1e6, open_low=True)] = 1800.0
-    """Time constant of the motor's temperature (first order, driven by the torque squared)."""
-    temperature_rise: Annotated[
-        float, Quantity("temperature difference", 0.0, 1000.0, open_low=True)
-    ] = 80.0
-    """Temperature rise after hours at the continuous torque."""
 
 
-class ACMotor(Section):
+class ACMotor(_Motor):
     """A vector-controlled alternating-current motor with its inverter.
 
     Torque constant one: its "current" is its torque [N m].  The command is a speed reference
@@ -77,10 +82,6 @@ class ACMotor(Section):
     """`ac`: vector-controlled motor, commanded by a speed or a torque reference."""
     torque_bandwidth: Annotated[float, Quantity("frequency", 0.1, 1e4)]
     """Bandwidth of the inverter's torque loop (first order)."""
-    inertia: Annotated[float, Quantity("inertia", 0.0, 1e6, open_low=True)]
-    """Moment of inertia of the rotor (of all motors on the drum together)."""
-    viscous_friction: Annotated[float, Quantity("rotary damping", 0.0, 1e5)] = 0.0
-    """Viscous friction of the drive train at the motor's shaft."""
     speed_gain: Annotated[float, Quantity("rotary damping", 0.0, 1e7)] = 0.0
     """Gain of the drive's inner speed regulator: torque demand = speed_gain * (reference -
     speed); 0 leaves the drive in torque mode."""
@@ -88,17 +89,6 @@ class ACMotor(Section):
     """Speed above which the torque falls as 1/speed (constant power)."""
     maximum_speed: Annotated[float, Quantity("angular speed", 0.0, 5000.0, open_low=True)]
     """Highest speed of the motor."""
-    coulomb_friction: Annotated[float, Quantity("torque", 0.0, 1e6)] = 0.0
-    """Dry friction of the drive train at the motor's shaft, the same at every speed; for the
-    simulation only."""
-    friction_speed: Annotated[float, Quantity("angular speed", 0.0, 1000.0, open_low=True)] = 1.0
-    """Speed over which dry friction changes its sign, as tanh(speed/friction_speed)."""
-    thermal_time_constant: Annotated[float, Quantity("time", 0.0, 1e6, open_low=True)] = 1800.0
-    """Time constant of the motor's temperature (first order, driven by the torque squared)."""
-    temperature_rise: Annotated[
-        float, Quantity("temperature difference", 0.0, 1000.0, open_low=True)
-    ] = 80.0
-    """Temperature rise after hours at the continuous torque."""
 
     def _faults(self) -> Iterator[tuple[str, str]]:
         if self.maximum_speed < self.base_speed:

@@ -143,9 +143,9 @@ WRONG = {
     ),
     "unknown key in a motor": (
         ("type: ac", "type: ac\n    resistance: 3"),
-        "my.yaml:32: winch.motor.resistance: unknown key; known here: type, torque_bandwidth, "
-        "inertia, viscous_friction, speed_gain, base_speed, maximum_speed, coulomb_friction, "
-        "friction_speed, thermal_time_constant, temperature_rise",
+        "my.yaml:32: winch.motor.resistance: unknown key; known here: inertia, "
+        "viscous_friction, coulomb_friction, friction_speed, thermal_time_constant, "
+        "temperature_rise, type, torque_bandwidth, speed_gain, base_speed, maximum_speed",
     ),
     "missing field": (
         ("  length: 1000 m\n", ""),
