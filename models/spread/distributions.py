@@ -387,15 +387,6 @@ KINDS: dict[str, type[Distribution]] = {
 """The distributions by their names in a file."""
 
 
-def distribution_of(path: str, given: Any) -> Distribution:
-    """Return a distribution; a text or a number alone is the width of a uniform one."""
-    if isinstance(given, Distribution):
-        return given
-    if isinstance(given, str | int | float) and not isinstance(given, bool):
-        return Uniform(given)
-    raise InputError(f"spread: {path} must be a distribution, got {given!r}")
-
-
 def at_ends(distribution: Distribution, points: FloatArray) -> FloatArray:
     """Return values at points of [0, 1]: even steps between the ends of a range."""
     low, high = distribution.ends

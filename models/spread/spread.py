@@ -30,7 +30,7 @@ from ..basics import FloatArray, InputError, check_range
 from ..case import Case
 from ..casefile import line_of, message_line, read_yaml, suggestion, yaml_text
 from ..operation import PREFIX as FAULTS
-from .distributions import KINDS, Distribution, Samples, Uniform, at_ends, distribution_of
+from .distributions import KINDS, Distribution, Samples, Uniform, at_ends
 from .fields import ALIASES, DRAG, GAINS, Field, field_of, resolved
 from .sampling import copula_factor, correlated, counted, unit_points
 
@@ -83,7 +83,10 @@ class Spread:
             path = ALIASES.get(name, name)
             if path in own:
                 raise InputError(f"spread: {path} is given twice")
-            own[path] = distribution_of(path, given)
+            try:
+                own[path] = _distribution(given)
+            except InputError as error:
+                raise InputError(f"spread: {path} {error}") from None
         pairs = {}
         for (one, other), value in (self.correlations or {}).items():
             pair = ALIASES.get(one, one), ALIASES.get(other, other)
@@ -430,6 +433,8 @@ def read_spread(
 
 def _distribution(value: Any) -> Distribution:
     """Return the distribution that an entry of `vary:` stands for."""
+    if isinstance(value, Distribution):
+        return value
     if isinstance(value, str | int | float) and not isinstance(value, bool):
         return Uniform(value)
     if isinstance(value, list | tuple):
