@@ -30,7 +30,7 @@ from ..basics import FloatArray, SolverError, check_range, check_seed
 from ..run import Accumulator, Event, Run, Timings
 from ..sensing import Measurement, holds_brake
 from .simulation import Simulation
-from .trips import Watch
+from .trips import Watch, trip_limits
 
 Progress = Callable[[float], None]
 
@@ -168,7 +168,8 @@ class _Stepper:
         self._kernels = simulation.kernels
         self._signals = simulation.loop.signals
         self._sample_time = simulation.loop.sample_time
-        self.watch: Watch | None = Watch(simulation.trips, self._signals, self._sample_time)
+        limits = trip_limits(simulation.case)
+        self.watch: Watch | None = Watch(limits, self._signals, self._sample_time)
         self.seconds: list[float] = []
         self.fallbacks: dict[str, int] = {}
         self.events: list[Event] = []

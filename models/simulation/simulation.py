@@ -41,7 +41,6 @@ from .closed_loop import HOOK, LoopRecursion, build_closed_loop
 from .integrate import StepChoice, choose_step
 from .kernel import Kernel
 from .rows import RowMaker
-from .trips import TripLimit, trip_limits
 
 EASE = 30.0  # in which the hook's motion grows where the controller is engaged from the start [s]
 _CLOSING_TIME = 0.3  # of a brake that the case says nothing about [s]
@@ -114,8 +113,6 @@ class Simulation:
         controller and of what comes after.
     sensors
         What the controller sees.
-    trips
-        What ends its work in mid-run.
     rest
         The plant at rest.
     """
@@ -129,7 +126,6 @@ class Simulation:
     kernels: tuple[Kernel, ...]
     sensors: SensorModel
     schedule: Schedule
-    trips: tuple[TripLimit, ...]
     rest: OperatingPoint
 
     @property
@@ -309,7 +305,6 @@ def prepare(
         kernels=tuple(Kernel(function, compiled=options.compiled) for function in functions),
         sensors=sensors,
         schedule=Schedule(scenario=scenario, sample_time=sample_time),
-        trips=trip_limits(case),
         rest=rest,
     )
 
