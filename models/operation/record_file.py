@@ -37,6 +37,7 @@ from ..basics import (
     FloatArray,
     InputError,
     PhysicsWarning,
+    check_choice,
     check_finite,
     check_range,
     parse_quantity,
@@ -331,16 +332,12 @@ def _number(where: str, row: Sequence[str], i: int) -> float:
 
 
 def _without_trend(z: FloatArray, source: str, detrend: str) -> FloatArray:
+    from scipy.signal import detrend as without
+
+    check_choice(source, "detrend", detrend, ("none", "mean", "linear"))
     if detrend == "none":
         return z
-    if detrend == "mean":
-        result: FloatArray = z - z.mean()
-        return result
-    if detrend == "linear":
-        clock = np.linspace(-1.0, 1.0, z.size)
-        result = z - z.mean() - clock * (clock @ z) / (clock @ clock)
-        return result
-    raise InputError(f"{source}: detrend must be one of none, mean, linear; got {detrend!r}")
+    return np.asarray(without(z, type="constant" if detrend == "mean" else "linear"))
 
 
 def _high_passed(z: FloatArray, step: float, source: str, period: float) -> FloatArray:

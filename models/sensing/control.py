@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Protocol, runtime_checkable
 
 import casadi as ca
@@ -20,33 +19,30 @@ import numpy as np
 
 from ..basics import FloatArray, InputError, check_finite, pick, read_only
 
-MEASURED_UNITS: Mapping[str, str] = MappingProxyType(
-    {
-        "payload.acceleration": "m/s2",
-        "payload.velocity": "m/s",
-        "payload.displacement": "m",
-        "payload.age": "s",
-        "payload.valid": "",
-        "mru.heave": "m",
-        "mru.heave_rate": "m/s",
-        "mru.valid": "",
-        "drum.haul": "m",
-        "motor.speed": "rad/s",
-        "rope.tension": "N",
-        "motor.torque": "N m",
-        "drive.applied": "of the command",
-        "reference.displacement": "m",
-        "reference.velocity": "m/s",
-        "reference.acceleration": "m/s2",
-    }
-)
-#: Names of the measurement vector, in its order.
+#: Names of the measurement vector, in its order; SI, and `drive.applied` in the command's unit.
 #:
 #: The payload's signals are those received last, `payload.age` their age (delay and time held)
 #: and `payload.valid` 1 where a message has just arrived.  `drive.applied` is the command that
 #: the drive has really followed over the last sample, within its limits.  The references are
 #: what the operator asks of the payload.
-HEARD: tuple[str, ...] = tuple(MEASURED_UNITS)
+HEARD: tuple[str, ...] = (
+    "payload.acceleration",
+    "payload.velocity",
+    "payload.displacement",
+    "payload.age",
+    "payload.valid",
+    "mru.heave",
+    "mru.heave_rate",
+    "mru.valid",
+    "drum.haul",
+    "motor.speed",
+    "rope.tension",
+    "motor.torque",
+    "drive.applied",
+    "reference.displacement",
+    "reference.velocity",
+    "reference.acceleration",
+)
 
 _AT = {name: i for i, name in enumerate(HEARD)}
 
