@@ -133,7 +133,10 @@ def gumbel_maximum(
     # The maximum of m blocks is Gumbel again, further up by scale * ln m.
     reach = math.log(duration / block)
     value = location + reach * scale
-    errors = gumbel_errors(x.size, reach, repetitions=repetitions, seed=seed)
+    # Errors of the same estimate on samples of a law that is known, over their own scales.
+    drawn = np.random.default_rng(seed).gumbel(size=(repetitions, x.size))
+    locations, scales = gumbel_fit(drawn)
+    errors = (locations + reach * scales - reach) / scales
     tail = 0.5 * (1.0 - confidence)
     least, most = np.quantile(errors, (tail, 1.0 - tail))
     return ExtremeEstimate(
@@ -320,29 +323,6 @@ def gumbel_fit(maxima: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
             break
     location = -beta * np.log(np.exp(-z / beta).mean(axis=-1, keepdims=True))
     return (mean + spread * location)[..., 0], (spread * beta)[..., 0]
-
-
-def gumbel_errors(size: int, reach: float, *, repetitions: int, seed: int) -> FloatArray:
-    """Return errors of the quantile location + reach * scale, each over its estimated scale.
-
-    Parameters
-    ----------
-    size
-        Number of maxima in a sample.
-    reach
-        Reduced variate of the quantile.
-    repetitions, seed
-        Number of samples drawn, and their seed.
-
-    Returns
-    -------
-    FloatArray
-        Errors (repetitions,).
-    """
-    drawn = np.random.default_rng(seed).gumbel(size=(repetitions, size))
-    location, scale = gumbel_fit(drawn)
-    errors: FloatArray = (location + reach * scale - reach) / scale
-    return errors
 
 
 class _NoDataError(InputError):
