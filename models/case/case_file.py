@@ -8,7 +8,6 @@ name the field alone, as the standard library does not say in which line a value
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 import warnings
 from collections.abc import Mapping
@@ -16,9 +15,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ..basics import InputError, PhysicsWarning
+from ..basics import InputError, PhysicsWarning, read_text
 from ..casefile import Path as FieldPath
-from ..casefile import line_of, message_line, read_yaml
+from ..casefile import line_of, message_line, read_yaml, suggestion
 from .case import Case
 from .plausibility import remarks
 
@@ -142,19 +141,10 @@ def _bundled_text(name: str) -> str:
 
 
 def _file_text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        names = _bundled_names()
-        near = difflib.get_close_matches(path.name, names, n=1, cutoff=0.6)
-        hint = f"did you mean {near[0]!r}?" if near else f"bundled cases: {', '.join(names)}"
-        raise InputError(f"{path}: no such case file or bundled case; {hint}") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder; a case file is wanted") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is not a text file in UTF-8 (byte {error.start})") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+    if not path.exists():
+        near = suggestion(path.name, _bundled_names())
+        raise InputError(f"{path}: no such case file or bundled case; {near}")
+    return read_text(path)
 
 
 def _parsed(text: str, kind: str, source: str) -> tuple[Any, dict[FieldPath, int]]:

@@ -42,6 +42,7 @@ from ..basics import (
     check_range,
     parse_quantity,
     read_only,
+    read_text,
 )
 from .excitation import Motion
 from .hermite import interpolated
@@ -283,14 +284,9 @@ def read_columns(
     InputError
         If the file cannot be read, lacks a column or holds what is no number; the line is named.
     """
-    try:
-        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not a text file in UTF-8"
-        raise InputError(f"{path}: cannot be read: {reason}") from error
     rows = [
         (number, line)
-        for number, line in enumerate(lines, 1)
+        for number, line in enumerate(read_text(path).splitlines(), 1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not rows:

@@ -9,13 +9,12 @@ the surface are in `models.operation.contact_scenarios`.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from typing import Any
 
 from ..basics import InputError
 from ..case import Case
-from ..casefile import Quantity
+from ..casefile import Quantity, suggestion
 from .contact_scenarios import CONTACT_SCENARIOS
 from .faults import limited_power
 from .options import (
@@ -228,7 +227,5 @@ def scenario_named(name: str, case: Case, **options: object) -> Scenario:
 
 def _recipe(name: str) -> ScenarioRecipe:
     if name not in _RECIPES:
-        near = difflib.get_close_matches(name, _RECIPES, n=1, cutoff=0.6)
-        hint = f"did you mean {near[0]!r}? " if near else ""
-        raise InputError(f"scenario: there is no {name!r}; {hint}there are: {', '.join(_RECIPES)}")
+        raise InputError(f"scenario: there is no {name!r}; {suggestion(name, list(_RECIPES))}")
     return _RECIPES[name]

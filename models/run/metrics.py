@@ -24,8 +24,9 @@ from ..basics import (
     mean_interval,
     share,
 )
+from ..casefile import suggestion
 from .run import Run
-from .summary import Statistics, unknown
+from .summary import Statistics
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -137,7 +138,8 @@ class Summary:
     def __getitem__(self, name: str) -> Interval:
         """Return mean and interval of a quantity; an `InputError` names the closest there are."""
         if name not in self.means:
-            raise InputError(unknown("summary of runs", "quantity", name, self.means))
+            near = suggestion(name, list(self.means))
+            raise InputError(f"summary of runs: no quantity {name!r}; {near}")
         return self.means[name]
 
     def table(self) -> tuple[tuple[str, float, float, float, str], ...]:

@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..basics import FloatArray, InputError
-from .summary import Statistics, unknown
+from ..casefile import suggestion
+from .summary import Statistics
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -195,7 +196,7 @@ class Run:
     def __getitem__(self, name: str) -> FloatArray:
         """Return a signal (n,) by its name; an `InputError` names the closest there are."""
         if name not in self.signals:
-            raise InputError(unknown("run", "signal", name, self.signals))
+            raise InputError(f"run: no signal {name!r}; {suggestion(name, self.signals)}")
         column: FloatArray = self.values[:, self.signals.index(name)]
         return column
 

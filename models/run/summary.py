@@ -7,9 +7,8 @@ SI and a unit, so that a table of them needs nothing else.
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -17,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..basics import FloatArray, InputError, ReadOnlyArrays
+from ..casefile import suggestion
 
 ERROR = "payload.error"
 """Name of the tracking error, payload.displacement less reference.displacement."""
@@ -142,13 +142,15 @@ class Statistics:
     def __getitem__(self, name: str) -> SignalStatistics:
         """Return the statistics of a signal; an `InputError` names those there are."""
         if name not in self.signals:
-            raise InputError(unknown("run statistics", "signal", name, self.signals))
+            near = suggestion(name, list(self.signals))
+            raise InputError(f"run statistics: no signal {name!r}; {near}")
         return self.signals[name]
 
     def value(self, name: str) -> float:
         """Return a quantity by its name; an `InputError` names those there are."""
         if name not in self.quantities:
-            raise InputError(unknown("run statistics", "quantity", name, self.quantities))
+            near = suggestion(name, list(self.quantities))
+            raise InputError(f"run statistics: no quantity {name!r}; {near}")
         return self.quantities[name].value
 
     def table(self) -> tuple[tuple[str, float, str], ...]:
@@ -179,14 +181,3 @@ class Statistics:
             mark = "└" if name == next(reversed(shown)) else "├"
             lines.append(f"{mark} {name}: {q.value:.4g} {q.unit}".rstrip())
         return "\n".join(lines)
-
-
-def unknown(owner: str, kind: str, name: str, names: Iterable[str]) -> str:
-    """Return a sentence about a name that there is not, with the closest ones that there are."""
-    known = list(names)
-    near = difflib.get_close_matches(str(name), known, n=3, cutoff=0.5)
-    if near:
-        hint = f"did you mean {' or '.join(repr(n) for n in near)}?"
-    else:
-        hint = f"there are {', '.join(known)}" if known else "there are none"
-    return f"{owner}: no {kind} {name!r}; {hint}"

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, InputError, check_range
+from ..basics import FloatArray, InputError, check_range, read_text
 from ..case import Case
 from ..casefile import line_of, message_line, read_yaml, suggestion, yaml_text
 from ..operation import PREFIX as FAULTS
@@ -403,11 +403,7 @@ def read_spread(
     lines: dict[tuple[str | int, ...], int] = {}
     data: Any = given
     if isinstance(given, Path):
-        try:
-            text = given.read_text(encoding="utf-8-sig")
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"{source}: the spread cannot be read: {error}") from None
-        data, lines = read_yaml(text, source)
+        data, lines = read_yaml(read_text(given), source)
     if not isinstance(data, Mapping) or not isinstance(data.get("vary"), Mapping):
         raise InputError(
             f"{source}: must hold a section `vary:` with what varies, by path of the case"

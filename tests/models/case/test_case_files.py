@@ -20,7 +20,7 @@ class TestFiles:
         with pytest.raises(InputError) as caught:
             load_case(tmp_path / "my.yaml")
         assert str(caught.value) == (
-            f"{tmp_path}/my.yaml: no such case file or bundled case; bundled cases: landing, "
+            f"{tmp_path}/my.yaml: no such case file or bundled case; known here: landing, "
             "subsea-crane, thesis-1975, thesis-1975-rope"
         )
 
@@ -38,13 +38,14 @@ class TestFiles:
     def test_folder(self, tmp_path):
         with pytest.raises(InputError) as caught:
             load_case(tmp_path)
-        assert str(caught.value) == f"{tmp_path}: is a folder; a case file is wanted"
+        assert str(caught.value) == f"{tmp_path}: is a folder; a file is wanted"
 
     def test_unreadable(self, tmp_path, monkeypatch):
         def refuse(*_, **__):  # root, who may run the tests, may read every file
             raise PermissionError(13, "Permission denied")
 
-        monkeypatch.setattr(Path, "read_text", refuse)
+        (tmp_path / "my.yaml").touch()
+        monkeypatch.setattr(Path, "read_bytes", refuse)
         with pytest.raises(InputError, match=r"my\.yaml: cannot be read: Permission denied"):
             load_case(tmp_path / "my.yaml")
 
@@ -62,8 +63,8 @@ class TestFiles:
                 "must hold sections (sea:, vessel:, rope:, ...) at the top, "
                 "got 'Dear sir or madam'",
             ),
-            (b"\x89PNG\r\n\x1a\n\x00", "is not a text file in UTF-8 (byte 0)"),
-            (b"a: \x00\n", "is not YAML: unacceptable character #x0000"),
+            (b"\x89PNG\r\n\x1a\n\x00", "is not a text file (byte 0)"),
+            (b"a: \x00\n", "is not a text file (it holds a zero byte)"),
             (b"---\na: 1\n---\nb: 2\n", "must hold one YAML document, got 2"),
         ],
     )

@@ -392,7 +392,7 @@ class TestLibrary:
             (
                 "landig",
                 {},
-                "scenario: there is no 'landig'; did you mean 'landing'? there are: hold, engage, ",
+                "scenario: there is no 'landig'; did you mean 'landing'?",
             ),
             (
                 "hold",

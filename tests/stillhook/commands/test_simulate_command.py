@@ -309,7 +309,7 @@ def test_a_run_that_diverges_ends_with_1(run, monkeypatch):
 WRONG = {
     "no such scenario": (
         "thesis-1975 --scenario holding",
-        r"scenario: there is no 'holding'; did you mean 'hold'\? there are: hold, engage, .*",
+        r"scenario: there is no 'holding'; did you mean 'hold'\?",
     ),
     "no such option": (
         "thesis-1975 --scenario landing --option hight=5",
@@ -340,7 +340,7 @@ WRONG = {
         r"integration: step must be at most 0\.0\d+ s, which the plant's fastest mode, at "
         r"[\d.]+ rad/s, allows, got 0\.05",
     ),
-    "no file": ("thesis-1975 --hook none.csv", "none.csv: cannot be read: No such file .*"),
+    "no file": ("thesis-1975 --hook none.csv", "none.csv: no such file"),
     "a bad file": (
         "thesis-1975 --hook bad.csv",
         "bad.csv:3: displacement must be a finite number, got 'x'",
