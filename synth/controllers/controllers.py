@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
+from typing import Any
 
 import casadi as ca
 
@@ -47,43 +49,23 @@ class BrakeOn(RecursiveController):
         self._adopt("none", sample_time, (), lambda xc, m: (xc, ca.SX(0.0)))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ControllerRequest:
-    """What a controller is made from.
-
-    Attributes
-    ----------
-    case
-        The case.
-    design
-        A design of its feedback, if there is one.
-    gains
-        Gains of the feedback, if they are given; they count before a design.
-    sample_time
-        T [s]; None for the controller's own.
-    """
-
-    case: Case
-    design: Design | Tuning | None = None
-    gains: Mapping[str, float] | None = None
-    sample_time: float | None = None
-
-    def time(self, usual: float) -> float:
-        """Return the sample time, `usual` if none is asked for [s]."""
-        return usual if self.sample_time is None else self.sample_time
-
-
-def _feedback(request: ControllerRequest, *, anti_windup: bool = True) -> LinearFeedback:
-    case, sample_time = request.case, request.time(0.01)
+def _feedback(
+    case: Case,
+    *,
+    design: Design | Tuning | None = None,
+    gains: Mapping[str, float] | None = None,
+    anti_windup: bool = True,
+    sample_time: float = 0.01,
+) -> LinearFeedback:
     name = "feedback" if anti_windup else "feedback-no-antiwindup"
-    if request.gains is None and request.design is not None:
+    if gains is None and design is not None:
         made = LinearFeedback.from_design(
-            request.design, case=case, sample_time=sample_time, anti_windup=anti_windup, name=name
+            design, case=case, sample_time=sample_time, anti_windup=anti_windup, name=name
         )
     else:
-        gains = _own_gains(name, case) if request.gains is None else request.gains
+        law = _own_gains(name, case) if gains is None else gains
         made = LinearFeedback(
-            case, gains, sample_time=sample_time, anti_windup=anti_windup, name=name
+            case, law, sample_time=sample_time, anti_windup=anti_windup, name=name
         )
     if not anti_windup and not made.dynamic:
         raise InputError(
@@ -101,21 +83,15 @@ def _own_gains(name: str, case: Case) -> Mapping[str, float]:
     return {gain: getattr(case.gains, gain) for gain in ("A", "a", "a1", "a2")}
 
 
-#: What makes a controller, by its name.
-CONTROLLERS: Mapping[str, Callable[[ControllerRequest], RecursiveController]] = MappingProxyType(
+#: What makes a controller from a case, by its name.
+CONTROLLERS: Mapping[str, Callable[..., RecursiveController]] = MappingProxyType(
     {
         "feedback": _feedback,
-        "feedback-no-antiwindup": lambda request: _feedback(request, anti_windup=False),
-        "feed-forward": lambda request: VelocityFeedForward(
-            request.case, sample_time=request.time(0.02)
-        ),
-        "feed-forward-lead": lambda request: VelocityFeedForward.with_lead(
-            request.case, sample_time=request.time(0.02)
-        ),
-        "constant-tension": lambda request: ConstantTension(
-            request.case, sample_time=request.time(0.02)
-        ),
-        "none": lambda request: BrakeOn(request.case, sample_time=request.time(0.02)),
+        "feedback-no-antiwindup": partial(_feedback, anti_windup=False),
+        "feed-forward": VelocityFeedForward,
+        "feed-forward-lead": VelocityFeedForward.with_lead,
+        "constant-tension": ConstantTension,
+        "none": BrakeOn,
     }
 )
 
@@ -149,5 +125,7 @@ def controller_named(
         If the controller is not stable on the linear plant of the case.
     """
     pick("controllers", "controller", tuple(CONTROLLERS), (name,))
-    request = ControllerRequest(case=case, design=design, gains=gains, sample_time=sample_time)
-    return CONTROLLERS[name](request)
+    options: dict[str, Any] = {} if sample_time is None else {"sample_time": sample_time}
+    if name.startswith("feedback"):
+        options |= {"design": design, "gains": gains}
+    return CONTROLLERS[name](case, **options)
