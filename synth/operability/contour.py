@@ -14,7 +14,7 @@ from models.basics import FloatArray, InputError, read_only
 
 from .columns import SeaColumn
 from .criteria import Criterion
-from .limiting import HIGHEST, SeaStates, limiting_heights
+from .limiting import HIGHEST, ColumnLimits, SeaStates, limiting_heights
 from .systems import System
 
 _FULL_CIRCLE_GAP = math.radians(90.0)  # between headings that still stand for a full circle
@@ -82,33 +82,43 @@ class Contour:
         InputError
             If headings are given and the contour has none, or does not reach them.
         """
-        wanted = np.asarray(periods, dtype=np.float64)
-        finite = np.minimum(self.limit, self.highest)
+        finite, along = np.minimum(self.limit, self.highest), self._period_shares(periods)
         if headings is None:
-            return self._over_periods(finite.max(axis=0), wanted)
-        rows = np.array([self._over_periods(row, wanted) for row in finite])  # (h, n)
-        return over_headings(self.headings, rows, np.asarray(headings, dtype=np.float64))
+            return np.asarray(finite.max(axis=0) @ along)
+        turned = heading_shares(self.headings, headings)
+        return np.asarray(np.einsum("hp,pn,hn->n", finite, along, turned))
 
-    def _over_periods(self, values: FloatArray, wanted: FloatArray) -> FloatArray:
-        if self.periods.size == 1:
-            near = np.isclose(wanted, self.periods[0], rtol=_ROUND)
-            return np.where(near, values[0], np.nan)
-        slack = _ROUND * self.periods[-1]
-        found = np.interp(wanted, self.periods, values)
-        inside = (wanted >= self.periods[0] - slack) & (wanted <= self.periods[-1] + slack)
-        return np.where(inside, found, np.nan)
+    def binding_at(
+        self, periods: npt.ArrayLike, headings: npt.ArrayLike | None
+    ) -> npt.NDArray[np.str_]:
+        """Return the name of the criterion with the lowest limit, as `at` has it (n,)."""
+        finite, along = np.minimum(self.heights, self.highest), self._period_shares(periods)
+        turned = np.ones((1, along.shape[1]))
+        if self.headings is not None and headings is not None:
+            turned = heading_shares(self.headings, headings)
+        each = np.einsum("chp,pn,hn->cn", finite, along, turned)
+        names = np.array([c.name for c in self.criteria])
+        return np.asarray(names[each.argmin(axis=0)])
+
+    def _period_shares(self, periods: npt.ArrayLike) -> FloatArray:
+        """Return what each peak period of the contour counts (p, n); NaN beyond its ends."""
+        wanted, ends = np.asarray(periods, dtype=np.float64), self.periods[[0, -1]]
+        near = np.clip(wanted, *ends)
+        wanted = np.where(np.isclose(wanted, near, rtol=_ROUND, atol=0.0), near, wanted)
+        rows = np.eye(self.periods.size)
+        return np.array(
+            [np.interp(wanted, self.periods, r, left=np.nan, right=np.nan) for r in rows]
+        )
 
 
-def over_headings(axis: FloatArray | None, rows: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return values (h, n) on an axis of headings at the headings wanted (n,), linear between.
+def heading_shares(axis: FloatArray | None, headings: npt.ArrayLike) -> FloatArray:
+    """Return what each heading of an axis counts at the headings wanted, linear between (h, n).
 
     Parameters
     ----------
     axis
         Headings, ascending (h,) [rad].
-    rows
-        Values of each heading (h, n).
-    wanted
+    headings
         Headings (n,) [rad].
 
     Raises
@@ -119,23 +129,16 @@ def over_headings(axis: FloatArray | None, rows: FloatArray, wanted: FloatArray)
     if axis is None:
         raise InputError("operability: this contour has no headings")
     turn = 2.0 * math.pi
-    gaps = np.diff(np.append(axis, axis[0] + turn))
-    angle = np.mod(wanted - axis[0], turn) + axis[0]
-    angle = np.where(np.isclose(angle, axis[0] + turn, rtol=0.0, atol=_ROUND), axis[0], angle)
-    if gaps.max() <= _FULL_CIRCLE_GAP + _ROUND:
-        axis, rows = np.append(axis, axis[0] + turn), np.vstack([rows, rows[:1]])
-    elif np.any(angle > axis[-1] + _ROUND):
+    angle = np.mod(np.asarray(headings) - axis[0] + _ROUND, turn) + axis[0] - _ROUND
+    whole = np.diff(np.append(axis, axis[0] + turn)).max() <= _FULL_CIRCLE_GAP + _ROUND
+    if not whole and np.any(angle > axis[-1] + _ROUND):
         worst = float(np.degrees(angle.max()))
         raise InputError(
             f"operability: the headings must reach {worst:.4g} deg or go round, got "
             f"{math.degrees(axis[0]):.4g} to {math.degrees(axis[-1]):.4g} deg"
         )
-    if axis.size == 1:
-        return np.asarray(rows[0])
-    place = np.clip(np.searchsorted(axis, angle, side="right") - 1, 0, axis.size - 2)
-    share = np.clip((angle - axis[place]) / (axis[place + 1] - axis[place]), 0.0, 1.0)
-    column = np.arange(wanted.size)
-    return np.asarray((1.0 - share) * rows[place, column] + share * rows[place + 1, column])
+    period = turn if whole else None
+    return np.array([np.interp(angle, axis, row, period=period) for row in np.eye(axis.size)])
 
 
 def contour_of(
@@ -164,6 +167,16 @@ def contour_of(
         states = SeaStates.of(system, column)
         found.append(limiting_heights(states, criteria, highest=highest))
         step()
+    return assembled(criteria, columns, found, highest)
+
+
+def assembled(
+    criteria: Sequence[Criterion],
+    columns: Sequence[SeaColumn],
+    found: Sequence[ColumnLimits],
+    highest: float,
+) -> Contour:
+    """Return the contour of what was found in each column."""
     headings = columns[0].headings
     return Contour(
         criteria=tuple(criteria),

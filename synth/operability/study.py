@@ -40,10 +40,10 @@ from ..question import pose
 from ..search import Progress, search
 from .capability import capability
 from .columns import SeaColumn, has_headings, has_period, sea_column
-from .contour import Contour, contour_of
+from .contour import Contour, assembled, contour_of
 from .criteria import payload_criteria
 from .depths import AtDepth, rope_state
-from .limiting import HIGHEST, SeaStates, limiting_heights
+from .limiting import HIGHEST, ColumnLimits, SeaStates, limiting_heights
 from .pose import OperabilityQuestion, pose_operability
 from .result import Operability
 from .workable import workable
@@ -212,13 +212,7 @@ def _diagram(given: Scatter | str | Path | None) -> Scatter | None:
 def _headings(case: Case, given: Sequence[float] | None) -> Sequence[float] | None:
     if given is None:
         return np.radians(np.arange(0.0, 360.0, _STEP)).tolist() if has_headings(case) else None
-    owner = "operability"
-    axis = check_ascending(owner, "headings", given)
-    if axis.size == 0 or axis.size > _MOST_HEADINGS:
-        raise InputError(f"{owner}: headings must be 1 to {_MOST_HEADINGS}, got {axis.size}")
-    check_range(owner, "headings", float(axis[0]), low=0.0, unit="rad")
-    check_range(owner, "headings", float(axis[-1]), high=2.0 * np.pi, unit="rad", open_high=True)
-    return [float(b) for b in axis]
+    return _axis("headings", given, _MOST_HEADINGS, "rad", 2.0 * np.pi, open_high=True)
 
 
 def _periods(
@@ -228,12 +222,20 @@ def _periods(
         if not has_period(case):
             return [None]
         return [float(t) for t in default_periods(scatter)]
-    axis = check_ascending("operability", "periods", given)
-    if axis.size == 0 or axis.size > _MOST_PERIODS:
-        raise InputError(f"operability: periods must be 1 to {_MOST_PERIODS}, got {axis.size}")
-    check_range("operability", "periods", float(axis[0]), low=0.0, unit="s", open_low=True)
-    check_range("operability", "periods", float(axis[-1]), high=60.0, unit="s")
-    return [float(t) for t in axis]
+    return _axis("periods", given, _MOST_PERIODS, "s", 60.0, open_low=True)
+
+
+def _axis(
+    name: str, given: Sequence[float], most: int, unit: str, high: float, **ends: bool
+) -> list[float]:
+    """Return the values of an axis, ascending from zero to the ends that `check_range` is told."""
+    axis = check_ascending("operability", name, given)
+    if axis.size == 0 or axis.size > most:
+        raise InputError(f"operability: {name} must be 1 to {most}, got {axis.size}")
+    return [
+        check_range("operability", name, v, low=0.0, high=high, unit=unit, **ends)
+        for v in axis.tolist()
+    ]
 
 
 def _on_rope(column: SeaColumn, question: OperabilityQuestion) -> SeaColumn:
@@ -349,9 +351,10 @@ def reoptimised_contour(
     assert question.loop is not None
     criteria = question.criteria["loop"]
     drive = tuple(c.limit for c in criteria if c.limit is not None)
-    shape = (len(criteria), len(columns[0].hooks), len(columns))
-    heights, drag = np.zeros(shape), np.full(shape[1:], np.nan)
-    for p, column in enumerate(columns):
+    found = []
+    for column in columns:
+        heights = np.zeros((len(criteria), len(column.hooks)))
+        drag = np.full(len(column.hooks), np.nan)
         for h, case in enumerate(column.cases):
             gains = _best(case, design, drive, seed)
             step()
@@ -362,16 +365,10 @@ def reoptimised_contour(
                 question.loop,
                 controller=pose(case, design.structure, design.masses).controller(gains),
             )
-            found = limiting_heights(SeaStates.of(loop, one), criteria, highest=highest)
-            heights[:, h, p], drag[h, p] = found.heights[:, 0], found.drag[0]
-    return Contour(
-        criteria=criteria,
-        periods=np.array([column.period for column in columns]),
-        headings=None if columns[0].headings is None else np.array(columns[0].headings),
-        heights=heights,
-        drag=drag,
-        highest=highest,
-    )
+            limits = limiting_heights(SeaStates.of(loop, one), criteria, highest=highest)
+            heights[:, h], drag[h] = limits.heights[:, 0], limits.drag[0]
+        found.append(ColumnLimits(heights=heights, drag=drag))
+    return assembled(criteria, columns, found, highest)
 
 
 def _best(

@@ -19,12 +19,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from models.basics import FloatArray
 from models.sea import Scatter
 
-from .contour import Contour, over_headings
+from .contour import Contour
 
 HIGHEST_TENTH = 1.27
 """H_1/10 over H_s [-]."""
@@ -107,8 +106,6 @@ def workable(contour: Contour, scatter: Scatter, heading: float | None = None) -
     known = contour.headings is not None
 
     def limit_for(turned: float | None) -> FloatArray:
-        if not known:
-            return contour.at(period)
         return contour.at(period, _relative(contour, scatter, turned))
 
     def kept(limit: FloatArray) -> FloatArray:
@@ -127,7 +124,7 @@ def workable(contour: Contour, scatter: Scatter, heading: float | None = None) -
             by_heading[float(angle)] = float(share @ kept(limit_for(float(angle))))
     lost: dict[str, float] = {}
     inside = np.isfinite(own)
-    names = _binding_at(contour, scatter, heading)
+    names = contour.binding_at(period, _relative(contour, scatter, heading))
     for name in np.unique(names[inside & (works < 1.0)]):
         mine = inside & (names == name)
         lost[str(name)] = float(share[mine] @ (1.0 - works[mine]))
@@ -141,11 +138,13 @@ def workable(contour: Contour, scatter: Scatter, heading: float | None = None) -
     )
 
 
-def _relative(contour: Contour, scatter: Scatter, turned: float | None) -> FloatArray:
-    """Return the heading of the waves to the bow in each sea state (n,) [rad]."""
+def _relative(contour: Contour, scatter: Scatter, turned: float | None) -> FloatArray | None:
+    """Return the heading of the waves to the bow in each sea state (n,) [rad]; None without."""
+    if contour.headings is None:
+        return None
     if scatter.heading is not None:
         return np.asarray(scatter.heading - (turned or 0.0))
-    if contour.headings is not None and contour.headings.size == 1:
+    if contour.headings.size == 1:
         turned = float(contour.headings[0])  # it was the one asked for
     return np.full(scatter.peak_period.size, turned or 0.0)
 
@@ -182,18 +181,3 @@ def _part_below(height: FloatArray, width: float, limit: FloatArray) -> FloatArr
         # A state on the limit is workable, whatever the last digit of either.
         return np.where(height <= limit * (1.0 + 1e-9), 1.0, 0.0)
     return np.clip((limit - height) / width + 0.5, 0.0, 1.0)
-
-
-def _binding_at(contour: Contour, scatter: Scatter, heading: float | None) -> npt.NDArray[np.str_]:
-    """Return the criterion with the lowest limit in each sea state (n,)."""
-    names = np.array([c.name for c in contour.criteria])
-    period = scatter.peak_period
-    finite = np.minimum(contour.heights, contour.highest)
-    rows = np.array(
-        [[np.interp(period, contour.periods, row) for row in one] for one in finite]
-    )  # (c, h, n)
-    if contour.headings is None:
-        return np.asarray(names[rows[:, 0].argmin(axis=0)])
-    wanted = _relative(contour, scatter, heading)
-    each = np.array([over_headings(contour.headings, one, wanted) for one in rows])
-    return np.asarray(names[each.argmin(axis=0)])

@@ -28,7 +28,7 @@ from stillhook.seas import (
 )
 from stillhook.seas.operability import netcdf
 from synth.operability import Contour, Operability, operability
-from synth.operability.contour import over_headings
+from synth.operability.contour import heading_shares
 from synth.operability.criteria import STABILITY
 from synth.operability.study import example_scatter
 from synth.operability.workable import RULES, class_width, rule_shares, workable
@@ -135,7 +135,7 @@ def test_headings_of_the_diagram_and_of_the_vessel_meet() -> None:
 def test_values_between_headings_go_round_the_circle(angle: float) -> None:
     axis = np.radians([0.0, 60.0, 120.0, 180.0, 240.0, 300.0])
     rows = np.array([[1.0], [4.0], [2.0], [7.0], [3.0], [5.0]])
-    found = over_headings(axis, rows, np.array([angle]))
+    found = (rows * heading_shares(axis, [angle])).sum(axis=0)
     wound = np.append(rows[:, 0], rows[0, 0])
     expected = np.interp(angle % TURN, np.append(axis, TURN), wound)
     assert found[0] == pytest.approx(expected, abs=1e-6)
@@ -143,9 +143,9 @@ def test_values_between_headings_go_round_the_circle(angle: float) -> None:
 
 def test_headings_that_do_not_go_round_are_not_made_up() -> None:
     axis, rows = np.radians([90.0, 135.0, 180.0]), np.array([[1.0, 1.0], [2.0, 2.0], [3.0, 3.0]])
-    assert over_headings(axis, rows, np.radians([100.0, 180.0]))[1] == 3.0
+    assert (rows * heading_shares(axis, np.radians([100.0, 180.0]))).sum(axis=0)[1] == 3.0
     with pytest.raises(InputError, match="must reach 200 deg or go round, got 90 to 180 deg"):
-        over_headings(axis, rows, np.radians([200.0]))
+        heading_shares(axis, np.radians([200.0]))
     with pytest.raises(InputError, match="has no headings"):
         contour([[1.0, 1.0]]).at([8.0], [0.0])
 
