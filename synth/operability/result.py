@@ -226,37 +226,22 @@ def dataset_of(case: Case, depths: Sequence[AtDepth], status: str) -> xr.Dataset
     """
     import xarray as xr
 
-    names = _names(depths)
-    main = depths[0].main
-    many = len(depths) > 1
-    turns = main.headings is not None
-    tail = (*(("heading",) if turns else ()), "peak_period")
-    lead = ("rope_length",) if many else ()
-    variables: dict[str, Any] = {}
-    for system, words in STAGES.items():
-        if system not in depths[0].contours:
-            continue
-        contours = [at.contours[system] for at in depths]
-        every = np.array([_by_limit(contour, names) for contour in contours])
-        lowest = np.array([contour.limit for contour in contours])
-        binding = np.array([contour.binding for contour in contours]).astype(object)
-        drag = np.array([contour.drag for contour in contours])
-        end = _SUFFIX[system]
-        text = f"limiting significant wave height {words}"
-        for name, values, dims, unit, long_name in (
-            ("height_limit", every, ("limit", *tail), "m", f"{text}, by limit"),
-            ("height", lowest, tail, "m", text),
-            ("binding", binding, tail, "", f"limit that binds {words}"),
-            ("drag", drag, tail, "N s/m", f"drag coefficient at the limit {words}"),
-        ):
-            shown = values if turns else values.squeeze(axis=-2)
-            notes = ({"units": unit} if unit else {}) | {"long_name": long_name}
-            variables[f"{name}{end}"] = ((*lead, *dims), shown if many else shown[0], notes)
-    if "loop" in depths[0].contours:
-        peaks = np.array([at.max_sensitivity for at in depths])
-        about = {"units": "1", "long_name": "sensitivity peak M_s of the design's loop"}
-        variables["max_sensitivity"] = (lead, peaks if many else peaks[0], about)
-    variables |= _shares(depths, lead)
+    names, main = _names(depths), depths[0].main
+    ropes = [
+        {
+            name: ((), getattr(at.rope, field), {"units": unit, "long_name": text})
+            for name, field, unit, text in _ROPE
+        }
+        for at in depths
+    ]
+    parts = [
+        xr.Dataset(_variables(at, names), coords=rope)
+        for at, rope in zip(depths, ropes, strict=True)
+    ]
+    found = parts[0]
+    if len(parts) > 1:
+        own = [name for name, *_ in _ROPE if name != "rope_length"]
+        found = xr.concat(parts, "rope_length", data_vars="all", coords=own, join="exact")
     first = {c.name: c for n in depths[0].contours.values() for c in n.criteria}
     coordinates: dict[str, Any] = {
         "limit": ("limit", names, {"long_name": "limit"}),
@@ -271,7 +256,6 @@ def dataset_of(case: Case, depths: Sequence[AtDepth], status: str) -> xr.Dataset
             "long_name": "heading: where the waves travel to, counter-clockwise from the bow",
         }
         coordinates["heading"] = ("heading", np.degrees(main.headings), about)
-    coordinates |= _ropes(depths, many)
     attributes = {
         "title": f"Operability of {case.name}",
         "case": case.to_yaml(),
@@ -280,9 +264,9 @@ def dataset_of(case: Case, depths: Sequence[AtDepth], status: str) -> xr.Dataset
         "highest_height": main.highest,
         "status": status,
     }
-    if not turns:
+    if main.headings is None:
         attributes["headings"] = "none: the vessel is given by the heave of its hook alone"
-    return xr.Dataset(variables, coords=coordinates, attrs=attributes)
+    return found.assign_coords(coordinates).assign_attrs(attributes)
 
 
 def table_text(depths: Sequence[AtDepth]) -> str:
@@ -317,45 +301,48 @@ def _by_limit(contour: Contour, names: list[str]) -> Any:
     return np.array([rows.get(name, nothing) for name in names])
 
 
-def _ropes(depths: Sequence[AtDepth], many: bool) -> dict[str, Any]:
-    return {
-        name: (
-            ("rope_length",) if many else (),
-            [getattr(at.rope, field) for at in depths] if many else getattr(depths[0].rope, field),
-            {"units": unit, "long_name": text},
-        )
-        for name, field, unit, text in _ROPE
-    }
-
-
 def _names(depths: Sequence[AtDepth]) -> list[str]:
     """Return the names of all criteria, each once."""
     found = (c.name for at in depths for n in at.contours.values() for c in n.criteria)
     return list(dict.fromkeys(found))
 
 
-def _shares(depths: Sequence[AtDepth], lead: tuple[str, ...]) -> dict[str, Any]:
-    """Return the workable shares as variables; none without a scatter diagram."""
+def _variables(at: AtDepth, names: list[str]) -> dict[str, Any]:
+    """Return the contours and the workable shares with one length of rope as variables."""
     found: dict[str, Any] = {}
-    for system, words in STAGES.items():
-        if system not in depths[0].workable:
-            continue
-        shares = [at.workable[system] for at in depths]
-        end = _SUFFIX[system]
-        about = {"units": "1", "long_name": f"share of the time workable {words}"}
 
-        def put(name: str, dims: tuple[str, ...], values: list[Any], about: dict[str, str]) -> None:
-            found[name] = ((*lead, *dims), values if lead else values[0], about)
+    def put(name: str, dims: tuple[str, ...], values: Any, unit: str, long_name: str) -> None:
+        found[name] = (dims, values, {"units": unit, "long_name": long_name})
 
-        put(f"workable{end}", (), [s.share for s in shares], about)
-        if shares[0].best_heading is not None:
-            text = {**about, "long_name": f"{about['long_name']}, best heading in each sea"}
-            put(f"workable_best_heading{end}", (), [s.best_heading for s in shares], text)
-            values = [list(s.by_heading.values()) for s in shares]
-            text = {**about, "long_name": f"{about['long_name']}, one heading all year"}
-            put(f"workable_by_heading{end}", ("heading",), values, text)
-        if shares[0].by_month:
-            values = [[s.by_month.get(m, np.nan) for m in range(1, 13)] for s in shares]
-            text = {**about, "long_name": f"{about['long_name']}, by month"}
-            put(f"workable_by_month{end}", ("month",), values, text)
+    turns = at.main.headings is not None
+    plane = (*(("heading",) if turns else ()), "peak_period")
+    for system in (name for name in STAGES if name in at.contours):
+        contour, end, words = at.contours[system], _SUFFIX[system], STAGES[system]
+        text = f"limiting significant wave height {words}"
+
+        def over(values: Any) -> Any:
+            return values if turns else values.squeeze(axis=-2)
+
+        by_limit = over(_by_limit(contour, names))
+        put(f"height_limit{end}", ("limit", *plane), by_limit, "m", f"{text}, by limit")
+        put(f"height{end}", plane, over(contour.limit), "m", text)
+        about = {"long_name": f"limit that binds {words}"}
+        found[f"binding{end}"] = (plane, over(contour.binding.astype(object)), about)
+        text = f"drag coefficient at the limit {words}"
+        put(f"drag{end}", plane, over(contour.drag), "N s/m", text)
+    if "loop" in at.contours:
+        text = "sensitivity peak M_s of the design's loop"
+        put("max_sensitivity", (), at.max_sensitivity, "1", text)
+    for system in (name for name in STAGES if name in at.workable):
+        share, end = at.workable[system], _SUFFIX[system]
+        text = f"share of the time workable {STAGES[system]}"
+        put(f"workable{end}", (), share.share, "1", text)
+        if share.best_heading is not None:
+            name, values = f"workable_best_heading{end}", list(share.by_heading.values())
+            put(name, (), share.best_heading, "1", f"{text}, best heading in each sea")
+            name = f"workable_by_heading{end}"
+            put(name, ("heading",), values, "1", f"{text}, one heading all year")
+        if share.by_month:
+            values = [share.by_month.get(m, np.nan) for m in range(1, 13)]
+            put(f"workable_by_month{end}", ("month",), values, "1", f"{text}, by month")
     return found
