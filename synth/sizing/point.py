@@ -12,8 +12,8 @@ with the motor, it is the motor's own inertia that stops it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 from models.basics import InputError, check_range, parse_quantity
 from models.case import Case
@@ -64,8 +64,8 @@ class SizePoint:
         Of the payload [m].
     binding
         Names of the limits that bind, or of those that stop it.
-    parameters
-        The controller's, by name.
+    answer
+        The optimum there, or the last one looked at; None where there was none.
     """
 
     gear: float
@@ -73,20 +73,12 @@ class SizePoint:
     motor: MotorData | None
     payload_rms: float
     binding: tuple[str, ...]
-    parameters: Mapping[str, float]
+    answer: Answer | None = field(default=None, repr=False)
 
     @property
     def feasible(self) -> bool:
         """Whether there is such a motor."""
         return math.isfinite(self.scale)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SmallestMotor:
-    """A point with the answer that its neighbours begin from."""
-
-    point: SizePoint
-    answer: Answer | None
 
 
 def with_target(question: DesignQuestion, target: float) -> Problem:
@@ -103,7 +95,7 @@ def least_motor(
     masses: int,
     near: Answer,
     scale: float = 1.0,
-) -> SmallestMotor:
+) -> SizePoint:
     """Return the smallest motor behind a gear.
 
     Parameters
@@ -128,19 +120,16 @@ def least_motor(
         ratings = [m.name for m in problem.limits if m.name in RATINGS]
         found = follow(problem, [answer], goal=Goal.RELAX, relaxed=ratings)
         if found is None:
-            return SmallestMotor(point=_stopped(problem, answer, gear), answer=None)
+            return _stopped(problem, answer, gear)
         answer, extra = found, found.solved.extra
         known.append((size, extra))
         if abs(extra) < _SETTLED or (extra < 0.0 and size <= rest):
-            at_rest = extra <= -_SETTLED
-            return SmallestMotor(
-                point=_point(case, gear, size, found, at_rest=at_rest), answer=found
-            )
+            return _point(case, gear, size, found, at_rest=extra <= -_SETTLED)
         step = _next(known, rest)
         if step is None or step > math.log(_LARGEST):
             break
         size = step
-    return SmallestMotor(point=_none(gear, ("motor.inertia",)), answer=answer)
+    return replace(_none(gear, ("motor.inertia",)), answer=answer)
 
 
 def _at_rest(case: Case, gear: float) -> float:
@@ -203,7 +192,7 @@ def _point(case: Case, gear: float, size: float, answer: Answer, *, at_rest: boo
         motor=MotorData.of(with_motor(case, scale, gear)),
         payload_rms=answer.payload_rms,
         binding=(*((AT_REST,) if at_rest else ()), *sorted(names, key=lambda n: -abs(prices[n]))),
-        parameters=answer.parameters,
+        answer=answer,
     )
 
 
@@ -228,14 +217,7 @@ def _stopped(problem: Problem, near: Answer, gear: float) -> SizePoint:
 
 
 def _none(gear: float, names: tuple[str, ...]) -> SizePoint:
-    return SizePoint(
-        gear=gear,
-        scale=math.inf,
-        motor=None,
-        payload_rms=math.inf,
-        binding=names,
-        parameters={},
-    )
+    return SizePoint(gear=gear, scale=math.inf, motor=None, payload_rms=math.inf, binding=names)
 
 
 def target_of(target: float | str, hook_rms: float) -> float:

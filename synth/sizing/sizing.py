@@ -31,7 +31,7 @@ from ..search import KEPT, Progress, search
 from .catalogue import ChosenMotor, choose, read_catalogue
 from .follow import Answer, designed, follow, least_between, posed
 from .motor import MotorData, with_motor
-from .point import SizePoint, SmallestMotor, highest_sea, least_motor, target_of
+from .point import SizePoint, highest_sea, least_motor, target_of
 
 _SPAN = 2.5  # gears that are tried: the case's over and times this
 _FINE = 0.03  # of the logarithm of the gear, to which the best is found
@@ -106,24 +106,27 @@ class _Search:
     masses: int
     free: Answer
     tell: Progress
-    found: dict[float, SmallestMotor]
+    found: dict[float, SizePoint]
 
-    def at(self, gear: float) -> SmallestMotor:
+    def at(self, gear: float) -> SizePoint:
         """Return the smallest motor behind a gear, from the nearest that is known."""
         if gear not in self.found:
-            known = [g for g, least in self.found.items() if least.point.feasible]
-            nearest = min(known, key=lambda g: abs(math.log(g / gear)), default=None)
-            near = self.found[nearest] if nearest is not None else None
+            known = sorted(self.feasible, key=lambda p: abs(math.log(p.gear / gear)))
             self.found[gear] = least_motor(
                 self.case,
                 self.structure,
                 gear,
                 self.target,
                 masses=self.masses,
-                near=near.answer if near is not None and near.answer is not None else self.free,
-                scale=near.point.scale if near is not None else 1.0,
+                near=(known[0].answer if known else None) or self.free,
+                scale=known[0].scale if known else 1.0,
             )
         return self.found[gear]
+
+    @property
+    def feasible(self) -> list[SizePoint]:
+        """The gears behind which some motor does it."""
+        return [point for point in self.found.values() if point.feasible]
 
 
 @one_thread()
@@ -256,17 +259,15 @@ def _sized(
     given = _given(walk, question.problem)
     result = replace(
         empty,
-        points=tuple(walk.found[g].point for g in sorted(walk.found)),
+        points=tuple(walk.found[g] for g in sorted(walk.found)),
         given_rms=given.payload_rms if given is not None else math.inf,
         highest_height=highest_sea(
             base, structure, target, masses=question.masses, near=given or free, tell=tell
         ),
     )
-    feasible = [g for g, least in walk.found.items() if least.point.feasible]
-    if not feasible:
+    if not walk.feasible:
         return replace(result, status=_why_not(result, free)), question.masses, free
-    best = min(feasible, key=lambda g: walk.found[g].point.scale)
-    least = walk.found[best]
+    least = min(walk.feasible, key=lambda point: point.scale)
     return _chosen(result, walk, least), question.masses, least.answer
 
 
@@ -281,27 +282,26 @@ def _walked(walk: _Search, grid: FloatArray) -> None:
         up, held = way.step > 0, False
         for i in way:
             walk.tell("the smallest motor behind each gear", len(walk.found), total)
-            feasible = walk.at(float(grid[i])).point.feasible
+            feasible = walk.at(float(grid[i])).feasible
             # What stops it there (speed, inertia, and below a motor that does) stops it further on.
             if not feasible and (up or held):
                 later += way[way.index(i) + 1 :]
                 break
             held = feasible
-    if not any(least.point.feasible for least in walk.found.values()):
+    if not walk.feasible:
         for i in later:
             walk.tell("the smallest motor behind each gear", len(walk.found), total)
             walk.at(float(grid[i]))
-    gears = sorted(g for g, least in walk.found.items() if least.point.feasible)
-    if not gears:
+    if not walk.feasible:
         return
     known = sorted(walk.found)
-    at = known.index(min(gears, key=lambda g: walk.found[g].point.scale))
+    at = known.index(min(walk.feasible, key=lambda point: point.scale).gear)
     ends = known[max(at - 1, 0)], known[min(at + 1, len(known) - 1)]
 
     def size(gear: float) -> float:
         walk.tell("the best gear", min(len(walk.found), total), total)
         # Three digits: a gear is ordered by a number.
-        return walk.at(float(f"{gear:.3g}")).point.scale
+        return walk.at(float(f"{gear:.3g}")).scale
 
     least_between(size, *ends, _FINE)
 
@@ -315,18 +315,17 @@ def _given(walk: _Search, problem: Problem) -> Answer | None:
     return follow(problem, [*known[:1], walk.free])
 
 
-def _chosen(sizing: Sizing, walk: _Search, best: SmallestMotor) -> Sizing:
+def _chosen(sizing: Sizing, walk: _Search, point: SizePoint) -> Sizing:
     """Return the sizing with the chosen motor, and with its gains, verified."""
-    point, answer = best.point, best.answer
+    answer = point.answer
     assert answer is not None
     scale = point.scale * _ROOM
     walk.tell("the gains of the chosen motor", 0, 1)
     chosen_case = with_motor(walk.case, scale, point.gear).variant({"limits.drive": "enforce"})
     design = designed(chosen_case, walk.structure, answer, walk.masses, walk.tell)
-    point = replace(point, scale=scale, motor=MotorData.of(chosen_case))
+    motor = MotorData.of(chosen_case)
+    point = replace(point, scale=scale, motor=motor)
     met = design is not None and design.payload_rms <= sizing.target * (1.0 + KEPT)
-    motor = point.motor
-    assert motor is not None
     text = (
         f"the smallest motor has {1e-3 * motor.power:.4g} kW ({1e-3 * motor.torque_continuous:.4g} "
         f"kN m, {1e-3 * motor.torque_peak:.4g} kN m at the peak) behind a gear of "

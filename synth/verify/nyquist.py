@@ -119,19 +119,12 @@ class Curve:
 
     def _least(self, measure: Callable[[ComplexArray], FloatArray]) -> float:
         """Return the least value of a measure of 1 + L along the curve."""
-        values = np.asarray(measure(self.values), dtype=np.float64)
-        best = float(values.min())
-        valley = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])) + 1
-        valley = valley[values[valley] < 1.5 * best]
-        for i in valley[np.argsort(values[valley])][:_VALLEYS]:
-            found = minimize_scalar(
-                lambda t: float(measure(np.array([self._at(t)]))[0]),
-                bounds=(self.t[i - 1], self.t[i + 1]),
-                method="bounded",
-                options={"xatol": 1e-10},
-            )
-            best = min(best, float(found.fun))
-        return best
+        return _least(
+            lambda t: float(measure(np.array([self._at(t)]))[0]),
+            self.t,
+            np.asarray(measure(self.values), dtype=np.float64),
+            1.5,
+        )
 
     def _real_crossings(self) -> list[float]:
         """Return the values of L where it meets the real axis, its ends there included."""
@@ -199,16 +192,24 @@ def largest(
 ) -> float:
     """Return the largest value of a real function of omega between `low` and `high` [rad/s]."""
     t = np.log(lively(low, high, marks, per_decade=100))
-    values = function(np.exp(t))
-    best = float(values.max())
-    tops = np.flatnonzero((values[1:-1] >= values[:-2]) & (values[1:-1] >= values[2:])) + 1
-    tops = tops[values[tops] > 0.7 * best]
-    for i in tops[np.argsort(-values[tops])][:_VALLEYS]:
+    return -_least(
+        lambda x: -float(function(np.array([np.exp(x)]))[0]), t, -function(np.exp(t)), 0.7
+    )
+
+
+def _least(
+    function: Callable[[float], float], t: FloatArray, values: FloatArray, share: float
+) -> float:
+    """Return the least value of a function, known on points, from its valleys.
+
+    Those are solved for whose floor is at most `share` of the lowest.
+    """
+    best = float(values.min())
+    valley = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])) + 1
+    valley = valley[values[valley] < share * best]
+    for i in valley[np.argsort(values[valley])][:_VALLEYS]:
         found = minimize_scalar(
-            lambda x: -float(function(np.array([np.exp(x)]))[0]),
-            bounds=(t[i - 1], t[i + 1]),
-            method="bounded",
-            options={"xatol": 1e-10},
+            function, bounds=(t[i - 1], t[i + 1]), method="bounded", options={"xatol": 1e-10}
         )
-        best = max(best, -float(found.fun))
+        best = min(best, float(found.fun))
     return best
