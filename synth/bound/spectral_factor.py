@@ -19,7 +19,8 @@ unit's error is matched exactly.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -43,27 +44,46 @@ class SpectralFactor:
 
     Attributes
     ----------
-    filter
-        The filter, with the fit's errors.
-    origin
-        Zeros at the origin.
     values
         Logarithms of the sections' frequencies over `peak` and dampings, and of the gain.
-    sections
-        Second-order sections of the denominator.
+    sections, origin
+        Second-order sections of the denominator, and zeros at the origin.
     peak, variance
         Scales [rad/s], [unit squared].
     band
         Band that holds the spectrum's variance [rad/s].
+    omega, target
+        Frequencies [rad/s] and the true density there, (k,) each.
     """
 
-    filter: ShapingFilter
-    origin: int
     values: FloatArray
     sections: int
+    origin: int
     peak: float
     variance: float
     band: tuple[float, float]
+    omega: FloatArray
+    target: FloatArray
+
+    @cached_property
+    def filter(self) -> ShapingFilter:
+        """The filter, with the fit's errors."""
+        A, B, C = controllable_form(*_split(self.values, self.sections), self.origin)
+        order = np.argsort(self.omega)
+        at, wanted = self.omega[order], self.target[order]
+        inside = (at >= self.band[0]) & (at <= self.band[1])
+        at, wanted = at[inside], wanted[inside]
+        fitted = _shape(self.values, self.sections, self.origin, at / self.peak) ** 2
+        fitted *= self.variance / self.peak
+        held = float(np.trapezoid(wanted, at))
+        return ShapingFilter(
+            # Time in units of 1/peak becomes seconds: one root of the peak each in B and C.
+            A=self.peak * A,
+            B=np.sqrt(self.peak) * B,
+            C=np.exp(self.values[-1]) * np.sqrt(self.variance) * np.sqrt(np.pi) * C,
+            variance_error=float(np.trapezoid(fitted, at)) / held - 1.0,
+            shape_error=float(np.trapezoid(np.abs(fitted - wanted), at)) / held,
+        )
 
     def refitted(
         self, omega: FloatArray, target: FloatArray, weights: FloatArray
@@ -82,24 +102,13 @@ class SpectralFactor:
             return np.asarray(root * (_shape(values, self.sections, self.origin, x) ** 2 - wanted))
 
         wanted = target / scale
-        low, high = _bounds(
-            self.sections, self.values.size, np.log(np.array(self.band) / self.peak)
-        )
+        ends = np.log(np.array(self.band) / self.peak)
+        bounds = _bounds(self.sections, self.values.size, ends)
         size = float(np.linalg.norm(misfit(self.values))) or 1.0
-
-        def scaled(values: FloatArray) -> FloatArray:
-            return misfit(values) / size
-
-        found = least_squares(
-            scaled,
-            np.clip(self.values, low, high),
-            bounds=(low, high),
-            max_nfev=60,
-        )
-        better = found.x if np.all(np.isfinite(found.x)) else self.values
-        return _factor(
-            better, self.sections, self.origin, self.peak, self.variance, self.band, omega, target
-        )
+        start = np.clip(self.values, *bounds)
+        found = least_squares(lambda v: misfit(v) / size, start, bounds=bounds, max_nfev=60).x
+        better = found if np.all(np.isfinite(found)) else self.values
+        return replace(self, values=better, omega=omega, target=target)
 
 
 def spectral_factor(disturbance: Disturbance, order: int = 8) -> SpectralFactor:
@@ -185,7 +194,16 @@ def fit_spectral_factor(
     if not found:
         raise SolverError("spectral factor: no fit converged")
     _, origin, values = min(found, key=lambda entry: entry[0])
-    return _factor(values, sections, origin, peak, variance, band, omega, target)
+    return SpectralFactor(
+        values=values,
+        sections=sections,
+        origin=origin,
+        peak=peak,
+        variance=variance,
+        band=band,
+        omega=omega,
+        target=target,
+    )
 
 
 def _bounds(sections: int, size: int, ends: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -210,42 +228,6 @@ def _shape(values: FloatArray, sections: int, origin: int, x: FloatArray) -> Flo
         for at, damping in rows:
             size *= np.hypot(at**2 - x**2, 2.0 * damping * at * x) ** sign
     return np.asarray(np.exp(values[-1]) * x**origin * size)
-
-
-def _factor(
-    values: FloatArray,
-    sections: int,
-    origin: int,
-    peak: float,
-    variance: float,
-    band: tuple[float, float],
-    omega: FloatArray,
-    target: FloatArray,
-) -> SpectralFactor:
-    poles, zeros = _split(values, sections)
-    A, B, C = controllable_form(poles, zeros, origin)
-    order = np.argsort(omega)
-    at, wanted = omega[order], target[order]
-    inside = (at >= band[0]) & (at <= band[1])
-    at, wanted = at[inside], wanted[inside]
-    fitted = variance / peak * _shape(values, sections, origin, at / peak) ** 2
-    held = float(np.trapezoid(wanted, at))
-    return SpectralFactor(
-        filter=ShapingFilter(
-            # Time in units of 1/peak becomes seconds: one root of the peak each in B and C.
-            A=peak * A,
-            B=np.sqrt(peak) * B,
-            C=np.exp(values[-1]) * np.sqrt(variance) * np.sqrt(np.pi) * C,
-            variance_error=float(np.trapezoid(fitted, at)) / held - 1.0,
-            shape_error=float(np.trapezoid(np.abs(fitted - wanted), at)) / held,
-        ),
-        origin=origin,
-        values=values,
-        sections=sections,
-        peak=peak,
-        variance=variance,
-        band=band,
-    )
 
 
 def _occupied(disturbance: Disturbance) -> tuple[float, float]:
