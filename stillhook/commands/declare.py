@@ -190,6 +190,12 @@ NO_BOUND = switch(
     "do not compare with the best that any linear controller could do (2 s each, 15 s of one "
     "alone)",
 )
+OBJECTIVE = choice(
+    "--objective",
+    ("worst", "mean", "regret"),
+    "what is made small of several (default: the worst payload motion)",
+    "worst",
+)
 STRUCTURE = text(
     "--structure", "NAME", "controller structure (default: payload-feedback)", "payload-feedback"
 )

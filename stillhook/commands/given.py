@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from models.basics import InputError, PhysicsWarning
+from models.basics import InputError, PhysicsWarning, check_range
 
 from ..text import OutputFolder, told_once
 
@@ -57,6 +57,35 @@ def parse_changes(texts: Sequence[str]) -> dict[str, Any]:
     {'rope.length': '800 m', 'limits.roll_off': None, 'vessel.below': 'zero'}
     """
     return read_pairs("--set", "PATH=VALUE, as in rope.length=800", texts)
+
+
+def parse_members(texts: Sequence[str]) -> list[dict[str, Any]]:
+    """Return changes by dotted path from texts PATH=VALUE[;PATH=VALUE..], one for each member.
+
+    Raises
+    ------
+    InputError
+        If a text is not of that form, or a path comes twice in one.
+
+    Examples
+    --------
+    >>> parse_members(["rope.damping_ratio=2e-4", "rope.length=800 m; payload.mass=40 t"])
+    [{'rope.damping_ratio': 0.0002}, {'rope.length': '800 m', 'payload.mass': '40 t'}]
+    """
+    form = "PATH=VALUE[;PATH=VALUE..], as in rope.damping_ratio=0.0002"
+    return [read_pairs("--member", form, text.split(";")) for text in texts]
+
+
+def parse_fixed(texts: Sequence[str]) -> dict[str, float]:
+    """Return parameters by name from texts NAME=NUMBER.
+
+    Raises
+    ------
+    InputError
+        If a text is not of that form, a value is no number, or a name comes twice.
+    """
+    pairs = read_pairs("--fix", "NAME=NUMBER, as in a=0", texts)
+    return {name: check_range("--fix", name, value) for name, value in pairs.items()}
 
 
 def split_pairs(

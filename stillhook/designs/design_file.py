@@ -23,7 +23,7 @@ from models.basics import InputError, write_text_atomically
 from models.case import Case
 from models.casefile import line_of, message_line, read_yaml, suggestion, yaml_text
 from synth.design import Design
-from synth.question import PAYLOAD, controller_for
+from synth.question import PAYLOAD, controller_for, difference_text
 from synth.verify import Verification
 
 FORMAT = 2
@@ -63,7 +63,11 @@ def design_text(design: Design) -> str:
 
     content = {_KEY: FORMAT, _WRITER: f"stillhook {__version__}", **_encoded(design)}
     for other in content["alternatives"]:
-        del other["case"]  # the same
+        for same in (other, *other["members"]):
+            del same["case"]
+    for one in (content, *content["alternatives"]):
+        for member in one["members"]:
+            del member["built_for"]
     # The case comes last: it is the longest, and the one part that is not an answer.
     content["case"] = content.pop("case")
     return (
@@ -74,11 +78,21 @@ def design_text(design: Design) -> str:
 
 
 def design_data(design: Design) -> dict[str, Any]:
-    """Return a design as plain data, SI units: its fields by their names, but for the case."""
+    """Return a design as plain data, SI units: its fields by their names, but for the case.
+
+    A member has in its place what is different in it.
+    """
     data: dict[str, Any] = _encoded(design)
+    del data["case"]
     for other in data["alternatives"]:
         del other["case"]
-    return {name: value for name, value in data.items() if name != "case"}
+    for one, told in zip(
+        (design, *design.alternatives), (data, *data["alternatives"]), strict=True
+    ):
+        for member, fields in zip(one.members, told["members"], strict=True):
+            del fields["case"], fields["built_for"]
+            fields["difference"] = difference_text(one.case, member.case)
+    return data
 
 
 def load_design(path: str | Path) -> Design:
@@ -113,9 +127,7 @@ def load_design(path: str | Path) -> Design:
     reader = _Reader(source, lines)
     if data[key] == 1:
         fields = _of_format_1(fields, reader, structure=key == _STRUCTURE)
-    for other in fields.get("alternatives") or ():
-        if isinstance(other, dict):
-            other.setdefault("case", fields.get("case"))
+    _complete(fields)
     design: Design = reader.value(Design, fields, ())
     if design.parameters:
         try:
@@ -124,6 +136,22 @@ def load_design(path: str | Path) -> Design:
             where = ("gains" if "gains" in data else "parameters", str(error.args[0]))
             raise reader.error(where, "is missing; it must be a number") from None
     return design
+
+
+def _complete(fields: Mapping[str, Any]) -> None:
+    """Put the cases back that alternatives and members have in common with the design."""
+
+    def designs(of: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
+        return [one for one in of.get(name) or () if isinstance(one, dict)]
+
+    own = designs(fields, "members")
+    for other in designs(fields, "alternatives"):
+        other.setdefault("case", fields.get("case"))
+        for member, same in zip(designs(other, "members"), own, strict=False):
+            member.setdefault("case", same.get("case"))
+            member.setdefault("built_for", fields.get("case"))
+    for member in own:
+        member.setdefault("built_for", fields.get("case"))
 
 
 def _of_format_1(data: dict[str, Any], reader: _Reader, *, structure: bool) -> dict[str, Any]:

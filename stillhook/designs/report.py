@@ -23,6 +23,7 @@ from .summary import (
     has_loop,
     limit_table,
     margin_table,
+    member_table,
     motion_table,
     parameter_table,
     required_table,
@@ -58,6 +59,8 @@ def design_report(design: Design, *, bound: bool = True) -> Report:
     ]
     if (tried := alternatives_table(design)) is not None:
         sections.append(ReportSection("Structures", [tried]))
+    if (members := member_table(design)) is not None:
+        sections.append(ReportSection("Members", [members]))
     if (shares := share_table(design)) is not None:
         sections.append(ReportSection("", [shares]))
     if has_loop(design):

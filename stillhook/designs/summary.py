@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from models.rig import DCMotor
 from synth.design import Design, LimitUse
-from synth.question import HOOK, PAYLOAD
+from synth.question import HOOK, PAYLOAD, difference_text
 
 from ..text import (
     Bar,
@@ -111,10 +111,10 @@ def alternatives_table(design: Design) -> Table | None:
     """Return the structures that were tried, what each hears, and why it was not taken."""
     if not design.alternatives:
         return None
-    tried = sorted((design, *design.alternatives), key=lambda d: -d.payload_rms)
+    tried = sorted((design, *design.alternatives), key=lambda d: -d.family_rms)
     return Table(
         columns=columns("structure; payload_rms=payload [m]; residual=of the hook's [%]; hears <"),
-        rows=[(d.structure, d.payload_rms, d.residual, _hears(d)) for d in tried],
+        rows=[(d.structure, d.family_rms, d.family_rms / d.hook_rms, _hears(d)) for d in tried],
         notes=tuple(
             f"{other.structure}: {_why_not(design, other)}"
             for other in tried
@@ -134,10 +134,33 @@ def _why_not(taken: Design, other: Design) -> str:
     """Return why a structure was not taken."""
     if not other.ok:
         return other.status
-    if other.payload_rms > taken.payload_rms:
-        return f"{number(other.payload_rms / taken.payload_rms)} times the motion"
-    less = percent(1.0 - other.payload_rms / taken.payload_rms)
+    if other.family_rms > taken.family_rms:
+        return f"{number(other.family_rms / taken.family_rms)} times the motion"
+    less = percent(1.0 - other.family_rms / taken.family_rms)
     return f"only {less} less motion for a larger controller"
+
+
+def member_table(design: Design) -> Table | None:
+    """Return what the design does in each member of its family; None without a family."""
+    if not design.members:
+        return None
+    every = [("the case", design), *(
+        (difference_text(design.case, member.case), member) for member in design.members
+    )]  # fmt: skip
+    rows = []
+    for name, one in every:
+        enforced = [use for use in one.limits.values() if use.enforced]
+        tightest = max(enforced, key=lambda use: use.use, default=None)
+        used = (tightest.use, label_of(one, tightest.name)) if tightest else (None, "")
+        peak = None if one.margins is None else one.margins.max_sensitivity
+        rows.append((name, one.payload_rms, one.payload_rms_before, peak, *used))
+    heads = "member=; payload_rms=payload [m]; held=drum held [m]; M_s; use [%]; of <"
+    small = {
+        "worst": "the worst of them",
+        "mean": "their root mean square",
+        "regret": "the worst, over what gains of its own would reach",
+    }[design.objective]
+    return Table(columns=columns(heads), rows=rows, notes=(f"made small: {small}",))
 
 
 def has_loop(design: Design) -> bool:
@@ -149,7 +172,9 @@ def has_loop(design: Design) -> bool:
 def parameter_table(design: Design) -> Table:
     """Return the structure's parameters."""
     rows = [(name, value, design.units.get(name, "")) for name, value in design.parameters.items()]
-    notes = [f"{name} stands at the end of its range" for name in design.at_bounds]
+    notes = [f"{name} is held" for name in design.fixed]
+    ends = [name for name in design.at_bounds if name not in design.fixed]
+    notes += [f"{name} stands at the end of its range" for name in ends]
     heads = columns("parameter; value [6]; unit=<")
     return Table(columns=heads, rows=rows, notes=tuple(notes))
 

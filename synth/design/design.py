@@ -19,11 +19,11 @@ from models.basics import InputError
 from models.case import Case
 
 from ..loop import Assessment, LinearController, Margins
-from ..question import GAINS, HOOK, DesignQuestion, controller_for, pose
+from ..question import GAINS, HOOK, DesignQuestion, controller_for, difference_text, pose
 from ..search import Start
 from ..structures import structure_named
 from ..verify import Verification, verify_design
-from .tuning import LimitUse
+from .tuning import LimitUse, verified_members
 
 if TYPE_CHECKING:
     from ..bound import BestPossible
@@ -79,6 +79,13 @@ class Design:
         The independent check made before the design was handed over.
     alternatives
         Designs of other structures that were looked at besides.
+    members, objective
+        What the same controller does in each further member of the family that it was made for,
+        and what was made small over all of them (``worst``, ``mean`` or ``regret``).
+    fixed
+        Names of the parameters that were held.
+    built_for
+        The case whose motor and drum the controller is built for, where that is another.
     """
 
     case: Case
@@ -103,11 +110,21 @@ class Design:
     drive_kept: bool = True
     verification: Verification | None = None
     alternatives: tuple[Design, ...] = ()
+    members: tuple[Design, ...] = ()
+    objective: str = "worst"
+    fixed: tuple[str, ...] = ()
+    built_for: Case | None = None
 
     @property
     def feasible(self) -> bool:
         """Whether the figures hold for the sea that the case asks about."""
         return bool(np.isclose(self.significant_height, self.case.sea.significant_height))
+
+    @property
+    def family_rms(self) -> float:
+        """Payload's rms over all members: the worst, or for the mean the root mean square [m]."""
+        every = [one.payload_rms for one in (self, *self.members)]
+        return float(np.sqrt(np.mean(np.square(every)))) if self.objective == "mean" else max(every)
 
     @property
     def payload_significant(self) -> float:
@@ -149,7 +166,7 @@ class Design:
     @cached_property
     def question(self) -> DesignQuestion:
         """The question in the sea that the figures hold for."""
-        return pose(self.sea_case, self.structure, self.masses)
+        return pose(self.sea_case, self.structure, self.masses, built_for=self.built_for)
 
     @cached_property
     def controller(self) -> LinearController:
@@ -160,7 +177,7 @@ class Design:
         InputError
             If no controller was found.
         """
-        return controller_for(self.case, self.structure, self._known)
+        return controller_for(self.built_for or self.case, self.structure, self._known)
 
     @property
     def _known(self) -> Mapping[str, float]:
@@ -171,7 +188,7 @@ class Design:
     @property
     def measurements(self) -> tuple[str, ...]:
         """What the structure hears."""
-        return structure_named(self.structure, self.case).measurements
+        return structure_named(self.structure, self.built_for or self.case).measurements
 
     @cached_property
     def assessment(self) -> Assessment:
@@ -221,8 +238,8 @@ class Design:
         return tuple(found)
 
     def verify(self) -> Verification:
-        """Check everything that is claimed by code that the optimiser did not use."""
-        return verify_design(self)
+        """Check all that is claimed, in every member, by code that the optimiser did not use."""
+        return verified_members([verify_design(one) for one in (self, *self.members)])
 
     def __str__(self) -> str:
         """Return the result as a small tree."""
@@ -242,5 +259,9 @@ class Design:
         for u in self.limits.values():
             kind = "" if u.enforced else " (reported only)"
             lines.append(f"├ {u.name}: {100 * u.use:.1f} % of {u.bound:.4g} {u.unit}{kind}")
+        for member in self.members:
+            peak = "" if member.margins is None else f", M_s {member.margins.max_sensitivity:.3g}"
+            told = difference_text(self.case, member.case)
+            lines.append(f"├ {told}: payload {1e3 * member.payload_rms:.4g} mm rms{peak}")
         lines[-1] = "└" + lines[-1][1:]
         return "\n".join(line.rstrip() for line in lines)

@@ -7,14 +7,16 @@ the sea asked for and looks for the least factor on just those limits.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from models.basics import FloatArray
 
-from ..question import DesignQuestion, Goal, Problem
+from ..limits import Limit
+from ..loop import Assessment
+from ..question import FamilyProblem, Goal, Problem
 from ..search import Progress, Solution, assess, briskest, polish, settle
 from .tuning import Tuning
 
@@ -30,8 +32,8 @@ class Shortfall:
     ----------
     share
         Largest feasible significant height over the one asked for.
-    values, coefficient
-        Parameters there, and their drag coefficient [N s/m].
+    values
+        The searched parameters there.
     breaks_first
         Name of the drive limit that binds there at the highest price.
     required
@@ -39,51 +41,53 @@ class Shortfall:
     """
 
     share: float
-    values: Mapping[str, float]
-    coefficient: float | None
+    values: Sequence[float]
     breaks_first: str
     required: Mapping[str, float]
 
 
 def shortfall(
-    question: DesignQuestion, free: Tuning, progress: Progress | None = None
+    problem: FamilyProblem | Problem, free: Tuning, progress: Progress | None = None
 ) -> Shortfall | None:
     """Return the largest feasible sea and what is missing, or None if no sea is feasible.
 
+    Of a family the seas of all members grow and shrink together.
+
     Parameters
     ----------
-    question
-        The case, with all its limits.
+    problem
+        The problem, with all its limits.
     free
         The answer without drive limits, to start from.
     progress
         Called as progress(stage, done, total).
     """
-    problem = question.problem
+    family = FamilyProblem.of(problem)
     if progress is not None:
         progress("largest sea", 0, 2)
-    best = _largest_sea(problem, free)
+    best = _largest_sea(family, free)
     if best is None:
         return None
-    binding = _binding(problem, best)
+    binding = _binding(family, best)
     if progress is not None:
         progress("largest sea", 1, 2)
-    required = _required(problem, free, best, binding)
+    required = _required(family, free, best, binding)
     if progress is not None:
         progress("largest sea", 2, 2)
     return Shortfall(
         share=float(np.exp(best.extra)),
-        values=problem.law.named([float(v) for v in best.values]),
-        coefficient=best.coefficient,
+        values=[float(v) for v in best.values],
         breaks_first=binding[0],
         required=required,
     )
 
 
-def _largest_sea(problem: Problem, free: Tuning) -> Solution | None:
+def _largest_sea(problem: FamilyProblem, free: Tuning) -> Solution | None:
     seas = (0.0, -1.5, -4.0)  # from the sea asked for down to a fiftieth of it
     # Drag goes with the motion, so with the sea.
-    drags = [None if free.coefficient is None else free.coefficient * np.exp(sea) for sea in seas]
+    drags = [
+        tuple(None if drag is None else drag * np.exp(sea) for drag in _drags(free)) for sea in seas
+    ]
     begins = _begins(free)
     found = _arrived(problem, begins, list(zip(drags, seas, strict=True)), Goal.SEA)
     if not found:
@@ -94,38 +98,38 @@ def _largest_sea(problem: Problem, free: Tuning) -> Solution | None:
 
 
 def _arrived(
-    problem: Problem,
+    problem: FamilyProblem,
     begins: Sequence[FloatArray],
-    tries: Sequence[tuple[float | None, float]],
+    tries: Sequence[tuple[Sequence[float | None], float]],
     goal: Goal,
     relaxed: Sequence[str] = (),
 ) -> list[Solution]:
-    """Return from each point the answer of the first (drag, extra) that leads to a stable one."""
+    """Return from each point the answer of the first (drags, extra) that leads to a stable one."""
     found, reference = [], briskest(problem, begins)
     for begin in begins:
-        for coefficient, extra in tries:
+        for coefficients, extra in tries:
             solved = settle(
                 problem,
                 begin,
-                (coefficient,),
+                coefficients,
                 goal,
                 reference=reference,
                 relaxed=relaxed,
                 extra=extra,
             )
-            if solved.converged and problem.stable(solved.values, solved.coefficient):
+            if solved.converged and problem.stable(solved.values, solved.coefficients):
                 found.append(solved)
                 break
     return found
 
 
 def _required(
-    problem: Problem, free: Tuning, best: Solution, binding: Sequence[str]
+    problem: FamilyProblem, free: Tuning, best: Solution, binding: Sequence[str]
 ) -> dict[str, float]:
     """Return the least bounds of the binding limits for which the sea asked for is feasible."""
     begins = [*_begins(free), best.values]
     # From the limits as they are to twenty times those.
-    tries = [(free.coefficient, room) for room in (0.0, 1.0, 3.0)]
+    tries = [(_drags(free), room) for room in (0.0, 1.0, 3.0)]
     found = _arrived(problem, begins, tries, Goal.RELAX, binding)
     if not found:
         return {}
@@ -135,31 +139,45 @@ def _required(
     if excess > _KEPT:
         return {}
     # What each of them comes to there; one that the others spare is not asked for more.
-    values = {
-        lim.name: (lim, lim.measure(assessments[0]))
-        for lim in problem.limits
-        if lim.name in binding
-    }
-    return {name: value for name, (lim, value) in values.items() if lim.use(value) > 1.0}
+    needed: dict[str, tuple[float, float]] = {}
+    for lim, value in _measured(problem, assessments):
+        if lim.name in binding and lim.use(value) > max(1.0, needed.get(lim.name, (0.0, 0.0))[0]):
+            needed[lim.name] = lim.use(value), value
+    return {name: value for name, (_, value) in needed.items()}
 
 
-def _binding(problem: Problem, solved: Solution) -> list[str]:
+def _binding(problem: FamilyProblem, solved: Solution) -> list[str]:
     """Return the drive limits that are used up at the largest sea, the dearest first.
 
     Not by their multipliers alone: of two limits that say nearly the same (torque and current
     of a DC motor) only one has a price, and relaxing that one would change nothing.
     """
-    (assessment,), _ = assess(problem, solved, Goal.SEA)
-    uses = {lim.name: lim.use(lim.measure(assessment)) for lim in problem.limits if lim.drive}
+    uses: dict[str, float] = {}
+    for lim, value in _measured(problem, assess(problem, solved, Goal.SEA)[0]):
+        if lim.drive:
+            uses[lim.name] = max(uses.get(lim.name, -np.inf), lim.use(value))
     names = [name for name, use in uses.items() if use > 1.0 - _BINDING]
-    return sorted(
-        names or [max(uses, key=lambda n: uses[n])], key=lambda n: -abs(solved.prices[0][n])
-    )
+    price = {name: sum(abs(own.get(name, 0.0)) for own in solved.prices) for name in uses}
+    return sorted(names or [max(uses, key=lambda n: uses[n])], key=lambda n: -price[n])
+
+
+def _measured(
+    problem: FamilyProblem, assessments: Sequence[Assessment]
+) -> Iterator[tuple[Limit, float]]:
+    """Return every limit of every member with what is measured of it."""
+    for scenario, assessment in zip(problem.scenarios, assessments, strict=True):
+        for lim in scenario.problem.limits:
+            yield lim, lim.measure(assessment)
+
+
+def _drags(free: Tuning) -> tuple[float | None, ...]:
+    """Return the drag coefficient of every member [N s/m]."""
+    return tuple(one.coefficient for one in (free, *free.members))
 
 
 def _begins(free: Tuning) -> list[FloatArray]:
     """Return the answer without drive limits and a few other stable ends of its search."""
-    best = np.array(list(free.parameters.values()))
+    assert free.found.solved is not None
     others = [s.end for s in free.starts if s.converged and s.stable]
     others += [s.begin for s in free.starts]
-    return [best, *others[:5]]
+    return [free.found.solved.values, *others[:5]]

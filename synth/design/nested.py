@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..question import GAINS, DesignQuestion, Problem, pose
+from ..question import GAINS, DesignQuestion, FamilyProblem, Problem, pose
 from ..search import KEPT, Found, Progress, Solution, polish, search
 from ..structures import TRANSPARENT, LowOrderFeedback, ParametrisedController, WinchLaw
 from .tuning import Tuning, tuning_of
@@ -66,7 +66,7 @@ def nested_starts(
     """
     structure = question.structure
     within = WITHIN.get(structure.name, ())
-    if isinstance(structure, LowOrderFeedback) and structure.order >= 2:
+    if isinstance(structure, LowOrderFeedback) and structure.order >= 2 and not question.held:
         within = (_ROLLED,)
     found: list[list[float]] = []
     for name in within:
@@ -125,46 +125,51 @@ def as_values(law: ParametrisedController, known: Mapping[str, float]) -> list[f
     return [float(np.clip(v, *pair)) for v, pair in zip(values, limits, strict=True)]
 
 
-def no_worse(problem: Problem, found: Found, starts: Sequence[Sequence[float]]) -> Found:
+def no_worse(
+    asked: FamilyProblem | Problem, found: Found, starts: Sequence[Sequence[float]]
+) -> Found:
     """Return what was found, or the best of known points that keep the limits and are better.
 
     A search may leave the basin that it was shown; a point that is known already is then polished
     in its own.
     """
+    family = FamilyProblem.of(asked)
     for values in starts:
         best = found.solved.objective if found.solved is not None else np.inf
         best = best if found.excess <= KEPT else np.inf
-        solved = _as_it_is(problem, values)
+        solved = _as_it_is(family, values)
         if solved is None or solved.objective > best - _BETTER:
             continue
-        again, assessments, excess = polish(problem, solved, np.array(values, dtype=np.float64))
+        again, assessments, excess = polish(family, solved, np.array(values, dtype=np.float64))
         if again.converged and excess <= KEPT and again.objective < best:
             found = replace(found, solved=again, assessments=assessments, excess=excess)
     return found
 
 
-def _as_it_is(problem: Problem, values: Sequence[float]) -> Solution | None:
+def _as_it_is(family: FamilyProblem, values: Sequence[float]) -> Solution | None:
     """Return a known point as an answer; None if it is unstable or breaks a limit."""
-    if not problem.stable(values):
+    if not family.stable(values):
         return None
-    assessment = problem.assess(values)
-    coefficient = assessment.coefficient if problem.drag is not None else None
-    if not problem.stable(values, coefficient):
+    loops = [(s.problem, s.problem.assess(s.values(values))) for s in family.scenarios]
+    drags = tuple(seen.coefficient if asked.drag is not None else None for asked, seen in loops)
+    if not family.stable(values, drags):
         return None
-    if any(limit.use(limit.measure(assessment)) > 1.0 + KEPT for limit in problem.limits):
+    if any(
+        lim.use(lim.measure(seen)) > 1.0 + KEPT for asked, seen in loops for lim in asked.limits
+    ):
         return None
-    variance = sum(
-        weight * assessment.sigma(name) ** 2 for name, weight in problem.minimise.items()
+    costs = np.sqrt(
+        [sum(w * seen.sigma(z) ** 2 for z, w in asked.minimise.items()) for asked, seen in loops]
     )
     return Solution(
         values=np.array(values, dtype=np.float64),
-        coefficients=(coefficient,),
+        coefficients=drags,
         # A hair dearer than it is, so that a solve which arrives at the same point counts.
-        objective=0.5 * float(np.log(variance)) + _HAIR,
+        objective=float(np.log(family.total(costs))) + _HAIR,
         converged=False,
         message="as it was",
         iterations=0,
-        prices=({limit.name: 0.0 for limit in problem.limits},),
-        costs=np.array([np.sqrt(variance)]),
-        pressure=np.ones(1),
+        prices=tuple({lim.name: 0.0 for lim in s.problem.limits} for s in family.scenarios),
+        costs=costs,
+        pressure=np.full(len(costs), 1.0 / len(costs)),
     )

@@ -23,8 +23,19 @@ from models.plant import MAX_MASSES
 from models.sensing import aboard
 
 from ..loop import Assessment
-from ..question import GAINS, PAYLOAD, DesignQuestion, Problem, masses_for, pose, with_masses
-from ..search import Progress, search
+from ..question import (
+    GAINS,
+    PAYLOAD,
+    DesignQuestion,
+    FamilyProblem,
+    Objective,
+    PosedFamily,
+    masses_for,
+    pose,
+    pose_family,
+    with_masses,
+)
+from ..search import Progress, search, with_bests
 from ..structures import LowOrderFeedback, structure_named
 from .design import Design
 from .high_order import high_order_gains
@@ -53,6 +64,9 @@ def optimise_gains(
     case: Case,
     structure: str | Sequence[str] | None = None,
     *,
+    members: Sequence[Mapping[str, Any] | Case] = (),
+    objective: str = "worst",
+    fixed: Mapping[str, float] | None = None,
     starts: int = 16,
     seed: int = 0,
     progress: Progress | None = None,
@@ -60,9 +74,10 @@ def optimise_gains(
 ) -> Design:
     """Return the controller that minimises the payload's variance within the limits of a case.
 
-    Of several structures it is the simplest within five percent of the stillest that is ok; the
-    others are its `alternatives`.  Where the limits cannot all be kept, it is the stillest in the
-    largest sea in which any structure can keep them.
+    With `members` it is one controller for the case and for others like it, which keeps the limits
+    of all of them.  Of several structures it is the simplest within five percent of the stillest
+    that is ok; the others are its `alternatives`.  Where the limits cannot all be kept, it is the
+    stillest in the largest sea in which any structure can keep them.
 
     Parameters
     ----------
@@ -72,6 +87,14 @@ def optimise_gains(
     structure
         Name of the structure, see `synth.structures.structure_names`, or several, the simplest
         first; by default those of `NESTED` whose sensors the case names.
+    members
+        What the controller is for besides the case itself: changes of it by dotted path, as
+        `Case.replace` takes them, or cases.  It is built for the motor and drum of the case.
+    objective
+        Of several members: ``worst`` for the least worst payload rms, ``mean`` for the least root
+        of the mean square, ``regret`` for the least worst ratio to the best of each member alone.
+    fixed
+        Parameters that are held, by name, as ``{"a": 0.0}``; the others are searched.
     starts, seed
         Size and seed of the multi-start search; each of several structures has a quarter of the
         starts, and begins at the simpler ones' answers too.
@@ -86,16 +109,24 @@ def optimise_gains(
     -------
     Design
         `ok` only if it is stable, keeps every enforced limit in the sea asked for and passes
-        the independent check.
+        the independent check, as each of its `members` does.
 
     Raises
     ------
     InputError
-        If there is no such structure, or a limit lies below the static load.
+        If there is no such structure, parameter, objective or change, a limit lies below the static
+        load, or no gains of its own keep the limits of a member, for the regret.
     """
     check_range("optimise_gains", "starts", starts, low=1)
+
+    def optimised(
+        name: str, starts: int, progress: Progress | None, guesses: Sequence[Mapping[str, float]]
+    ) -> Design:
+        posed = pose_family(case, members, name, objective=objective, held=fixed)
+        return _optimised(posed, starts, seed, progress, guesses)
+
     if isinstance(structure, str):
-        return _optimised(case, structure, int(starts), seed, progress, guesses)
+        return optimised(structure, int(starts), progress, guesses)
     names = structures_aboard(case) if structure is None else tuple(dict.fromkeys(structure))
     if not names:
         raise InputError("optimise_gains: structure must name at least one structure, got none")
@@ -105,7 +136,7 @@ def optimise_gains(
         stage = None if progress is None else _told(progress, f"{name} ({k + 1}/{len(names)})")
         simpler = [d.parameters for d in designs if d.structure in WITHIN.get(name, ())]
         known = [*guesses, *(parameters for parameters in simpler if parameters)]
-        designs.append(_optimised(case, name, few, seed, stage, known))
+        designs.append(optimised(name, few, stage, known))
     chosen = _simplest(designs)
     others = tuple(design for design in designs if design is not chosen)
     return replace(chosen, alternatives=others)
@@ -124,9 +155,9 @@ def _simplest(designs: Sequence[Design]) -> Design:
     if not ok:
         roughest = max(design.significant_height for design in designs)
         there = [d for d in designs if d.significant_height >= _ROUGHEST * roughest]
-        return min(there, key=lambda design: design.payload_rms)
-    stillest = min(design.payload_rms for design in ok)
-    return next(design for design in ok if design.payload_rms <= _AS_STILL * stillest)
+        return min(there, key=lambda design: design.family_rms)
+    stillest = min(design.family_rms for design in ok)
+    return next(design for design in ok if design.family_rms <= _AS_STILL * stillest)
 
 
 def _told(progress: Progress, name: str) -> Progress:
@@ -137,39 +168,50 @@ def _told(progress: Progress, name: str) -> Progress:
 
 
 def _optimised(
-    case: Case,
-    structure: str,
+    posed: PosedFamily,
     starts: int,
     seed: int,
     progress: Progress | None,
     guesses: Sequence[Mapping[str, float]],
 ) -> Design:
     """Return the design of one structure; see `optimise_gains`."""
-    count = starts
-    question = pose(case, structure)
+    question = posed.first
     if isinstance(named := question.structure, LowOrderFeedback) and named.family == "high-order":
-        question, parameters = high_order_gains(case, named.order or None, progress)
-        return verified(_evaluated(question, parameters), progress, question)
-    known = starts_from(question, guesses) or nested_starts(question, count, seed, progress)
-    count += len(known)
+        return _high_order(posed, named.order or None, progress)
+    known = starts_from(question, guesses) or nested_starts(question, starts, seed, progress)
+    count = starts + len(known)
     known = [*known, *gains_in_use(question)]
-    tuning = _searched(question.problem, count, seed, known, progress)
-    while (loop := tuning.assessment) is not None and loop.stable:
-        if (wanted := masses_for(question, loop)) <= question.masses:
-            break
+    tuning = _answer(posed, count, seed, known, progress)
+    while (wanted := _masses_wanted(posed, tuning)) > posed.masses:
         # The rope turned out to need more masses: the ends of the search are the guesses.
-        question, tuning = _on_more(question, wanted, tuning, count, seed, progress)
+        posed = posed.on(wanted)
+        tuning = _again(posed.problem, tuning, count, seed, progress)
     if not tuning.ok:
-        if tuning.assessment is None or not question.drive:
-            return design_of(question, tuning)
-        return _best_possible(question, count, seed, known, progress)
-    design = verified(design_of(question, tuning), progress, question)
+        if tuning.assessment is None or not any(member.drive for member in posed.questions):
+            return _family_design(posed, tuning)
+        return _best_possible(posed, count, seed, known, progress)
+    design = verified(_family_design(posed, tuning), progress, posed.first)
     most = 1 if question.data.lumping == "thesis" else MAX_MASSES
-    while tuning.ok and not design.ok and 2 * question.masses <= most:
+    while tuning.ok and not design.ok and 2 * posed.masses <= most:
         # It stands on its own rope only: once more on twice the masses.
-        question, tuning = _on_more(question, 2 * question.masses, tuning, count, seed, progress)
-        design = verified(design_of(question, tuning), progress, question)
+        posed = posed.on(2 * posed.masses)
+        tuning = _again(posed.problem, tuning, count, seed, progress)
+        design = verified(_family_design(posed, tuning), progress, posed.first)
     return design
+
+
+def _high_order(posed: PosedFamily, order: int | None, progress: Progress | None) -> Design:
+    """Return the design of a controller of high order, made for the case alone."""
+    if posed.first.held:
+        raise InputError("fixed: must be empty for high-order, which is not found by parameters")
+    question, parameters = high_order_gains(posed.first.case, order, progress)
+    name, masses = question.structure.name, question.masses
+    others = (
+        pose(member.case, name, masses, built_for=question.case) for member in posed.questions[1:]
+    )
+    designs = [_evaluated(member, parameters) for member in (question, *others)]
+    design = _with_members(designs, posed)
+    return verified(replace(design, ok=all(one.ok for one in designs)), progress, question)
 
 
 @one_thread()
@@ -204,14 +246,17 @@ def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback
         if masses > question.masses:
             question = with_masses(question, masses)
             growth = _growth(question, complete)
+    return verified(_evaluated(question, complete, growth), None, question)
+
+
+def _evaluated(
+    question: DesignQuestion, parameters: Mapping[str, float], growth: float | None = None
+) -> Design:
+    """Return what parameters do; the loop's growth rate [1/s] is worked out if it is not given."""
+    growth = _growth(question, parameters) if growth is None else growth
     if growth > 0.0:
         status = f"unstable: grows by a factor e every {1.0 / growth:.3g} s"
-        return recorded(question, complete, None, {}, ok=False, status=status)
-    return verified(_evaluated(question, complete), None, question)
-
-
-def _evaluated(question: DesignQuestion, parameters: Mapping[str, float]) -> Design:
-    """Return what parameters of a stable loop do."""
+        return recorded(question, parameters, None, {}, ok=False, status=status)
     assessment = question.assess(parameters)
     uses = every_use(question, assessment, {})
     broken = [u.name for u in uses.values() if u.enforced and not u.kept]
@@ -219,101 +264,121 @@ def _evaluated(question: DesignQuestion, parameters: Mapping[str, float]) -> Des
     return recorded(question, parameters, assessment, uses, ok=not broken, status=status)
 
 
-def _searched(
-    problem: Problem,
+def _answer(
+    posed: PosedFamily,
     starts: int,
     seed: int,
-    guesses: Sequence[Sequence[float]],
+    known: Sequence[Sequence[float]],
     progress: Progress | None,
+    *,
+    drive: bool = True,
 ) -> Tuning:
-    """Return the answer of a search, or a guess that is better and keeps the limits."""
-    found = search(problem, starts, seed, guesses, progress)
-    return tuning_of(problem, no_worse(problem, found, guesses))
+    """Return the answer of the case alone, and from where its search ended that of the family."""
+    alone, family = (one.problem if drive else one.without_drive for one in (posed.alone, posed))
+    tuning = tuning_of(alone, no_worse(alone, search(alone, starts, seed, known, progress), known))
+    if len(posed.questions) == 1:
+        return tuning
+    return _again(family, tuning, starts, seed, progress, known)
 
 
-def _on_more(
-    question: DesignQuestion,
-    masses: int,
+def _again(
+    family: FamilyProblem,
     tuning: Tuning,
     starts: int,
     seed: int,
     progress: Progress | None,
-) -> tuple[DesignQuestion, Tuning]:
-    """Return the question on more rope masses, and its answer from the ends of the search."""
-    question = with_masses(question, masses)
-    values, problem = list(tuning.parameters.values()), question.problem
-    ends = [s.end for s in sorted(tuning.starts, key=lambda s: s.cost) if s.converged]
-    known = [values, *([float(v) for v in end] for end in ends[:_RESUMED])]
-    again = tuning_of(problem, search(problem, 1, seed, known, progress, only_guesses=True))
+    known: Sequence[Sequence[float]] = (),
+) -> Tuning:
+    """Return the answer for more members or more rope masses, from the ends of a search."""
+    ends = [s.end for s in sorted(tuning.starts, key=lambda s: s.cost) if s.converged][:_RESUMED]
+    if tuning.found.solved is not None:
+        ends = [tuning.found.solved.values, *ends]
+    if family.objective is Objective.REGRET:
+        family = with_bests(family, seed, ends, progress)
+    found = search(family, 1, seed, ends, progress, only_guesses=True)
+    again = tuning_of(family, no_worse(family, found, known))
     if not again.ok and tuning.ok:
-        again = tuning_of(problem, search(problem, starts, seed, [values], progress))
-    return question, replace(again, starts=tuning.starts, agreed=tuning.agreed)
+        again = tuning_of(family, search(family, starts, seed, ends[:1], progress))
+    return replace(again, starts=tuning.starts, agreed=tuning.agreed)
 
 
 def _best_possible(
-    question: DesignQuestion,
+    posed: PosedFamily,
     starts: int,
     seed: int,
-    guesses: Sequence[Sequence[float]],
+    known: Sequence[Sequence[float]],
     progress: Progress | None,
 ) -> Design:
     """Return the best design in the largest feasible sea, for a drive that is too small."""
-    case = question.case
-    free = _searched(question.problem_with(question.loop), starts, seed, guesses, progress)
+    case = posed.first.case
+    free = _answer(posed, starts, seed, known, progress, drive=False)
     if not free.ok:
         status = f"whatever the drive: {free.status}"
-        return design_of(question, replace(free, status=status), drive_kept=False)
-    short = shortfall(question, free, progress)
+        return _family_design(posed, replace(free, status=status), drive_kept=False)
+    short = shortfall(posed.problem, free, progress)
     if short is None:
         status = "the drive's limits cannot be kept in any sea, however small"
-        return design_of(question, replace(free, ok=False, status=status), drive_kept=False)
+        return _family_design(posed, replace(free, ok=False, status=status), drive_kept=False)
     if short.share >= 1.0:
         # The sea asked for is feasible after all: the search missed it, so it starts from there.
-        values = list(short.values.values())
-        tuning = tuning_of(question.problem, search(question.problem, 4, seed, [values], progress))
-        return verified(design_of(question, tuning), progress, question)
-    parameters = question.named(list(short.values.values()))
-    height = short.share * case.sea.significant_height
-    calm = _kept_in(question, parameters, height)
-    status = _too_small(question, short, calm.significant_height)
+        found = search(posed.problem, 4, seed, [short.values], progress)
+        return verified(_family_design(posed, tuning_of(posed.problem, found)), progress)
+    calm = _kept_in(posed, posed.first.named(short.values), short.share)
+    height = calm.significant_height
     design = replace(
         calm,
-        status=status,
+        status=_too_small(posed, short, height),
         case=case,
         required=short.required,
         starts=free.starts,
         agreed=free.agreed,
+        members=tuple(
+            replace(member, case=question.case)
+            for member, question in zip(calm.members, posed.questions[1:], strict=True)
+        ),
     )
     return replace(verified(design, progress), ok=False)
 
 
-def _kept_in(question: DesignQuestion, parameters: Mapping[str, float], height: float) -> Design:
-    """Return given parameters in the sea near a height [m] in which they keep the drive's limits.
+def _kept_in(posed: PosedFamily, parameters: Mapping[str, float], share: float) -> Design:
+    """Return given parameters in seas near a share of those asked for that the drive can do.
 
     The shortfall makes everything smaller that shakes the loop; but the noise of sensors does not
     shrink with the sea, so that the sea may have to be calmer still.
     """
 
-    def at(log_height: float) -> Design:
-        sea = {"sea.significant_height": float(np.exp(log_height))}
-        calmer = pose(question.case.replace(sea), question.structure.name, question.masses)
-        assessment = calmer.assess(parameters)
-        uses = every_use(calmer, assessment, {})
-        return recorded(calmer, parameters, assessment, uses, ok=False, status="")
+    def at(log_share: float) -> Design:
+        designs = []
+        for question in posed.questions:
+            height = float(np.exp(log_share)) * question.case.sea.significant_height
+            calmer = pose(
+                question.case.replace({"sea.significant_height": height}),
+                question.structure.name,
+                question.masses,
+                built_for=posed.first.case,
+            )
+            assessment = calmer.assess(parameters)
+            uses = every_use(calmer, assessment, {})
+            designs.append(recorded(calmer, parameters, assessment, uses, ok=False, status=""))
+        return _with_members(designs, posed)
 
-    def over(log_height: float) -> float:
-        limits = at(log_height).limits
-        return max(limits[limit.name].use for limit in question.drive) - 1.0
+    def over(log_share: float) -> float:
+        design = at(log_share)
+        return max(
+            one.limits[limit.name].use
+            for one, question in zip((design, *design.members), posed.questions, strict=True)
+            for limit in question.drive
+        ) - 1.0  # fmt: skip
 
-    top = float(np.log(height))
+    top = float(np.log(share))
     if over(top) > _HAIR > over(top - _CALMER):
         top = brentq(lambda x: over(x) - 0.5 * _HAIR, top - _CALMER, top, xtol=0.1 * _HAIR)
     return at(top)
 
 
-def _too_small(question: DesignQuestion, found: Shortfall, height: float) -> str:
-    names = {limit.name: limit for limit in question.limits}
-    asked = question.case.sea.significant_height
+def _too_small(posed: PosedFamily, found: Shortfall, height: float) -> str:
+    names = {limit.name: limit for question in posed.questions for limit in question.limits}
+    asked = posed.first.case.sea.significant_height
     text = (
         f"not feasible at H_s {asked:.3g} m: {found.breaks_first} breaks first; feasible up to "
         f"H_s {height:.3g} m, for which the gains are"
@@ -329,9 +394,27 @@ def _number(value: float) -> str:
     return f"{value:.4g}" if abs(value) < 1e4 else f"{value:,.0f}".replace(",", " ")
 
 
+def _family_design(posed: PosedFamily, tuning: Tuning, *, drive_kept: bool = True) -> Design:
+    """Return a tuning as a design, with one for each further member that has a stable loop."""
+    each = zip(posed.questions, (tuning, *tuning.members), strict=False)
+    return _with_members([design_of(*pair, drive_kept=drive_kept) for pair in each], posed)
+
+
+def _with_members(designs: Sequence[Design], posed: PosedFamily) -> Design:
+    """Return the first of some designs, the others as its members."""
+    first, *others = designs
+    return replace(
+        first,
+        objective=posed.objective.value,
+        fixed=tuple(posed.first.held),
+        members=tuple(replace(member, built_for=posed.first.case) for member in others),
+    )
+
+
 def design_of(question: DesignQuestion, tuning: Tuning, *, drive_kept: bool = True) -> Design:
     """Return a tuning as a design, with the limits that it did not have to keep as reported."""
-    if tuning.assessment is None:
+    solved = tuning.found.solved
+    if tuning.assessment is None or solved is None:
         status = "no stabilising gains were found"
         design = recorded(question, {}, None, {}, ok=False, status=status)
     else:
@@ -339,7 +422,7 @@ def design_of(question: DesignQuestion, tuning: Tuning, *, drive_kept: bool = Tr
         uses = every_use(question, tuning.assessment, prices, drive_kept=drive_kept)
         design = recorded(
             question,
-            question.named(list(tuning.parameters.values())),
+            question.named([float(v) for v in solved.values]),
             tuning.assessment,
             uses,
             ok=tuning.ok,
@@ -385,7 +468,7 @@ def recorded(
         case=question.case,
         structure=question.structure.name,
         parameters=dict(parameters),
-        units={p.name: p.unit for p in question.law.parameters},
+        units={p.name: p.unit for p in question.whole_law.parameters},
         ok=ok,
         status=status,
         significant_height=question.case.sea.significant_height,
@@ -415,7 +498,8 @@ def verified(
     checked = design.verify()
     if progress is not None:
         progress("verify", 1, 1)
-    status = design.status + _in_small_motion(question or design.question, design.parameters)
+    questions = [question or design.question, *(member.question for member in design.members)]
+    status = design.status + _in_small_motion(questions, design.parameters)
     if design.payload_rms > design.payload_rms_before:
         status += "; with the drum held the payload moves less"
     if not checked.ok:
@@ -431,13 +515,13 @@ def _growth(
     return float(question.assess(parameters, coefficient).poles.real.max())
 
 
-def _in_small_motion(question: DesignQuestion, parameters: Mapping[str, float]) -> str:
-    """Return a remark if the loop needs its drag to be stable, else nothing.
+def _in_small_motion(questions: Sequence[DesignQuestion], parameters: Mapping[str, float]) -> str:
+    """Return a remark if a loop needs its drag to be stable, else nothing.
 
     Quadratic drag vanishes in small motion: such a loop swings by itself, at the amplitude
     that gives it drag enough.
     """
-    if question.drag is None or _growth(question, parameters, 0.0) <= 0.0:
+    if all(q.drag is None or _growth(q, parameters, 0.0) <= 0.0 for q in questions):
         return ""
     return "; without drag, in small motion, the loop is unstable and swings by itself"
 
@@ -467,3 +551,10 @@ def checked_parameters(question: DesignQuestion, gains: object) -> dict[str, flo
             "gains", name, every[name], low=0.0 if low >= 0.0 else -np.inf, open_low=low > 0.0
         )
     return checked
+
+
+def _masses_wanted(posed: PosedFamily, tuning: Tuning) -> int:
+    seen = [t.assessment for t in (tuning, *tuning.members) if t.assessment is not None]
+    if len(seen) < len(posed.questions) or not all(one.stable for one in seen):
+        return posed.masses
+    return posed.masses_wanted(seen)

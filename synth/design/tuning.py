@@ -21,8 +21,8 @@ from models.plant import LinearPlant
 from ..bound import lqg_bound
 from ..limits import Limit, Rms
 from ..loop import Assessment, DragElement, LinearController, Margins, disturbances
-from ..question import Problem
-from ..search import KEPT, Found, Progress, Start, search
+from ..question import FamilyLoop, FamilyProblem, Objective, Problem
+from ..search import KEPT, Found, Progress, Start, search, with_bests
 from ..structures import Fixed, Structure
 from ..verify import Verification, verify_tuning
 
@@ -99,6 +99,8 @@ class Tuning:
         The search's raw answer.
     coefficient
         The drag coefficient that agrees with the response [N s/m], if drag was asked for.
+    members
+        The same controller on each further plant that it was tuned for.
     """
 
     problem: Problem
@@ -112,6 +114,7 @@ class Tuning:
     starts: tuple[Start, ...] = ()
     agreed: int = 0
     coefficient: float | None = None
+    members: tuple[Tuning, ...] = ()
     assessment: Assessment | None = field(repr=False)
     found: Found = field(repr=False)
 
@@ -142,8 +145,8 @@ class Tuning:
         return LqgFigure(cost=found.value)
 
     def verify(self) -> Verification:
-        """Check everything that is claimed by code that the optimiser did not use."""
-        return verify_tuning(self)
+        """Check everything that is claimed, on every plant, by code that the search did not use."""
+        return verified_members([verify_tuning(one) for one in (self, *self.members)])
 
     def __str__(self) -> str:
         """Return a small tree."""
@@ -156,12 +159,15 @@ class Tuning:
         if self.margins is not None:
             m = self.margins
             lines.append(f"├ M_s {m.max_sensitivity:.3f}, delay margin {m.delay:.4g} s")
+        for k, member in enumerate(self.members):
+            peak = "" if member.margins is None else f", M_s {member.margins.max_sensitivity:.3f}"
+            lines.append(f"├ plant {k + 2}: cost {member.cost:.6g}{peak}")
         lines[-1] = "└" + lines[-1][1:]
         return "\n".join(lines)
 
 
 def tune(
-    plant: LinearPlant,
+    plant: LinearPlant | Sequence[LinearPlant],
     structure: Structure,
     *,
     spectrum: Mapping[str, Any],
@@ -172,6 +178,7 @@ def tune(
     drag: DragElement | None = None,
     guesses: Sequence[Sequence[float]] = (),
     fixed: Mapping[str, float] | None = None,
+    objective: str = "worst",
     progress: Progress | None = None,
 ) -> Tuning:
     """Return the controller of a structure that minimises a weighted variance within limits.
@@ -179,7 +186,8 @@ def tune(
     Parameters
     ----------
     plant
-        Any linear plant with named signals; delays of its measurements are taken exactly.
+        Any linear plant with named signals; delays of its measurements are taken exactly.  Or
+        several with the same signals, for one controller that keeps the limits on all of them.
     structure
         `StaticGain`, `PayloadFeedback`, `LowOrder` or a structure of your own (`Structure`).
     spectrum
@@ -199,26 +207,45 @@ def tune(
         Vectors of the free parameters to start from, before any that are drawn.
     fixed
         Parameters of the structure that are held, by name; the others are searched.
+    objective
+        Of several plants: ``worst`` for the least worst cost, ``mean`` for the least root of the
+        mean square, ``regret`` for the least worst ratio to what a controller for that plant alone
+        would reach.
     progress
         Called as progress(stage, done, total).
 
     Returns
     -------
     Tuning
-        With ``ok`` false and a status that says why if no stable design within the limits
-        was found.
+        Of the first plant, with the others as its `members`; ``ok`` false and a status that says
+        why if no design was found that is stable and within the limits on every plant.
 
     Raises
     ------
     InputError
-        If a name is unknown, a weight is negative or there is nothing to minimise or to search.
+        If a name is unknown, a weight is negative, there is nothing to minimise or to search, or
+        the plants differ in their signals.
     """
     if fixed:
         structure = Fixed(structure=structure, values=fixed)
-    problem = _problem(plant, structure, spectrum, minimise, limits, drag)
+    plants = (plant,) if isinstance(plant, LinearPlant) else tuple(plant)
+    if not plants:
+        raise InputError("tune: plant must be a plant, or at least one, got none")
+    for name in ("inputs", "measurements"):
+        if len({getattr(one, name) for one in plants}) > 1:
+            raise InputError(f"tune: plant: all must have the same {name}")
+    wanted = Objective.of(objective)
+    problems = [_problem(one, structure, spectrum, minimise, limits, drag) for one in plants]
+    loops = (
+        FamilyLoop(name=f"plant {k + 1}", problem=replace(problem, law=problems[0].law))
+        for k, problem in enumerate(problems)
+    )
     check_range("tune", "starts", starts, low=1)
     with one_thread():
-        answer = tuning_of(problem, search(problem, int(starts), seed, guesses, progress))
+        family = FamilyProblem(scenarios=tuple(loops), objective=wanted)
+        if wanted is Objective.REGRET:
+            family = with_bests(family, seed, guesses, progress)
+        answer = tuning_of(family, search(family, int(starts), seed, guesses, progress))
     return replace(answer, status=answer.status + _few(answer))
 
 
@@ -245,12 +272,13 @@ def limit_uses(
     return uses
 
 
-def tuning_of(problem: Problem, found: Found) -> Tuning:
-    """Return what a search found as an answer in words and numbers."""
-    solved, assessment = found.solved, found.assessment
-    if solved is None or assessment is None:
+def tuning_of(asked: FamilyProblem | Problem, found: Found) -> Tuning:
+    """Return what a search found as an answer in words and numbers, with one for each member."""
+    family = FamilyProblem.of(asked)
+    first = family.scenarios[0].problem
+    if found.solved is None or not found.assessments:
         return Tuning(
-            problem=problem,
+            problem=first,
             ok=False,
             status="no stabilising controller of this structure was found",
             cost=np.inf,
@@ -262,41 +290,82 @@ def tuning_of(problem: Problem, found: Found) -> Tuning:
             assessment=None,
             found=found,
         )
-    cost = float(np.sqrt(sum(w * assessment.sigma(o) ** 2 for o, w in problem.minimise.items())))
-    # The programme prices the logarithm of the cost per logarithm of the bound.
-    prices = {name: 0.01 * abs(price) * cost for name, price in solved.prices[0].items()}
-    uses = limit_uses(problem.limits, assessment, prices)
-    ok = bool(assessment.stable and solved.converged and found.excess <= KEPT and np.isfinite(cost))
-    return Tuning(
-        problem=problem,
+    every = [_of_member(family, found, i) for i in range(len(family.scenarios))]
+    ok = all(member.ok for member in every)
+    status = _status(ok, every, family)
+    members = tuple(replace(member, ok=ok, status=status) for member in every[1:])
+    return replace(
+        every[0],
         ok=ok,
-        status=_status(ok, assessment, uses, cost),
-        cost=cost,
-        parameters=problem.law.named([float(v) for v in solved.values]),
-        controller=problem.law.controller([float(v) for v in solved.values]),
-        margins=assessment.margins,
-        limits=uses,
+        status=status,
         starts=found.starts,
         agreed=found.agreed,
-        coefficient=solved.coefficient,
-        assessment=assessment,
+        members=members,
         found=found,
     )
 
 
-def _status(ok: bool, assessment: Assessment, uses: Mapping[str, LimitUse], cost: float) -> str:
+def _of_member(family: FamilyProblem, found: Found, index: int) -> Tuning:
+    """Return what the answer for a family is for one member alone."""
+    scenario = family.scenarios[index]
+    problem, own = scenario.problem, found.member(index, scenario)
+    assessment, solved = own.assessments[0], own.solved
+    assert solved is not None
+    cost = float(np.sqrt(sum(w * assessment.sigma(o) ** 2 for o, w in problem.minimise.items())))
+    # The programme prices the logarithm of the cost per logarithm of the bound.
+    prices = {name: 0.01 * abs(price) * cost for name, price in solved.prices[0].items()}
+    kept = assessment.stable and solved.converged and found.excess <= KEPT and np.isfinite(cost)
+    values = [float(v) for v in solved.values]
+    return Tuning(
+        problem=problem,
+        ok=bool(kept),
+        status="",
+        cost=cost,
+        parameters=problem.law.named(values),
+        controller=problem.law.controller(values),
+        margins=assessment.margins,
+        limits=limit_uses(problem.limits, assessment, prices),
+        coefficient=solved.coefficient,
+        assessment=assessment,
+        found=own,
+    )
+
+
+def _status(ok: bool, members: Sequence[Tuning], family: FamilyProblem) -> str:
+    names = [scenario.name for scenario in family.scenarios]
+    several = f" over {len(names)} members" if len(names) > 1 else ""
     if ok:
-        binding = [u.name for u in uses.values() if u.price > 1e-5 * cost]
+        every = [(u, member) for member in members for u in member.limits.values()]
+        binding = dict.fromkeys(u.name for u, member in every if u.price > 1e-5 * member.cost)
         if not binding:
-            return "optimal; no limit binds"
-        return f"optimal within the limits; {', '.join(binding)} bind{'s' * (len(binding) == 1)}"
-    if not assessment.stable:
+            return f"optimal{several}; no limit binds"
+        bind = f"{', '.join(binding)} bind{'s' * (len(binding) == 1)}"
+        return f"optimal{several} within the limits; {bind}"
+    if not all(member.assessment and member.assessment.stable for member in members):
         return "the search ended at an unstable loop"
-    broken = [u for u in uses.values() if not u.kept]
-    if not broken:
+    values = [
+        f"{u.name} at {u.value:.4g} instead of {u.bound:.4g}" + (f" ({name})" if several else "")
+        for name, member in zip(names, members, strict=True)
+        for u in member.limits.values()
+        if not u.kept
+    ]
+    if not values:
         return "the solver did not converge"
-    values = [f"{u.name} at {u.value:.4g} instead of {u.bound:.4g}" for u in broken]
     return f"the limits cannot all be kept; the least violation leaves {' and '.join(values)}"
+
+
+def verified_members(each: Sequence[Verification]) -> Verification:
+    """Return the checks of every member as one verification, that of the first if it is alone."""
+    if len(each) == 1:
+        return each[0]
+    checks = tuple(
+        replace(check, name=check.name if k == 0 else f"member {k + 1}.{check.name}")
+        for k, one in enumerate(each)
+        for check in one.checks
+    )
+    failed = (f"member {k + 1}: {one.status}" for k, one in enumerate(each) if not one.ok)
+    status = next(failed, f"{each[0].status}; the other members hold too")
+    return Verification(ok=all(one.ok for one in each), status=status, checks=checks)
 
 
 def _few(answer: Tuning) -> str:

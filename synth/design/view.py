@@ -46,12 +46,7 @@ from ..question import (
 )
 from ..search import KEPT, Solution, cost_nodes, margin_nodes, settle
 from .design import Design
-from .optimise import (
-    checked_parameters,
-    every_use,
-    recorded,
-    verified,
-)
+from .optimise import checked_parameters, every_use, recorded, verified
 from .tuning import LimitUse
 
 _PER_DECADE = 40  # margin frequencies; peaks and crossings between them are refined

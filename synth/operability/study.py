@@ -379,13 +379,16 @@ def _best(
     problem = question.problem_with(question.loop)
     own = question.values(design.parameters)
     free = tuning_of(problem, search(problem, _STARTS, seed, [own], None))
-    if free.assessment is None:
+    solved = free.found.solved
+    if free.assessment is None or solved is None:
         return None
     if not free.ok:  # few starts did not arrive: the design's own parameters are a start as good
-        free = replace(free, parameters=problem.law.named(own))
+        free = replace(
+            free, found=replace(free.found, solved=replace(solved, values=np.array(own)))
+        )
     limited = replace(question, drive=drive, reported=())
     try:
-        found = shortfall(limited, free)
+        found = shortfall(limited.problem, free)
     except SolverError:
         found = None
-    return None if found is None else question.named(list(found.values.values()))
+    return None if found is None else question.named(found.values)

@@ -11,7 +11,13 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from ..limits import HOOK, PAYLOAD
     from .family_problem import FamilyLoop, FamilyProblem, Objective
-    from .family_question import PAYLOAD_FEEDBACK, FamilyQuestion, pose_family
+    from .family_question import (
+        PAYLOAD_FEEDBACK,
+        FamilyQuestion,
+        PosedFamily,
+        difference_text,
+        pose_family,
+    )
     from .loop_numbers import (
         Closing,
         LoopBlocks,

@@ -1,6 +1,7 @@
-"""`FamilyQuestion`: a case, changes of it and a structure, as the problem of a family.
+"""A case, changes of it and a structure: the questions of all, and the problem of the family.
 
-    case, structure -> FamilyQuestion -> DesignQuestion of each changed case -> FamilyProblem
+    case, structure -> FamilyQuestion -> DesignQuestion of each changed case
+    case, changes, structure -> PosedFamily -> FamilyProblem
 
 The controller is one: its law is bound to the plant of the case itself and used around every
 member.  Members that differ in nothing but the sea share their plant where drag is fixed.
@@ -9,7 +10,7 @@ member.  Members that differ in nothing but the sea share their plant where drag
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -19,8 +20,7 @@ from models.plant import LinearPlant
 from ..loop import Assessment
 from ..structures import ParametrisedController
 from .family_problem import FamilyLoop, FamilyProblem, Objective
-from .problem import Problem
-from .question import DesignQuestion, pose
+from .question import DesignQuestion, pose, with_masses
 from .rope_masses import masses_for
 
 PAYLOAD_FEEDBACK = "payload-feedback"
@@ -43,7 +43,7 @@ class FamilyQuestion:
         self, case: Case, structure: str = PAYLOAD_FEEDBACK, masses: int | None = None
     ) -> None:
         self.case, self.structure, self.masses = case, structure, masses
-        self._posed: dict[Case, tuple[DesignQuestion, Problem]] = {}
+        self._posed: dict[Case, DesignQuestion] = {}
         self._plants: dict[tuple[object, ...], LinearPlant] = {}
 
     @property
@@ -54,7 +54,7 @@ class FamilyQuestion:
     @cached_property
     def law(self) -> ParametrisedController:
         """The controller's law, bound to the plant of the case itself."""
-        return self._pose(self.case)[1].law
+        return self.nominal.law
 
     @property
     def guesses(self) -> list[list[float]]:
@@ -67,75 +67,167 @@ class FamilyQuestion:
     @property
     def most_masses(self) -> int:
         """The largest number of rope masses of any case posed so far."""
-        return max([self.nominal.masses, *(q.masses for q, _ in self._posed.values())])
+        return max([self.nominal.masses, *(q.masses for q in self._posed.values())])
 
     def question(self, case: Case) -> DesignQuestion:
         """Return the question of a case like this one."""
-        return self._pose(case)[0]
+        if case not in self._posed:
+            posed = pose(case, self.structure, self.masses, built_for=self.case)
+            self._posed[case] = posed
+        return self._posed[case]
 
     def loop(self, case: Case, name: str = "", weight: float = 1.0) -> FamilyLoop:
         """Return the member that a case like this one is."""
-        question, problem = self._pose(case)
-        plant = self._plants.setdefault(
-            (question.data, case.sensors, question.drag_before, question.masses), problem.plant
-        )
-        problem = replace(problem, plant=plant, law=self.law)
+        question = self.question(case)
+        plant = self._plants.setdefault(_loop_key(question), question.plant)
+        problem = replace(question.problem, plant=plant, law=self.law)
         return FamilyLoop(name=name, problem=problem, weight=weight)
 
     def masses_wanted(self, cases: Sequence[Case], assessments: Sequence[Assessment]) -> int:
         """Return the rope masses that the most demanding loop of any member asks for."""
-        most = self.most_masses
         if self.masses is not None:
-            return most
-        loops = zip(cases, assessments, strict=True)
-        return max(
-            [most, *(masses_for(self.question(c), loop) for c, loop in loops if loop.stable)]
-        )
+            return self.most_masses
+        questions = [self.question(case) for case in cases]
+        return max(self.most_masses, _masses_wanted(questions, assessments))
 
-    def _pose(self, case: Case) -> tuple[DesignQuestion, Problem]:
-        if case not in self._posed:
-            self._posed[case] = _posed(case, self.structure, self.masses)
-        return self._posed[case]
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PosedFamily:
+    """A case and changes of it with one structure, posed.
+
+    Attributes
+    ----------
+    questions
+        The question of each member, the case's own first.
+    names
+        What each member is called.
+    objective
+        What is made small over all of them.
+    """
+
+    questions: tuple[DesignQuestion, ...]
+    names: tuple[str, ...]
+    objective: Objective = Objective.WORST
+
+    @property
+    def first(self) -> DesignQuestion:
+        """The question of the case itself."""
+        return self.questions[0]
+
+    @property
+    def alone(self) -> PosedFamily:
+        """The case itself, a family of one."""
+        return replace(self, questions=self.questions[:1], names=self.names[:1])
+
+    @property
+    def masses(self) -> int:
+        """The most rope masses of any member."""
+        return max(question.masses for question in self.questions)
+
+    @cached_property
+    def problem(self) -> FamilyProblem:
+        """The problem with all limits that bind."""
+        return self._problem(drive=True)
+
+    @cached_property
+    def without_drive(self) -> FamilyProblem:
+        """The problem with the limits of the loop only, as if the drive were large enough."""
+        return self._problem(drive=False)
+
+    def _problem(self, *, drive: bool) -> FamilyProblem:
+        plants: dict[tuple[object, ...], LinearPlant] = {}
+        loops = []
+        for name, question in zip(self.names, self.questions, strict=True):
+            problem = question.problem_with(question.limits if drive else question.loop)
+            plant = plants.setdefault(_loop_key(question), problem.plant)
+            problem = replace(problem, plant=plant, law=self.first.law)
+            loops.append(FamilyLoop(name=name, problem=problem))
+        return FamilyProblem(scenarios=tuple(loops), objective=self.objective)
+
+    def masses_wanted(self, assessments: Sequence[Assessment]) -> int:
+        """Return the rope masses that the most demanding loop of any member asks for."""
+        return max(self.masses, _masses_wanted(self.questions, assessments))
+
+    def on(self, masses: int) -> PosedFamily:
+        """Return the family on a number of rope masses, where members have fewer."""
+        finer = (
+            with_masses(question, masses)
+            if question.masses < masses and question.data.lumping != "thesis"
+            else question
+            for question in self.questions
+        )
+        return replace(self, questions=tuple(finer))
 
 
 def pose_family(
     case: Case,
-    members: Sequence[Mapping[str, Any]],
+    members: Sequence[Mapping[str, Any] | Case],
     structure: str = PAYLOAD_FEEDBACK,
     *,
     objective: str | Objective = Objective.WORST,
     masses: int | None = None,
-) -> FamilyProblem:
-    """Return the problem of a case together with changes of it.
+    held: Mapping[str, float] | None = None,
+) -> PosedFamily:
+    """Return a case together with changes of it, posed for a structure.
 
     Parameters
     ----------
     case
         The case, the first member of the family.
     members
-        Changes of the case by dotted path, a mapping for each further member.
+        The further members: changes of the case by dotted path, or cases.
     structure, masses
         As `FamilyQuestion` takes them.
     objective
         ``worst``, ``mean`` or ``regret``; for the last see `synth.search.with_bests`.
+    held
+        Parameters of the structure that are not searched, by name.
 
     Raises
     ------
     InputError
-        If a change is not valid, or there is no such structure or objective.
+        If a change is not valid, or there is no such structure, objective or parameter.
     """
+    cases = [m if isinstance(m, Case) else case.replace(dict(m)) for m in members]
     posed = FamilyQuestion(case, structure, masses)
-    changed = [posed.loop(case.replace(dict(m)), _named(m)) for m in members]
-    return FamilyProblem(
-        scenarios=(posed.loop(case, case.name), *changed), objective=Objective.of(objective)
+    return PosedFamily(
+        questions=tuple(
+            replace(posed.question(one), held=dict(held or {})) for one in (case, *cases)
+        ),
+        names=(case.name, *(difference_text(case, one) for one in cases)),
+        objective=Objective.of(objective),
     )
 
 
-def _named(changes: Mapping[str, Any]) -> str:
-    return ", ".join(f"{path} {value}" for path, value in changes.items())
+def difference_text(case: Case, other: Case) -> str:
+    """Return in what a case differs from another, as ``rope.damping_ratio 0.0003``."""
+    own, others = _flat(case.to_dict()), _flat(other.to_dict())
+    paths = [path for path in {**own, **others} if own.get(path) != others.get(path)]
+    told = (f"{path} {_value_text(others.get(path))}" for path in paths)
+    return ", ".join(told) or "the case itself"
 
 
-def _posed(case: Case, structure: str, masses: int | None) -> tuple[DesignQuestion, Problem]:
-    """Return the question of a case, and its problem with a structure."""
-    question = pose(case, structure, masses)
-    return question, question.problem
+def _flat(data: Mapping[str, Any], above: str = "") -> dict[str, Any]:
+    """Return what stands in nested sections by dotted path."""
+    found: dict[str, Any] = {}
+    for name, value in data.items():
+        path = f"{above}{name}"
+        found |= _flat(value, f"{path}.") if isinstance(value, Mapping) else {path: value}
+    return found
+
+
+def _value_text(value: Any) -> str:
+    if isinstance(value, list):
+        return "changed"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _loop_key(question: DesignQuestion) -> tuple[object, ...]:
+    """Return what questions have in common that share their plant."""
+    return question.data, question.case.sensors, question.drag_before, question.masses
+
+
+def _masses_wanted(questions: Sequence[DesignQuestion], assessments: Sequence[Assessment]) -> int:
+    """Return the rope masses that the most demanding stable loop asks for."""
+    pairs = zip(questions, assessments, strict=True)
+    return max((masses_for(q, seen) for q, seen in pairs if seen.stable), default=0)

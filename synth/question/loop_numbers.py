@@ -349,6 +349,7 @@ class LoopNumbers:
         self._cost, self._margins = cost, margins
         self.omega, self._point = omega, point
         self.log_drag, self.extra = log_drag, extra
+        self._goal = goal
         self._amplitude = exp(extra * 2.0) if goal is Goal.SEA else None
         self._fresh: Fresh | None = None
 
@@ -364,6 +365,7 @@ class LoopNumbers:
             self._point,
             log_drag=self.log_drag,
             extra=self.extra,
+            goal=self._goal,
         )
 
     @cached_property

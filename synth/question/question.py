@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -45,6 +45,7 @@ from ..limits import (
 )
 from ..loop import Assessment, DragElement, LinearController, disturbances
 from ..structures import (
+    Fixed,
     LowOrderFeedback,
     ParametrisedController,
     PayloadFeedback,
@@ -117,6 +118,8 @@ class DesignQuestion:
         The quadratic drag to be linearised with the response, or None if C is given.
     drag_before, payload_rms_before
         Linear drag [N s/m] and rms payload motion [m] with the drum held.
+    held
+        Parameters of the structure that are not searched, by name.
     """
 
     case: Case
@@ -132,6 +135,7 @@ class DesignQuestion:
     drag: DragElement | None
     drag_before: float
     payload_rms_before: float
+    held: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def masses(self) -> int:
@@ -144,14 +148,21 @@ class DesignQuestion:
         return (*self.loop, *self.drive)
 
     @cached_property
-    def law(self) -> ParametrisedController:
-        """The structure, bound to the plant."""
+    def whole_law(self) -> ParametrisedController:
+        """The structure, bound to the plant, with all its parameters."""
         return self.structure.bind(self.plant)
+
+    @cached_property
+    def law(self) -> ParametrisedController:
+        """The structure, bound to the plant, with the parameters that are not held."""
+        if not self.held:
+            return self.whole_law
+        return Fixed(structure=self.structure, values=self.held).bind(self.plant)
 
     @property
     def amplifier(self) -> float | None:
         """The fixed gain A of the thesis's feedback; None for a structure without."""
-        return _amplifier(self.structure, self.law)
+        return _amplifier(self.structure, self.whole_law)
 
     @cached_property
     def problem(self) -> Problem:
@@ -195,6 +206,8 @@ def pose(
     structure: str = "payload-feedback",
     masses: int | None = None,
     known: DesignQuestion | None = None,
+    *,
+    built_for: Case | None = None,
 ) -> DesignQuestion:
     """Return the question of a case and a structure.
 
@@ -211,13 +224,15 @@ def pose(
         Rope masses; by default the case's, or a number that suits a quick loop.
     known
         The question of a similar case: what this one has in common with it is taken from there.
+    built_for
+        The case whose motor, drum and gains the structure is built for; by default the case.
 
     Raises
     ------
     InputError
         If there is no such structure, or the case lacks what a design needs.
     """
-    named = structure_named(structure, case)
+    named = structure_named(structure, built_for or case)
     data = PlantData.from_case(case)
     shaken = known if known is not None and _same_sea(case, known.case) else None
     hook = HookMotion.from_case(case) if shaken is None else shaken.hook

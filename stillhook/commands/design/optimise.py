@@ -10,14 +10,35 @@ from typing import TYPE_CHECKING
 
 from ...designs import AT_LEAST, LIMITS
 from ...text import OutputFolder, number
-from ..declare import CASE, NO_BOUND, SEED, results_folder, starts, text
-from ..given import case_words, gains_text, given_case
+from ..declare import (
+    CASE,
+    NO_BOUND,
+    OBJECTIVE,
+    SEED,
+    changed_words,
+    repeated,
+    results_folder,
+    starts,
+    text,
+)
+from ..given import case_words, gains_text, given_case, parse_fixed, parse_members
 from ..lists import names
 from ..working import conclude, kept_in, prepared, working
 
 if TYPE_CHECKING:
     from synth.design import Design
 
+_FAMILY = (
+    repeated(
+        "--member",
+        "PATH=VALUE[;..]",
+        "another case that the same gains are for, as in --member rope.damping_ratio=0.0002 or "
+        "--member 'rope.length=800 m; payload.mass=40 t'",
+        "members",
+    ),
+    OBJECTIVE,
+    repeated("--fix", "NAME=NUMBER", "hold a parameter, as in --fix a=0", "fixed"),
+)
 ARGUMENTS = (
     CASE,
     results_folder("out/<name of the case>"),
@@ -30,6 +51,7 @@ ARGUMENTS = (
         "(default: those that the case's sensors allow)",
         read=names,
     ),
+    *_FAMILY,
     NO_BOUND,
 )
 
@@ -39,7 +61,8 @@ def run(arguments: argparse.Namespace) -> int:
     from synth.structures import structure_named
 
     case = given_case(arguments)
-    asked = arguments.structure
+    asked, fixed = arguments.structure, parse_fixed(arguments.fixed)
+    members = [case.replace(changes) for changes in parse_members(arguments.members)]
     for name in asked or ():
         structure_named(name, case)  # an unknown name ends here, before any file
     folder = prepared(arguments, case.name)
@@ -54,6 +77,9 @@ def run(arguments: argparse.Namespace) -> int:
             design = optimise_gains(
                 case,
                 asked[0] if asked is not None and len(asked) == 1 else asked,
+                members=members,
+                objective=arguments.objective,
+                fixed=fixed,
                 starts=arguments.starts,
                 seed=arguments.seed,
                 progress=tell,
@@ -83,7 +109,8 @@ def _next(
     words = case_words(arguments, folder)
     plain = design.structure == "payload-feedback"
     structure = "" if plain else f" --structure {design.structure}"
-    optimise = f"stillhook optimise {words}{structure}"
+    family = "".join(f" {shlex.quote(word)}" for word in changed_words(arguments, _FAMILY))
+    optimise = f"stillhook optimise {words}{structure}{family}"
     rows = []
     if not design.feasible:
         height = _rounded(design.significant_height, math.floor)

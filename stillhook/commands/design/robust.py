@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING
 from models.basics import InputError
 
 from ...text import OutputFolder, csv_text
-from ..declare import CASE, SEED, STRUCTURE, choice, repeated, results_folder, starts, text, whole
+from ..declare import (
+    CASE,
+    OBJECTIVE,
+    SEED,
+    STRUCTURE,
+    repeated,
+    results_folder,
+    starts,
+    text,
+    whole,
+)
 from ..given import case_words, gains_text, given_case
 from ..lists import parse_range
 from ..vary import parse_seas, parse_vary
@@ -33,12 +43,7 @@ ARGUMENTS = (
         "FILE",
         "a table of sea states: significant_height, peak_period, occurrence (.csv)",
     ),
-    choice(
-        "--objective",
-        ("worst", "mean", "regret"),
-        "what is made small (default: the worst payload motion)",
-        "worst",
-    ),
+    OBJECTIVE,
     STRUCTURE,
     text(
         "--schedule",

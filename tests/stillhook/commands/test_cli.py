@@ -89,6 +89,25 @@ def test_optimise_prints_a_summary_that_fits_a_terminal(optimised):
     assert len(after.splitlines()) >= 6
 
 
+def test_optimise_hands_on_members_objective_and_fixed_parameters(run, monkeypatch):
+    asked = {}
+
+    def made(case, structure, **settings):
+        asked.update(settings)
+        return infeasible_design()
+
+    monkeypatch.setattr("synth.optimise_gains", made)
+    family = ["--member", "rope.length=1500; payload.mass=40 t", "--member", "rope.length=1 km"]
+    words = [*family, "--objective", "mean", "--fix", "a=50"]
+    ending = run("optimise", "thesis-1975", *THREE, *words, "--no-bound")
+    assert [case.rope.length for case in asked["members"]] == [1500.0, 1000.0]
+    assert asked["members"][0].payload.mass == 40e3
+    assert asked["objective"] == "mean"
+    assert asked["fixed"] == {"a": 50.0}
+    again = "--member 'rope.length=1500; payload.mass=40 t' --member 'rope.length=1 km'"
+    assert f"{again} --objective mean --fix a=50" in re.sub(r"\s+", " ", ending.out)
+
+
 def test_optimise_suggests_commands_that_work(optimised, run):
     folder, done = optimised
     lines = done.stdout.partition("\nNext:\n")[2].splitlines()
@@ -443,6 +462,12 @@ WRONG_WORDS = {
         "optimise thesis-1975 --starts 0",
         r"optimise: --starts must be in \[1, 4096\], got 0",
     ),
+    "no member": (
+        "optimise thesis-1975 --member rope.length",
+        r"--member: must be PATH=VALUE\[;PATH=VALUE..\], as in rope.damping_ratio=0.0002, got "
+        "'rope.length'",
+    ),
+    "no number": ("optimise thesis-1975 --fix a=x", "--fix: a must be a finite number, got 'x'"),
     "no seed": ("optimise thesis-1975 --seed -1", "optimise: --seed must be at least 0, got -1"),
     "a new case nowhere": ("new none/my.yaml", "none/my.yaml: cannot be written: No such file .*"),
 }

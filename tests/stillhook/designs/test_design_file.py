@@ -12,6 +12,7 @@ from designs import infeasible_design, loopless_design, thesis_design, unstable_
 
 import stillhook as sh
 from models import Case, InputError
+from stillhook.designs import design_data
 from synth.search import Start
 from synth.verify import Verification
 
@@ -87,6 +88,24 @@ def test_alternatives_come_back_on_the_same_case(tmp_path):
     path = sh.save_design(design, tmp_path / "d.yaml")
     assert path.read_text(encoding="utf-8").count("winch:") == 1
     assert differences(design, sh.load_design(path)) == []
+
+
+def test_members_come_back_on_their_own_cases(tmp_path):
+    case = thesis_design().case
+    member = dataclasses.replace(
+        thesis_design(), case=case.replace({"rope.length": 1500.0}), built_for=case
+    )
+    other = dataclasses.replace(thesis_design(), members=(member,), status="another")
+    design = dataclasses.replace(
+        thesis_design(), members=(member,), alternatives=(other,), objective="mean", fixed=("a",)
+    )
+    path = sh.save_design(design, tmp_path / "d.yaml")
+    assert path.read_text(encoding="utf-8").count("winch:") == 2
+    assert differences(design, sh.load_design(path)) == []
+    told = design_data(design)
+    assert "case" not in told
+    assert told["members"][0]["difference"] == "rope.length 1500"
+    assert not {"case", "built_for"} & set(told["alternatives"][0]["members"][0])
 
 
 def test_a_file_of_gains_of_the_first_format_is_read():

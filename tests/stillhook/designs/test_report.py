@@ -257,3 +257,15 @@ def test_facts_name_what_the_figures_rest_on():
     assert rows["check"].startswith("verified on")
     assert "search" not in rows
     assert required_table(thesis_design()) is None
+
+
+def test_members_and_held_parameters_are_told():
+    design = thesis_design()
+    case = design.case.replace({"rope.length": 1500.0})
+    member = dataclasses.replace(design, case=case, payload_rms=0.5)
+    made = dataclasses.replace(design, members=(member,), fixed=("a",))
+    text = markdown(design_report(made, bound=False))
+    assert "rope.length 1500" in text
+    assert "made small: the worst of them" in text
+    assert "a is held" in text
+    assert "made small" not in markdown(design_report(design, bound=False))
