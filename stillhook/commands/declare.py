@@ -193,7 +193,7 @@ NO_BOUND = switch(
 OBJECTIVE = choice(
     "--objective",
     ("worst", "mean", "regret"),
-    "what is made small of several (default: the worst payload motion)",
+    "what is made small (default: the worst payload motion)",
     "worst",
 )
 STRUCTURE = text(
