@@ -104,9 +104,9 @@ class SpectralFactor:
         wanted = target / scale
         ends = np.log(np.array(self.band) / self.peak)
         bounds = _bounds(self.sections, self.values.size, ends)
-        size = float(np.linalg.norm(misfit(self.values))) or 1.0
+        root /= float(np.linalg.norm(misfit(self.values))) or 1.0  # of size one to begin with
         start = np.clip(self.values, *bounds)
-        found = least_squares(lambda v: misfit(v) / size, start, bounds=bounds, max_nfev=60).x
+        found = least_squares(misfit, start, bounds=bounds, max_nfev=60).x
         better = found if np.all(np.isfinite(found)) else self.values
         return replace(self, values=better, omega=omega, target=target)
 
