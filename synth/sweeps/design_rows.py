@@ -339,13 +339,13 @@ class DesignRows:
         )
         found.drag[:] = batch.numbers.fixed_drag
         if self.spring:
-            springs = self._springs(batch)
+            springs, orders = self._springs(batch), 2 if self._second else 1
             found.stable[:] = springs.stable
-            with np.errstate(all="ignore"):
-                orders = 2 if self._second else 1
-                several = springs.moments(self._outputs, nodes, shaken, orders=orders)
-            for name, columns in several.items():
-                found.moments[name][:, :orders] = columns
+            if self._outputs:
+                with np.errstate(all="ignore"):
+                    moments = springs.moments(self._outputs, nodes, shaken, orders=orders)
+                for name, columns in moments.items():
+                    found.moments[name][:, :orders] = columns
             return found
         loops = self._chains(batch, np.zeros(1))
         at = np.arange(len(batch))

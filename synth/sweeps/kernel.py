@@ -126,7 +126,7 @@ class SpringLoops:
         weights = nodes.sea if shaken.ratios is None else nodes.weights
         x = (nodes.omega / self.reference) ** 2
         squares = {name: squared(self._scaled(self._numerators[name]())) for name in outputs}
-        highest = max((len(c) for c in squares.values()), default=0) + orders - 1
+        highest = max(len(c) for c in squares.values()) + orders - 1
         powers = np.stack([x**m for m in range(highest)])
         right = (weights[:, None, :] * powers[None]).reshape(-1, x.size).T.copy()
         sums = np.empty((len(self), right.shape[1]))

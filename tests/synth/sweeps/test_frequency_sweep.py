@@ -262,6 +262,14 @@ def test_dataset_says_what_it_holds_and_unstable_cases_have_no_numbers() -> None
     )
 
 
+@pytest.mark.parametrize("metrics", [[], ["max_sensitivity"]])
+def test_sweep_needs_no_variances(metrics: list[str]) -> None:
+    alone = frequency_sweep(thesis_design(), SPRING, samples=32, metrics=metrics)
+    whole = frequency_sweep(thesis_design(), SPRING, samples=32)
+    for name in ("stable", *metrics):
+        np.testing.assert_array_equal(alone[name], whole[name])
+
+
 def test_worst_case_runs_again_alone_with_the_same_numbers() -> None:
     result = frequency_sweep(thesis_design(), SPRING, samples=200)
     worst = int(result["case"][int(np.nanargmax(result["payload_rms"].values))])
