@@ -32,7 +32,7 @@ from ..question import PAYLOAD
 from ..search import Progress
 from .differences import StepError, derivative
 from .fields import Number, numbers_of
-from .fixed_design import FixedDesign, fixed_design
+from .fixed_design import FixedDesign
 from .gradient import Gradient, sensitivity_gradient, variance_gradient
 from .results import FIGURES, Elasticity, Sensitivity
 from .slopes import PlantSlopes, changed
@@ -68,7 +68,7 @@ def sensitivity(
     """
     if design.margins is None:
         raise InputError("sensitivity: the loop must be stable; an unstable one has no rms")
-    fixed = fixed_design(design)
+    fixed = FixedDesign.of(design)
     figures, found, idle, steps = _first(fixed, progress)
     found.sort(key=lambda e: -abs(e.payload_rms))
     for k in range(min(second, len(found))):
@@ -94,10 +94,10 @@ def _first(
     gradients = _gradients(assessment, fixed)
     figures = {name: gradients[name].value for name in _OUTPUTS}
     figures["max_sensitivity"] = assessment.max_sensitivity
+    design, drag_now = fixed.design, assessment.coefficient or fixed.fixed_drag
     slopes = PlantSlopes(
-        fixed.case, masses=fixed.masses, drag=assessment.coefficient or fixed.fixed_drag,
-        measurements=fixed.measurements,
-    )  # fmt: skip
+        fixed.case, masses=design.masses, drag=drag_now, measurements=design.measurements
+    )
     drag = _DragMotion(fixed, assessment, gradients, slopes) if fixed.stochastic else None
     numbers = [n for n in numbers_of(fixed.case) if only is None or n.path == only]
     found: list[Elasticity] = []
@@ -134,7 +134,7 @@ def _first(
         }
         moved = drag.shift(own["velocity"]) if drag is not None else 0.0
         whole = _shares(value, own, moved, drag)
-        found.append(Elasticity(path=path, value=value, unit=fixed.units.get(name, ""), **whole))
+        found.append(Elasticity(path=path, value=value, unit=design.units.get(name, ""), **whole))
     return figures, found, idle, steps
 
 

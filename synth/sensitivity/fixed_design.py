@@ -1,6 +1,6 @@
 """A fixed design on a case that changes: `FixedDesign`.
 
-    Design -> FixedDesign -> closed loop on any case, with any gain moved
+    Design -> FixedDesign -> closed loop on its case, or with a number or a gain moved
 
 The controller is that of the design whatever the case becomes: sensitivity is about a world that
 differs from the one designed for.
@@ -8,7 +8,7 @@ differs from the one designed for.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -34,27 +34,39 @@ class FixedDesign:
 
     Attributes
     ----------
-    case, masses
-        The case that the figures hold for, and its rope masses.
-    law, names, values, units
-        The structure bound to its plant, its parameters' names, values and units.
-    measurements
-        What it hears of the plant with all sensors.
-    reference
-        The drag before compensation [N s/m]: where a consistent drag is counted from.
+    design
+        The design, whose structure stays bound to the plant that it was made for.
+    case, values
+        The case that the figures hold for, and the structure's parameters.
     drag
-        The design's own drag coefficient [N s/m], which is that of the unchanged case.
+        The linear drag coefficient [N s/m], where it is known: on the unchanged case.
     """
 
+    design: Design
     case: Case
-    masses: int
-    law: ParametrisedController
-    names: tuple[str, ...]
     values: tuple[float, ...]
-    units: Mapping[str, str]
-    measurements: tuple[str, ...]
-    reference: float
     drag: float | None
+
+    @classmethod
+    def of(cls, design: Design) -> FixedDesign:
+        """Return a design on its own case."""
+        question = design.question
+        return cls(
+            design=design,
+            case=design.sea_case,
+            values=tuple(question.values(design.parameters)),
+            drag=design.drag if question.drag is not None else None,
+        )
+
+    @property
+    def law(self) -> ParametrisedController:
+        """The structure."""
+        return self.design.question.law
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its parameters."""
+        return tuple(p.name for p in self.law.parameters)
 
     @property
     def stochastic(self) -> bool:
@@ -80,32 +92,22 @@ class FixedDesign:
     def disturbances_of(self, case: Case) -> tuple[Disturbance, ...]:
         """Return what shakes the plant of a changed case."""
         hook = HookMotion.from_case(case, warn=False)
-        spectra = heard_spectra(case, hook, self.measurements)
+        spectra = heard_spectra(case, hook, self.design.measurements)
         return disturbances(spectra, tuple(spectra))
 
-    def assessment(
-        self, case: Case | None = None, *, gain: str | None = None, factor: float = 1.0
-    ) -> Assessment | None:
-        """Return the closed loop on a case, a gain times a factor; None if it is unstable."""
-        here = self.case if case is None else case
-        values = [
-            value * (factor if name == gain or gain == "A" else 1.0)
-            for name, value in zip(self.names, self.values, strict=True)
-        ]
-        if gain is not None and gain != "A" and gain not in self.names:
-            raise InputError(f"sensitivity: there is no gain {gain!r}; there are: {self.names}")
-        quadratic = PlantData.from_case(here).quadratic_drag
-        stochastic = here.payload.fixed_drag is None and quadratic > 0.0
-        start = self.reference if stochastic else here.payload.fixed_drag or 0.0
-        plant = sensed_plant(here, masses=self.masses, drag=start)
-        plant = plant.select(measurements=self.measurements)
-        drag = DragElement(quadratic=quadratic, reference=start) if stochastic else None
+    def assessment(self) -> Assessment | None:
+        """Return the closed loop; None if it is unstable."""
+        stochastic = self.stochastic
+        # Where a consistent drag is counted from: that before compensation.
+        start = self.design.question.drag_before if stochastic else self.fixed_drag
+        plant = sensed_plant(self.case, masses=self.design.masses, drag=start)
+        quadratic = PlantData.from_case(self.case).quadratic_drag
         assessment = Assessment(
-            plant,
-            self.law.controller(values),
-            self.disturbances if case is None else self.disturbances_of(here),
-            drag=drag,
-            coefficient=self.drag if case is None and gain is None else None,
+            plant.select(measurements=self.design.measurements),
+            self.law.controller(list(self.values)),
+            self.disturbances,
+            drag=DragElement(quadratic=quadratic, reference=start) if stochastic else None,
+            coefficient=self.drag,
         )
         try:
             return assessment if assessment.stable else None
@@ -113,19 +115,29 @@ class FixedDesign:
             return None  # no drag agrees: unstable with any
 
     def with_number(self, path: str, factor: float) -> FixedDesign | None:
-        """Return the same design with a number of its case, or a gain, times a factor."""
+        """Return the same design with a number of its case, or a gain, times a factor.
+
+        None at the end of the number's range.  The amplifier ``gains.A`` moves all gains.
+
+        Raises
+        ------
+        InputError
+            If there is no such number or gain.
+        """
         if path.startswith("gains."):
-            name = path.removeprefix("gains.")
-            values = [
-                value * (factor if known == name else 1.0)
-                for known, value in zip(self.names, self.values, strict=True)
-            ]
+            gain = path.removeprefix("gains.")
+            if gain != "A" and gain not in self.names:
+                raise InputError(f"sensitivity: there is no gain {gain!r}; there are: {self.names}")
+            pairs = zip(self.names, self.values, strict=True)
+            values = (value * factor if gain in (name, "A") else value for name, value in pairs)
             return replace(self, values=tuple(values), drag=None)
-        number = next(n for n in numbers_of(self.case) if n.path == path)
+        number = next((n for n in numbers_of(self.case) if n.path == path), None)
+        if number is None:
+            raise InputError(f"sensitivity: there is no number {path!r} in the case")
         try:
             case = self.case.variant(number.change(number.value * factor))
         except InputError:
-            return None  # at the end of its range
+            return None
         return replace(self, case=case, drag=None)
 
     def law_slopes(self, s: ComplexArray) -> Iterator[tuple[str, float, ComplexArray]]:
@@ -144,19 +156,3 @@ class FixedDesign:
             return self.law.controller(values).response_at(s)
 
         return np.asarray(derivative(response, self.values[at], common=True), np.complex128)
-
-
-def fixed_design(design: Design) -> FixedDesign:
-    """Return a design as sensitivity sees it."""
-    question = design.question
-    return FixedDesign(
-        case=design.sea_case,
-        masses=design.masses,
-        law=question.law,
-        names=tuple(p.name for p in question.law.parameters),
-        values=tuple(question.values(design.parameters)),
-        units=design.units,
-        measurements=design.measurements,
-        reference=question.drag_before,
-        drag=design.drag if question.drag is not None else None,
-    )

@@ -15,9 +15,7 @@ from models.basics import InputError
 
 from ..design import Design
 from ..question import PAYLOAD
-from .fields import numbers_of
-from .fixed_design import FixedDesign, fixed_design
-from .slopes import changed
+from .fixed_design import FixedDesign
 
 FIGURES = ("payload_rms", "max_sensitivity", "torque_rms", "speed_rms")
 """The figures of a design that have elasticities."""
@@ -119,7 +117,7 @@ class Sensitivity:
 
     @cached_property
     def _fixed(self) -> FixedDesign:
-        return fixed_design(self.design)
+        return FixedDesign.of(self.design)
 
     def moved(self, share: float = 0.1, paths: Sequence[str] | None = None) -> tuple[Moved, ...]:
         """Recompute the design with numbers moved one at a time.
@@ -134,21 +132,15 @@ class Sensitivity:
         Raises
         ------
         InputError
-            If a path is unknown.
+            If a path is unknown, or the number is at the end of its range.
         """
         wanted = [e.path for e in self.elasticities if e.path.startswith("gains.")]
-        numbers = {n.path: n for n in numbers_of(self._fixed.case)}
         found = []
         for path in wanted if paths is None else paths:
-            if path.startswith("gains."):
-                assessment = self._fixed.assessment(
-                    gain=path.removeprefix("gains."), factor=1.0 + share
-                )
-            elif path in numbers:
-                case = changed(self._fixed.case, numbers[path], numbers[path].value * (1 + share))
-                assessment = self._fixed.assessment(case)
-            else:
-                raise InputError(f"sensitivity: there is no number {path!r} in the case")
+            moved = self._fixed.with_number(path, 1.0 + share)
+            if moved is None:
+                raise InputError(f"sensitivity: {path} cannot be moved by {100.0 * share:g} %")
+            assessment = moved.assessment()
             rms, peak = np.inf, np.inf
             if assessment is not None:
                 rms, peak = assessment.sigma(PAYLOAD), assessment.max_sensitivity

@@ -55,7 +55,7 @@ class MatrixSlope:
 
 
 class PlantSlopes:
-    """Slopes of the plant of a case, with or without its sensors.
+    """Slopes of the plant of a case with its sensors.
 
     Parameters
     ----------
@@ -66,11 +66,11 @@ class PlantSlopes:
     drag
         Linear drag coefficient of the payload at which the slopes are taken [N s/m].
     measurements
-        What the controller hears; None: the payload's three signals of the bare plant.
+        What the controller hears.
     """
 
     def __init__(
-        self, case: Case, *, masses: int, drag: float, measurements: Sequence[str] | None
+        self, case: Case, *, masses: int, drag: float, measurements: Sequence[str]
     ) -> None:
         self.case = case
         self._measurements = measurements
@@ -101,7 +101,7 @@ class PlantSlopes:
         count = len(self._nominal)
         both = np.asarray(derivative(parameters, number.value), dtype=np.float64)
         slope = self._slope(self.case, both[:count], both[count:])
-        if self._measurements is None or not number.path.startswith("sensors."):
+        if not number.path.startswith("sensors."):
             return slope
 
         def filters(value: float) -> FloatArray:
@@ -122,8 +122,6 @@ class PlantSlopes:
         return MatrixSlope(blocks=blocks, delays=delays)
 
     def _heard(self, bare: LinearPlant, case: Case) -> LinearPlant:
-        if self._measurements is None:
-            return bare
         return with_sensors(bare, case.sensors).select(measurements=self._measurements)
 
 
