@@ -49,21 +49,36 @@ class FrequencyAxis:
         return cmath.log(omega / self.low)
 
     def at(self, t: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the frequencies [rad/s] of points of one panel, and their slopes d omega/dt."""
-        middle = 0.5 * (t[0] + t[-1])
-        if middle <= 0.0 and self.half_line:
-            return self.low * (1.0 + t), np.full_like(t, self.low)
-        if middle >= self.end and self.half_line:
-            inverse = 1.0 / (1.0 - (t - self.end))
-            return self.high * inverse, self.high * inverse**2
+        """Return the frequencies [rad/s] of points of panels, (p, n), and slopes d omega/dt."""
         omega = self.low * np.exp(t)
-        return omega, omega
+        slope = omega
+        if self.half_line:
+            middle = 0.5 * (t[:, :1] + t[:, -1:])
+            below, above = middle <= 0.0, middle >= self.end
+            inverse = 1.0 / np.where(above, 1.0 - (t - self.end), 1.0)
+            far = np.where(above, self.high * inverse, omega)
+            slope = np.where(below, self.low, np.where(above, self.high * inverse**2, omega))
+            omega = np.where(below, self.low * (1.0 + t), far)
+        return omega, slope
 
-    def rule(self, a: float, b: float, count: int) -> tuple[FloatArray, FloatArray]:
-        """Return nodes [rad/s] and weights [rad/s] of one panel."""
-        x, w = _gauss_legendre(count)
-        omega, slope = self.at(0.5 * (a + b) + 0.5 * (b - a) * x)
-        return omega, 0.5 * (b - a) * w * slope
+    def rules(
+        self, panels: Sequence[tuple[float, float]] | FloatArray, counts: npt.ArrayLike
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return nodes and weights [rad/s] of panels one after the other, with so many nodes each.
+
+        `counts` is one number for all panels, or one for each.
+        """
+        a, b = np.array(panels, dtype=np.float64).reshape(-1, 2).T[:, :, None]
+        lengths = np.broadcast_to(counts, len(a))
+        first = np.cumsum(lengths) - lengths
+        omega, weights = np.empty((2, int(lengths.sum())))
+        for count in np.unique(lengths):
+            own = np.flatnonzero(lengths == count)
+            x, w = _gauss_legendre(int(count))
+            at, slope = self.at(0.5 * (a[own] + b[own]) + 0.5 * (b[own] - a[own]) * x)
+            places = first[own, None] + np.arange(count)
+            omega[places], weights[places] = at, 0.5 * (b[own] - a[own]) * w * slope
+        return omega, weights
 
     def poles(self, poles: Iterable[complex]) -> list[complex]:
         """Return poles s as points t with a positive imaginary part."""

@@ -168,17 +168,14 @@ def spectral_nodes(
         raise InputError(f"quadrature: per_panel must be at least 2, got {per_panel!r}")
     marks = axis.poles(poles)
     longest = longest_panel(panels_per_decade)
-    places = np.array(marks, dtype=np.complex128)
-    omega, weights = [], []
-    for a, b in cut_panels(axis, splits, marks, longest, clearance=1.0):
-        half = 0.5 * (b - a)
-        ratio = distance(a, b, places).min(initial=0.5 * longest) / half
-        rho = ratio + math.hypot(ratio, 1.0)
-        count = math.ceil(per_panel * math.log(_RHO_REFERENCE) / math.log(rho))
-        nodes, weight = axis.rule(a, b, min(per_panel, max(3, count)))
-        omega.append(nodes)
-        weights.append(weight)
-    return Quadrature(omega=np.concatenate(omega), weights=np.concatenate(weights))
+    panels = np.array(cut_panels(axis, splits, marks, longest, clearance=1.0))
+    half = 0.5 * (panels[:, 1] - panels[:, 0])
+    away = distance(panels[:, :1], panels[:, 1:], np.array(marks, dtype=np.complex128))
+    ratio = away.min(axis=1, initial=0.5 * longest) / half
+    rho = ratio + np.hypot(ratio, 1.0)
+    counts = np.ceil(per_panel * math.log(_RHO_REFERENCE) / np.log(rho)).astype(np.int64)
+    omega, weights = axis.rules(panels, np.clip(counts, 3, per_panel))
+    return Quadrature(omega=omega, weights=weights)
 
 
 def adaptive_nodes(
@@ -297,8 +294,8 @@ def _measure(
     """Evaluate the integrands on all wanted panels in one call."""
     if not wanted:
         return []
-    rules = [axis.rule(a, b, _LADDER[rung]) for a, b, rung, _ in wanted]
-    omega = np.concatenate([nodes for nodes, _ in rules])
+    counts = [_LADDER[rung] for _, _, rung, _ in wanted]
+    omega, weights = axis.rules([(a, b) for a, b, _, _ in wanted], counts)
     values = np.atleast_2d(_real(f(omega)))
     if values.shape[-1] != omega.size or values.ndim != 2:
         raise InputError(
@@ -312,19 +309,19 @@ def _measure(
             f"got {values[tuple(bad[0])]} at {omega[bad[0][1]]:.6g} rad/s"
         )
     panels, start = [], 0
-    for (a, b, rung, previous), (nodes, weights) in zip(wanted, rules, strict=True):
-        part = values[:, start : start + nodes.size]
-        start += nodes.size
-        integral = part @ weights
+    for (a, b, rung, previous), count in zip(wanted, counts, strict=True):
+        own = slice(start, start + count)
+        start += count
+        integral = values[:, own] @ weights[own]
         panels.append(
             _Panel(
                 a=a,
                 b=b,
                 rung=rung,
-                omega=nodes,
-                weights=weights,
+                omega=omega[own],
+                weights=weights[own],
                 integral=integral,
-                modulus=np.abs(part) @ weights,
+                modulus=np.abs(values[:, own]) @ weights[own],
                 error=np.abs(integral - (0.0 if previous is None else previous)),
             )
         )

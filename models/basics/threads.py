@@ -7,14 +7,23 @@ took 50 s instead of 8 s.
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
     """Run a block with one BLAS thread."""
-    with threadpool_limits(limits=1, user_api="blas"):
+    with _libraries().limit(limits=1, user_api="blas"):
         yield
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    """Return the BLAS libraries that are loaded, looked for once, as that takes a millisecond."""
+    importlib.import_module("scipy.linalg")  # it brings one of its own
+    return ThreadpoolController()

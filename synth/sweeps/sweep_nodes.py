@@ -144,7 +144,7 @@ def sweep_nodes(
     omega, weights, sea = [], [], []
     for a, b in panels:
         x, *rules = _rule()
-        at, slope = axis.at(0.5 * (a + b) + 0.5 * (b - a) * x)
+        (at,), (slope,) = axis.at((0.5 * (a + b) + 0.5 * (b - a) * x)[None])
         own = np.stack([0.5 * (b - a) * rule * slope for rule in rules])
         omega.append(at)
         weights.append(own)
@@ -172,9 +172,9 @@ def _product(
     edges = [
         np.linspace(one, two, int((two - one) / _FINE) + 2)[:-1] for one, two in pairwise(inner)
     ]
-    parts = [axis.rule(one, two, _FINE_RULE) for one, two in pairwise([*np.concatenate(edges), b])]
-    fine = np.concatenate([weight * density(at) for at, weight in parts])
-    t = np.array([axis.cut(complex(w)).real for at, _ in parts for w in at])
+    at, weights = axis.rules(list(pairwise([*np.concatenate(edges), b])), _FINE_RULE)
+    fine = weights * density(at)
+    t = np.array([axis.cut(complex(w)).real for w in at])
     points = (2.0 * t - a - b) / (b - a)
     found = np.zeros((2, x.size))
     for row, step in ((0, 1), (1, 2)):
