@@ -19,7 +19,7 @@ from ..basics import SolverError, check_range
 
 _OWNER = "drag"
 _ROUNDS = 12  # of finding nodes for a drag; two are the rule
-_SETTLED = 1e-3  # relative change of a drag for which the nodes need not change
+_SETTLED = 1e-3  # relative change of a drag for which adapted nodes need not change
 
 
 def gaussian_gain(sigma: float, current: float = 0.0) -> float:
@@ -135,7 +135,11 @@ def consistent_drag(
 
 
 def settled_drag(
-    quadratic: float, about: Callable[[float], Callable[[float], float]], start: float
+    quadratic: float,
+    about: Callable[[float], Callable[[float], float]],
+    start: float,
+    *,
+    settled: float = _SETTLED,
 ) -> float:
     """Return `consistent_drag` where the motion is an integral over frequencies.
 
@@ -152,6 +156,8 @@ def settled_drag(
         suit this C; it may raise SolverError where there are none (an undamped motion).
     start
         The first C [N s/m].
+    settled
+        Relative change of C for which the nodes need not change.
 
     Raises
     ------
@@ -163,14 +169,14 @@ def settled_drag(
     check_range(_OWNER, "quadratic", quadratic, low=0.0, unit="N s2/m2")
     if quadratic == 0.0:
         return 0.0
-    current = max(start, quadratic)
+    current = start or quadratic
     for _ in range(_ROUNDS):
         try:
             found = consistent_drag(quadratic, about(current))
         except SolverError:
             current *= 4.0  # more drag damps the motion, so that it can be integrated
             continue
-        if found == 0.0 or abs(found - current) <= _SETTLED * found:
+        if found == 0.0 or abs(found - current) <= settled * found:
             return found
         current = found
     return consistent_drag(quadratic, lambda C: about(C)(C))

@@ -30,10 +30,9 @@ from ..question import (
     FamilyProblem,
     Objective,
     PosedFamily,
-    masses_for,
+    on_enough_masses,
     pose,
     pose_family,
-    with_masses,
 )
 from ..search import Progress, search, with_bests
 from ..structures import LowOrderFeedback, structure_named
@@ -209,7 +208,11 @@ def _high_order(posed: PosedFamily, order: int | None, progress: Progress | None
     others = (
         pose(member.case, name, masses, built_for=question.case) for member in posed.questions[1:]
     )
-    designs = [_evaluated(member, parameters) for member in (question, *others)]
+    designs = []
+    for member in (question, *others):
+        growth = _growth(member, parameters)
+        loop = member.assess(parameters) if growth <= 0.0 else None
+        designs.append(evaluated(member, parameters, loop, growth=growth))
     design = _with_members(designs, posed)
     return verified(replace(design, ok=all(one.ok for one in designs)), progress, question)
 
@@ -235,32 +238,33 @@ def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback
     """
     question = pose(case, structure)
     complete = checked_parameters(question, gains)
-    growth = _growth(question, complete)
-    if growth > 0.0 and question.masses < MAX_MASSES and question.data.masses is None:
-        # Few masses do not have their modes where the rope does: made on it, a loop may hold there.
-        finer = with_masses(question, MAX_MASSES)
-        if (there := _growth(finer, complete)) <= 0.0:
-            question, growth = finer, there
-    if growth <= 0.0:
-        masses = masses_for(question, question.assess(complete))
-        if masses > question.masses:
-            question = with_masses(question, masses)
-            growth = _growth(question, complete)
-    return verified(_evaluated(question, complete, growth), None, question)
+    question, loop, growth = on_enough_masses(
+        question, complete, lambda posed, values: posed.problem.assess(values)
+    )
+    return verified(evaluated(question, complete, loop, growth=growth), None, question)
 
 
-def _evaluated(
-    question: DesignQuestion, parameters: Mapping[str, float], growth: float | None = None
+def evaluated(
+    question: DesignQuestion,
+    parameters: Mapping[str, float],
+    assessment: Assessment | None,
+    prices: Mapping[str, float] | None = None,
+    *,
+    growth: float = 0.0,
+    how: str = "stable",
 ) -> Design:
-    """Return what parameters do; the loop's growth rate [1/s] is worked out if it is not given."""
-    growth = _growth(question, parameters) if growth is None else growth
-    if growth > 0.0:
-        status = f"unstable: grows by a factor e every {1.0 / growth:.3g} s"
+    """Return what given parameters do: a design that is ok if it keeps every limit.
+
+    `how` begins its status; `growth` [1/s] is told where `assessment` is None.
+    """
+    if assessment is None:
+        status = "unstable: no drag agrees with the motion"
+        if growth > 0.0:
+            status = f"unstable: grows by a factor e every {1.0 / growth:.3g} s"
         return recorded(question, parameters, None, {}, ok=False, status=status)
-    assessment = question.assess(parameters)
-    uses = every_use(question, assessment, {})
+    uses = every_use(question, assessment, prices or {})
     broken = [u.name for u in uses.values() if u.enforced and not u.kept]
-    status = "stable; " + (f"breaks {', '.join(broken)}" if broken else "keeps every limit")
+    status = f"{how}; " + (f"breaks {', '.join(broken)}" if broken else "keeps every limit")
     return recorded(question, parameters, assessment, uses, ok=not broken, status=status)
 
 
@@ -459,8 +463,7 @@ def recorded(
     """Return a design in the question's sea; `assessment` is None where the loop is unstable."""
     drag, shares = question.drag_before, {}
     if assessment is not None:
-        fixed = question.case.payload.fixed_drag
-        drag = assessment.coefficient if question.drag is not None else float(fixed or 0.0)
+        drag = question.drag_in(assessment)
         limits = (*question.limits, *question.reported)
         signals = dict.fromkeys([PAYLOAD, *(name for limit in limits for name in limit.outputs)])
         shares = {name: assessment.shares(name) for name in signals}

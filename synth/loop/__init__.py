@@ -1,8 +1,7 @@
 """The closed loop of a plant and a linear controller.
 
 In come a linear plant, a controller in state space and the spectra of the disturbances; out come
-responses, poles, variances, stability margins and the
-drag that agrees with the motion.
+responses, poles, variances, stability margins and the drag that agrees with the motion.
 """
 
 from typing import TYPE_CHECKING
@@ -10,9 +9,10 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .assess import Assessment, frequency_grid, integration_band
+    from .assess import Assessment, consistent_coefficient, frequency_grid, integration_band
     from .controller import LinearController, closed_loop_matrix, closed_loop_poles
     from .disturbance import Disturbance, disturbances
+    from .drag_element import DragElement, with_drag
     from .dual import (
         Dual,
         at_least,
@@ -27,15 +27,8 @@ if TYPE_CHECKING:
         value_of,
         where,
     )
-    from .loop import (
-        DragElement,
-        PlantBlocks,
-        closed_loop,
-        numeric_blocks,
-        return_differences,
-        with_drag,
-    )
-    from .margins import Margins, crossings, loop_margins, refine_minima, worst_margins
+    from .margins import Margins, crossings, level_ends, loop_margins, refine_minima
     from .pole_region import PoleRegion, counted_poles, with_delay_models
+    from .responses import Closing, LoopBlocks, LoopResponses
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -1,16 +1,15 @@
 """`Assessment`: the closed loop of any linear controller in numbers.
 
-This is what the optimiser, the exchange of nodes and every report look through: one plant,
-one controller, what shakes them, and (if there is quadratic drag) the drag coefficient that
-agrees with the response.  Everything is computed when asked for and kept.
+This is what every report looks through, and the warm view on nodes and frequencies that are made
+from poles alone: one plant, one controller, what shakes them, and (if there is quadratic drag) the
+drag coefficient that agrees with the response.  Everything is computed when asked for and kept.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 
@@ -26,13 +25,18 @@ from models.plant import LinearPlant, settled_drag
 
 from .controller import LinearController, closed_loop_plant, closed_loop_poles
 from .disturbance import Disturbance
-from .loop import DragElement, closed_loop, numeric_blocks, return_differences, with_drag
-from .margins import Margins, loop_margins, refine_minima, sensitivity_peaks, worst_margins
+from .drag_element import DragElement, with_drag
+from .margins import Margins, least_distances, loop_margins, refine_minima, worst_margins
 from .pole_region import PoleRegion, with_delay_models
+from .responses import LoopBlocks, LoopResponses
 
 _RTOL = 1e-8  # of every variance
 _GRID_PER_DECADE = 150
 _LOW = 0.3  # of the largest value on the grid, below which no peak between its points is looked for
+_SAME_NODES = 0.05  # relative change of the drag for which nodes made from poles do
+
+Nodes = Callable[[ComplexArray], Quadrature]
+Grid = Callable[[ComplexArray], FloatArray]
 
 
 class Assessment:
@@ -48,6 +52,10 @@ class Assessment:
         Quadratic drag, if any; its coefficient is then solved with the response.
     coefficient
         The drag coefficient [N s/m] if it is known already (the optimiser's own).
+    nodes, grid
+        From the closed loop's poles [1/s] to quadrature nodes for its variances, and to frequencies
+        [rad/s] dense enough to see every peak and crossing; by default nodes that adapt to the
+        spectra, and `frequency_grid`.
     """
 
     def __init__(
@@ -58,12 +66,16 @@ class Assessment:
         *,
         drag: DragElement | None = None,
         coefficient: float | None = None,
+        nodes: Nodes | None = None,
+        grid: Grid | None = None,
     ) -> None:
         self._bare = plant
         self.controller = controller
         self.disturbances = tuple(disturbances)
         self._drag = drag
         self._given = coefficient
+        self._nodes, self._dense = nodes, grid
+        self._parts: dict[tuple[str, ...], LinearPlant] = {}
         self._moments: dict[str, tuple[float, float]] = {}
         self._shares: dict[str, dict[str, float]] = {}
 
@@ -74,7 +86,9 @@ class Assessment:
             return 0.0
         if self._given is not None:
             return self._given
-        return consistent_coefficient(self._bare, self.controller, self.disturbances, self._drag)
+        return consistent_coefficient(
+            self._bare, self.controller, self.disturbances, self._drag, nodes=self._nodes
+        )
 
     @cached_property
     def plant(self) -> LinearPlant:
@@ -105,6 +119,8 @@ class Assessment:
     @cached_property
     def grid(self) -> FloatArray:
         """Frequencies dense enough to see every peak and crossing [rad/s]."""
+        if self._dense is not None:
+            return self._dense(self.poles)
         open_poles = np.concatenate([self.plant.poles(), np.linalg.eigvals(self.controller.A)])
         return frequency_grid(np.concatenate([self.poles, open_poles]))
 
@@ -113,28 +129,28 @@ class Assessment:
         """Margins of the loops broken at the inputs."""
         return worst_margins(
             [
-                loop_margins(partial(self.loop_gain, index=i), self.grid, gain, self._peaks[i])
-                for i, gain in enumerate(self._grid_gain)
+                loop_margins(partial(self.loop_gain, index=i), self.grid, gain, self._minima[i])
+                for i, gain in enumerate(self.gains)
             ]
         )
 
     @cached_property
-    def _grid_gain(self) -> list[ComplexArray]:
-        """L of each loop on the grid."""
+    def gains(self) -> list[ComplexArray]:
+        """L of each loop on the grid, (k,) each."""
         return self._gains(self.grid)
 
     @cached_property
-    def _peaks(self) -> list[tuple[FloatArray, FloatArray]]:
-        """Places of the local minima of |1 + L| of each loop, and their values."""
+    def _minima(self) -> list[list[tuple[FloatArray, FloatArray]]]:
+        """Places and values of the local minima of |1 + L| and of 1/|S - 1/2| of each loop."""
         return [
-            sensitivity_peaks(partial(self.loop_gain, index=i), self.grid, gain)
-            for i, gain in enumerate(self._grid_gain)
+            least_distances(partial(self.loop_gain, index=i), self.grid, gain)
+            for i, gain in enumerate(self.gains)
         ]
 
     @property
     def max_sensitivity(self) -> float:
         """M_s of the worst loop, as in `margins` but without the crossings."""
-        return float(1.0 / min(least.min() for _, least in self._peaks))
+        return float(1.0 / min(least.min() for (_, least), _ in self._minima))
 
     def loop_gain(self, omega: FloatArray, index: int = 0) -> ComplexArray:
         """Return L of the loop broken at input `index`, (k,)."""
@@ -142,8 +158,7 @@ class Assessment:
 
     def response(self, output: str, disturbance: str, omega: FloatArray) -> ComplexArray:
         """Return the closed-loop response of `output` to `disturbance`, (k,)."""
-        pair = (output, disturbance)
-        return np.asarray(self._responses(omega, [pair])[pair])
+        return np.asarray(self._responses([output], [disturbance], omega)[0, 0])
 
     def sigma(self, output: str) -> float:
         """Return the standard deviation of `output`."""
@@ -168,7 +183,7 @@ class Assessment:
 
     def sensitivity_peaks(self, above: float) -> FloatArray:
         """Return the frequencies of all peaks of |S| above a value [rad/s]."""
-        found = [at[least < 1.0 / above] for at, least in self._peaks]
+        found = [at[least < 1.0 / above] for (at, least), _ in self._minima]
         return np.unique(np.concatenate(found))
 
     def largest_loop_gain(self, above: float) -> float:
@@ -203,13 +218,15 @@ class Assessment:
 
     def spectrum(self, output: str, omega: FloatArray) -> FloatArray:
         """Return the one-sided density of `output` at `omega` [rad/s], (k,)."""
-        return np.asarray(np.sum(self._spectra([output], omega), axis=0), dtype=np.float64)
+        return np.asarray(np.sum(self._spectra([output], omega)[0], axis=0), dtype=np.float64)
 
     def quadrature(self, outputs: Sequence[str], rtol: float = _RTOL) -> Quadrature:
         """Return nodes on which the variance and the second moment of `outputs` are accurate."""
+        if self._nodes is not None:
+            return self._nodes(self.poles)
         low, high, half_line = integration_band(self.disturbances, self.poles)
         return adaptive_nodes(
-            lambda omega: np.array(self._spectra(outputs, omega)),
+            lambda omega: np.concatenate(self._spectra(outputs, omega)),
             low,
             high,
             splits=[w for d in self.disturbances for w in d.splits],
@@ -239,53 +256,47 @@ class Assessment:
 
     def _integrate(self, outputs: Sequence[str]) -> None:
         nodes = self.quadrature(outputs)
-        count, spectra = len(self.disturbances), self._spectra(outputs, nodes.omega)
-        for i, output in enumerate(outputs):
-            parts = spectra[i * count : (i + 1) * count]
-            density = np.asarray(np.sum(parts, axis=0), dtype=np.float64)
-            m0 = float(nodes.integrate(density))
-            self._shares[output] = {
-                d.name: float(np.sqrt(nodes.integrate(part)))
-                for d, part in zip(self.disturbances, parts, strict=True)
-            }
-            self._moments[output] = m0, float(nodes.integrate(density * nodes.omega**2))
+        parts = self._spectra(outputs, nodes.omega) * nodes.weights
+        variances, rates = parts.sum(axis=2), parts @ nodes.omega**2
+        for output, own, rate in zip(outputs, variances, rates, strict=True):
+            names = (d.name for d in self.disturbances)
+            self._shares[output] = dict(zip(names, np.sqrt(own).tolist(), strict=True))
+            self._moments[output] = float(own.sum()), float(rate.sum())
 
     def _responses(
-        self, omega: FloatArray, pairs: Sequence[tuple[str, str]]
-    ) -> Mapping[tuple[str, str], Any]:
-        if self._rational is not None:
-            response = self._rational.response(omega)
-            return {pair: response.column(*pair) for pair in pairs}
-        omega = self.plant.beside_poles(omega)
-        return closed_loop(numeric_blocks(self.plant.response(omega)), self._law(omega), pairs)
+        self, outputs: Sequence[str], sources: Sequence[str], omega: FloatArray
+    ) -> ComplexArray:
+        """Return the closed-loop responses of outputs to disturbances, (z, w, k)."""
+        if self._rational is None:
+            return self._closed(outputs, sources, omega).responses
+        found = LoopBlocks.of(self._rational.response(omega), outputs, sources)
+        return found.zw
+
+    def _closed(
+        self, outputs: Sequence[str], sources: Sequence[str], omega: FloatArray
+    ) -> LoopResponses:
+        key = tuple(outputs)
+        if key not in self._parts:
+            self._parts[key] = self.plant.select(outputs=key)
+        plant = self._parts[key]
+        response = plant.response(plant.beside_poles(omega))
+        return LoopResponses.of(response, self.controller, sources)
 
     @cached_property
     def _rational(self) -> LinearPlant | None:
         """The closed loop as a plant, finite at the poles of the open one; None if it is late."""
         return None if any(self.plant.delays) else closed_loop_plant(self.plant, self.controller)
 
-    def _spectra(self, outputs: Sequence[str], omega: FloatArray) -> list[FloatArray]:
-        """Return what each disturbance alone makes of each output, (k,) each."""
-        densities = {d.name: d.density(omega) for d in self.disturbances}
-        found = self._responses(omega, [(output, name) for output in outputs for name in densities])
-        return [np.abs(response) ** 2 * densities[name] for (_, name), response in found.items()]
+    def _spectra(self, outputs: Sequence[str], omega: FloatArray) -> FloatArray:
+        """Return what each disturbance alone makes of each output, (z, w, k)."""
+        densities = np.array([d.density(omega) for d in self.disturbances])
+        responses = self._responses(outputs, [d.name for d in self.disturbances], omega)
+        return np.asarray(np.abs(responses) ** 2 * densities)
 
     def _gains(self, omega: FloatArray) -> list[ComplexArray]:
         """Return L of each loop, (k,) each."""
-        omega = self.plant.beside_poles(omega)
-        blocks = numeric_blocks(self._heard.response(omega))
-        differences = return_differences(blocks, self._law(omega))
-        return [np.asarray(d, dtype=np.complex128) - 1.0 for d in differences]
-
-    @cached_property
-    def _heard(self) -> LinearPlant:
-        """The plant without its outputs, which no loop gain needs."""
-        return self.plant.select(outputs=())
-
-    def _law(self, omega: FloatArray) -> list[list[ComplexArray]]:
-        response = self.controller.response_at(1j * omega)
-        rows, columns = response.shape[1:]
-        return [[response[:, i, j] for j in range(columns)] for i in range(rows)]
+        loop = self._closed((), (), omega)  # no loop gain needs an output
+        return [np.asarray(loop.difference(i) - 1.0) for i in range(len(self.plant.inputs))]
 
     @staticmethod
     def _largest(function: Callable[[FloatArray], FloatArray], places: FloatArray) -> float:
@@ -337,8 +348,18 @@ def consistent_coefficient(
     controller: LinearController,
     disturbances: Sequence[Disturbance],
     drag: DragElement,
+    *,
+    start: float | None = None,
+    nodes: Nodes | None = None,
 ) -> float:
     """Return the drag coefficient [N s/m] that agrees with the closed loop's own velocity.
+
+    Parameters
+    ----------
+    plant, controller, disturbances, drag, nodes
+        As `Assessment` takes them.
+    start
+        A coefficient to begin with [N s/m]; by default that of the plant.
 
     Raises
     ------
@@ -347,13 +368,19 @@ def consistent_coefficient(
     """
 
     def loop(coefficient: float) -> Assessment:
-        return Assessment(plant, controller, disturbances, drag=drag, coefficient=coefficient)
+        return Assessment(
+            plant, controller, disturbances, drag=drag, coefficient=coefficient, nodes=nodes
+        )
+
+    plain = loop(drag.reference)  # the plant as it is, decomposed once for all
 
     def about(coefficient: float) -> Callable[[float], float]:
-        here, calm = loop(coefficient), np.inf
-        nodes = here.quadrature([drag.velocity])
-        felt = here.response(drag.velocity, drag.force, nodes.omega)
-        weights = nodes.weights * here.spectrum(drag.velocity, nodes.omega)
+        calm, found = np.inf, loop(coefficient).quadrature([drag.velocity])
+        names = [*(d.name for d in disturbances), drag.force]
+        *shaken, felt = plain._responses([drag.velocity], names, found.omega)[0]
+        pairs = zip(disturbances, shaken, strict=True)
+        density = np.sum([np.abs(v) ** 2 * d.density(found.omega) for d, v in pairs], axis=0)
+        weights = found.weights * density
 
         def velocity(other: float) -> float:
             nonlocal calm  # the least drag known to do; more of it does too, as is checked below
@@ -362,11 +389,14 @@ def consistent_coefficient(
                     return np.inf
                 calm = other
             # More drag is a rank-one change of the closed loop (Woodbury).
-            return float(np.sqrt(np.abs(1.0 + (other - coefficient) * felt) ** -2 @ weights))
+            return float(np.sqrt(np.abs(1.0 + (other - drag.reference) * felt) ** -2 @ weights))
 
         return velocity
 
-    found = settled_drag(drag.quadratic, about, drag.reference)
+    begin = drag.reference if start is None else start
+    # Nodes that do not adapt are as good for a loop with a little more drag.
+    settled = {} if nodes is None else {"settled": _SAME_NODES}
+    found = settled_drag(drag.quadratic, about, begin, **settled)
     if not loop(found).stable:
         raise SolverError(f"drag: the loop is unstable at {found:.4g} N s/m but not with less")
     return found

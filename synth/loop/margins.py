@@ -7,7 +7,7 @@ crossings by bisection, so that no figure depends on the grid's spacing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,9 @@ _NOTHING = 1e-9  # |L| below which neither a peak nor a crossing matters to any 
 _CLOSE, _MOST_STEPS = 1e-14, 60  # relative width of a bracket that is a point; steps towards it
 _ZOOM = np.linspace(0.0, 1.0, 17)
 _ROUNDS = 7  # each zooms by a factor of eight: 8^7 is 2e6
-_FORETOLD = 1e-13  # relative error of a parabola that is as good as the function itself
+_LEVEL = 1e-12  # relative depth of a minimum below which it is none
+_FORETOLD = 1e-11  # relative error of a parabola that the next round makes as good as exact
+_ROUNDING = 1e-15  # relative, of a value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,22 +71,23 @@ def loop_margins(
     loop: LoopGain,
     grid: FloatArray,
     gain: ComplexArray,
-    peaks: tuple[FloatArray, FloatArray] | None = None,
+    minima: Sequence[tuple[FloatArray, FloatArray]] | None = None,
 ) -> Margins:
     """Return the margins of `loop`(omega) -> L, (k,), known as `gain` on a grid [rad/s].
 
-    `peaks` are its `sensitivity_peaks`, where they are known already.
+    `minima` are its `least_distances`, where they are known already.
     """
-    peak_at, distance = sensitivity_peaks(loop, grid, gain) if peaks is None else peaks
+    (peak_at, distance), (_, disk) = minima or least_distances(loop, grid, gain)
     felt = np.abs(gain) > _NOTHING
-    # |S - 1/2| = |1 - L| / (2 |1 + L|)
-    _, disk = refine_minima(lambda w: _disk_distance(loop(w)), grid, _disk_distance(gain), felt)
-    crossovers = crossings(lambda w: np.abs(loop(w)) - 1.0, grid, np.abs(gain) - 1.0)
-    at_unity = loop(crossovers) if crossovers.size else np.zeros(0, complex)
-    turn = np.angle(-at_unity)  # angle beyond -180 deg
-    axis = crossings(lambda w: loop(w).imag, grid, gain.imag, felt)
-    on_axis = loop(axis).real if axis.size else np.zeros(0)
-    axis, on_axis = _with_ends(grid, gain, axis, on_axis)
+
+    def heights(at: ComplexArray) -> FloatArray:
+        return np.array([np.abs(at) - 1.0, at.imag])
+
+    among = np.array([np.ones_like(felt), felt])
+    crossovers, axis = _all_crossings(lambda w: heights(loop(w)), grid, heights(gain), among)
+    turn = np.angle(-loop(crossovers))  # angle beyond -180 deg
+    axis = np.append(axis, grid[[0, -1]][level_ends(gain)])
+    on_axis = loop(axis).real
     negative = on_axis < 0.0
     above, below = on_axis[negative & (on_axis > -1.0)], on_axis[negative & (on_axis < -1.0)]
     return Margins(
@@ -92,8 +95,8 @@ def loop_margins(
         peak=float(peak_at[np.argmin(distance)]),
         gain=float(np.min(-1.0 / above)) if above.size else np.inf,
         gain_down=float(np.max(-1.0 / below)) if below.size else 0.0,
-        phase=float(np.abs(turn).min()) if turn.size else np.inf,
-        delay=float((np.mod(turn, 2.0 * np.pi) / crossovers).min()) if turn.size else np.inf,
+        phase=float(np.abs(turn).min(initial=np.inf)),
+        delay=float((np.mod(turn, 2.0 * np.pi) / crossovers).min(initial=np.inf)),
         disk=float(disk.min()),
         crossovers=crossovers,
         real_axis_crossings=axis[negative],
@@ -118,12 +121,19 @@ def worst_margins(margins: list[Margins]) -> Margins:
     )
 
 
-def sensitivity_peaks(
+def least_distances(
     loop: LoopGain, grid: FloatArray, gain: ComplexArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return places and values of the local minima of |1 + L|, as in `refine_minima`."""
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Return places and values of the local minima of |1 + L| and of 1/|S - 1/2|."""
+
+    def distances(at: ComplexArray) -> FloatArray:
+        # |S - 1/2| = |1 - L| / (2 |1 + L|); 1 - L may vanish: the distance is then unbounded, which
+        # a least value does not mind.
+        own = np.abs(1.0 + at)
+        return np.array([own, 2.0 * own / np.maximum(np.abs(1.0 - at), 1e-300)])
+
     felt = np.abs(gain) > _NOTHING
-    return refine_minima(lambda w: np.abs(1.0 + loop(w)), grid, np.abs(1.0 + gain), felt)
+    return _all_minima(lambda w: distances(loop(w)), grid, distances(gain), felt)
 
 
 def refine_minima(
@@ -134,40 +144,66 @@ def refine_minima(
 ) -> tuple[FloatArray, FloatArray]:
     """Return places and values of all local minima of `function`, refined from a grid.
 
-    The ends of the grid count as minima.  All brackets are zoomed into at once, so the
-    function is called a handful of times with long vectors.  Where `among` is given, the
-    others of the grid's points are no minima worth it.
+    The ends of the grid count as minima, and so does what is level to rounding, as it is.  Where
+    `among` is given, the others of the grid's points are no minima worth it.
     """
-    lower = (values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])
-    inner = np.flatnonzero(lower if among is None else lower & among[1:-1]) + 1
-    ends = np.array([0, grid.size - 1])
-    if not inner.size:
-        return grid[ends], values[ends]
+    return _all_minima(lambda w: function(w)[None], grid, values[None], among)[0]
+
+
+def _all_minima(
+    function: Callable[[FloatArray], FloatArray],
+    grid: FloatArray,
+    values: FloatArray,
+    among: BoolArray | None,
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Return `refine_minima` of each of several functions, (f, k), that are evaluated together.
+
+    All brackets are zoomed into at once, so the functions are called a handful of times with long
+    vectors.
+    """
+    centre, beside = values[:, 1:-1], np.array([values[:, :-2], values[:, 2:]])
+    lower = (centre <= beside.min(axis=0)) & (True if among is None else among[1:-1])
+    level = beside.max(axis=0) - centre <= _LEVEL * np.abs(centre)
+    which, inner = np.nonzero(lower & ~level)
+    inner = inner + 1
+    best, at = values[which, inner], grid[inner]
     low, high = grid[inner - 1], grid[inner + 1]
-    best, at = values[inner], grid[inner]
-    rows = np.arange(inner.size)
-    for _ in range(_ROUNDS):
+    rows, foretold, known = np.arange(inner.size), np.zeros(inner.size, np.bool_), best + 1.0
+    for _ in range(_ROUNDS if inner.size else 0):
+        settled, before = foretold, known  # one round more makes the place as good as the value
         nodes = low[:, None] + (high - low)[:, None] * _ZOOM
-        inside = function(nodes.ravel()).reshape(nodes.shape)
+        inside = function(nodes.ravel()).reshape(-1, *nodes.shape)[which, rows]
         k = np.argmin(inside, axis=1)
         middle = np.clip(k, 1, _ZOOM.size - 2)
         low, high = nodes[rows, middle - 1], nodes[rows, middle + 1]
         # The vertex of the parabola through the best node and its neighbours, and how well the
         # function is foretold there: a smooth minimum is found in two or three rounds.
-        left, centre, right = (inside[rows, middle + i] for i in (-1, 0, 1))
-        bend = left - 2.0 * centre + right
+        left, mid, right = (inside[rows, middle + i] for i in (-1, 0, 1))
+        bend = left - 2.0 * mid + right
         # Clipped before the division, which would overflow where the nodes are all but level.
         reach = 2.0 * np.maximum(bend, 0.0)
         step = np.clip(left - right, -reach, reach) / np.where(reach > 0.0, reach, 1.0)
         vertex = nodes[rows, middle] + step * 0.5 * (high - low)
-        lowest = function(vertex)
+        lowest = function(vertex)[which, rows]
+        known = best
         for place, value in ((nodes[rows, k], inside[rows, k]), (vertex, lowest)):
             better = value < best
             best, at = np.where(better, value, best), np.where(better, place, at)
-        foretold = centre - 0.5 * bend * step**2
-        if np.all(np.abs(lowest - foretold) <= _FORETOLD * np.abs(lowest)):
+        error = np.abs(lowest - mid + 0.5 * bend * step**2)
+        foretold = settled | (error <= _FORETOLD * np.abs(lowest))
+        at = np.where(foretold & (lowest <= best * (1.0 + _ROUNDING)), vertex, at)
+        # At an edge of the function the grid's own point stays the best.
+        if np.all(settled | (best == before)):
             break
-    return np.concatenate([at, grid[ends]]), np.concatenate([best, values[ends]])
+    rest = lower & level
+    found = []
+    for i, own in enumerate(values):
+        others = np.concatenate([np.flatnonzero(rest[i]) + 1, [0, grid.size - 1]])
+        mine = which == i
+        found.append(
+            (np.concatenate([at[mine], grid[others]]), np.concatenate([best[mine], own[others]]))
+        )
+    return found
 
 
 def crossings(
@@ -176,15 +212,28 @@ def crossings(
     values: FloatArray,
     among: BoolArray | None = None,
 ) -> FloatArray:
-    """Return where `function` changes its sign between grid points, all of them at once.
+    """Return where `function` changes its sign between grid points, all of them at once."""
+    felt = np.ones_like(values, np.bool_) if among is None else among
+    return _all_crossings(lambda w: function(w)[None], grid, values[None], felt[None])[0]
+
+
+def _all_crossings(
+    function: Callable[[FloatArray], FloatArray],
+    grid: FloatArray,
+    values: FloatArray,
+    among: BoolArray,
+) -> list[FloatArray]:
+    """Return `crossings` of each of several functions, (f, k), that are evaluated together.
 
     By Chandrupatla's method (Adv. Eng. Software 28, 1997): inverse quadratic interpolation
     where it is safe, bisection elsewhere.
     """
     # Zero counts as positive, so that a crossing that falls on a grid point is seen once.
-    changed = (values[:-1] >= 0.0) != (values[1:] >= 0.0)
-    at = np.flatnonzero(changed if among is None else changed & (among[:-1] | among[1:]))
-    a, b, fa, fb = grid[at + 1], grid[at], values[at + 1], values[at]  # a is the latest point
+    changed = (values[:, :-1] >= 0.0) != (values[:, 1:] >= 0.0)
+    which, at = np.nonzero(changed & (among[:, :-1] | among[:, 1:]))
+    rows = np.arange(at.size)
+    a, b = grid[at + 1], grid[at]  # a is the latest point
+    fa, fb = values[which, at + 1], values[which, at]
     step = np.full(at.size, 0.5)
     for _ in range(_MOST_STEPS):
         width = np.abs(b - a)
@@ -193,7 +242,7 @@ def crossings(
             break
         least = np.minimum(0.5, smallest / np.maximum(width, smallest))
         x = a + np.clip(step, least, 1.0 - least) * (b - a)
-        fx = function(x)
+        fx = function(x)[which, rows]
         same = (fx >= 0.0) == (fa >= 0.0)
         c, fc = np.where(same, a, b), np.where(same, fa, fb)
         b, fb = np.where(same, b, a), np.where(same, fb, fa)
@@ -203,19 +252,11 @@ def crossings(
             inverse = fa / (fb - fa) * fc / (fb - fc)
             inverse += (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
         step = np.where((phi**2 < xi) & ((1.0 - phi) ** 2 < 1.0 - xi), inverse, 0.5)
-    return np.asarray(np.where(np.abs(fa) <= np.abs(fb), a, b))
+    nearest = np.asarray(np.where(np.abs(fa) <= np.abs(fb), a, b))
+    return [nearest[which == i] for i in range(len(values))]
 
 
-def _with_ends(
-    grid: FloatArray, gain: ComplexArray, axis: FloatArray, on_axis: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Add the ends of the grid where L starts or ends on the real axis (a finite DC gain)."""
-    for i in (0, -1):
-        if abs(gain[i]) > 1e-6 and abs(gain[i].imag) < 1e-3 * abs(gain[i]):
-            axis, on_axis = np.append(axis, grid[i]), np.append(on_axis, gain[i].real)
-    return axis, on_axis
-
-
-def _disk_distance(gain: ComplexArray) -> FloatArray:
-    # 1 - L may vanish: the distance is then unbounded, which a least value does not mind.
-    return np.asarray(2.0 * np.abs(1.0 + gain) / np.maximum(np.abs(1.0 - gain), 1e-300))
+def level_ends(gain: ComplexArray) -> BoolArray:
+    """Return at which ends of a grid L is on the real axis (a finite DC gain), (2,)."""
+    ends = gain[[0, -1]]
+    return np.asarray((np.abs(ends) > 1e-6) & (np.abs(ends.imag) < 1e-3 * np.abs(ends)))

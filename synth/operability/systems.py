@@ -26,8 +26,7 @@ from ..loop import (
     Disturbance,
     DragElement,
     LinearController,
-    closed_loop,
-    numeric_blocks,
+    LoopResponses,
 )
 from ..question import HOOK, PAYLOAD
 from .responses import DragResponses
@@ -159,12 +158,8 @@ class LoopSystem(System):
     def responses(self, nodes: Quadrature) -> DragResponses:
         names = [*self.disturbances, FORCE]
         outputs = [*self.outputs, VELOCITY]
-        law = self.controller.response_at(1j * nodes.omega)
-        rows, columns = law.shape[1:]
-        matrix = [[law[:, i, j] for j in range(columns)] for i in range(rows)]
-        blocks = numeric_blocks(self.plant.response(nodes.omega))
-        found = closed_loop(blocks, matrix, [(z, w) for z in outputs for w in names])
-        table = np.array([[np.asarray(found[z, w]) for w in names] for z in outputs])
+        found = LoopResponses.of(self.plant.response(nodes.omega), self.controller)
+        table = np.array([[found.response(z, w) for w in names] for z in outputs])
         return DragResponses(
             nodes=nodes,
             outputs=self.outputs,

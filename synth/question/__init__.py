@@ -18,15 +18,7 @@ if TYPE_CHECKING:
         difference_text,
         pose_family,
     )
-    from .loop_numbers import (
-        Closing,
-        LoopBlocks,
-        LoopNumbers,
-        LoopResponses,
-        Moments,
-        Point,
-        moment_weights,
-    )
+    from .loop_numbers import LoopNumbers, Moments, Point, moment_weights
     from .problem import Goal, Problem, Values
     from .question import (
         GAINS,
@@ -39,6 +31,6 @@ if TYPE_CHECKING:
         uncompensated,
         with_masses,
     )
-    from .rope_masses import masses_for
+    from .rope_masses import masses_for, on_enough_masses
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

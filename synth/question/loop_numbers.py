@@ -1,21 +1,8 @@
-r"""The loop on its frequencies in numbers: moments, responses and return differences with slopes.
+"""The numbers that a search needs of a loop, with slopes: cost, moments, curves, margins, poles.
 
-With the plant's blocks at a frequency and u = C y,
-
-.. math::
-
-    G = (I - C P_{yu})^{-1}, \quad v = G C P_{yw}, \quad y = P_{yw} + P_{yu} v,
-    \quad F = P_{zw} + P_{zu} v
-
-and every slope follows from that of the controller alone,
-
-.. math::
-
-    dv = G \, dC \, y, \quad dF = P_{zu} \, dv, \quad dG = G \, dC \, P_{yu} G .
-
-Quadratic drag, linearised, is one more loop around the plant: a force -(c - c_0) v with the
-logarithm of c as its variable.  Given many parameter vectors at once and no slopes, the same lines
-screen candidates.
+The responses are `synth.loop`'s.  Quadratic drag, linearised, is one more loop around the plant: a
+force -(c - c_0) v with the logarithm of c as its variable.  At many parameter vectors at once and
+without slopes, the same numbers screen candidates.
 """
 
 from __future__ import annotations
@@ -30,16 +17,18 @@ import numpy as np
 from scipy.linalg import eig
 
 from models.basics import BoolArray, ComplexArray, FloatArray, Quadrature
-from models.plant import PlantResponse
 
 from ..limits import Size
 from ..loop import (
+    Closing,
     Dual,
+    LoopResponses,
     at_least,
     counted_poles,
     crossings,
     exp,
     joined,
+    level_ends,
     log,
     real,
     refine_minima,
@@ -54,50 +43,6 @@ _SHIFT = 1e-6  # relative, of a frequency or a parameter, of differences
 _SMALL = 1e-3  # of its typical size: a parameter below it is shifted as if it were that
 _SINGLE, _NUDGE = 1e-9, 1e-15  # product of unit eigenvectors below which poles are pulled apart
 _LEAST_CYCLES = float(np.exp(0.5))  # of a peak: a factor of one, below which the log turns negative
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LoopBlocks:
-    """A plant's blocks, the drag's loop among them, at k points s.
-
-    `zw` (nz, nw, k), `zu` (nz, m, k), `yw` (l, nw, k), `yu` (l, m, k), with m inputs and l
-    measurements of which the last of each is the drag's, if there is drag.
-    """
-
-    s: ComplexArray
-    zw: ComplexArray
-    zu: ComplexArray
-    yw: ComplexArray
-    yu: ComplexArray
-
-    @classmethod
-    def of(cls, problem: Problem, response: PlantResponse, outputs: Sequence[str]) -> LoopBlocks:
-        """Return the blocks of a response for some outputs and the problem's disturbances."""
-        z = [response.outputs.index(name) for name in outputs]
-        w = [response.disturbances.index(name) for name in problem.sources]
-        zw, yw = response.zw[:, z][:, :, w], response.yw[:, :, w]
-        zu, yu = response.zu[:, z], response.yu
-        if problem.drag is not None:
-            v = response.outputs.index(problem.drag.velocity)
-            f = response.disturbances.index(problem.drag.force)
-            zu = np.concatenate([zu, response.zw[:, z, f : f + 1]], axis=2)
-            yw = np.concatenate([yw, response.zw[:, v : v + 1][:, :, w]], axis=1)
-            own = np.concatenate([response.zu[:, v : v + 1], response.zw[:, v : v + 1, f, None]], 2)
-            yu = np.concatenate(
-                [np.concatenate([yu, response.yw[:, :, f, None]], axis=2), own], axis=1
-            )
-        moved = (np.ascontiguousarray(np.moveaxis(block, 0, -1)) for block in (zw, zu, yw, yu))
-        return cls(s=response.s, **dict(zip(("zw", "zu", "yw", "yu"), moved, strict=True)))
-
-    def part(self, which: slice) -> LoopBlocks:
-        """Return some of the points."""
-        return LoopBlocks(
-            s=self.s[which],
-            zw=self.zw[..., which],
-            zu=self.zu[..., which],
-            yw=self.yw[..., which],
-            yu=self.yu[..., which],
-        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,31 +63,19 @@ class Point:
     drag: Any = None
     slopes: bool = False
 
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Closing:
-    """C with the drag's loop at k points, (m, l, ..., k), and its slopes, if asked for.
-
-    The slopes are those of the entries that depend on a variable, (k,) each, by variable.
-    """
-
-    law: ComplexArray
-    slopes: list[dict[tuple[int, int], ComplexArray]] | None
-
-    @classmethod
-    def of(cls, problem: Problem, s: ComplexArray, point: Point) -> Closing:
+    def closing(self, problem: Problem, s: ComplexArray) -> Closing:
         """Return what closes the loop of a problem at points `s`, (k,) [1/s]."""
         law: ParametrisedController = problem.law
-        count, drag = len(point.values), problem.drag
-        values: list[Any] = list(point.values)
+        count, drag = len(self.values), problem.drag
+        values: list[Any] = list(self.values)
         slopes: list[dict[tuple[int, int], ComplexArray]] | None = None
-        if point.slopes:
+        if self.slopes:
             unit = np.eye(count)
             values = [Dual(np.array([v]), unit[:, i : i + 1]) for i, v in enumerate(values)]
             slopes = [{} for _ in range(count + (drag is not None))]
         entries = law.response(values, s)
         m, length = len(entries) + (drag is not None), len(entries[0]) + (drag is not None)
-        many = np.shape(point.values[0])[:-1] if count else ()
+        many = np.shape(self.values[0])[:-1] if count else ()
         C = np.zeros((m, length, *many, s.size), dtype=np.complex128)
         for i, line in enumerate(entries):
             for j, entry in enumerate(line):
@@ -154,142 +87,10 @@ class Closing:
                 else:
                     C[i, j] = entry
         if drag is not None:
-            C[-1, -1] = -(point.drag - drag.reference)
+            C[-1, -1] = -(self.drag - drag.reference)
             if slopes is not None:
-                slopes[count][m - 1, length - 1] = np.full(s.shape, -point.drag, np.complex128)
-        return cls(law=C, slopes=slopes)
-
-    def part(self, which: slice) -> Closing:
-        """Return some of the points."""
-        slopes = self.slopes
-        if slopes is not None:
-            slopes = [{key: slope[which] for key, slope in own.items()} for own in slopes]
-        return Closing(law=self.law[..., which], slopes=slopes)
-
-
-class LoopResponses:
-    """The closed loop at some points.
-
-    Parameters
-    ----------
-    blocks, closing
-        The plant's blocks, and what closes the loop at the same points.
-    """
-
-    def __init__(self, blocks: LoopBlocks, closing: Closing) -> None:
-        law, slope = closing.law, closing.slopes
-        self.count = 0 if slope is None else len(slope)
-        yu, yw = blocks.yu, blocks.yw
-        if law.ndim > 3:  # many parameter vectors: an axis for them before that of the points
-            yu, yw = yu[..., None, :], yw[..., None, :]
-            self._zw, self._zu = blocks.zw[..., None, :], blocks.zu[..., None, :]
-        else:
-            self._zw, self._zu = blocks.zw, blocks.zu
-        identity = np.eye(len(law)).reshape(len(law), len(law), *(1,) * (law.ndim - 2))
-        self.inverse = _inverse(identity - _times(law, yu))
-        self._commands = _times(self.inverse, _times(law, yw))
-        self._yu = yu
-        self._law_slope = slope
-        self._heard = yw + _times(yu, self._commands) if slope is not None else None
-
-    @cached_property
-    def _command_slope(self) -> ComplexArray:
-        """Slopes of the commands by each variable, (n, m, nw, k)."""
-        assert self._law_slope is not None
-        assert self._heard is not None
-        m, points = len(self.inverse), self._heard.shape[-1]
-        found = np.zeros((self.count, m, self._heard.shape[1], points), np.complex128)
-        for a, parts in enumerate(self._law_slope):
-            by_command: dict[int, ComplexArray] = {}
-            for (i, j), slope in parts.items():  # most entries depend on few parameters
-                term = slope * self._heard[j]
-                by_command[i] = by_command[i] + term if i in by_command else term
-            for i, through in by_command.items():
-                found[a] += self.inverse[:, i, None] * through
-        return found
-
-    def response(self, row: int, column: int) -> Any:
-        """Return the response of an output to a disturbance, (k,)."""
-        value = self._zw[row, column] + _times(self._zu[row : row + 1], self._commands)[0, column]
-        if self._law_slope is None:
-            return value
-        slope = np.einsum("rk,nrk->nk", self._zu[row], self._command_slope[:, :, column])
-        return Dual(value, slope)
-
-    def difference(self, index: int) -> Any:
-        """Return 1 + L of the loop broken at one command, all others closed, (k,)."""
-        own = self.inverse[index, index]
-        if self._law_slope is None:
-            return 1.0 / own
-        # dG_ii = G_i. dC (P_yu G)_.i
-        back = np.einsum("jmk,mk->jk", self._yu, self.inverse[:, index])
-        return Dual(1.0 / own, -self._turned(self.inverse[index], back) / own**2)
-
-    def determinant(self) -> Any:
-        """Return det(I - C P_yu), (k,)."""
-        whole = np.linalg.det(np.moveaxis(self.inverse, (0, 1), (-2, -1)))
-        if self._law_slope is None:
-            return 1.0 / whole
-        # d det M = det M tr(M^-1 dM), M = I - C P_yu
-        turned = np.einsum("jmk,mrk->jrk", self._yu, self.inverse)
-        slope = np.zeros((self.count, turned.shape[-1]), np.complex128)
-        for a, parts in enumerate(self._law_slope):
-            for (i, j), part in parts.items():
-                slope[a] -= part * turned[j, i]
-        return Dual(1.0 / whole, slope / whole)
-
-    def _turned(self, left: ComplexArray, right: ComplexArray) -> ComplexArray:
-        """Return left . dC right of vectors (m, k) and (l, k) by each variable, (n, k)."""
-        assert self._law_slope is not None
-        found = np.zeros((self.count, right.shape[-1]), np.complex128)
-        for a, parts in enumerate(self._law_slope):
-            for (i, j), slope in parts.items():
-                found[a] += left[i] * slope * right[j]
-        return found
-
-    def moments(self, rows: Sequence[int], powers: Sequence[FloatArray]) -> Any:
-        """Return integrals of |F|^2 over all disturbances.
-
-        Parameters
-        ----------
-        rows
-            Output of each integral.
-        powers
-            Its weights, (nw, k) each: quadrature weights times density times a power of omega.
-
-        Returns
-        -------
-        ndarray or Dual
-            (..., number of integrals).
-        """
-        found = {row: self._all(row) for row in dict.fromkeys(rows)}
-        values = []
-        for row, weights in zip(rows, powers, strict=True):
-            # (nw, ..., k) against (nw, k)
-            spread = weights.reshape(len(weights), *(1,) * (found[row].ndim - 2), -1)
-            values.append(np.sum(np.abs(found[row]) ** 2 * spread, axis=(0, -1)))
-        value = np.stack(values, axis=-1)
-        if self._law_slope is None:
-            return value
-        adjoint = np.stack(
-            [
-                (np.conj(found[row]) * weights)[None] * self._zu[row][:, None]
-                for row, weights in zip(rows, powers, strict=True)
-            ]
-        )
-        size = len(rows), -1
-        slope = 2.0 * (self._command_slope.reshape(self.count, -1) @ adjoint.reshape(size).T)
-        return Dual(value, slope.real)
-
-    def curvature(self, row: int, weights: FloatArray) -> FloatArray:
-        """Return half the Gauss-Newton Hessian of an integral of |F|^2, (n, n); see `moments`."""
-        slope = np.einsum("rk,nrwk->nwk", self._zu[row], self._command_slope) * np.sqrt(weights)
-        flat = slope.reshape(self.count, -1)
-        return np.asarray((flat @ flat.conj().T).real)
-
-    def _all(self, row: int) -> ComplexArray:
-        """Return the responses of an output to every disturbance, (nw, ..., k)."""
-        return np.asarray(self._zw[row] + _times(self._zu[row : row + 1], self._commands)[0])
+                slopes[count][m - 1, length - 1] = np.full(s.shape, -self.drag, np.complex128)
+        return Closing(law=C, slopes=slopes)
 
 
 #: Weights of the moments m_0 and m_2 on quadrature nodes, (nw, k) each, by order.
@@ -315,8 +116,6 @@ class LoopNumbers:
     ----------
     problem
         The problem.
-    outputs
-        Names of the outputs that the blocks hold.
     cost, margins
         The closed loop on the quadrature nodes and on the margin frequencies.
     weights, omega
@@ -334,7 +133,6 @@ class LoopNumbers:
     def __init__(
         self,
         problem: Problem,
-        outputs: Sequence[str],
         cost: LoopResponses,
         margins: LoopResponses,
         weights: Moments,
@@ -345,7 +143,7 @@ class LoopNumbers:
         extra: Any = None,
         goal: Goal = Goal.COST,
     ) -> None:
-        self._problem, self._outputs, self._weights = problem, tuple(outputs), weights
+        self._problem, self._weights = problem, weights
         self._cost, self._margins = cost, margins
         self.omega, self._point = omega, point
         self.log_drag, self.extra = log_drag, extra
@@ -357,7 +155,6 @@ class LoopNumbers:
         """Return the same loop shaken by the disturbances of another problem."""
         return LoopNumbers(
             problem,
-            self._outputs,
             self._cost,
             self._margins,
             weights,
@@ -403,8 +200,7 @@ class LoopNumbers:
             found = [(self.omega, d) for d in self.differences]
             takes = [methodcaller("difference", i) for i in range(len(found))]
         else:
-            row, column = self._outputs.index(channel[0]), self._problem.sources.index(channel[1])
-            takes = [methodcaller("response", row, column)]
+            takes = [methodcaller("response", *channel)]
             found = [(self.omega, self._padded(takes[0](self._margins)))]
         fresh = self._fresh
         if fresh is None:
@@ -481,7 +277,7 @@ class LoopNumbers:
                 gain.imag,
                 np.abs(gain) > _FAINT,
             )
-            ends = self.omega[[0, -1]][_flat(gain[[0, -1]])]
+            ends = self.omega[[0, -1]][level_ends(gain)]
             for places, moves in ((at, True), (ends, False)):
                 loop = self._padded(fresh(places, isinstance(d, Dual)).difference(i) - 1.0)
                 if isinstance(loop, Dual):
@@ -519,9 +315,9 @@ class LoopNumbers:
     @cached_property
     def _moments(self) -> Mapping[tuple[str, int], Any]:
         """Spectral moments m_0 and m_2 of every output."""
-        keys = [(name, order) for name in self._outputs for order in self._weights]
-        rows = [self._outputs.index(name) for name, _ in keys]
-        every = self._cost.moments(rows, [self._weights[order] for _, order in keys])
+        keys = [(name, order) for name in self._cost.outputs for order in self._weights]
+        names = [name for name, _ in keys]
+        every = self._cost.moments(names, [self._weights[order] for _, order in keys])
         every = self._padded(every)
         return {
             key: every[k : k + 1] if isinstance(every, Dual) else every[..., k : k + 1]
@@ -552,8 +348,7 @@ class LoopNumbers:
         """
         total, variance = np.zeros((self._cost.count, self._cost.count)), 0.0
         for name, weight in self._problem.minimise.items():
-            row = self._outputs.index(name)
-            total += weight * self._cost.curvature(row, self._weights[0])
+            total += weight * self._cost.curvature(name, self._weights[0])
             variance += weight * float(value_of(self._moments[name, 0]).item())
         found = total / variance
         if isinstance(self.extra, Dual):
@@ -602,24 +397,3 @@ def _rate(fresh: Fresh, omega: FloatArray, index: int) -> ComplexArray:
     """Return dL/d omega by central differences, (k,)."""
     ends = [_gain(fresh(omega * (1.0 + step), False), index) for step in (_SHIFT, -_SHIFT)]
     return np.asarray((ends[0] - ends[1]) / (2.0 * _SHIFT * omega))
-
-
-def _flat(gain: ComplexArray) -> Any:
-    """Return where L starts or ends on the real axis, as `synth.loop` counts it."""
-    return (np.abs(gain) > 1e-6) & (np.abs(gain.imag) < 1e-3 * np.abs(gain))
-
-
-def _times(a: ComplexArray, b: ComplexArray) -> ComplexArray:
-    """Return the product of matrices that stand on the first two axes."""
-    return np.asarray(np.einsum("ij...,jk...->ik...", a, b))
-
-
-def _inverse(a: ComplexArray) -> ComplexArray:
-    """Return the inverse of matrices on the first two axes."""
-    if len(a) == 1:
-        return np.asarray(1.0 / a)
-    if len(a) == 2:
-        determinant = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]
-        return np.asarray(np.array([[a[1, 1], -a[0, 1]], [-a[1, 0], a[0, 0]]]) / determinant)
-    found: ComplexArray = np.linalg.inv(np.moveaxis(a, (0, 1), (-2, -1))).astype(np.complex128)
-    return np.moveaxis(found, (-2, -1), (0, 1))

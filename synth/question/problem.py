@@ -8,12 +8,20 @@ from enum import Enum
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from models.basics import ComplexArray, FloatArray
 from models.plant import LinearPlant
 
 from ..limits import Limit
-from ..loop import Assessment, Disturbance, DragElement, with_delay_models, with_drag
+from ..loop import (
+    Assessment,
+    Disturbance,
+    DragElement,
+    LoopBlocks,
+    with_delay_models,
+    with_drag,
+)
 from ..structures import ParametrisedController
 
 Values = Sequence[float] | FloatArray
@@ -72,6 +80,10 @@ class Problem:
         """Names of the disturbances that shake the plant, then of others that limits speak of."""
         spoken = [limit.channel[1] for limit in self.limits if limit.channel is not None]
         return tuple(dict.fromkeys([*(d.name for d in self.disturbances), *spoken]))
+
+    def blocks(self, s: npt.ArrayLike) -> LoopBlocks:
+        """Return what the plant's loop is closed about at points `s` [1/s]."""
+        return LoopBlocks.of(self.plant.response_at(s), self.outputs, self.sources, self.drag)
 
     def loop_poles(self, values: Values, coefficient: float | None = None) -> ComplexArray:
         """Return the closed loop's poles [1/s], delays as Pade models."""

@@ -194,6 +194,12 @@ class DesignQuestion:
         """Return the controller of given parameters."""
         return self.law.controller(self.values(parameters))
 
+    def drag_in(self, loop: Assessment) -> float:
+        """Return the linear drag coefficient in a loop [N s/m]: its own, or the case's."""
+        if self.drag is None:
+            return float(self.case.payload.fixed_drag or 0.0)
+        return loop.coefficient
+
     def assess(
         self, parameters: Mapping[str, float], coefficient: float | None = None
     ) -> Assessment:

@@ -8,6 +8,7 @@ then what is kept on the masses is broken on the rope.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -16,8 +17,9 @@ from models.plant import MAX_MASSES, masses_for_bandwidth
 from models.sensing import sensed_line_at
 
 from ..limits import MaxSensitivity
-from ..loop import Assessment, numeric_blocks, refine_minima, return_differences
-from .question import DesignQuestion
+from ..loop import Assessment, LoopResponses, refine_minima
+from .problem import Values
+from .question import DesignQuestion, with_masses
 
 _MODES = 5.0  # every rope mode below this many crossovers belongs in the plant
 _KEPT = 1e-3  # relative excess on the rope as it is over a limit that its masses keep
@@ -48,17 +50,55 @@ def masses_for(question: DesignQuestion, loop: Assessment) -> int:
     return question.masses
 
 
+def on_enough_masses(
+    question: DesignQuestion,
+    parameters: Mapping[str, float],
+    assess: Callable[[DesignQuestion, Values], Assessment | None],
+    finer: Callable[[DesignQuestion, int], DesignQuestion] = with_masses,
+) -> tuple[DesignQuestion, Assessment | None, float]:
+    """Return a question on the masses that given parameters ask for, their loop and its growth.
+
+    Parameters
+    ----------
+    question, parameters
+        The question, and the structure's parameters by name.
+    assess
+        From a question and the law's parameters to the loop; None where no drag agrees with it.
+    finer
+        From the question to that on more masses.
+
+    Returns
+    -------
+    tuple
+        The question, the loop (None where it is not stable) and the largest real part of its poles
+        [1/s] with the drag before compensation.
+    """
+    values = question.values(parameters)
+    growth = question.problem.growth(values)
+    if growth > 0.0 and question.masses < MAX_MASSES and question.data.masses is None:
+        # Few masses do not have their modes where the rope does: made on it, a loop may hold there.
+        most = finer(question, MAX_MASSES)
+        if (there := most.problem.growth(values)) <= 0.0:
+            question, growth = most, there
+    while growth <= 0.0:
+        loop = assess(question, values)
+        if loop is None or (masses := masses_for(question, loop)) <= question.masses:
+            return question, loop, growth
+        question = finer(question, masses)
+        growth = question.problem.growth(values)
+    return question, None, growth
+
+
 def _sensitivity_on_the_rope(question: DesignQuestion, loop: Assessment, above: float) -> float:
     """Return the largest peak of |S| on the distributed rope that lies above a value."""
     controller, grid = loop.controller, loop.grid
-    drag = question.drag_before if question.drag is None else loop.coefficient
+    drag = question.drag_in(loop)
 
     def distance(omega: FloatArray) -> FloatArray:
         line = sensed_line_at(question.case, 1j * omega, drag=drag, data=question.data)
-        blocks = numeric_blocks(line.select(measurements=controller.measurements))
-        law = np.moveaxis(controller.response_at(1j * omega), 0, -1)
-        differences = return_differences(blocks, [list(row) for row in law])
-        return np.asarray(np.min(np.abs(differences), axis=0))
+        found = LoopResponses.of(line.select(measurements=controller.measurements), controller)
+        loops = range(len(controller.inputs))
+        return np.asarray(np.min([np.abs(found.difference(i)) for i in loops], axis=0))
 
     near = distance(grid)
     return float(1.0 / refine_minima(distance, grid, near, near < 1.0 / above)[1].min())

@@ -28,18 +28,14 @@ from typing import Any
 import numpy as np
 
 from models.basics import FloatArray, Quadrature
-from models.plant import LinearPlant
 
 from ..limits import Limit
-from ..loop import Dual, exp, value_of
+from ..loop import Dual, LoopResponses, exp, value_of
 from ..question import (
-    Closing,
     FamilyLoop,
     FamilyProblem,
     Goal,
-    LoopBlocks,
     LoopNumbers,
-    LoopResponses,
     Objective,
     Point,
     Problem,
@@ -453,22 +449,17 @@ class _Loop:
         reference: FloatArray,
     ) -> None:
         problem = self.problem = members[0].problem
-        self.outputs = problem.outputs
         self.omega = omega
         self.weights = [moment_weights(member.problem, nodes) for member in members]
-        every = self._blocks(problem.plant, np.concatenate([nodes.omega, omega]))
+        every = problem.blocks(1j * np.concatenate([nodes.omega, omega]))
         self._s = every.s
         self._parts = slice(0, nodes.omega.size), slice(nodes.omega.size, None)
         self._cost, self._margins = (every.part(part) for part in self._parts)
-        slow = problem.plant.response_at([problem.slow_point])
-        self._slow = LoopBlocks.of(problem, slow, self.outputs)
+        self._slow = problem.blocks([problem.slow_point])
         drag = None if problem.drag is None else problem.drag.reference
         begin = Point(values=list(members[0].values(reference)), drag=drag)
-        there = LoopResponses(self._slow, Closing.of(problem, self._slow.s, begin)).determinant()
+        there = LoopResponses(self._slow, begin.closing(problem, self._slow.s)).determinant()
         self._there = float(np.real(there[0]))
-
-    def _blocks(self, plant: LinearPlant, omega: FloatArray) -> LoopBlocks:
-        return LoopBlocks.of(self.problem, plant.response(omega), self.outputs)
 
     def at(
         self,
@@ -480,10 +471,9 @@ class _Loop:
         slopes: bool,
         exact: bool,
     ) -> LoopNumbers:
-        closing = Closing.of(self.problem, self._s, _point(values, log_drag, slopes))
+        closing = _point(values, log_drag, slopes).closing(self.problem, self._s)
         numbers = LoopNumbers(
             self.problem,
-            self.outputs,
             LoopResponses(self._cost, closing.part(self._parts[0])),
             LoopResponses(self._margins, closing.part(self._parts[1])),
             self.weights[0],
@@ -499,8 +489,8 @@ class _Loop:
 
     def _fresh(self, omega: FloatArray, point: Point) -> LoopResponses:
         """Return the closed loop at other frequencies."""
-        blocks = self._blocks(self.problem.plant, omega)
-        return LoopResponses(blocks, Closing.of(self.problem, blocks.s, point))
+        blocks = self.problem.blocks(1j * omega)
+        return LoopResponses(blocks, point.closing(self.problem, blocks.s))
 
     def no_slow_pole(
         self, values: FloatArray, log_drag: float | None, extra: float | None, slopes: bool
@@ -512,7 +502,7 @@ class _Loop:
         through |1 + L| > 0, but a real one may creep up to zero, below every frequency node;
         stability alone would let it crawl there.
         """
-        closing = Closing.of(self.problem, self._slow.s, _point(values, log_drag, slopes))
+        closing = _point(values, log_drag, slopes).closing(self.problem, self._slow.s)
         found = LoopResponses(self._slow, closing).determinant()
         if not isinstance(found, Dual):
             return 1e-6 - np.real(found) / self._there

@@ -19,12 +19,10 @@ from scipy.stats import qmc
 
 from models.basics import FloatArray
 
+from ..loop import LoopBlocks, LoopResponses
 from ..question import (
-    Closing,
     FamilyProblem,
-    LoopBlocks,
     LoopNumbers,
-    LoopResponses,
     Moments,
     Point,
     Problem,
@@ -202,10 +200,7 @@ def _merits(family: FamilyProblem, points: FloatArray) -> list[FloatArray]:
         problem = first.problem
         poles = around([problem.loop_poles(first.values(p)) for p in sample])
         nodes, omega = cost_nodes(problem, poles), margin_nodes(problem, poles, _PER_DECADE)
-        outputs = problem.outputs
-        blocks = LoopBlocks.of(
-            problem, problem.plant.response(np.concatenate([nodes.omega, omega])), outputs
-        )
+        blocks = problem.blocks(1j * np.concatenate([nodes.omega, omega]))
         parts = blocks.part(slice(0, nodes.omega.size)), blocks.part(slice(nodes.omega.size, None))
         weights = [moment_weights(family.scenarios[i].problem, nodes) for i in group]
         for begin in range(0, len(points), _AT_ONCE):
@@ -217,13 +212,13 @@ def _merits(family: FamilyProblem, points: FloatArray) -> list[FloatArray]:
             if problem.drag is not None:
                 drag = _consistent(problem, own, parts[0], weights[0])
             point = Point(values=own, drag=drag)
-            closing = Closing.of(problem, blocks.s, point)
+            closing = point.closing(problem, blocks.s)
             cuts = slice(0, nodes.omega.size), slice(nodes.omega.size, None)
             cost, margins = (
                 LoopResponses(part, closing.part(cut))
                 for part, cut in zip(parts, cuts, strict=True)
             )
-            numbers = LoopNumbers(problem, outputs, cost, margins, weights[0], omega, point)
+            numbers = LoopNumbers(problem, cost, margins, weights[0], omega, point)
             for k, i in enumerate(group):
                 member = family.scenarios[i].problem
                 seen = numbers if i == group[0] else numbers.under(member, weights[k])
@@ -247,9 +242,8 @@ def _consistent(
     element = problem.drag
     assert element is not None
     drag = np.full((len(values[0]), 1), element.reference)
-    row = problem.outputs.index(element.velocity)
     for _ in range(_DRAGS):
-        closing = Closing.of(problem, blocks.s, Point(values=values, drag=drag))
-        variance = LoopResponses(blocks, closing).moments([row], [weights[0]])
+        closing = Point(values=values, drag=drag).closing(problem, blocks.s)
+        variance = LoopResponses(blocks, closing).moments([element.velocity], [weights[0]])
         drag = element.slope * np.sqrt(variance)
     return drag

@@ -63,7 +63,7 @@ def test_the_curves_are_those_of_the_figures() -> None:
 
     assert isinstance(look, Look)
     assert look.stable
-    assert not look.verified
+    assert look.verification is None
     assert look.margins is not None
     nearest = 1.0 / np.abs(1.0 + look.loop_gain).min()
     assert nearest <= look.margins.max_sensitivity  # which is refined between the frequencies
