@@ -95,7 +95,7 @@ def objectives(starts: int, draws: int) -> list[Row]:
         design = optimise_robust(case, asked, objective, starts=starts, draws=draws)
         print(
             f"{objective}: {'ok' if design.ok else design.status}; worst "
-            f"{1e3 * design.worst.payload_rms:.1f} mm, mean {1e3 * design.mean_rms:.1f} mm; "
+            f"{1e3 * design.worst.design.payload_rms:.1f} mm, mean {1e3 * design.mean_rms:.1f} mm; "
             f"{time.process_time() - began:.0f} s"
         )
         rows += [
@@ -103,10 +103,10 @@ def objectives(starts: int, draws: int) -> list[Row]:
                 "objective": objective,
                 "ok": "yes" if design.ok else "no",
                 "scenario": scenario.name,
-                "payload_rms": scenario.payload_rms,
-                "payload_rms_before": scenario.payload_rms_before,
+                "payload_rms": scenario.design.payload_rms,
+                "payload_rms_before": scenario.design.payload_rms_before,
                 "best_rms": scenario.best_rms if scenario.best_rms is not None else "",
-                "max_sensitivity": scenario.max_sensitivity,
+                "max_sensitivity": scenario.margins.max_sensitivity,
             }
             for scenario in design.scenarios
         ]

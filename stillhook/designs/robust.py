@@ -50,12 +50,12 @@ def robust_figure(design: RobustDesign) -> Figure:
         A design with at least one stable scenario.
     """
     shown = design.scenarios[:_SHOWN]
-    rms = np.array([s.payload_rms for s in shown])
+    rms = np.array([s.design.payload_rms for s in shown])
     size, unit = scale("m", float(np.median(rms)))
     at = np.arange(len(shown))[::-1]
     figure = new_figure(9.0, 2.6 + 0.22 * len(shown))
     left, right = figure.subplots(1, 2, width_ratios=(3, 1), sharey=True)
-    before = np.array([s.payload_rms_before for s in shown]) / size
+    before = np.array([s.design.payload_rms_before for s in shown]) / size
     left.scatter(before, at, color=BEFORE, marker="|", s=60, label="drum held")
     left.scatter(rms / size, at, color=AFTER, s=24, label="these gains")
     own = [(s.best_rms, k) for s, k in zip(shown, at, strict=True) if s.best_rms is not None]
@@ -71,14 +71,14 @@ def robust_figure(design: RobustDesign) -> Figure:
     left.set_xlabel(f"payload rms [{unit}]")
     left.set_yticks(at, [s.name for s in shown], fontsize=7.5)
     figure.legend(loc="outside lower left", ncols=4, fontsize=8.0)
-    right.scatter([s.max_sensitivity for s in shown], at, color=AFTER, s=24)
-    bound = shown[0].limits.get("max_sensitivity")
+    right.scatter([s.margins.max_sensitivity for s in shown], at, color=AFTER, s=24)
+    bound = shown[0].design.limits.get("max_sensitivity")
     if bound is not None:
         right.axvline(bound.bound, color=BEFORE, linewidth=1.2)
     right.set_xlabel(typeset("M_s"))
     most = quantity(float(rms.max()), "m")
     finding = f"One set of gains: {most} rms at most in {len(design.scenarios)} scenarios"
-    return headline(figure, finding, design.case.name)
+    return headline(figure, finding, design.family.case.name)
 
 
 @drawn
@@ -125,7 +125,7 @@ def robust_report(design: RobustDesign) -> Report:
     if design.added:
         items.append(f"the search for the worst member added {design.added} of the scenarios")
     return Report(
-        name=design.case.name,
+        name=design.family.case.name,
         about="one set of gains",
         status=design.status,
         ok=design.ok,
@@ -157,18 +157,19 @@ def schedule_report(schedule: GainSchedule) -> Report:
 def scenario_table(design: RobustDesign) -> Table:
     """Return every figure of all scenarios as data, SI units."""
     paths = [axis.path for axis in design.family.axes]
-    names = sorted({name for s in design.scenarios for name in s.limits})
+    names = sorted({name for s in design.scenarios for name in s.design.limits})
     head = [*paths, "significant_height", "peak_period", "weight", "payload_rms"]
     head += ["payload_rms_held", "best_rms", "max_sensitivity", "gain_down", "gain", "phase"]
     head += ["delay_margin", "disk_margin", "gain_radius", "gain_box", "pressure", "verified"]
     rows = []
     for s in design.scenarios:
         sea, radius = design.family.seas[s.member.sea], s.radius
-        row = [*s.member.point, sea.significant_height, sea.peak_period, s.weight, s.payload_rms]
-        row += [s.payload_rms_before, s.best_rms, s.max_sensitivity, s.gain_down, s.gain, s.phase]
-        row += [s.delay, s.disk, *((radius.ball, radius.box) if radius else (None, None))]
+        own, m = s.design, s.margins
+        row = [*s.member.point, sea.significant_height, sea.peak_period, s.weight, own.payload_rms]
+        row += [own.payload_rms_before, s.best_rms, m.max_sensitivity, m.gain_down, m.gain, m.phase]
+        row += [m.delay, m.disk, *((radius.ball, radius.box) if radius else (None, None))]
         row += [s.pressure, s.verified]
-        rows.append([*row, *(s.limits[n].use if n in s.limits else None for n in names)])
+        rows.append([*row, *(own.limits[n].use if n in own.limits else None for n in names)])
     return data_table([*head, *(f"use:{name}" for name in names)], rows)
 
 
@@ -177,8 +178,9 @@ def _scenarios(design: RobustDesign) -> Table:
     rows = []
     for k, s in enumerate(design.scenarios[:_ROWS]):
         tightest, off = s.tightest, None if s.radius is None else s.radius.box
-        row = (k + 1, s.payload_rms, s.payload_rms_before, s.max_sensitivity, s.delay, s.disk, off)
-        rows.append((*row, *((tightest.use, tightest.name) if tightest else (None, ""))))
+        own, m = s.design, s.margins
+        row = (k + 1, own.payload_rms, own.payload_rms_before, m.max_sensitivity, m.delay, m.disk)
+        rows.append((*row, off, *((tightest.use, tightest.name) if tightest else (None, ""))))
     heads = (
         *columns("scenario=; payload_rms=payload [m]; held=held [m]; max_sensitivity=M_s"),
         Column("delay", write=lambda s: quantity(s, "s") if math.isfinite(s) else "any"),

@@ -57,14 +57,6 @@ class FamilyQuestion:
         return self.nominal.law
 
     @property
-    def guesses(self) -> list[list[float]]:
-        """The gains in use, if the case has any that are this structure's."""
-        gains = self.case.gains
-        if gains is None or self.structure != PAYLOAD_FEEDBACK:
-            return []
-        return [[gains.a, gains.a1, gains.a2]]
-
-    @property
     def most_masses(self) -> int:
         """The largest number of rope masses of any case posed so far."""
         return max([self.nominal.masses, *(q.masses for q in self._posed.values())])

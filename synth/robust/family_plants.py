@@ -14,7 +14,6 @@ from models.case import Case
 
 from ..loop import Assessment
 from ..question import PAYLOAD_FEEDBACK, DesignQuestion, FamilyLoop, FamilyQuestion
-from ..structures import ParametrisedController
 from ..sweeps import DesignRows, SolvedRows
 from .family import Family, Member
 
@@ -42,24 +41,9 @@ class FamilyPlants:
         self._engines: dict[tuple[Any, ...], DesignRows] = {}
 
     @property
-    def structure(self) -> str:
-        """Name of the structure."""
-        return self.posed.structure
-
-    @property
     def nominal(self) -> DesignQuestion:
         """The question of the nominal member in the first sea."""
         return self.posed.nominal
-
-    @property
-    def law(self) -> ParametrisedController:
-        """The controller's law, bound to the nominal plant."""
-        return self.posed.law
-
-    @property
-    def guesses(self) -> list[list[float]]:
-        """The gains in use, if the case has any that are this structure's."""
-        return self.posed.guesses
 
     def for_assessed(
         self, members: Sequence[Member], assessments: Sequence[Assessment]
@@ -68,7 +52,7 @@ class FamilyPlants:
         masses = self.posed.masses_wanted([self._case(m) for m in members], assessments)
         if masses <= self.posed.most_masses:
             return self
-        return FamilyPlants(self.family, self.structure, masses)
+        return FamilyPlants(self.family, self.posed.structure, masses)
 
     def question(self, member: Member) -> DesignQuestion:
         """Return the question of a member."""

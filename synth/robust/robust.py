@@ -18,6 +18,7 @@ import numpy as np
 from models.basics import InputError, check_range, one_thread
 from models.case import Case
 
+from ..design import gains_in_use
 from ..question import PAYLOAD_FEEDBACK, FamilyProblem, Objective
 from ..search import KEPT, Found, Progress, search, with_bests
 from .family import Family, Member
@@ -84,7 +85,7 @@ def optimise_robust(
     plants = FamilyPlants(family, structure)
     members = _first(family)
     problem = _problem(plants, members, wanted, seed, progress)
-    records = found = search(problem, starts, seed, plants.guesses, progress)
+    found = search(problem, starts, seed, gains_in_use(plants.nominal), progress)
     given, quiet = len(members), False
     for k in range(_ROUNDS):
         if found.solved is None:
@@ -114,7 +115,7 @@ def optimise_robust(
         problem = _problem(plants, members, wanted, seed, progress)
         found = _again(problem, found, starts, seed, progress)
     return answer_of(
-        case, family, wanted, plants, problem, members, found, records,
+        plants, problem, members, found,
         given=given, quiet=quiet, draws=draws, seed=seed, progress=progress,
     )  # fmt: skip
 
@@ -158,5 +159,5 @@ def _problem(
         scenarios[first:] = [replace(s, weight=0.0) for s in scenarios[first:]]
     family = FamilyProblem(scenarios=tuple(scenarios), objective=objective)
     if objective is Objective.REGRET:
-        return with_bests(family, seed, plants.guesses, progress)
+        return with_bests(family, seed, gains_in_use(plants.nominal), progress)
     return family

@@ -24,6 +24,7 @@ from scipy.interpolate import CubicSpline
 from models.basics import FloatArray, InputError, check_range, one_thread, read_only
 from models.case import Case
 
+from ..design import gains_in_use
 from ..question import FamilyProblem, Objective
 from ..search import KEPT, Progress, search
 from ..sizing import Answer, best_of_each
@@ -251,7 +252,7 @@ class _ScheduleSearch:
         problems = [self.plants.scenario(member).problem for member in self.members]
         found = best_of_each(
             problems,
-            self.plants.guesses,
+            gains_in_use(self.plants.nominal),
             harder=True,  # a longer rope is softer
             seed=self._seed,
             known={},
@@ -263,7 +264,7 @@ class _ScheduleSearch:
         """Return the schedule, its nodes added until it holds and costs little."""
         own = self.own
         lost = [float(v) for v, f in zip(self.lengths, own, strict=True) if f is None]
-        names = tuple(p.name for p in self.plants.law.parameters)
+        names = tuple(p.name for p in self.plants.nominal.law.parameters)
         if lost:
             status = f"no gains keep the limits at a length of {lost[0]:.4g} m"
             return self._made([0, len(own) - 1], np.zeros((2, len(names))), [], False, status)
@@ -343,7 +344,7 @@ class _ScheduleSearch:
             case=self.case,
             lengths=self.lengths[list(nodes)],
             gains=gains,
-            names=tuple(p.name for p in self.plants.law.parameters),
+            names=tuple(p.name for p in self.plants.nominal.law.parameters),
             amplifier=self.plants.nominal.amplifier or 1.0,
             ok=ok,
             status=status,
@@ -352,7 +353,7 @@ class _ScheduleSearch:
 
     def _tuned(self, nodes: Sequence[int], members: Sequence[float]) -> FloatArray | None:
         """Return the gains at the nodes that serve some lengths best together."""
-        parameters = self.plants.law.parameters
+        parameters = self.plants.nominal.law.parameters
         count = len(parameters)
         starts = np.array([f.solved.values for f in self.own if f is not None])
         scenarios = []

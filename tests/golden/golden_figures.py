@@ -596,7 +596,7 @@ def optimum(found: Figures) -> None:
     robust = sh.optimise_robust(
         one, sh.Family.of(one, {"rope.length": (1500.0, 2000.0)}), starts=1, draws=50
     )
-    worst = max(s.payload_rms for s in robust.scenarios)
+    worst = max(s.design.payload_rms for s in robust.scenarios)
     found.put("optimum.robust.payload_rms", worst, "optimum")
     found.put("optimum.robust.status", robust.status, "text")
 

@@ -118,10 +118,10 @@ def _next(
 ) -> list[tuple[str, str]]:
     words = case_words(arguments, folder)
     rows = []
-    if design.scenarios and design.structure == "payload-feedback":
+    if design.scenarios and design.worst.design.gains:
         worst = design.family.case_at(design.worst.member)
         path = folder.write("worst.yaml", worst.to_yaml())
-        gains = gains_text(design.gains)
+        gains = gains_text(design.parameters)
         evaluate = f"stillhook evaluate {shlex.quote(str(path))} --gains {gains}"
         rows.append(("these gains where the payload moves most", evaluate))
     lengths = (a for a in design.family.axes if a.path == "rope.length" and a.continuous)

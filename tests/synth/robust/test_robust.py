@@ -26,11 +26,11 @@ def test_a_robust_design_is_verified_and_no_draw_is_unstable(design):
 
 
 def test_no_member_in_the_ranges_is_worse_than_the_set(design):
-    values = list(design.parameters.values())
+    values = design.plants.nominal.values(design.parameters)
     for member in design.family.draw(25, seed=11):
         figures = exact_figures(design.plants, values, member)
         assert figures.stable
-        assert figures.payload_rms <= design.worst.payload_rms * (1.0 + 3e-3)
+        assert figures.payload_rms <= design.worst.design.payload_rms * (1.0 + 3e-3)
         assert figures.use <= 1.0 + 3e-3
 
 
@@ -38,11 +38,11 @@ def test_the_worst_case_table_holds_the_margins_of_each_loop(design):
     from synth import evaluate_gains
 
     worst = design.worst
-    single = evaluate_gains(design.family.case_at(worst.member), design.gains)
-    assert single.payload_rms == pytest.approx(worst.payload_rms, rel=1e-4)
+    single = evaluate_gains(design.family.case_at(worst.member), design.parameters)
+    assert single.payload_rms == pytest.approx(worst.design.payload_rms, rel=1e-4)
     assert single.margins is not None
-    assert single.margins.delay == pytest.approx(worst.delay, rel=1e-4)
-    assert single.margins.disk == pytest.approx(worst.disk, rel=1e-4)
+    assert single.margins.delay == pytest.approx(worst.margins.delay, rel=1e-4)
+    assert single.margins.disk == pytest.approx(worst.margins.disk, rel=1e-4)
     assert worst.radius is not None
     assert 0.0 < worst.radius.box < 1.0
 
