@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from models.basics import FloatArray, read_only
+from models.basics import BoolArray, FloatArray, read_only
 from models.plant import MEASUREMENTS
 from models.sensing import HEARD, MEASURED, Measurement
 
@@ -26,14 +26,12 @@ from .prediction import PredictionModel, constant_scales
 _AT = np.array([HEARD.index(name) for name in MEASURED])
 _AGE, _FRESH = HEARD.index("payload.age"), HEARD.index("payload.valid")
 _UNIT = HEARD.index("mru.valid")
+_TELEMETRY, _REFERENCE = slice(0, 3), slice(3, 5)  # among the measurements
 _APPLIED, _SPEED = HEARD.index("drive.applied"), HEARD.index("motor.speed")
-_NO_TELEMETRY = 1  # bits of what is missing
-_NO_UNIT = 2
 _STARTING = 10.0  # in which the gain comes to its steady value [s]
 # What is not known of the constants at first, over `constant_scales`.
 _AT_FIRST = (0.3, 0.1, 0.01, 0.3)
 _LOWER = 1.0  # by which the load may hang lower or higher at first [m]
-_BITS = 1 << np.arange(len(MEASURED))
 _HUGE = 1e12
 _LATER = 1e-3  # of a sample: an age that is no other than usual
 
@@ -64,9 +62,9 @@ class WinchEstimator:
     def __init__(self, model: PredictionModel) -> None:
         self.model = model
         self.covariance = kalman_covariance(model)
-        # By what is missing: of the 2^8 sets of signals a few occur, each for many samples.
-        self._gains: dict[int, FloatArray] = {}
-        self.gain = self._gain(0)
+        # By what is there: of the 2^8 sets of signals a few occur, each for many samples.
+        self._gains: dict[bytes, FloatArray] = {}
+        self.gain = self._gain(np.ones(len(MEASURED), dtype=np.bool_))
         self._first = _first_gains(model, self.covariance)
         self._C = np.ascontiguousarray(model.C)
         self._A = np.ascontiguousarray(model.A)
@@ -150,24 +148,21 @@ class WinchEstimator:
         self._begun = True
         # Age and validity of the telemetry come with it: old values are used as such, and a flag
         # that says "not valid" takes a signal out before its number is looked at.
-        y = shown[_AT] - self._rest
-        missing = 0 if shown[_FRESH] > 0.5 else _NO_TELEMETRY
+        y = shown[_AT] - self._rest - self._felt * winch.extra_drag(float(self._velocity @ ahead))
+        error = y - self._late(float(shown[_AGE])) @ ahead
+        there = np.isfinite(error)
+        if not shown[_FRESH] > 0.5:
+            there[_TELEMETRY] = False
         if shown[_UNIT] <= 0.5:
-            missing |= _NO_UNIT
-        y = y - self._felt * winch.extra_drag(float(self._velocity @ ahead))
-        error = y - self._C @ ahead
-        if missing == 0 and math.isfinite(float(np.abs(error).max())):
-            late = float(shown[_AGE]) - self._usual
-            if late > self._slack or late < -self._slack:
-                error = y - self._late(float(shown[_AGE])) @ ahead
-            # Everything is there, as nearly always: one product, no mask.
-            gain = self.gain
-            if self._samples < len(self._first):
-                gain = self._first[self._samples]
-                self._samples += 1
-            self.state = ahead + gain @ error
+            there[_REFERENCE] = False
+        if not there.all():
+            gain, error = self._gain(there), np.where(there, error, 0.0)
+        elif self._samples < len(self._first):
+            gain = self._first[self._samples]
+            self._samples += 1
         else:
-            self.state = self._partly(ahead, y, missing, float(shown[_AGE]))
+            gain = self.gain
+        self.state = ahead + gain @ error
         if not float(np.abs(self.state).max()) < _HUGE:  # no number, or no longer of this world
             self.reset()
         self.speed = float(self._speed @ self.state)
@@ -178,34 +173,21 @@ class WinchEstimator:
         """Take A chi, which the caller has computed among other products, as next prediction."""
         self._ahead = ahead
 
-    def _partly(self, ahead: FloatArray, y: FloatArray, missing: int, age: float) -> FloatArray:
-        """Update with what there is."""
-        rows = self._late(age) if math.isfinite(age) else self._C
-        error = y - rows @ ahead
-        there = np.isfinite(error)
-        if missing & _NO_TELEMETRY:
-            there[:3] = False
-        if missing & _NO_UNIT:
-            there[3:5] = False
-        error = np.where(there, error, 0.0)
-        mask = int((~there) @ _BITS)
-        return np.asarray(ahead + self._gain(mask) @ error)
-
     def _late(self, age: float) -> FloatArray:
-        """Return C for telemetry of another age than usual."""
-        if abs(age - self._usual) <= self._slack:
+        """Return C for telemetry of an age [s]; the usual one where it is not known."""
+        if not math.isfinite(age) or abs(age - self._usual) <= self._slack:
             return self._C
         rows = self._C.copy()
         for name in MEASUREMENTS:
             rows[MEASURED.index(name)] = self.model.late_row(name, age)
         return rows
 
-    def _gain(self, mask: int) -> FloatArray:
-        """Return the gain without the measurements whose bits are set."""
-        if mask not in self._gains:
-            there = np.array([not mask >> k & 1 for k in range(len(MEASURED))])
-            self._gains[mask] = kalman_gain(self.model.C, self.model.R, self.covariance, there)
-        return self._gains[mask]
+    def _gain(self, there: BoolArray) -> FloatArray:
+        """Return the gain of the measurements that are there, (ny,)."""
+        key = there.tobytes()
+        if key not in self._gains:
+            self._gains[key] = kalman_gain(self.model.C, self.model.R, self.covariance, there)
+        return self._gains[key]
 
 
 def kalman_covariance(model: PredictionModel) -> FloatArray:
