@@ -160,8 +160,6 @@ def _sentences(entry: Any, path: Path, owner: type[Section] | None) -> Iterator[
     elif kind in ("extra_forbidden", "invalid_key"):
         key = str(path[-1])
         yield (*path[:-1], key), f"unknown key; {suggestion(key, list(fields))}"
-    elif kind in ("model_type", "model_attributes_type", "dict_type"):
-        yield path, f"must be a section with keys of its own, got {got}"
     elif kind == "literal_error":
         expected = context["expected"]
         yield path, f"must be {expected}, got {got}{_near(entry.get('input'), expected)}"
@@ -172,22 +170,26 @@ def _sentences(entry: Any, path: Path, owner: type[Section] | None) -> Iterator[
         tag = str(context["discriminator"]).strip("'")
         text = f"{_choices(fields.get(key))}, got {context['tag']!r}"
         yield (*path, tag), text + _near(context["tag"], context["expected_tags"])
-    elif kind in ("tuple_type", "list_type"):
-        yield path, f"must be a list, got {got}"
     elif kind in ("too_short", "too_long"):
         bound = context.get("min_length", context.get("max_length"))
         side = "at least" if kind == "too_short" else "at most"
         noun = "entry" if bound == 1 else "entries"
         yield path, f"must have {side} {bound} {noun}, got {context['actual_length']}"
-    elif kind == "string_type":
-        yield path, f"must be text, got {got}"
-    elif kind == "string_too_short":
-        yield path, "must not be empty"
-    elif kind == "string_too_long":
-        yield path, f"must have at most {context['max_length']} characters, got {got}"
+    elif kind in _PLAIN:
+        yield path, _PLAIN[kind].format(got=got, **context)
     else:
         message = str(entry["msg"]).removeprefix("Value error, ")
         yield path, f"{message[:1].lower()}{message[1:]}, got {got}"
+
+
+_SECTION = "must be a section with keys of its own, got {got}"
+_PLAIN = {
+    **dict.fromkeys(("model_type", "model_attributes_type", "dict_type"), _SECTION),
+    **dict.fromkeys(("tuple_type", "list_type"), "must be a list, got {got}"),
+    "string_type": "must be text, got {got}",
+    "string_too_short": "must not be empty",
+    "string_too_long": "must have at most {max_length} characters, got {got}",
+}
 
 
 def _got(value: object) -> str:
