@@ -133,6 +133,8 @@ def solve_hull(
     SolverError
         If Capytaine fails.
     """
+    from threadpoolctl import threadpool_limits
+
     cpt = capytaine()
     frequencies = np.atleast_1d(check_ascending("hull", "omega", np.asarray(omega)))
     check_range("hull", "omega", frequencies[0], low=1e-3, unit="rad/s")
@@ -140,7 +142,7 @@ def solve_hull(
     headings = np.atleast_1d(check_ascending("hull", "heading", np.asarray(heading)))
     if not math.isinf(depth):
         check_range("hull", "depth", depth, low=1.01 * hull.draught, unit="m")
-    with quiet(), _limited(threads):
+    with quiet(), threadpool_limits(limits=threads):
         try:
             mesh = capytaine_mesh(hull)
             body = cpt.FloatingBody(
@@ -333,18 +335,6 @@ def quiet() -> Iterator[None]:
         yield
     finally:
         log.setLevel(level)
-
-
-@contextlib.contextmanager
-def _limited(threads: int | None) -> Iterator[None]:
-    """Let the computation use this many threads."""
-    if threads is None:
-        yield
-        return
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(limits=threads):
-        yield
 
 
 def cached_hydrodynamics(
