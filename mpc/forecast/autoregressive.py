@@ -44,7 +44,7 @@ from scipy.linalg import lapack
 
 from models.basics import FloatArray, check_range, read_only
 
-from .forecast import Forecast, hermite_weights, leads_of, usable
+from .forecast import Forecast, hermite_weights, leads_of
 
 _TRAIN_EVERY = 0.2  # [s] between two regressions
 _FADING = 1.0  # [s] in which a forecast fades before there is a model
@@ -173,7 +173,8 @@ class AdaptiveAR:
     def update(self, heave: float, rate: float, valid: bool, time: float) -> None:
         """Take what the unit shows: heave [m], heave rate [m/s]; `time` plays no part."""
         del time
-        if usable(heave, rate, valid, _LARGEST):
+        # A comparison with NaN is false, so that it needs no test of its own.
+        if valid and abs(heave) <= _LARGEST and abs(rate) <= _LARGEST:
             self._append((heave, rate * self._D), gap=False)
             self._missing, self._stale = 0, max(0, self._stale - _WORKED_OFF)
             # The mean while the record is short, then with the forgetting of the regression.

@@ -9,7 +9,6 @@ know which predictor stands behind it: `AdaptiveAR` (knows the record alone), `P
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -132,19 +131,3 @@ def hermite_weights(owner: str, knots: FloatArray, at: FloatArray) -> FloatArray
         weights[rows, 2 * left + column] = value
         weights[n + rows, 2 * left + column] = rate
     return weights
-
-
-def usable(heave: float, rate: float, valid: bool, largest: float) -> bool:
-    """Return whether a sample may enter a state: valid, finite and not absurdly large.
-
-    Parameters
-    ----------
-    heave, rate
-        What the unit shows [m], [m/s].
-    valid
-        Whether the unit says that it works.
-    largest
-        Magnitude that no measurement exceeds [m], [m/s].
-    """
-    # A comparison with NaN is false, so that it needs no test of its own.
-    return bool(valid) and math.fabs(heave) <= largest and math.fabs(rate) <= largest

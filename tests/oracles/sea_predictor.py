@@ -28,7 +28,7 @@ from models.basics import FloatArray, SolverError, check_range, read_only
 from models.hook import HookMotion
 from models.sensing import MruModel
 from mpc.forecast import Forecast
-from mpc.forecast.forecast import leads_of, usable
+from mpc.forecast.forecast import leads_of
 
 if TYPE_CHECKING:
     from models.case import Case
@@ -151,7 +151,7 @@ class SeaPredictor:
         """Take what the unit shows: heave [m], heave rate [m/s]; `time` plays no part."""
         del time
         model = self._model
-        seen = usable(heave, rate, valid, self._limits)
+        seen = valid and abs(heave) <= self._limits and abs(rate) <= self._limits
         if self._covariance is None:
             if seen:
                 self._state = self._closed @ self._state + self._gain @ (heave, rate)
