@@ -11,6 +11,7 @@ to port, 180 deg head sea.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator
 from typing import Annotated, Literal
 
@@ -18,7 +19,7 @@ from pydantic import Field
 
 from ..basics import ascending_fault
 from ..casefile import DataFile, Quantity, Section
-from .crane import Point, crane_tip
+from .crane import Point
 
 
 def _bundled() -> Collection[str]:
@@ -86,15 +87,20 @@ class Crane(Section):
 
     @property
     def tip(self) -> Point:
-        """The boom's tip in the frame of the RAOs [m]."""
-        return crane_tip(
-            (self.x, self.y, self.z),
-            slew=self.slew,
-            boom_length=self.boom_length,
-            boom_angle=self.boom_angle,
-            jib_length=self.jib_length,
-            jib_angle=self.jib_angle,
-        )
+        """The boom's tip in the frame of the RAOs [m].
+
+        A boom of 20 m at 60 degrees over the port side:
+
+        >>> crane = Crane(x=-25.0, y=5.0, z=12.0, slew="90 deg", boom_length=20.0,
+        ...               boom_angle="60 deg")
+        >>> [round(x, 2) for x in crane.tip]
+        [-25.0, 15.0, 29.32]
+        """
+        booms = ((self.boom_length, self.boom_angle), (self.jib_length, self.jib_angle))
+        reach = sum(length * math.cos(angle) for length, angle in booms)
+        rise = sum(length * math.sin(angle) for length, angle in booms)
+        across = self.y + reach * math.sin(self.slew)
+        return (self.x + reach * math.cos(self.slew), across, self.z + rise)
 
 
 class Current(Section):
