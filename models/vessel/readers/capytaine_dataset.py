@@ -19,7 +19,6 @@ import numpy.typing as npt
 
 from ...basics import GRAVITY, FloatArray, InputError, wave_frequency
 from ..assemble import decoded
-from ..raos import MODES
 
 LARGEST = 20_000_000
 """Most numbers in a variable that is read; Capytaine's files have some ten thousand."""
@@ -239,19 +238,6 @@ class CapytaineData:
         if array.dtype.kind not in "fiu" or array.ndim != 1:
             raise InputError(f"{self.owner}: {name} must be a row of numbers, got {_short(array)}")
         return array.astype(np.float64)
-
-
-def mode_of(dof: str) -> tuple[str, str | None]:
-    """Return the body and the motion that a degree of freedom's name means, if it is one of six.
-
-    Examples
-    --------
-    >>> mode_of("Heave"), mode_of("barge__Roll"), mode_of("bending 1")
-    (('', 'heave'), ('barge', 'roll'), ('', None))
-    """
-    body, _, name = dof.rpartition("__")
-    found = name.strip().lower()
-    return body, found if found in MODES else None
 
 
 def _opened(owner: str, data: bytes) -> Any:

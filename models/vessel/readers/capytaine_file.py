@@ -23,7 +23,7 @@ from ..assemble import finished
 from ..crane import Point
 from ..hull import FloatingBody, Hydrodynamics, centre_of_mass, solved_motions
 from ..raos import MODES, VesselRaos
-from .capytaine_dataset import CapytaineData, mode_of
+from .capytaine_dataset import CapytaineData
 
 _ROLL = MODES.index("roll")
 
@@ -254,8 +254,10 @@ def _places(data: CapytaineData, body: str | None) -> dict[str, int]:
     """Return where each motion of the body stands."""
     bodies: dict[str, dict[str, int]] = {}
     for column, dof in enumerate(data.dofs):
-        name, mode = mode_of(dof)
-        if mode is None:
+        # The name of its body may stand before it, as in barge__Roll.
+        name, _, motion = dof.rpartition("__")
+        mode = motion.strip().lower()
+        if mode not in MODES:
             continue
         if mode in bodies.setdefault(name, {}):
             raise InputError(f"{data.owner}: {mode} is there twice: {', '.join(data.dofs)}")

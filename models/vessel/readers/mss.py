@@ -69,7 +69,7 @@ def parse_mss(
                 f"{owner}: vessel {what} must be finite numbers up to {high:g}, got {column[:3]}.."
             )
     check_range(owner, "lowest frequency", omega.min(), low=0.0, unit="rad/s", open_low=True)
-    chosen = chosen_speed(owner, [float(v) for v in speeds], speed)
+    chosen, told = chosen_speed(owner, speeds.tolist(), speed)
     at = int(np.argmin(np.abs(speeds - chosen)))
     if not np.any(amplitude[:, :, at]):
         raise InputError(f"{owner}: all motion RAOs at {chosen:g} m/s are zero")
@@ -80,9 +80,8 @@ def parse_mss(
         f"MSS .mat: {MSS.words()}; turned half a circle about x",
         "the file does not say where its point CO is: positions count from there"
         + ("" if not any(origin) else f", taken to be at {origin} m"),
+        *told,
     ]
-    if speeds.size > 1:
-        notes.append(f"speed {chosen:g} m/s of {', '.join(f'{v:g}' for v in np.sort(speeds))} m/s")
     return finished(
         VesselRaos(
             name=_name(vessel), omega=rows[0], heading=rows[1], values=rows[2],

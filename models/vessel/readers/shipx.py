@@ -127,7 +127,7 @@ def parse_shipx(owner: str, text: str, *, speed: float | None = None) -> VesselR
             f"{owner}, line {lines.at + 1}: there is more than the file's header counts: "
             f"{rest[0].strip()[:60]!r}"
         )
-    chosen = chosen_speed(owner, list(found), speed)
+    chosen, told = chosen_speed(owner, list(found), speed)
     about, rows = found[chosen]
     omega = np.array([row[0] for row in rows])
     direction = SHIPX.directions([row[1] for row in rows])
@@ -139,10 +139,8 @@ def parse_shipx(owner: str, text: str, *, speed: float | None = None) -> VesselR
         f"ShipX .re1: {SHIPX.words()}; turned half a circle about z",
         f"motions of the point {origin[0]:g} m forward of L_pp/2, {origin[2]:g} m above the still "
         "water, which the file names; positions count from L_pp/2, centre line and still water",
+        *told,
     ]
-    if len(found) > 1:
-        every = ", ".join(f"{v:g}" for v in sorted(found))
-        notes.append(f"speed {chosen:g} m/s of {every} m/s")
     ship = head[2].partition(":")[2].strip()
     return finished(
         VesselRaos(
@@ -152,21 +150,20 @@ def parse_shipx(owner: str, text: str, *, speed: float | None = None) -> VesselR
     )  # fmt: skip
 
 
-def chosen_speed(owner: str, speeds: list[float], wanted: float | None) -> float:
-    """Return the speed of a file that is asked for; the slowest if none is.
+def chosen_speed(owner: str, speeds: list[float], wanted: float | None) -> tuple[float, list[str]]:
+    """Return the speed of a file that is asked for, the slowest if none is, and a note of it.
 
     Raises
     ------
     InputError
         If the file has no such speed.
     """
-    if wanted is None:
-        return min(speeds, key=abs)
-    nearest = min(speeds, key=lambda v: abs(v - wanted))
-    if not abs(nearest - wanted) <= 1e-3:
-        every = ", ".join(f"{v:g}" for v in sorted(speeds))
+    near = 0.0 if wanted is None else wanted
+    chosen = min(speeds, key=lambda v: abs(v - near))
+    every = ", ".join(f"{v:g}" for v in sorted(speeds))
+    if wanted is not None and not abs(chosen - wanted) <= 1e-3:
         raise InputError(f"{owner}: speed must be one of {every} m/s, got {wanted:g} m/s")
-    return nearest
+    return chosen, [f"speed {chosen:g} m/s of {every} m/s"] if len(speeds) > 1 else []
 
 
 def _modes(lines: _Lines) -> list[complex]:
