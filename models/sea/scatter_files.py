@@ -81,8 +81,12 @@ def read_scatter(path: str | Path, *, gamma: float = 1.0) -> Scatter:
     kinds = [_name(part)[0] for part in corner]
     periods = {"peak_period", "zero_crossing_period"}
     if len(corner) == 2 and "significant_height" in kinds and periods & set(kinds):
-        return _matrix(corner, header[1:], body, owner, line, ratio)
-    return _list(header, body, owner, line, ratio)
+        columns = _matrix(corner, header[1:], body, owner, line)
+    else:
+        columns = _list(header, body, owner, line)
+    if "zero_crossing_period" in columns:
+        columns["peak_period"] = columns.pop("zero_crossing_period") / ratio
+    return Scatter(**columns, source=owner)
 
 
 def write_scatter(path: str | Path, scatter: Scatter) -> Path:
@@ -182,8 +186,7 @@ def _list(
     body: list[tuple[int, list[str]]],
     owner: str,
     line: int,
-    ratio: float,
-) -> Scatter:
+) -> dict[str, Any]:
     named = [_name(cell) for cell in header]
     if body and _is_units_row(body[0][1]):
         units = [cell.strip("[]() ") for cell in body[0][1]]
@@ -216,10 +219,7 @@ def _list(
             raise InputError(f"{owner}:{number}: must have {len(header)} columns, got {len(cells)}")
         for name, index in at.items():
             columns[name].append(_number(cells[index], owner, number, name) * factors[name])
-    arrays: dict[str, Any] = {name: np.array(values) for name, values in columns.items()}
-    if period == "zero_crossing_period":
-        arrays["peak_period"] = arrays.pop("zero_crossing_period") / ratio
-    return Scatter(**arrays, source=owner)
+    return {name: np.array(values) for name, values in columns.items()}
 
 
 def _is_units_row(cells: Sequence[str]) -> bool:
@@ -241,8 +241,7 @@ def _matrix(
     body: list[tuple[int, list[str]]],
     owner: str,
     line: int,
-    ratio: float,
-) -> Scatter:
+) -> dict[str, Any]:
     (down_name, down_unit), (across_name, across_unit) = (_name(part) for part in corner)
     across = [cell for cell in across if cell.lower() not in ("", "sum", "total", "all")]
     columns = [
@@ -271,10 +270,7 @@ def _matrix(
         raise InputError(f"{owner}: the matrix must have at least one row and one column")
     rows, cols = np.meshgrid(down, columns, indexing="ij")
     by_name = {down_name: rows, across_name: cols, "occurrence": np.array(table)}
-    if "zero_crossing_period" in by_name:
-        by_name["peak_period"] = by_name.pop("zero_crossing_period") / ratio
-    arrays: dict[str, Any] = {name: values.ravel() for name, values in by_name.items()}
-    return Scatter(**arrays, source=owner)
+    return {name: values.ravel() for name, values in by_name.items()}
 
 
 def _centre(cell: str, owner: str, line: int) -> float:

@@ -338,8 +338,8 @@ class SeaSpectrum:
         return result if self.depth is None else result * shapes.depth_function(omega, self.depth)
 
 
-def _takes(kind: str) -> str:
-    """Return what a kind takes, in words."""
+def takes(kind: str) -> str:
+    """Return what a kind takes besides its height, in words."""
     named = [f"{name} [{_UNITS[name]}]" if name in _UNITS else name for name in FIELDS[kind]]
     return ", ".join(named) or "no period"
 
@@ -348,7 +348,7 @@ def _check_fields(kind: str, value_of: Callable[[str], object]) -> None:
     """Check that a sea has the fields of its kind and none of another's."""
     for name in dict.fromkeys(name for names in FIELDS.values() for name in names):
         if name not in FIELDS[kind] and value_of(name) is not None:
-            raise InputError(f"sea: spectrum {kind} takes {_takes(kind)}, not {name}")
+            raise InputError(f"sea: spectrum {kind} takes {takes(kind)}, not {name}")
     for name in FIELDS[kind]:
         value, unit = value_of(name), _UNITS.get(name, "")
         if value is None:

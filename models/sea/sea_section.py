@@ -25,7 +25,7 @@ from pydantic import (
 
 from ..basics import GRAVITY, InputError, file_stamp, range_text
 from ..casefile import DataFile, Quantity, Section, problems
-from .sea import FIELDS, SeaSpectrum
+from .sea import FIELDS, SeaSpectrum, takes
 from .shapes import fully_arisen, gaussian_widths, jonswap_gamma
 from .spreading import Spreading
 from .table import SpectrumTable, row_faults
@@ -77,13 +77,6 @@ _Gamma = Annotated[
         "(DNV-RP-C205). The other spectra do not use it."
     ),
 ]
-
-
-def _takes(kind: str) -> str:
-    """Return what a kind takes besides a height, in words."""
-    if kind == "measured":
-        return "a table or a file"
-    return " and ".join(FIELDS[kind]) or "no period"
 
 
 def _kind(section: type[SeaSection]) -> str:
@@ -140,13 +133,14 @@ class SeaSection(Section):
         if "wind_speed" in given & foreign:
             names = ", ".join(_kind(one) for one in KINDS_OF_SEA if issubclass(one, _SeaByWind))
             raise problems(("wind_speed", f"is not for the {kind} spectrum: it is for {names}"))
+        wanted = "a table or a file" if kind == "measured" else takes(kind)
         found = [
             (name, f"is missing: the {kind} spectrum needs it")
             for name in cls._needs(data)
             if name not in given
         ]
         found += [
-            (name, f"is not for the {kind} spectrum, which takes {_takes(kind)}")
+            (name, f"is not for the {kind} spectrum, which takes {wanted}")
             for name in data
             if name in given & foreign and name not in _IDLE
         ]
