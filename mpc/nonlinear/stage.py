@@ -34,7 +34,7 @@ from models.basics import FloatArray, InputError, ReadOnlyArrays
 from models.plant import DrumTravel, build_plant, displacement_names, zero_order_hold
 from models.simulation import Kernel
 
-from ..programme import hermite_within
+from ..programme import hermite_hold
 from ..winch import SampledWinch
 from .mean_torque import Drift, mean_torque
 
@@ -188,7 +188,7 @@ def _sampled(winch: SampledWinch, law: ForceLaw, drift: Drift) -> dict[str, Floa
     held = np.column_stack([plant.B[:, 0], plant.E[:, known["payload.force"]], columns])
     motion = plant.E[:, [known["hook.heave"], known["hook.heave_rate"]]]
     over, added = zero_order_hold(plant.A, held, 0.5 * T)
-    moved, hook = hermite_within(plant.A, motion, T, 0.5 * T)
+    moved, hook = hermite_hold(plant.A, motion, T, 0.5 * T)
     # The command is held at u = back omega(start) + d / gain, with d what gives the input: the mean
     # torque, and what the start is over it.
     D = rows @ added[:, 0] / winch.gain

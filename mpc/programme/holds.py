@@ -14,11 +14,13 @@ import scipy.linalg
 from models.basics import FloatArray
 
 
-def hermite_hold(A: FloatArray, E: FloatArray, dt: float) -> FloatArray:
-    """Return the effect on x of a motion that is cubic over one sample, (n, 4).
+def hermite_hold(
+    A: FloatArray, E: FloatArray, dt: float, at: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return what a motion that is cubic over a sample has done to x at a time, and is there.
 
-    x' = A x + E [z, z'], with z the cubic through (z0, z0') and (z1, z1'); the columns belong to
-    z0, z0', z1, z1'.
+    x' = A x + E [z, z'], with z the cubic through (z0, z0') and (z1, z1'); the columns of both
+    results, (n, 4) and (2, 4) for z and z', belong to z0, z0', z1, z1'.
 
     Parameters
     ----------
@@ -26,18 +28,8 @@ def hermite_hold(A: FloatArray, E: FloatArray, dt: float) -> FloatArray:
         (n, n) [1/s].
     E
         Columns of z and of z', (n, 2).
-    dt
-        Sample time [s].
-    """
-    return hermite_within(A, E, dt, dt)[0]
-
-
-def hermite_within(
-    A: FloatArray, E: FloatArray, dt: float, at: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return the effect on x, and z and z' themselves, at a time within the sample.
-
-    (n, 4) and (2, 4), with the arguments of `hermite_hold` and the time since the sample's start.
+    dt, at
+        Sample time, and the time since the sample's start [s].
     """
     n, T = len(A), dt
     chain = np.zeros((n + 4, n + 4))

@@ -208,7 +208,7 @@ def sampled_winch(
         # The command is held at u = back omega(start) + d / gain.
         A=A + back * np.outer(inputs[:, 0], speed),
         B=inputs[:, :1] / gain,
-        from_hook=hermite_hold(plant.A, plant.E[:, hook], T),
+        from_hook=hermite_hold(plant.A, plant.E[:, hook], T, T)[0],
         from_constants=np.column_stack([inputs[:, 1], inputs[:, 0] / gain]),
         payload=plant.Cz[rows["payload.displacement"]],
         velocity=plant.Cz[rows["payload.velocity"]],
