@@ -46,7 +46,7 @@ class PhysicsWarning(UserWarning):
 def check_range(
     owner: str,
     name: str,
-    value: float,
+    value: object,
     *,
     low: float = -math.inf,
     high: float = math.inf,
@@ -61,7 +61,7 @@ def check_range(
     owner, name
         What the value belongs to, and what it is called there.
     value
-        The value that came.
+        The value that came: a number, or a text that is one.
     low, high
         Ends of the range [unit]; `open_low` and `open_high` exclude them.
     unit
@@ -73,7 +73,7 @@ def check_range(
         If the value is not a finite number within the range.
     """
     try:
-        number = float(value)
+        number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         number = math.nan
     inside = (number > low if open_low else number >= low) and (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -174,13 +173,6 @@ def _factor(name: str, unit: str, owner: str) -> float:
     return known[unit]
 
 
-def _number(cell: str, owner: str, line: int, what: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        raise InputError(f"{owner}:{line}: {what} must be a number, got {cell!r:.40}") from None
-
-
 def _list(
     header: Sequence[str],
     body: list[tuple[int, list[str]]],
@@ -218,7 +210,8 @@ def _list(
         if len(cells) <= max(at.values()):
             raise InputError(f"{owner}:{number}: must have {len(header)} columns, got {len(cells)}")
         for name, index in at.items():
-            columns[name].append(_number(cells[index], owner, number, name) * factors[name])
+            value = check_range(f"{owner}:{number}", name, cells[index])
+            columns[name].append(value * factors[name])
     return {name: np.array(values) for name, values in columns.items()}
 
 
@@ -262,7 +255,7 @@ def _matrix(
         # An empty cell of a diagram is one that never occurs.
         table.append(
             [
-                _number(cell, owner, number, "occurrence") if cell else 0.0
+                check_range(f"{owner}:{number}", "occurrence", cell or 0.0)
                 for cell in cells[1 : len(columns) + 1]
             ]
         )
@@ -278,7 +271,4 @@ def _centre(cell: str, owner: str, line: int) -> float:
     match = _RANGE.match(cell)
     if match:
         return 0.5 * (float(match.group(1)) + float(match.group(2)))
-    value = _number(cell, owner, line, "a class of the matrix")
-    if not math.isfinite(value):
-        raise InputError(f"{owner}:{line}: a class of the matrix must be finite, got {cell!r}")
-    return value
+    return check_range(f"{owner}:{line}", "a class of the matrix", cell)

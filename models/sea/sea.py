@@ -133,7 +133,7 @@ class SeaSpectrum:
     def __post_init__(self) -> None:
         """Check the values, and give a measured sea or a sum its height."""
         check_choice("sea", "spectrum", self.kind, SPECTRA)
-        _check_fields(self.kind, lambda name: getattr(self, name))
+        self._check_fields()
         if self.parts is not None:
             object.__setattr__(self, "parts", tuple(self.parts))
             if not self.parts or any(part.kind == "sum" for part in self.parts):
@@ -276,6 +276,19 @@ class SeaSpectrum:
             return replace(self, significant_height=significant_height)
         return replace(self, significant_height=significant_height, shape_height=self._shape_height)
 
+    def _check_fields(self) -> None:
+        """Check that the sea has the fields of its kind and none of another's."""
+        own, every = FIELDS[self.kind], {name for names in FIELDS.values() for name in names}
+        for name in (*sorted(every.difference(own)), *own):
+            wanted, value, unit = name in own, getattr(self, name), _UNITS.get(name)
+            if not wanted and value is not None:
+                raise InputError(f"sea: spectrum {self.kind} takes {takes(self.kind)}, not {name}")
+            if wanted and value is None:
+                needed = f"{name} [{unit}]" if unit else name
+                raise InputError(f"sea: spectrum {self.kind} needs {needed}")
+            if wanted and unit:
+                check_range("sea", name, value, low=0.0, unit=unit, open_low=True)
+
     @property
     def _shape_height(self) -> float:
         return self.significant_height if self.shape_height is None else self.shape_height
@@ -342,19 +355,6 @@ def takes(kind: str) -> str:
     """Return what a kind takes besides its height, in words."""
     named = [f"{name} [{_UNITS[name]}]" if name in _UNITS else name for name in FIELDS[kind]]
     return ", ".join(named) or "no period"
-
-
-def _check_fields(kind: str, value_of: Callable[[str], object]) -> None:
-    """Check that a sea has the fields of its kind and none of another's."""
-    for name in dict.fromkeys(name for names in FIELDS.values() for name in names):
-        if name not in FIELDS[kind] and value_of(name) is not None:
-            raise InputError(f"sea: spectrum {kind} takes {takes(kind)}, not {name}")
-    for name in FIELDS[kind]:
-        value, unit = value_of(name), _UNITS.get(name, "")
-        if value is None:
-            raise InputError(f"sea: spectrum {kind} needs {name}" + (f" [{unit}]" if unit else ""))
-        if unit and isinstance(value, int | float):
-            check_range("sea", name, value, low=0.0, unit=unit, open_low=True)
 
 
 def highest_of(density: Callable[[FloatArray], FloatArray], peaks: Sequence[float]) -> float:

@@ -246,8 +246,7 @@ def _convention(owner: str, told: Mapping[str, str], first: str, columns: Column
             raise InputError(
                 f"{owner}: {field} is told twice: {choices[field]}, and {value} at {mode}_{part}"
             )
-    zero = _one(owner, "heading_zero", told.get("heading_zero", "0"))
-    return Convention(**choices, heading_zero=zero)
+    return Convention(**choices, heading_zero=_figure(owner, "heading_zero", told, 0.0))
 
 
 def _values(
@@ -284,19 +283,12 @@ def _values(
     return convention.complex_values(table, slope), missing
 
 
-def _one(owner: str, name: str, word: str) -> float:
-    try:
-        return check_range(owner, name, float(word), low=-1e4, high=1e4)
-    except ValueError:
-        raise InputError(f"{owner}: {name} must be a number, got {word[:40]!r}") from None
-
-
 def _figure(owner: str, name: str, told: Mapping[str, str], default: float) -> float:
     if name not in told:
         return default
     if name == "depth" and told[name].strip().lower() in {"inf", "infinite", "deep"}:
         return math.inf
-    return _one(owner, name, told[name])
+    return check_range(owner, name, told[name], low=-1e4, high=1e4)
 
 
 def _point(
@@ -307,4 +299,4 @@ def _point(
     words = told[name].replace(",", " ").split()
     if len(words) != len(default):
         raise InputError(f"{owner}: {name} must be {len(default)} numbers [m], got {told[name]!r}")
-    return tuple(_one(owner, name, word) for word in words)
+    return tuple(check_range(owner, name, word, low=-1e4, high=1e4) for word in words)

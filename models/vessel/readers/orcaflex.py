@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ...basics import ComplexArray, FloatArray, InputError, check_finite, wave_number
+from ...basics import ComplexArray, FloatArray, InputError, check_finite, check_range, wave_number
 from ..assemble import finished, grid
 from ..convention import Convention, one_of
 from ..raos import VesselRaos
@@ -190,7 +190,7 @@ def _table(
         entry = _entry(row) if isinstance(row, dict) else None
         if not entry:
             continue
-        direction = check_finite(owner, "RAODirection", _number(owner, row.get("RAODirection")))
+        direction = check_range(owner, "RAODirection", row.get("RAODirection"), unit="deg")
         table = _table_of(owner, entry, tables)
         first = table[:, 0]
         low, high = _PERIODS
@@ -209,15 +209,6 @@ def _table(
             f"{owner}: all RAOs of this vessel type are zero: they were never filled in"
         )
     return grid(owner, np.concatenate(omega), np.concatenate(heading), rows)
-
-
-def _number(owner: str, value: object) -> float:
-    if isinstance(value, (int, float, str)) and not isinstance(value, bool):
-        try:
-            return float(value)
-        except ValueError:
-            pass
-    raise InputError(f"{owner}: RAODirection must be a number [deg], got {value!r}")
 
 
 def _point(

@@ -132,7 +132,7 @@ def test_a_csv_of_ones_own_tells_its_convention_in_remarks(tmp_path: Path) -> No
         ("omega [rad/s]", "omega [furlongs]", "first column must be omega"),
         ("heading [deg]", "direction", "second column must be heading"),
         ("roll_real", "roll_real [inch]", r"unit \[inch\] of roll_real is not known"),
-        ("# depth: inf", "# depth: shallow", "depth must be a number, got 'shallow'"),
+        ("# depth: inf", "# depth: shallow", "depth must be in .*, got 'shallow'"),
         ("# origin: 0.0, 0.0, 0.0", "# origin: 0.0, 0.0", "origin must be 3 numbers"),
         ("# speed: 0.0", "# speed: 0.0\n# phase: early", "phase must be one of leads, lags"),
     ],
@@ -266,7 +266,7 @@ def test_orcaflex_phase_origin_is_another_point_than_the_rao_origin(tmp_path: Pa
         ("UnitsSystem: SI", "UnitsSystem: US", "UnitsSystem must be SI, got 'US'"),
         ("VesselTypes:", "VesselKinds:", "no list of VesselTypes"),
         ("DisplacementRAOs:", "OtherRAOs:", "it may have load RAOs only"),
-        ("RAODirection: 30", "RAODirection: north", "RAODirection must be a number"),
+        ("RAODirection: 30", "RAODirection: north", "RAODirection must be a finite number"),
         ("Symmetry: None", "Symmetry: Circular", "must have 1 heading, got 12"),
     ],
 )
