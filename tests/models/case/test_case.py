@@ -275,7 +275,7 @@ class TestReplaceRefused:
                 {"sea.spectrum": "jonswap"},
                 "thesis-1975: sea.peak_period: is missing: the jonswap spectrum needs it\n"
                 "thesis-1975: sea.significant_period: is not for the jonswap spectrum, which "
-                "takes peak_period",
+                "takes peak_period [s]",
             ),
         ],
         ids=str,
