@@ -18,7 +18,7 @@ import numpy as np
 from typing_extensions import override
 
 from models.basics import ComplexArray, FloatArray, Quadrature
-from models.plant import LinearPlant, PlantData, fixed_top_modes, rope_transfers
+from models.plant import LinearPlant, PlantData
 from models.rig import MRU
 
 from ..loop import (
@@ -28,7 +28,7 @@ from ..loop import (
     LinearController,
     LoopResponses,
 )
-from ..question import HOOK, PAYLOAD
+from ..question import HOOK, PAYLOAD, held_poles, held_transfers
 from .responses import DragResponses
 
 VELOCITY, FORCE = "payload.velocity", "payload.force"
@@ -187,7 +187,7 @@ class HeldSystem(System):
     @override
     def responses(self, nodes: Quadrature) -> DragResponses:
         s = 1j * nodes.omega
-        P_Y, P_F, T_Y, T_F = _held(self.data, s.astype(np.complex128), self.reference)
+        P_Y, P_F, T_Y, T_F = held_transfers(self.data, s.astype(np.complex128), self.reference)
         to_heave = {PAYLOAD: P_Y, VELOCITY: s * P_Y, "rope.tension": T_Y}
         to_force = {PAYLOAD: P_F, VELOCITY: s * P_F, "rope.tension": T_F}
         return DragResponses(
@@ -204,12 +204,12 @@ class HeldSystem(System):
     @override
     def poles(self, coefficient: float) -> ComplexArray:
         # Those of the payload on its rope: what a quadrature has to look for, and no more.
-        return held_poles(self.data, coefficient)
+        return held_poles(self.data, coefficient, _HIGHEST)
 
     @override
     def _stable(self, coefficient: float) -> bool:
         # Nothing drives the rope's own modes; the first, undamped, would have no variance.
-        return bool(held_poles(self.data, coefficient)[0].real < 0.0)
+        return bool(self.poles(coefficient)[0].real < 0.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -248,40 +248,3 @@ class PerfectSystem(System):
     def poles(self, coefficient: float) -> ComplexArray:
         del coefficient
         return np.zeros(0, dtype=np.complex128)
-
-
-def held_poles(data: PlantData, coefficient: float, highest: float = _HIGHEST) -> ComplexArray:
-    """Return about where the poles are with the drum held [1/s], the upper half.
-
-    Parameters
-    ----------
-    data
-        The plant's numbers.
-    coefficient
-        Drag coefficient [N s/m]; it damps the first mode, as the payload hardly moves in others.
-    highest
-        Frequency up to which the modes are wanted [rad/s].
-    """
-    if data.lumping == "thesis" or data.mass_per_length == 0.0:
-        mass = data.payload_mass + (data.rope_mass if data.lumping == "thesis" else 0.0)
-        modes = np.array([np.sqrt(data.stiffness / mass)])
-    else:
-        mass = data.payload_mass + data.rope_mass / 3.0
-        rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
-        spacing = np.pi / data.rope_length * np.sqrt(data.axial_stiffness / data.mass_per_length)
-        modes = fixed_top_modes(*rope, data.payload_mass, int(highest / spacing) + 1)
-    decay = 0.5 * data.damping_time * modes**2
-    decay[0] += 0.5 * coefficient / mass
-    return np.asarray(-decay + 1j * modes, dtype=np.complex128)
-
-
-def _held(
-    data: PlantData, s: ComplexArray, drag: float
-) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-    """Return P/Y, P/F, T/Y and T/F: one spring, or the exact distributed rope."""
-    if data.lumping != "thesis":
-        return rope_transfers(data, s, drag)
-    spring = data.stiffness * (1.0 + s * data.damping_time)
-    mass = data.payload_mass + data.rope_mass
-    P_F = 1.0 / (mass * s**2 + drag * s + spring)
-    return spring * P_F, P_F, spring * (1.0 - spring * P_F), -spring * P_F

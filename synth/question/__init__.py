@@ -26,6 +26,8 @@ if TYPE_CHECKING:
         SampledNoise,
         controller_for,
         heard_spectra,
+        held_poles,
+        held_transfers,
         locked_response,
         pose,
         uncompensated,

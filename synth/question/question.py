@@ -333,23 +333,20 @@ def uncompensated(case: Case, data: PlantData, hook: HookMotion) -> tuple[float,
     On the exact distributed rope (the lumped one spring with the thesis's lumping); drag that
     is stochastically linearised agrees with the motion.
     """
-    modes = _modes(data, hook.band[1])
-    mass = data.payload_mass + data.rope_mass * (1.0 if data.lumping == "thesis" else 1.0 / 3.0)
 
     def moved(C: float, omega: FloatArray) -> FloatArray:
-        P_Y = _locked(data, np.asarray(1j * omega, dtype=np.complex128), C)
+        P_Y = held_transfers(data, np.asarray(1j * omega, dtype=np.complex128), C)[0]
         return np.asarray(np.abs(P_Y) ** 2)
 
     def about(C: float, power: int) -> Callable[[float], float]:
-        damping = 0.5 * data.damping_time * modes**2
-        damping[0] += 0.5 * C / mass  # the drag is the payload's, which hardly moves above
-        if damping[0] <= 0.0:
+        poles = held_poles(data, C, hook.band[1])
+        if poles[0].real >= 0.0:
             return lambda C: math.inf  # undamped resonance: no stationary motion
         nodes = adaptive_nodes(
             lambda omega: moved(C, omega) * hook.density(omega) * omega**power,
             *hook.band,
             splits=hook.splits,
-            poles=[complex(-h, w) for h, w in zip(damping, modes, strict=True) if h > 0.0],
+            poles=[complex(pole) for pole in poles if pole.real < 0.0],
             rtol=1e-9,
         )
         weights = nodes.weights * hook.density(nodes.omega) * nodes.omega**power
@@ -361,30 +358,47 @@ def uncompensated(case: Case, data: PlantData, hook: HookMotion) -> tuple[float,
     return fixed, about(fixed, 0)(fixed)
 
 
-def _modes(data: PlantData, highest: float) -> FloatArray:
-    """Return the axial modes with the drum held up to a frequency, at least one [rad/s]."""
+def held_poles(data: PlantData, drag: float, highest: float) -> ComplexArray:
+    """Return about where the poles are with the drum held [1/s], the upper half.
+
+    Parameters
+    ----------
+    data
+        The plant's numbers.
+    drag
+        Drag coefficient [N s/m]; it damps the first mode, as the payload hardly moves in others.
+    highest
+        Frequency up to which the modes are wanted [rad/s].
+    """
     if data.lumping == "thesis" or data.mass_per_length == 0.0:
-        mass = data.payload_mass + data.rope_mass
-        return np.array([math.sqrt(data.stiffness / mass)])
-    rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
-    spacing = math.pi / data.rope_length * math.sqrt(data.axial_stiffness / data.mass_per_length)
-    found = fixed_top_modes(*rope, data.payload_mass, int(highest / spacing) + 1)
-    return np.asarray(found[(found < highest) | (found == found[0])])
+        mass = data.payload_mass + (data.rope_mass if data.lumping == "thesis" else 0.0)
+        modes = np.array([math.sqrt(data.stiffness / mass)])
+    else:
+        mass = data.payload_mass + data.rope_mass / 3.0
+        rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
+        spacing = math.pi / data.rope_length * math.sqrt(rope[0] / data.mass_per_length)
+        modes = fixed_top_modes(*rope, data.payload_mass, int(highest / spacing) + 1)
+    decay = 0.5 * data.damping_time * modes**2
+    decay[0] += 0.5 * drag / mass
+    return np.asarray(-decay + 1j * modes, dtype=np.complex128)
+
+
+def held_transfers(
+    data: PlantData, s: ComplexArray, drag: float
+) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+    """Return P/Y, P/F, T/Y and T/F with the drum held: one spring, or the exact rope."""
+    if data.lumping != "thesis":
+        return rope_transfers(data, s, drag)
+    spring = data.stiffness * (1.0 + s * data.damping_time)
+    mass = data.payload_mass + data.rope_mass
+    P_F = 1.0 / (mass * s**2 + drag * s + spring)
+    return spring * P_F, P_F, spring * (1.0 - spring * P_F), -spring * P_F
 
 
 def locked_response(case: Case, omega: FloatArray, drag: float) -> ComplexArray:
     """Return P/Z with the drum held at frequencies [rad/s], (k,), for a drag C [N s/m]."""
     s = 1j * np.asarray(omega, dtype=np.complex128)
-    return _locked(PlantData.from_case(case), s, drag)
-
-
-def _locked(data: PlantData, s: ComplexArray, drag: float) -> ComplexArray:
-    """Return P/Z with the drum held, (k,): one spring or the exact distributed rope."""
-    if data.lumping != "thesis":
-        return rope_transfers(data, s, drag)[0]
-    spring = data.stiffness * (1.0 + s * data.damping_time)
-    mass = data.payload_mass + data.rope_mass
-    return np.asarray(spring / (mass * s**2 + drag * s + spring))
+    return held_transfers(PlantData.from_case(case), s, drag)[0]
 
 
 def with_masses(question: DesignQuestion, masses: int) -> DesignQuestion:
