@@ -21,8 +21,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.basics import check_range
-
 from ..loop import Assessment
 
 _GONE = 0.1  # loop gain below which nothing is left to trade
@@ -44,8 +42,6 @@ class BodeEstimate:
         Frequency beyond which the loop has no gain left [rad/s].
     max_sensitivity
         M_s.
-    least
-        The smallest |S| over the whole band that these allow.
     achieved
         Geometric mean of |S| over the band.
     resonance, resonant
@@ -58,12 +54,17 @@ class BodeEstimate:
     band: float
     available: float
     max_sensitivity: float
-    least: float
     achieved: float
     resonance: float = math.nan
     resonant: float = math.nan
     damping: float = math.nan
     open_damping: float = math.nan
+
+    @property
+    def least(self) -> float:
+        """The smallest |S| over the whole band that M_s and the available bandwidth allow."""
+        spare = max(self.available - self.band, 0.0) / self.band
+        return float(max(self.max_sensitivity, 1.0) ** -spare)
 
     @property
     def limits_band(self) -> bool:
@@ -95,22 +96,6 @@ class BodeEstimate:
         return f"Bode's integral: {'; '.join(said)}" if said else ""
 
 
-def least_sensitivity(max_sensitivity: float, available: float, band: float) -> float:
-    """Return the smallest |S| over a band [rad/s] for an M_s and an available bandwidth [rad/s].
-
-    Raises
-    ------
-    InputError
-        If M_s is below 1, or a frequency is not above zero.
-    """
-    peak = check_range("Bode integral", "max_sensitivity", max_sensitivity, low=1.0)
-    width = check_range("Bode integral", "band", band, low=0.0, unit="rad/s", open_low=True)
-    high = check_range(
-        "Bode integral", "available", available, low=0.0, unit="rad/s", open_low=True
-    )
-    return math.exp(-math.log(peak) * max(high - width, 0.0) / width)
-
-
 def bode_estimate(assessment: Assessment, *, available: float | None = None) -> BodeEstimate:
     """Return the estimate for a loop with one input and what shakes it first.
 
@@ -134,12 +119,10 @@ def bode_estimate(assessment: Assessment, *, available: float | None = None) -> 
         top = float(strong.max(initial=end))
     at = np.linspace(begin, end, 400)
     inside = np.log(np.abs(1.0 / (1.0 + assessment.loop_gain(at))))
-    peak = assessment.margins.max_sensitivity
     return BodeEstimate(
         band=float(end - begin),
         available=top,
-        max_sensitivity=peak,
-        least=least_sensitivity(max(peak, 1.0), top, float(end - begin)),
+        max_sensitivity=assessment.max_sensitivity,
         achieved=float(np.exp(np.mean(inside))),
         **_resonance(assessment),
     )

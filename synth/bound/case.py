@@ -50,6 +50,7 @@ from ..loop import (
     disturbances,
 )
 from ..question import PAYLOAD, DesignQuestion, pose
+from ..structures import series
 from .bode_integral import BodeEstimate, bode_estimate
 from .bound import Bound, lqg_bound
 from .dual import with_input_outputs
@@ -571,19 +572,11 @@ def _proper(controller: LinearController) -> LinearController:
     """Return a controller behind a first-order low-pass, if it has a direct path."""
     if not np.any(controller.D):
         return controller
-    nu = len(controller.inputs)
-    return replace(
-        controller,
-        A=np.block(
-            [
-                [controller.A, np.zeros((len(controller.A), nu))],
-                [_PROPER * controller.C, -_PROPER * np.eye(nu)],
-            ]
-        ),
-        B=np.vstack([controller.B, _PROPER * controller.D]),
-        C=np.hstack([np.zeros_like(controller.C), np.eye(nu)]),
-        D=np.zeros_like(controller.D),
-    )
+    one = np.eye(len(controller.inputs))
+    low_pass = -_PROPER * one, _PROPER * one, one, 0.0 * one
+    own = controller.A, controller.B, controller.C, controller.D
+    A, B, C, D = series(own, low_pass)
+    return replace(controller, A=A, B=B, C=C, D=D)
 
 
 def _heard_by(spectra: Mapping[str, Any], measurements: Sequence[str]) -> dict[str, Any]:

@@ -139,12 +139,7 @@ class TrueProblem:
         use = np.flatnonzero(charge)
         G = self._gradient(self.plant, X, self.spectra, use, charge)
         G -= self._gradient(self.model, X, self.fitted, use, charge)
-        yw, zu = self.plant.yw, self.plant.zu[:, use]
-        heard = np.einsum("kyw,wk,kvw->kyv", yw, self.spectra, yw.conj())
-        moved = np.einsum("kzu,z,kzv->kuv", zu.conj(), charge[use], zu)
-        # Measurements in units of their own noise, as those differ by many decades.
-        unit = np.sqrt(np.maximum(np.einsum("kyy->ky", heard).real, 1e-300))
-        heard = heard / unit[:, :, None] / unit[:, None, :]
+        heard, unit, moved = self._weights(charge)
         G = G / unit[:, :, None]
         lost = np.linalg.solve(heard, G)
         spare = np.linalg.solve(moved, np.swapaxes(G.conj(), 1, 2))
@@ -159,17 +154,26 @@ class TrueProblem:
         """Return what a squared error of one fitted density costs at every node, (k,)."""
         use = np.flatnonzero(charge)
         F = self._closed(self.plant, X)[:, use, source]
-        zu, heard = self.plant.zu[:, use], self.plant.yw[:, :, source]
-        effect = np.einsum("kz,z,kzu->ku", F.conj(), charge[use], zu)
-        moved = np.einsum("kzu,z,kzv->kuv", zu.conj(), charge[use], zu)
+        effect = np.einsum("kz,z,kzu->ku", F.conj(), charge[use], self.plant.zu[:, use])
+        y, unit, moved = self._weights(charge)
+        heard = self.plant.yw[:, :, source] / unit
         cost = np.einsum(
             "ku,ku->k", effect, np.linalg.solve(moved, effect.conj()[..., None])[..., 0]
         )
-        y = np.einsum("kyw,wk,kvw->kyv", self.plant.yw, self.spectra, self.plant.yw.conj())
-        unit = np.sqrt(np.maximum(np.einsum("kyy->ky", y).real, 1e-300))
-        y, heard = y / unit[:, :, None] / unit[:, None, :], heard / unit
         seen = np.einsum("ky,ky->k", heard.conj(), np.linalg.solve(y, heard[..., None])[..., 0])
         return np.asarray(np.maximum(cost.real * seen.real, 0.0))
+
+    def _weights(self, charge: FloatArray) -> tuple[ComplexArray, FloatArray, ComplexArray]:
+        """Return Phi_y in units of each measurement's own size, these units, and W_u.
+
+        The measurements differ by many decades.
+        """
+        use, yw = np.flatnonzero(charge), self.plant.yw
+        heard = np.einsum("kyw,wk,kvw->kyv", yw, self.spectra, yw.conj())
+        unit = np.sqrt(np.maximum(np.einsum("kyy->ky", heard).real, 1e-300))
+        zu = self.plant.zu[:, use]
+        moved = np.einsum("kzu,z,kzv->kuv", zu.conj(), charge[use], zu)
+        return heard / unit[:, :, None] / unit[:, None, :], unit, moved
 
     @staticmethod
     def _closed(blocks: PlantResponse, X: ComplexArray) -> ComplexArray:

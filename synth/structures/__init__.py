@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
+    from .blocks import series
     from .drum_speed import DrumSpeedLoop, SteadyMotion
     from .fixed import Fixed
     from .low_order import LowOrder, LowOrderFeedback, LowOrderLaw

@@ -76,10 +76,6 @@ class _FixedLaw(ParametrisedController):
         return self._law.controller(self._every(values))
 
     @override
-    def closed_loop_matrix(self, plant: LinearPlant, values: Sequence[float]) -> FloatArray:
-        return self._law.closed_loop_matrix(plant, self._every(values))
-
-    @override
     def guesses(self, problem: GeneralisedPlant, omega: FloatArray) -> FloatArray:
         return self._law.guesses(problem, omega)[:, self._free]
 

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from models.basics import InputError, adaptive_nodes
+from models.basics import adaptive_nodes
 from models.plant import LinearPlant
 from models.sea import SeaSpectrum
-from synth.bound.bode_integral import bode_estimate, least_sensitivity
+from synth.bound.bode_integral import BodeEstimate, bode_estimate
 from synth.loop import Assessment, LinearController, disturbances, loop_margins
 
 FloatArray = npt.NDArray[np.float64]
@@ -58,10 +58,9 @@ def test_bode_integral_of_a_stable_loop_is_zero() -> None:
 
 def test_least_sensitivity_trades_area_for_area() -> None:
     # ln 2 over 9 rad/s above pays for 9 ln 2 over 1 rad/s below
-    assert least_sensitivity(2.0, 10.0, 1.0) == pytest.approx(2.0**-9)
-    assert least_sensitivity(2.0, 1.0, 2.0) == 1.0
-    with pytest.raises(InputError, match="max_sensitivity must be"):
-        least_sensitivity(0.5, 1.0, 1.0)
+    paid = BodeEstimate(band=1.0, available=10.0, max_sensitivity=2.0, achieved=1.0)
+    assert paid.least == pytest.approx(2.0**-9)
+    assert replace(paid, available=1.0, band=2.0).least == 1.0
 
 
 def test_estimate_of_a_loop_is_one_line() -> None:
@@ -83,7 +82,7 @@ def test_estimate_of_a_loop_is_one_line() -> None:
     assert 0.0 < found.least < found.achieved < found.max_sensitivity
     assert "\n" not in str(found)
     assert found.limits_band == ("this loop's is" in str(found))
-    assert "this loop's is" in str(replace(found, least=0.1))
+    assert "this loop's is" in str(replace(found, available=2.0 * found.band))
     # More bandwidth, more to trade.
     assert bode_estimate(view, available=50.0).least < bode_estimate(view, available=5.0).least
 
