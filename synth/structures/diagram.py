@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import ComplexArray, FloatArray, pick
+from models.basics import FloatArray, pick
 from models.plant import LinearPlant
 
 from ..loop import LinearController, closed_loop_matrix
@@ -167,14 +167,6 @@ class DiagramLaw(ParametrisedController):
                 inside[:] = True
             self._kept[plant.states] = np.flatnonzero(inside)
         return self._kept[plant.states]
-
-    def draw(self, points: FloatArray, omega: FloatArray, yu: ComplexArray) -> FloatArray:
-        """Return candidates; structures override it with what they know of their gains."""
-        del omega, yu
-        scales = np.array([p.scale for p in self.parameters])
-        signed = 2.0 * points[:, : len(scales)] - 1.0
-        values = scales * np.sign(signed) * 10.0 ** (3.0 * np.abs(signed) - 2.5)
-        return self.with_sections(values, points)
 
     def with_sections(self, values: FloatArray, points: FloatArray) -> FloatArray:
         """Return candidates whose sections' parameters are drawn, clipped to the bounds."""

@@ -36,6 +36,7 @@ from scipy.stats import qmc
 
 from models.basics import ComplexArray, FloatArray, InputError, check_range, pick
 from models.plant import LinearPlant, PlantResponse
+from models.sensing import MEASURED
 
 from .blocks import FilterSection, LeadTime
 from .diagram import Branch, DiagramLaw, Group, Weight
@@ -110,13 +111,8 @@ class WinchStructure(Structure):
     @property
     def measurements(self) -> tuple[str, ...]:
         """Names of what it hears, in the order of the sensed plant."""
-        return (
-            *(PAYLOAD_MEASUREMENTS if self.hears_payload else ()),
-            *((_HEAVE, _HEAVE_RATE) if self.heave else ()),
-            *((_HAUL,) if self.drum else ()),
-            *((_SPEED,) if self.drum and not self.regulated else ()),
-            *((_TENSION,) if self.tension is not None else ()),
-        )
+        heard = {y for group in self.groups() for branch in group.branches for y in branch.weights}
+        return tuple(name for name in MEASURED if name in heard)
 
     def bind(self, plant: LinearPlant) -> ParametrisedController:
         """Return the law; see `Structure.bind`."""
