@@ -75,16 +75,16 @@ class CoDesign:
 
     case: Case
     structure: str
-    ok: bool
+    ok: bool = False
     status: str
     gear: float
     radius: float
-    payload_rms: float
+    payload_rms: float = math.inf
     given_rms: float
-    slope: float
+    slope: float = math.nan
     points: tuple[CoPoint, ...]
-    best_case: Case | None
-    design: Design | None
+    best_case: Case | None = None
+    design: Design | None = None
 
     def to_csv(self) -> str:
         """Return the gears that were tried as CSV, SI units."""
@@ -248,16 +248,11 @@ def _finished(
     result = CoDesign(
         case=case,
         structure=search.structure,
-        ok=False,
         status="no gains keep the limits behind any of these gears",
         gear=gear,
         radius=radius,
-        payload_rms=math.inf,
         given_rms=given,
-        slope=math.nan,
         points=points,
-        best_case=None,
-        design=None,
     )
     if answer is None:
         return result

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from models.basics import InputError, check_range, parse_quantity
 from models.case import Case
@@ -69,9 +69,9 @@ class SizePoint:
     """
 
     gear: float
-    scale: float
-    motor: MotorData | None
-    payload_rms: float
+    scale: float = math.inf
+    motor: MotorData | None = None
+    payload_rms: float = math.inf
     binding: tuple[str, ...]
     answer: Answer | None = field(default=None, repr=False)
 
@@ -129,7 +129,7 @@ def least_motor(
         if step is None or step > math.log(_LARGEST):
             break
         size = step
-    return replace(_none(gear, ("motor.inertia",)), answer=answer)
+    return SizePoint(gear=gear, binding=("motor.inertia",), answer=answer)
 
 
 def _at_rest(case: Case, gear: float) -> float:
@@ -205,19 +205,15 @@ def _stopped(problem: Problem, near: Answer, gear: float) -> SizePoint:
     relaxed = [m.name for m in problem.limits if m.drive and not m.at_least]
     wide = follow(problem, [near], goal=Goal.RELAX, relaxed=relaxed)
     if wide is None:
-        return _none(gear, ("stability",))
+        return SizePoint(gear=gear, binding=("stability",))
     uses, prices = wide.uses(), wide.prices
     broken = {n: u for n, u in uses.items() if u > 1.0 + _BINDING and n not in RATINGS}
     fixed = sorted((n for n in broken if n != TARGET), key=lambda n: -broken[n])
     if fixed:
-        return _none(gear, tuple(fixed))
+        return SizePoint(gear=gear, binding=tuple(fixed))
     loop = [m.name for m in problem.limits if not m.drive and uses[m.name] > 1.0 - _BINDING]
     loop.sort(key=lambda n: -abs(prices[n]))
-    return _none(gear, tuple(loop) or (TARGET,))
-
-
-def _none(gear: float, names: tuple[str, ...]) -> SizePoint:
-    return SizePoint(gear=gear, scale=math.inf, motor=None, payload_rms=math.inf, binding=names)
+    return SizePoint(gear=gear, binding=tuple(loop) or (TARGET,))
 
 
 def target_of(target: float | str, hook_rms: float) -> float:

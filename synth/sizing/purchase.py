@@ -209,11 +209,11 @@ class WorthRow:
 
     item: Item
     price: float
-    elasticity: float
-    per_step: float
+    elasticity: float = 0.0
+    per_step: float = 0.0
     factor: float
     twice_rms: float
-    gain: float
+    gain: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -234,10 +234,10 @@ class Worth:
 
     case: Case
     structure: str
-    ok: bool
+    ok: bool = False
     status: str
     payload_rms: float
-    rows: tuple[WorthRow, ...]
+    rows: tuple[WorthRow, ...] = ()
 
     @property
     def first(self) -> WorthRow | None:
@@ -291,10 +291,8 @@ def worth(
     result = Worth(
         case=design.case,
         structure=design.structure,
-        ok=False,
         status=design.status,
         payload_rms=design.payload_rms,
-        rows=(),
     )
     if not (design.parameters and design.drive_kept and design.feasible):
         return result
@@ -318,15 +316,7 @@ def _row(design: Design, here: Answer, item: Item) -> WorthRow:
     """Return what one figure is worth, by both routes."""
     price = _price(design, here, item)
     factor = 2.0 if item.better > 0 else 0.5
-    row = WorthRow(
-        item=item,
-        price=price,
-        elasticity=0.0,
-        per_step=0.0,
-        factor=factor,
-        twice_rms=here.payload_rms,
-        gain=0.0,
-    )
+    row = WorthRow(item=item, price=price, factor=factor, twice_rms=here.payload_rms)
     if item.limit is not None and abs(price) < _FREE:
         return row  # a limit that does not bind: looser, it leaves the optimum where it is
     way = item.better or (-1 if price > 0.0 else 1)

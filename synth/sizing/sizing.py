@@ -70,15 +70,15 @@ class Sizing:
     structure: str
     target: float
     hook_rms: float
-    ok: bool
+    ok: bool = False
     status: str
     unlimited_rms: float
-    points: tuple[SizePoint, ...]
-    chosen: SizePoint | None
-    sized_case: Case | None
-    design: Design | None
-    given_rms: float
-    highest_height: float
+    points: tuple[SizePoint, ...] = ()
+    chosen: SizePoint | None = None
+    sized_case: Case | None = None
+    design: Design | None = None
+    given_rms: float = math.inf
+    highest_height: float = 0.0
     choice: ChosenMotor | None = None
 
     def to_csv(self) -> str:
@@ -233,15 +233,8 @@ def _sized(
         structure=structure,
         target=aim,
         hook_rms=hook,
-        ok=False,
         status="no stable loop keeps the limits, whatever the motor",
         unlimited_rms=free.payload_rms if free is not None else math.inf,
-        points=(),
-        chosen=None,
-        sized_case=None,
-        design=None,
-        given_rms=math.inf,
-        highest_height=0.0,
     )
     if free is None:
         return empty, question.masses, None
