@@ -104,9 +104,13 @@ class SpectralFactor:
         wanted = target / scale
         ends = np.log(np.array(self.band) / self.peak)
         bounds = _bounds(self.sections, self.values.size, ends)
-        root /= float(np.linalg.norm(misfit(self.values))) or 1.0  # of size one to begin with
+        size = float(np.linalg.norm(misfit(self.values))) or 1.0
+
+        def scaled(values: FloatArray) -> FloatArray:
+            return misfit(values) / size
+
         start = np.clip(self.values, *bounds)
-        found = least_squares(misfit, start, bounds=bounds, max_nfev=60).x
+        found = least_squares(scaled, start, bounds=bounds, max_nfev=60).x
         better = found if np.all(np.isfinite(found)) else self.values
         return replace(self, values=better, omega=omega, target=target)
 
