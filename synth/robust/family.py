@@ -194,16 +194,21 @@ class Family:
 
     def draw(self, count: int, seed: int) -> list[Member]:
         """Return random members: uniform in the ranges and choices, seas by occurrence."""
-        rng = np.random.default_rng(seed)
+        return self.at(np.random.default_rng(seed).random((count, len(self.axes) + 1)))
+
+    def at(self, points: FloatArray) -> list[Member]:
+        """Return the members at points of the unit cube, (n, axes + 1); the last is the sea's."""
         columns: list[list[Any]] = []
-        for axis in self.axes:
+        for axis, share in zip(self.axes, points.T, strict=False):
             if axis.continuous:
-                columns.append([float(v) for v in rng.uniform(axis.low, axis.high, count)])
+                columns.append((axis.low + share * (axis.high - axis.low)).tolist())
             else:
-                columns.append([axis.values[i] for i in rng.integers(len(axis.values), size=count)])
-        seas = rng.choice(len(self.seas), size=count, p=self.occurrence)
-        points = zip(*columns, strict=True) if columns else [()] * count
-        return [Member(point=p, sea=int(k)) for p, k in zip(points, seas, strict=True)]
+                columns.append([axis.values[int(u * len(axis.values))] for u in share])
+        edges = np.cumsum(self.occurrence)
+        edges[-1] = np.inf  # whatever rounding has left of one
+        seas = np.searchsorted(edges, points[:, -1], side="right")
+        found = zip(*columns, strict=True) if columns else [()] * len(points)
+        return [Member(point=p, sea=int(k)) for p, k in zip(found, seas, strict=True)]
 
     def case_at(self, member: Member) -> Case:
         """Return the case of a member.

@@ -30,7 +30,7 @@ from ..search import KEPT, Progress, search
 from ..sizing import Answer, best_of_each
 from .family import Family, Member
 from .family_plants import FamilyPlants
-from .worst_case import exact_figures
+from .worst_case import Figures, exact_figures
 
 LENGTH = "rope.length"
 KEPT_BETWEEN = 1e-3  # relative excess over a limit that counts as kept between the nodes
@@ -40,16 +40,15 @@ _CLOSE = 0.10  # what a schedule may lose against gains of its own at any length
 
 
 @dataclass(frozen=True, kw_only=True)
-class SchedulePoint:
-    """The schedule at one length: what it does there, and what the best gains would do [m]."""
+class SchedulePoint(Figures):
+    """What the schedule does at one length, and what the best gains would do, `best_rms` [m]."""
 
-    length: float
-    payload_rms: float
     best_rms: float
-    max_sensitivity: float
-    use: float
-    limit: str
-    stable: bool
+
+    @property
+    def length(self) -> float:
+        """The rope's length [m]."""
+        return float(self.member.point[0])
 
     @property
     def ok(self) -> bool:
@@ -384,16 +383,9 @@ class _ScheduleSearch:
     def _point(self, nodes: Sequence[int], gains: FloatArray, length: float) -> SchedulePoint:
         values = [float(v) for v in blend_of(self.lengths[list(nodes)], length) @ gains]
         figures = exact_figures(self.plants, values, Member(point=(length,)))
-        return SchedulePoint(
-            length=length,
-            payload_rms=figures.payload_rms,
-            # No worse than what is done: a search of its own may have missed it by a hair.
-            best_rms=min(self._best(length), figures.payload_rms),
-            max_sensitivity=figures.max_sensitivity,
-            use=figures.use,
-            limit=figures.limit,
-            stable=figures.stable,
-        )
+        # No worse than what is done: a search of its own may have missed it by a hair.
+        best = min(self._best(length), figures.payload_rms)
+        return SchedulePoint(**vars(figures), best_rms=best)
 
     def _best(self, length: float) -> float:
         """Return what gains of its own do at a length [m], between those looked at in between."""

@@ -210,7 +210,10 @@ def worst_members(
         members = family.corners()
     except InputError:
         members = []
-    members = members[:_SAMPLES] + _sobol(plants, seed)
+    members = members[:_SAMPLES]
+    if family.continuous:
+        cube = qmc.Sobol(len(family.axes) + 1, seed=seed)
+        members += family.at(cube.random_base2(int(np.log2(_SAMPLES))))
     found = figures_of(plants, values, members)
     best = sorted(found, key=lambda f: -f.hurt(level))[:_TOP]
     width = 0.25
@@ -278,26 +281,6 @@ def _at_rest(limit: Limit, values: Mapping[str, float]) -> Limit:
     static = values.get(limit.outputs[0], 0.0)
     changed: Limit = replace(limit, static=static)  # type: ignore[call-arg]
     return changed
-
-
-def _sobol(plants: FamilyPlants, seed: int) -> list[Member]:
-    family = plants.family
-    if not family.continuous:
-        return []
-    count = len(family.axes)
-    points = qmc.Sobol(count + 1, seed=seed).random_base2(int(np.log2(_SAMPLES)))
-    edges = np.cumsum(family.occurrence)
-    members = []
-    for row in points:
-        point = []
-        for axis, u in zip(family.axes, row[:count], strict=True):
-            if axis.continuous:
-                point.append(axis.low + float(u) * (axis.high - axis.low))
-            else:
-                point.append(axis.values[min(int(u * len(axis.values)), len(axis.values) - 1)])
-        sea = min(int(np.searchsorted(edges, row[-1])), len(edges) - 1)
-        members.append(Member(point=tuple(point), sea=sea))
-    return members
 
 
 def _around(plants: FamilyPlants, member: Member, width: float, seed: int) -> list[Member]:
