@@ -13,14 +13,14 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 
-from models.basics import FloatArray, InputError, check_range
+from models.basics import FloatArray, InputError, check_range, parse_quantity
 from models.case import Case
 from models.sea import Scatter
-from models.spread import ALIASES, Samples, Spread, Uniform, with_payload
+from models.spread import ALIASES, Samples, Spread, Uniform, field_of, with_payload
 
 _MOST_CORNERS = 4096
 
@@ -277,7 +277,7 @@ def _axis(case: Case, path: str, values: Sequence[Any] | DiscreteValues) -> Axis
     raw = values.values if isinstance(values, DiscreteValues) else tuple(values)
     if not raw:
         raise InputError(f"family: {path} must have at least one value, got none")
-    read = [v if isinstance(v, bool | int | float) or choice else _read(case, path, v) for v in raw]
+    read = [_read(case, path, v) if isinstance(v, str) and not choice else v for v in raw]
     numbers = all(isinstance(v, int | float) and not isinstance(v, bool) for v in read)
     axis = Axis(path=path, values=tuple(read), continuous=numbers and not choice)
     probe = Family(case=case, axes=(axis,), seas=(_own_sea(case),))
@@ -287,22 +287,12 @@ def _axis(case: Case, path: str, values: Sequence[Any] | DiscreteValues) -> Axis
 
 
 def _read(case: Case, path: str, text: Any) -> Any:
-    """Return a value with a unit in SI, as the field at a path reads it."""
-    from pydantic import TypeAdapter, ValidationError
-
-    *sections, key = path.split(".")
-    section = value_at(case, ".".join(sections)) if sections else case
-    field = type(section).model_fields.get(key) if section is not None else None
-    if field is None:
-        return value_at(case.replace({path: text}), path)  # tells what is wrong with the path
-    kind: Any = field.annotation
-    if field.metadata:
-        kind = Annotated[(field.annotation, *field.metadata)]
+    """Return a value with a unit in SI; a text as it is where there is no number."""
     try:
-        return TypeAdapter(kind).validate_python(text)
-    except ValidationError as error:
-        reason = error.errors()[0]["msg"].removeprefix("Value error, ")
-        raise InputError(f"family: {path}: {reason}") from None
+        kind = field_of(case, path, {}, None).kind
+    except InputError:
+        return text
+    return parse_quantity(text, kind)
 
 
 def value_at(case: Case, path: str) -> Any:

@@ -27,15 +27,14 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from models.basics import ComplexArray, FloatArray, InputError, check_range
+from models.basics import ComplexArray, FloatArray, InputError, check_range, parse_quantity
 from models.case import Case
 from models.plant import LinearPlant, PlantData
 from models.sensing import sensed_plant
-from models.spread import ALIASES, with_payload
+from models.spread import field_of, with_payload
 
 from ..loop import LinearController
 from ..verify import LawMatrices
-from .family import value_at
 from .mu_structured_value import UncertaintyBlock
 
 #: Paths of delays, and the measurements that they make late.
@@ -102,13 +101,14 @@ def uncertain_numbers(
         raise InputError("robustness: uncertainty must name what may be off, got nothing")
     found = []
     for name, width in uncertainty.items():
-        path = ALIASES.get(name, name)
-        own = drag if path == DRAG else _number(case, path)
-        if isinstance(width, str):
-            half = _number(case.replace({path: width}), path)
-        else:
-            share = check_range("robustness", f"uncertainty[{name}]", width, low=0.0, open_low=True)
-            half = share * own
+        if not isinstance(width, str):
+            check_range("robustness", f"uncertainty[{name}]", width, low=0.0, open_low=True)
+        try:
+            field = field_of(case, name, {}, drag)
+            path, own = field.path, field.nominal
+            half = parse_quantity(width, field.kind) if isinstance(width, str) else width * own
+        except InputError as error:
+            raise InputError(f"robustness: {name}: {error}") from None
         if half <= 0.0:
             raise InputError(
                 f"robustness: {path} is {own:g} in this case, so a share of it is nothing; give "
@@ -138,14 +138,6 @@ def plant_of(
         ratio = data.damping_ratio * nominal.damping_time / data.damping_time
         data = replace(data, damping_ratio=min(ratio, 1.0))
     return sensed_plant(data, masses=masses, drag=drag, sensors=changed.sensors)
-
-
-def _number(case: Case, path: str) -> float:
-    """Return the number at a path of the case."""
-    found = value_at(case, path)
-    if isinstance(found, bool) or not isinstance(found, int | float):
-        raise InputError(f"robustness: there is no number at {path!r} in this case, got {found!r}")
-    return float(found)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -245,11 +245,11 @@ def test_a_structure_is_analysed_as_gains_are() -> None:
     ("ranges", "message"),
     [
         ({}, "must name what may be off"),
-        ({"payload.colour": 0.1}, "no number at 'payload.colour'"),
+        ({"payload.colour": 0.1}, "payload.colour is unknown"),
         ({"payload.mass": 1.5}, "must be less uncertain than its value"),
         ({"payload.mass": -0.1}, r"uncertainty\[payload.mass\] must be"),
         ({"payload.mass": 0.1, "payload": 0.2}, "given twice"),
-        ({"sensors.mru.delay": 0.1}, "no number at 'sensors.mru.delay'"),
+        ({"sensors.mru.delay": 0.1}, "sensors.mru.delay"),
     ],
 )
 def test_ranges_without_meaning_are_refused(ranges: dict[str, float], message: str) -> None:
