@@ -1,6 +1,6 @@
 """Declarations of what a command takes, beside the function that does it.
 
-    ARGUMENTS = (CASE, OUT, whole("--starts", "starts of the search", 16))  --> `declared`
+    ARGUMENTS = (CASE, options("--points N [9]  gears on the curve"), OUT)  --> `declared`
 
 Each command's module has such a tuple and a function ``run(arguments)``; `stillhook.cli` reads the
 tuple of the command that was asked for, and no other.
@@ -9,10 +9,14 @@ tuple of the command that was asked for, and no other.
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Callable, Mapping
+from textwrap import dedent
 from typing import Any
 
 from models.basics import check_range
+
+_NUMBER = re.compile(r"\d+(\.\d*)?")
 
 Declaration = Callable[[argparse._ActionsContainer], None]
 """Adds one argument, or a group of them, to a parser."""
@@ -24,7 +28,10 @@ Read = Callable[[str, Any], object]
 class _Reading(argparse.Action):
     """Reads what an option is given as it comes; `InputError` passes the parser by."""
 
-    read: Read
+    def __init__(self, *args: Any, read: Read, **settings: Any) -> None:
+        """Take what reads the value."""
+        super().__init__(*args, **settings)
+        self._read = read
 
     def __call__(
         self,
@@ -35,96 +42,99 @@ class _Reading(argparse.Action):
     ) -> None:
         """Keep what the value means under the option's name, and the value in ``given``."""
         owner = parser.prog.rpartition(" ")[2]
-        setattr(namespace, self.dest, self.read(f"{owner}: {self.option_strings[0]}", values))
+        setattr(namespace, self.dest, self._read(f"{owner}: {self.option_strings[0]}", values))
         namespace.given = {**getattr(namespace, "given", {}), self.dest: values}
 
 
-def _argument(*names: str, read: Read | None = None, **settings: Any) -> Declaration:
+def within(**limits: Any) -> Read:
+    """Return what refuses a number that is not within limits as for `check_range`."""
+
+    def read(option: str, value: float) -> float:
+        owner, _, name = option.rpartition(": ")
+        found = check_range(owner, name, value, **limits)
+        return value if isinstance(value, int) else found
+
+    return read
+
+
+# Of options that several commands have.
+_USUAL: dict[str, Read] = {
+    "seed": within(low=0),
+    "starts": within(low=1, high=4096),
+}
+
+
+def options(text: str, **means: Read) -> Declaration:
+    """Declare options as their help shows them, one below the other.
+
+        --name METAVAR [default]  what it is, in words that may go on in lines
+            that are indented
+        | --other METAVAR  one that goes without the one before
+        --name N [16]  a whole number; a number that is a default is told
+        --name {a,b} [a]  one of some words
+        --name PATH=VALUE ...  one that may come several times
+        --name  one without a value, that makes `name` true; --no-name makes it false
+        name  one without a dash; [name] may be left out
+        a title:
+        --name  what follows a title stands under it
+
+    Parameters
+    ----------
+    text
+        The options.
+    means
+        By an option's name what reads it; a number without a default is `within()` no limits.
+    """
+    lines: list[str] = []
+    for line in dedent(text).strip().splitlines():
+        if line.startswith(" "):
+            lines[-1] += f" {line.strip()}"
+        elif line:
+            lines.append(line)
+
     def add(parser: argparse._ActionsContainer) -> None:
-        if read is None:
-            parser.add_argument(*names, **settings)
-        else:
-            action = parser.add_argument(*names, action=_Reading, **settings)
-            assert isinstance(action, _Reading)
-            action.read = read
+        group = parser
+        for line, after in zip(lines, [*lines[1:], ""], strict=True):
+            if "  " not in line:
+                group = parser.add_argument_group(line.removesuffix(":"))
+                continue
+            if not line.startswith("| "):
+                place = group.add_mutually_exclusive_group() if after[:2] == "| " else group
+            _option(place, line.removeprefix("| "), _USUAL | means)
 
     return add
 
 
-def _within(number: type[float], limits: Mapping[str, Any]) -> Read | None:
-    """Return what refuses a number out of range; None where there is no range."""
-    return (lambda option, value: number(checked(option, value, **limits))) if limits else None
-
-
-def checked(option: str, value: float, **limits: Any) -> float:
-    """Return what an option is given if it is within limits as for `check_range`."""
-    owner, _, name = option.rpartition(": ")
-    return check_range(owner, name, value, **limits)
-
-
-def positional(name: str, help: str, *, optional: bool = False) -> Declaration:
-    """Declare an argument without a dash."""
-    return _argument(name, metavar=name.upper(), help=help, nargs="?" if optional else None)
-
-
-def text(
-    flag: str, metavar: str, help: str, default: object = None, read: Read | None = None
-) -> Declaration:
-    """Declare an option with a text, as a name, a file or a quantity; `read` says what it means."""
-    return _argument(flag, metavar=metavar, help=help, default=default, read=read)
-
-
-def whole(flag: str, help: str, default: int | None = None, **limits: float) -> Declaration:
-    """Declare an option with a whole number, within limits as for `check_range`."""
-    told = help if default is None else f"{help} (default: {default})"
-    read = _within(int, limits)
-    return _argument(flag, metavar="N", help=told, type=int, default=default, read=read)
-
-
-def real(
-    flag: str, metavar: str, help: str, default: float | None = None, **limits: Any
-) -> Declaration:
-    """Declare an option with a number, within limits as for `check_range`."""
-    told = help if default is None else f"{help} (default: {default:g})"
-    read = _within(float, limits)
-    return _argument(flag, metavar=metavar, help=told, type=float, default=default, read=read)
-
-
-def choice(flag: str, of: tuple[str, ...], help: str, default: str | None = None) -> Declaration:
-    """Declare an option with one of some words."""
-    return _argument(flag, choices=of, help=help, default=default)
-
-
-def switch(flag: str, help: str, dest: str | None = None) -> Declaration:
-    """Declare an option without a value: ``--no-x`` makes `x` false, any other its name true."""
-    off = flag.startswith("--no-")
-    name = dest or flag.removeprefix("--no-" if off else "--").replace("-", "_")
-    return _argument(flag, action="store_false" if off else "store_true", help=help, dest=name)
-
-
-def repeated(flag: str, metavar: str, help: str, dest: str | None = None) -> Declaration:
-    """Declare an option that may come several times."""
-    name = dest or flag.removeprefix("--")
-    told = f"{help}; may be repeated"
-    return _argument(flag, metavar=metavar, help=told, action="append", default=[], dest=name)
-
-
-def group(title: str, *inside: Declaration) -> Declaration:
-    """Declare options under a title."""
-
-    def add(parser: argparse._ActionsContainer) -> None:
-        declared(parser.add_argument_group(title), inside)
-
-    return add
-
-
-def one_of(*inside: Declaration) -> Declaration:
-    """Declare options of which one may be given."""
-
-    def add(parser: argparse._ActionsContainer) -> None:
-        declared(parser.add_mutually_exclusive_group(), inside)
-
-    return add
+def _option(parser: argparse._ActionsContainer, line: str, means: Mapping[str, Read]) -> None:
+    """Add the argument of a line to a parser."""
+    spec, _, told = (part.strip() for part in line.partition("  "))
+    name, _, shape = spec.partition(" ")
+    metavar, _, default = shape.removesuffix("]").partition(" [")
+    dest = name.removeprefix("--").replace("-", "_")
+    settings: dict[str, Any] = {"default": default or None}
+    if not name.startswith("--"):
+        settings = {"metavar": name.strip("[]").upper(), "nargs": "?" if "[" in name else None}
+    elif not shape:
+        off = name.startswith("--no-")
+        settings = {"action": "store_false" if off else "store_true"}
+        settings["dest"] = dest.removeprefix("no_") if off else dest
+    elif metavar.startswith("{"):
+        settings["choices"] = metavar.strip("{}").split(",")
+    elif metavar.endswith(" ..."):
+        told += "; may be repeated"
+        settings = {"metavar": metavar[:-4], "action": "append", "default": []}
+    else:
+        settings["metavar"], read = metavar, means.get(dest)
+        if metavar == "N" or _NUMBER.fullmatch(default):
+            number = settings["type"] = int if metavar == "N" else float
+            if default:
+                settings["default"] = number(default)
+                told += f" (default: {number(default):.6g})"
+        elif read is not None and default:
+            settings["default"] = read(name, default)
+        if read is not None:
+            settings |= {"action": _Reading, "read": read}
+    parser.add_argument(name.strip("[]"), help=told, **settings)
 
 
 def declared(parser: argparse._ActionsContainer, arguments: tuple[Declaration, ...]) -> None:
@@ -158,68 +168,38 @@ def changed_words(
     return words
 
 
-def case_argument(*, optional: bool = False) -> Declaration:
-    """Declare the case and changes of it."""
-    told = "a bundled case (see `stillhook cases`) or a case file (.yaml, .json, .toml)"
+_CASE = "a bundled case (see `stillhook cases`) or a case file (.yaml, .json, .toml)"
+_SET = """
+--set PATH=VALUE ...  change a field of the case, as in --set limits.max_sensitivity=2.5
+    or --set 'sensors.telemetry.delay=50 ms'
+"""
+CASE = options(f"case  {_CASE}{_SET}")
+#: None where something else names it.
+OPTIONAL_CASE = options(f"[case]  {_CASE}{_SET}")
 
-    def add(parser: argparse._ActionsContainer) -> None:
-        positional("case", told, optional=optional)(parser)
-        repeated(
-            "--set",
-            "PATH=VALUE",
-            "change a field of the case, as in --set limits.max_sensitivity=2.5 "
-            "or --set 'sensors.telemetry.delay=50 ms'",
-            "changes",
-        )(parser)
-
-    return add
-
-
-def design_argument(parser: argparse._ActionsContainer) -> None:
-    """Add the design, a file or gains; `commands.given_design` reads it."""
-    text("--design", "FILE", "a design that was written (design.yaml)")(parser)
-    told = "or gains, or parameters by name (default: the gains that the case has in use)"
-    text("--gains", "A=..,a=..,a1=..,a2=..", told)(parser)
-    text("--structure", "NAME", "whose parameters these are (default: payload-feedback)")(parser)
-
-
-CASE = case_argument()
-DESIGN: Declaration = design_argument
-NO_BOUND = switch(
-    "--no-bound",
-    "do not compare with the best that any linear controller could do (2 s each, 15 s of one "
-    "alone)",
+#: The design, a file or gains; `commands.given_design` reads it.
+DESIGN = options(
+    """
+    --design FILE  a design that was written (design.yaml)
+    --gains A=..,a=..,a1=..,a2=..  or gains, or parameters by name (default: the gains that the
+        case has in use)
+    --structure NAME  whose parameters these are (default: payload-feedback)
+    """
 )
-OBJECTIVE = choice(
-    "--objective",
-    ("worst", "mean", "regret"),
-    "what is made small (default: the worst payload motion)",
-    "worst",
+NO_BOUND = options(
+    """
+    --no-bound  do not compare with the best that any linear controller could do (2 s each, 15 s
+        of one alone)
+    """
 )
-STRUCTURE = text(
-    "--structure", "NAME", "controller structure (default: payload-feedback)", "payload-feedback"
-)
-
-
-#: The seed of a search, which any whole number is good for.
-SEED = whole("--seed", "seed of the starts", 0, low=0)
-
-
-def starts(default: int, help: str = "starts of the search") -> Declaration:
-    """Declare from how many places a search begins."""
-    return whole("--starts", help, default, low=1, high=4096)
-
-
-def results_folder(default: str) -> Declaration:
-    """Declare the folder for the results."""
-    return text("--out", "DIR", f"folder for the results (default: {default})")
-
 
 #: What every command takes, wherever it stands.
-EVERYWHERE = group(
-    "output",
-    switch("--quiet", "print the verdict only"),
-    switch("--json", "print what came of it as JSON, and nothing else"),
-    switch("--no-figures", "draw no figures", "figures"),
-    choice("--format", ("svg", "png"), "format of the figures (default: both)"),
+EVERYWHERE = options(
+    """
+    output:
+    --quiet  print the verdict only
+    --json  print what came of it as JSON, and nothing else
+    --no-figures  draw no figures
+    --format {svg,png}  format of the figures (default: both)
+    """
 )

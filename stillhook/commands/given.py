@@ -35,7 +35,7 @@ def given_case(arguments: argparse.Namespace) -> Case:
 
     with told_once():
         case = load_case(arguments.case)
-        changes = parse_changes(arguments.changes)
+        changes = parse_changes(arguments.set)
         if changes:
             case = case.replace(changes)
         HookMotion.from_case(case)  # warns of a sea beyond the RAO's table
@@ -186,9 +186,9 @@ def case_words(arguments: argparse.Namespace, folder: OutputFolder | None = None
 
     `folder` is the output folder that holds the case file, if there is one.
     """
-    if not arguments.changes:
+    if not arguments.set:
         return shlex.quote(arguments.case)
     if folder is not None:
         return shlex.quote(str(folder.path / "case.yaml"))
-    sets = [f"--set {shlex.quote(change)}" for change in arguments.changes]
+    sets = [f"--set {shlex.quote(change)}" for change in arguments.set]
     return " ".join([shlex.quote(arguments.case), *sets])

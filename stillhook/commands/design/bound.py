@@ -5,27 +5,22 @@ from __future__ import annotations
 import argparse
 
 from ...text import Report, ReportSection
-from ..declare import CASE, real, text, whole
+from ..declare import CASE, options, within
 from ..given import case_words, given_case
 from ..lists import names
 from ..working import conclude, working
 
 ARGUMENTS = (
     CASE,
-    text(
-        "--sensors",
-        "A,B,..",
-        "what a controller may hear, as in payload.displacement,mru.heave (default: all)",
-        read=names,
-    ),
-    whole("--masses", "masses along the rope"),
-    real(
-        "--faint",
-        "R",
-        "noise of a sensor that the case calls exact, over the hook's rms",
-        1e-3,
-        low=0.0,
-        open_low=True,
+    options(
+        """
+        --sensors A,B,..  what a controller may hear, as in payload.displacement,mru.heave (default:
+            all)
+        --masses N  masses along the rope
+        --faint R [0.001]  noise of a sensor that the case calls exact, over the hook's rms
+        """,
+        sensors=names,
+        faint=within(low=0.0, open_low=True),
     ),
 )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from ..declare import CASE, DESIGN, NO_BOUND, text
+from ..declare import CASE, DESIGN, NO_BOUND, options
 from ..given import case_words, given_case
 from ..given_design import given_design
 from ..working import conclude, prepared, working
@@ -12,7 +12,7 @@ from ..working import conclude, prepared, working
 ARGUMENTS = (
     CASE,
     DESIGN,
-    text("--out", "DIR", "folder for the results (default: none)"),
+    options("--out DIR  folder for the results (default: none)"),
     NO_BOUND,
 )
 

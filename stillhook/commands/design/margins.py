@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ...text import Report, ReportSection
-from ..declare import CASE, DESIGN, repeated, whole
+from ..declare import CASE, DESIGN, options, within
 from ..given import case_words, given_case, split_pairs
 from ..given_design import given_design
 from ..working import conclude, working
@@ -15,13 +15,14 @@ _USUAL = {"payload.mass": 0.3, "stiffness": 0.2, "drag": 0.5}
 ARGUMENTS = (
     CASE,
     DESIGN,
-    repeated(
-        "--off",
-        "PATH=SHARE",
-        "what may be off and how far either way, as in payload.mass=0.3, drag=0.5 or "
-        "'delay=20 ms' (default: payload.mass=0.3, stiffness=0.2, drag=0.5)",
+    options(
+        """
+        --off PATH=SHARE ...  what may be off and how far either way, as in payload.mass=0.3,
+            drag=0.5 or 'delay=20 ms' (default: payload.mass=0.3, stiffness=0.2, drag=0.5)
+        --draws N [1000]  random plants to check with
+        """,
+        draws=within(low=0, high=1_000_000),
     ),
-    whole("--draws", "random plants to check with", 1000, low=0, high=1_000_000),
 )
 
 

@@ -10,17 +10,7 @@ from typing import TYPE_CHECKING
 
 from ...designs import AT_LEAST, LIMITS
 from ...text import OutputFolder, number
-from ..declare import (
-    CASE,
-    NO_BOUND,
-    OBJECTIVE,
-    SEED,
-    changed_words,
-    repeated,
-    results_folder,
-    starts,
-    text,
-)
+from ..declare import CASE, NO_BOUND, changed_words, options
 from ..given import case_words, gains_text, given_case, parse_fixed, parse_members
 from ..lists import names
 from ..working import conclude, kept_in, prepared, working
@@ -28,30 +18,27 @@ from ..working import conclude, kept_in, prepared, working
 if TYPE_CHECKING:
     from synth.design import Design
 
-_FAMILY = (
-    repeated(
-        "--member",
-        "PATH=VALUE[;..]",
-        "another case that the same gains are for, as in --member rope.damping_ratio=0.0002 or "
-        "--member 'rope.length=800 m; payload.mass=40 t'",
-        "members",
-    ),
-    OBJECTIVE,
-    repeated("--fix", "NAME=NUMBER", "hold a parameter, as in --fix a=0", "fixed"),
+_FAMILY = options(
+    """
+    --member PATH=VALUE[;..] ...  another case that the same gains are for, as in
+        --member rope.damping_ratio=0.0002 or --member 'rope.length=800 m; payload.mass=40 t'
+    --objective {worst,mean,regret} [worst]  what is made small (default: the worst payload motion)
+    --fix NAME=NUMBER ...  hold a parameter, as in --fix a=0
+    """
 )
 ARGUMENTS = (
     CASE,
-    results_folder("out/<name of the case>"),
-    starts(16),
-    SEED,
-    text(
-        "--structure",
-        "NAME",
-        "controller structure, such as payload-feedback, or several, the simplest first "
-        "(default: those that the case's sensors allow)",
-        read=names,
+    options(
+        """
+        --out DIR  folder for the results (default: out/<name of the case>)
+        --starts N [16]  starts of the search
+        --seed N [0]  seed of the starts
+        --structure NAME  controller structure, such as payload-feedback, or several, the simplest
+            first (default: those that the case's sensors allow)
+        """,
+        structure=names,
     ),
-    *_FAMILY,
+    _FAMILY,
     NO_BOUND,
 )
 
@@ -61,8 +48,8 @@ def run(arguments: argparse.Namespace) -> int:
     from synth.structures import structure_named
 
     case = given_case(arguments)
-    asked, fixed = arguments.structure, parse_fixed(arguments.fixed)
-    members = [case.replace(changes) for changes in parse_members(arguments.members)]
+    asked, fixed = arguments.structure, parse_fixed(arguments.fix)
+    members = [case.replace(changes) for changes in parse_members(arguments.member)]
     for name in asked or ():
         structure_named(name, case)  # an unknown name ends here, before any file
     folder = prepared(arguments, case.name)
@@ -109,7 +96,7 @@ def _next(
     words = case_words(arguments, folder)
     plain = design.structure == "payload-feedback"
     structure = "" if plain else f" --structure {design.structure}"
-    family = "".join(f" {shlex.quote(word)}" for word in changed_words(arguments, _FAMILY))
+    family = "".join(f" {shlex.quote(word)}" for word in changed_words(arguments, (_FAMILY,)))
     optimise = f"stillhook optimise {words}{structure}{family}"
     rows = []
     if not design.feasible:

@@ -4,28 +4,24 @@ from __future__ import annotations
 
 import argparse
 
-from ..declare import CASE, choice, results_folder, text, whole
+from ..declare import CASE, options
 from ..given import case_words, gains_text, given_case
 from ..lists import parse_range
 from ..working import conclude, prepared, working
 
 ARGUMENTS = (
     CASE,
-    choice(
-        "--against",
-        ("torque", "speed", "max_sensitivity", "delay_margin", "delay"),
-        "the other quantity (default: torque); delay is that of the telemetry",
-        "torque",
+    options(
+        """
+        --against {torque,speed,max_sensitivity,delay_margin,delay} [torque]  the other quantity
+            (default: torque); delay is that of the telemetry
+        --points N [30]  points of the front
+        --between LOW..HIGH  ends of the front in SI units (default: found)
+        --seed N [0]  seed of the searches
+        --out DIR  folder for the results (default: out/<case>-pareto)
+        """,
+        between=parse_range,
     ),
-    whole("--points", "points of the front", 30),
-    text(
-        "--between",
-        "LOW..HIGH",
-        "ends of the front in SI units (default: found)",
-        read=parse_range,
-    ),
-    whole("--seed", "seed of the searches", 0),
-    results_folder("out/<case>-pareto"),
 )
 
 

@@ -9,17 +9,7 @@ from typing import TYPE_CHECKING
 from models.basics import InputError
 
 from ...text import OutputFolder, csv_text
-from ..declare import (
-    CASE,
-    OBJECTIVE,
-    SEED,
-    STRUCTURE,
-    repeated,
-    results_folder,
-    starts,
-    text,
-    whole,
-)
+from ..declare import CASE, options
 from ..given import case_words, gains_text, given_case
 from ..lists import parse_range
 from ..vary import parse_seas, parse_vary
@@ -31,30 +21,23 @@ if TYPE_CHECKING:
 
 ARGUMENTS = (
     CASE,
-    repeated(
-        "--vary",
-        "PATH=LOW..HIGH",
-        "what varies, as in rope.length=500..1500, payload.mass=40t,50t or "
-        "'PATH=a|b' for values with nothing between",
+    options(
+        """
+        --vary PATH=LOW..HIGH ...  what varies, as in rope.length=500..1500, payload.mass=40t,50t or
+            'PATH=a|b' for values with nothing between
+        --seas H_S/T_P[:SHARE],..  the sea states
+        --scatter FILE  a table of sea states: significant_height, peak_period, occurrence (.csv)
+        --objective {worst,mean,regret} [worst]  what is made small (default: the worst payload
+            motion)
+        --structure NAME [payload-feedback]  controller structure (default: payload-feedback)
+        --schedule LOW..HIGH  gains over the rope's length [m] instead of one set
+        --starts N [8]  starts of the search
+        --seed N [0]  seed of the starts
+        --draws N [10000]  random plants to check with
+        --out DIR  folder for the results (default: out/<case>-robust)
+        """,
+        schedule=parse_range,
     ),
-    text("--seas", "H_S/T_P[:SHARE],..", "the sea states"),
-    text(
-        "--scatter",
-        "FILE",
-        "a table of sea states: significant_height, peak_period, occurrence (.csv)",
-    ),
-    OBJECTIVE,
-    STRUCTURE,
-    text(
-        "--schedule",
-        "LOW..HIGH",
-        "gains over the rope's length [m] instead of one set",
-        read=parse_range,
-    ),
-    starts(8),
-    SEED,
-    whole("--draws", "random plants to check with", 10_000),
-    results_folder("out/<case>-robust"),
 )
 
 

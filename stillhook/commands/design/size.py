@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from models.basics import InputError
 
 from ...text import OutputFolder, pictures
-from ..declare import CASE, SEED, STRUCTURE, results_folder, starts, switch, text, whole
+from ..declare import CASE, options
 from ..given import case_words, given_case
 from ..lists import parse_range
 from ..working import conclude, prepared, working
@@ -22,31 +22,24 @@ if TYPE_CHECKING:
 
 ARGUMENTS = (
     CASE,
-    text(
-        "--target",
-        "LENGTH",
-        "rms that the payload may move: '20 mm', '5 %%' of the hook's rms, '26 dB' below it",
+    options(
+        """
+        --target LENGTH  rms that the payload may move: '20 mm', '5 %%' of the hook's rms, '26 dB'
+            below it
+        --hs LENGTH  significant wave height, as in '2.5 m' (default: the case's)
+        --gear LOW..HIGH  gear ratios to look at (default: the case's over and times 2.5)
+        --points N [9]  gears on the curve
+        --motors FILE  a catalogue of motors to choose from (.csv)
+        --co-design  keep the motor and find the gear with which the payload is stillest
+        --radius LOW..HIGH  with --co-design: drum radii to look at [m]
+        --structure NAME [payload-feedback]  controller structure (default: payload-feedback)
+        --starts N [4]  starts of the search
+        --seed N [0]  seed of the starts
+        --out DIR  folder for the results (default: out/<case>-size)
+        """,
+        gear=parse_range,
+        radius=parse_range,
     ),
-    text("--hs", "LENGTH", "significant wave height, as in '2.5 m' (default: the case's)"),
-    text(
-        "--gear",
-        "LOW..HIGH",
-        "gear ratios to look at (default: the case's over and times 2.5)",
-        read=parse_range,
-    ),
-    whole("--points", "gears on the curve", 9),
-    text("--motors", "FILE", "a catalogue of motors to choose from (.csv)"),
-    switch("--co-design", "keep the motor and find the gear with which the payload is stillest"),
-    text(
-        "--radius",
-        "LOW..HIGH",
-        "with --co-design: drum radii to look at [m]",
-        read=parse_range,
-    ),
-    STRUCTURE,
-    starts(4),
-    SEED,
-    results_folder("out/<case>-size"),
 )
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ...designs import design_data, design_text, structures_report, structures_table
 from ...text import OutputFolder, Progress, console, markdown
-from ..declare import CASE, NO_BOUND, SEED, results_folder, starts, text
+from ..declare import CASE, NO_BOUND, options
 from ..given import case_words, given_case
 from ..lists import names
 from ..working import conclude, prepared, working
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
 ARGUMENTS = (
     CASE,
-    text(
-        "--structures",
-        "A,B,..",
-        "which (default: all): payload-feedback, payload-feedback-rolloff, -lead, -notch, "
-        "-integral, drum-feedback, feed-forward, combined, constant-tension, low-order-N; on "
-        "request high-order, the best found of any order",
-        read=names,
+    options(
+        """
+        --structures A,B,..  which (default: all): payload-feedback, payload-feedback-rolloff,
+            -lead, -notch, -integral, drum-feedback, feed-forward, combined, constant-tension,
+            low-order-N; on request high-order, the best found of any order
+        --out DIR  folder for the results (default: out/<name of the case>)
+        --starts N [8]  starts of each search
+        --seed N [0]  seed of the starts
+        """,
+        structures=names,
     ),
-    results_folder("out/<name of the case>"),
-    starts(8, "starts of each search"),
-    SEED,
     NO_BOUND,
 )
 

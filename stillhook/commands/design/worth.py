@@ -8,7 +8,7 @@ import shlex
 from typing import TYPE_CHECKING
 
 from ...text import OutputFolder, pictures
-from ..declare import CASE, SEED, STRUCTURE, results_folder, starts
+from ..declare import CASE, options
 from ..given import case_words, given_case
 from ..working import conclude, prepared, working
 
@@ -17,10 +17,14 @@ if TYPE_CHECKING:
 
 ARGUMENTS = (
     CASE,
-    STRUCTURE,
-    starts(4),
-    SEED,
-    results_folder("out/<case>-worth"),
+    options(
+        """
+        --structure NAME [payload-feedback]  controller structure (default: payload-feedback)
+        --starts N [4]  starts of the search
+        --seed N [0]  seed of the starts
+        --out DIR  folder for the results (default: out/<case>-worth)
+        """
+    ),
 )
 
 

@@ -9,10 +9,10 @@ from models.operation import Option, WordOption, scenario_names, scenario_option
 
 from ...controllers import CONTROLLER_TEXTS
 from ...text import Report, ReportSection, pairs, quantity
-from ..declare import positional
+from ..declare import options
 from ..working import conclude
 
-ARGUMENTS = (positional("name", "an operation, to see its options", optional=True),)
+ARGUMENTS = (options("[name]  an operation, to see its options"),)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -39,19 +39,7 @@ from ...text import (
     progress,
     show,
 )
-from ..declare import (
-    CASE,
-    changed_words,
-    choice,
-    group,
-    one_of,
-    real,
-    repeated,
-    results_folder,
-    switch,
-    text,
-    whole,
-)
+from ..declare import CASE, changed_words, options, within
 from ..given import case_words
 from ..lists import numbers, quantity
 from ..working import Stop, kept_in, place_for, prepared, stoppable, tidy
@@ -71,93 +59,52 @@ class _Simulated:
 
 ARGUMENTS = (
     CASE,
-    group(
-        "what is simulated",
-        text(
-            "--controller",
-            "NAME",
-            "a controller, several with commas between, or all, which leaves out the predictive "
-            "ones (default: feedback; see `stillhook scenarios`)",
-            "feedback",
-        ),
-        text("--scenario", "NAME", "an operation (default: hold)", "hold"),
-        repeated(
-            "--option", "KEY=VALUE", "an option of the operation, as in 'height=6 m'", "options"
-        ),
-        whole("--seeds", "how many seas", 1, low=1, high=_MANY),
-        whole("--first-seed", "seed of the first", 0, low=0),
-        one_of(
-            real("--hours", "H", "length of a run in hours", low=0.0, high=1e4, open_low=True),
-            text(
-                "--duration",
-                "TIME",
-                "length of a run, as in '20 min' (default: the operation's own)",
-                read=TIME,
-            ),
-        ),
-        one_of(
-            text(
-                "--hook",
-                "FILE",
-                "the hook's motion from a CSV file with the columns time and displacement",
-            ),
-            text("--sine", "AMPLITUDE,PERIOD", "a sine instead, as in '0.5 m, 8 s'", read=sine),
-        ),
-        text(
-            "--tip",
-            "X,Y,Z",
-            "--hook holds heave, roll and pitch of the vessel; the crane's tip is so far "
-            "forward, to port and up [m]",
-            read=numbers(3),
-        ),
-    ),
-    group(
-        "the feedback's gains (default: those of the case)",
-        one_of(
-            text("--design", "FILE", "a design that was written, as in out/CASE/design.yaml"),
-            text("--gains", "A=..,a=..,a1=..,a2=..", "the gains"),
-        ),
-    ),
-    group(
-        "how",
-        text("--sample-time", "TIME", "of the controller, as in '20 ms'", read=TIME),
-        text("--step", "TIME", "integration step (default: the longest)", read=TIME),
-        whole("--masses", "masses along the rope (default: the case's)"),
-        text(
-            "--settle",
-            "TIME",
-            "when statistics begin (default: after some waves)",
-            read=quantity("time", 0.0, 1e8),
-        ),
-        text(
-            "--lock-limit",
-            "LENGTH",
-            "error of the payload that counts as lost lock (default: the hook's significant "
-            "height)",
-            read=quantity("length", 0.0, 1e5, open_low=True),
-        ),
-        switch(
-            "--no-compile",
-            "do not compile the loop to C: slower, and needs no compiler",
-            "compiled",
-        ),
-    ),
-    group(
-        "results",
-        results_folder("out/<case>-<scenario>"),
-        choice(
-            "--traces",
-            ("csv", "parquet", "netcdf", "none"),
-            "format of the time traces (default: csv)",
-            "csv",
-        ),
-        text(
-            "--store-step",
-            "TIME",
-            "time between two rows of them (default: so that there are at most 40 000)",
-            read=TIME,
-        ),
-        switch("--animate", "make a moving picture (GIF) of the worst run"),
+    options(
+        """
+        what is simulated:
+        --controller NAME [feedback]  a controller, several with commas between, or all, which
+            leaves out the predictive ones (default: feedback; see `stillhook scenarios`)
+        --scenario NAME [hold]  an operation (default: hold)
+        --option KEY=VALUE ...  an option of the operation, as in 'height=6 m'
+        --seeds N [1]  how many seas
+        --first-seed N [0]  seed of the first
+        --hours H  length of a run in hours
+        | --duration TIME  length of a run, as in '20 min' (default: the operation's own)
+        --hook FILE  the hook's motion from a CSV file with the columns time and displacement
+        | --sine AMPLITUDE,PERIOD  a sine instead, as in '0.5 m, 8 s'
+        --tip X,Y,Z  --hook holds heave, roll and pitch of the vessel; the crane's tip is so far
+            forward, to port and up [m]
+
+        the feedback's gains (default: those of the case):
+        --design FILE  a design that was written, as in out/CASE/design.yaml
+        | --gains A=..,a=..,a1=..,a2=..  the gains
+
+        how:
+        --sample-time TIME  of the controller, as in '20 ms'
+        --step TIME  integration step (default: the longest)
+        --masses N  masses along the rope (default: the case's)
+        --settle TIME  when statistics begin (default: after some waves)
+        --lock-limit LENGTH  error of the payload that counts as lost lock (default: the hook's
+            significant height)
+        --no-compile  do not compile the loop to C: slower, and needs no compiler
+
+        results:
+        --out DIR  folder for the results (default: out/<case>-<scenario>)
+        --traces {csv,parquet,netcdf,none} [csv]  format of the time traces (default: csv)
+        --store-step TIME  time between two rows of them (default: so that there are at most 40 000)
+        --animate  make a moving picture (GIF) of the worst run
+        """,
+        seeds=within(low=1, high=_MANY),
+        first_seed=within(low=0),
+        hours=within(low=0.0, high=1e4, open_low=True),
+        duration=TIME,
+        sine=sine,
+        tip=numbers(3),
+        sample_time=TIME,
+        step=TIME,
+        settle=quantity("time", 0.0, 1e8),
+        lock_limit=quantity("length", 0.0, 1e5, open_low=True),
+        store_step=TIME,
     ),
 )
 
@@ -296,7 +243,7 @@ def _question(asked: SimulationRequest, arguments: argparse.Namespace) -> dict[s
     return {
         "controllers": list(asked.controllers),
         "scenario": asked.scenario.name,
-        "options": list(arguments.options),
+        "options": list(arguments.option),
         "hook": "the case's own sea" if hook is None else hook.description,
         "seeds": list(asked.seeds),
         "gains": dict(design.parameters) if design is not None else asked.gains,
@@ -361,7 +308,7 @@ def _next(
 
 def _again(arguments: argparse.Namespace, case: str, **changes: object) -> str:
     """Return the command that does the same again, with changes."""
-    fresh: dict[str, object] = {"changes": [], "out": None, "traces": "csv", "animate": False}
+    fresh: dict[str, object] = {"set": [], "out": None, "traces": "csv", "animate": False}
     words = changed_words(arguments, ARGUMENTS, **(fresh | changes))
     return " ".join(["stillhook simulate", case, *map(shlex.quote, words)])
 

@@ -70,7 +70,7 @@ def asked_of(arguments: argparse.Namespace) -> SimulationRequest:
     from models.simulation import SimulationOptions
 
     names = parse_controllers(arguments.controller)
-    options = parse_options(arguments.options)
+    options = parse_options(arguments.option)
     gains = None if arguments.gains is None else parse_gains(arguments.gains)
     case = given_case(arguments)
     scenario = scenario_named(arguments.scenario, case, **options)
@@ -95,7 +95,7 @@ def asked_of(arguments: argparse.Namespace) -> SimulationRequest:
             hook=hook,
             duration=lasting,
             masses=arguments.masses,
-            compiled=None if arguments.compiled else False,  # as the machine can
+            compiled=None if arguments.compile else False,  # as the machine can
             step=arguments.step,
             settle=arguments.settle,
             store_step=arguments.store_step,

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ...comparison import Comparison, comparison_report, write_comparison
 from ...text import Report, ReportSection, console, count, pairs
-from ..declare import CASE, choice, switch, text, whole
+from ..declare import CASE, options, within
 from ..given import case_words, given_case
 from ..lists import names, numbers
 from ..working import conclude, counting, place_for, prepared, tidy
@@ -38,38 +38,28 @@ def _controllers(option: str, text: str) -> list[object]:
 
 ARGUMENTS = (
     CASE,
-    text(
-        "--controllers",
-        "A,B,..",
-        "who takes part (default: all that do anything here); see --list; a design file is "
-        "one too, as in out/CASE/design.yaml",
-        read=_controllers,
-    ),
-    switch("--list", "say who they are, and end"),
-    whole("--seeds", "seas of each height", 10, low=1, high=_MANY),
-    text("--hs", "H,H,..", "significant heights [m] (default: that of the case)", read=numbers()),
-    text("--duration", "TIME", "of a run (default: 20 min)", "20 min"),
-    text(
-        "--mismatch",
-        "NAME=VALUE,..",
-        "what of the plant is not as the controllers think, as in payload=+30%%,E=-30%%,"
-        "delay=+50ms,spectrum=jonswap, or a path of the case",
-    ),
-    choice(
-        "--design-at",
-        ("each", "case"),
-        "design the linear laws for each height (default), or once for the case's sea",
-        "each",
-    ),
-    whole("--starts", "starts of each search for a design", 8),
-    whole("--masses", "masses along the plant's rope (default: the case's)"),
-    text("--settle", "TIME", "when statistics begin"),
-    whole("--jobs", "processes (default: one for each core)"),
-    text(
-        "--out",
-        "DIR",
-        "folder for the results (default: out/<case>-compare); the same command again goes "
-        "on with what is there",
+    options(
+        """
+        --controllers A,B,..  who takes part (default: all that do anything here); see --list; a
+            design file is one too, as in out/CASE/design.yaml
+        --list  say who they are, and end
+        --seeds N [10]  seas of each height
+        --hs H,H,..  significant heights [m] (default: that of the case)
+        --duration TIME [20 min]  of a run (default: 20 min)
+        --mismatch NAME=VALUE,..  what of the plant is not as the controllers think, as in
+            payload=+30%%,E=-30%%,delay=+50ms,spectrum=jonswap, or a path of the case
+        --design-at {each,case} [each]  design the linear laws for each height (default), or once
+            for the case's sea
+        --starts N [8]  starts of each search for a design
+        --masses N  masses along the plant's rope (default: the case's)
+        --settle TIME  when statistics begin
+        --jobs N  processes (default: one for each core)
+        --out DIR  folder for the results (default: out/<case>-compare); the same command again goes
+            on with what is there
+        """,
+        controllers=_controllers,
+        seeds=within(low=1, high=_MANY),
+        hs=numbers(),
     ),
 )
 

@@ -15,7 +15,7 @@ import numpy as np
 from models.basics import InputError
 
 from ...text import OutputFolder, Progress, csv_text, pictures
-from ..declare import CASE, DESIGN, group, results_folder, switch, text
+from ..declare import CASE, DESIGN, options
 from ..given import case_words, gains_text, given_case
 from ..given_design import design_words, given_design
 from ..lists import axis, quantity
@@ -31,49 +31,36 @@ _HEIGHT = quantity("length", 0.0, 1e3, open_low=True)
 ARGUMENTS = (
     CASE,
     DESIGN,
-    switch(
-        "--held",
-        "no design: the drum held and a perfect winch only (default: the case's gains, or "
-        "the best ones where it has none)",
+    options(
+        """
+        --held  no design: the drum held and a perfect winch only (default: the case's gains, or the
+            best ones where it has none)
+        --tp LOW..HIGH[/STEP]|A,B,..  peak periods [s], as in 5..15, 5..15/0.5 or 6,8,10 (default:
+            4..18, or those of the scatter diagram)
+        --headings LOW..HIGH[/STEP]|A,B,..  headings [deg], where the waves travel to, 180 head sea,
+            as in 0..345/15 or 90,135,180 (default: 0..330/30 of a vessel with raos)
+
+        how still the payload must be:
+        --payload-rms LENGTH  standard deviation of its motion, as in '50 mm'
+        --payload-significant LENGTH  significant double amplitude, 4 sigma
+        --payload-max LENGTH  most probable maximum amplitude in the case's exposure time
+        --payload-speed SPEED  most probable maximum of its speed, as in '0.5 m/s'
+        """,
+        tp=axis(1.0),
+        headings=axis(30.0),
     ),
-    text(
-        "--tp",
-        "LOW..HIGH[/STEP]|A,B,..",
-        "peak periods [s], as in 5..15, 5..15/0.5 or 6,8,10 (default: 4..18, or those of "
-        "the scatter diagram)",
-        read=axis(1.0),
+    options(
+        """
+        --depths A,B,..  lengths of rope paid out [m], as in 100,500,1000 (default: the case's)
+        --scatter FILE  scatter diagram (.csv): the share of the year that is workable; `example` is
+            a made-up one
+        --reoptimise  also find the gains anew for each sea (seconds for each)
+        --highest LENGTH [30 m]  highest H_s looked at (default: 30 m)
+        --out DIR  folder for the results (default: out/<case>-operability)
+        """,
+        depths=axis(None),
+        highest=_HEIGHT,
     ),
-    text(
-        "--headings",
-        "LOW..HIGH[/STEP]|A,B,..",
-        "headings [deg], where the waves travel to, 180 head sea, as in 0..345/15 or "
-        "90,135,180 (default: 0..330/30 of a vessel with raos)",
-        read=axis(30.0),
-    ),
-    group(
-        "how still the payload must be",
-        text("--payload-rms", "LENGTH", "standard deviation of its motion, as in '50 mm'"),
-        text("--payload-significant", "LENGTH", "significant double amplitude, 4 sigma"),
-        text(
-            "--payload-max", "LENGTH", "most probable maximum amplitude in the case's exposure time"
-        ),
-        text("--payload-speed", "SPEED", "most probable maximum of its speed, as in '0.5 m/s'"),
-    ),
-    text(
-        "--depths",
-        "A,B,..",
-        "lengths of rope paid out [m], as in 100,500,1000 (default: the case's)",
-        read=axis(None),
-    ),
-    text(
-        "--scatter",
-        "FILE",
-        "scatter diagram (.csv): the share of the year that is workable; `example` is a "
-        "made-up one",
-    ),
-    switch("--reoptimise", "also find the gains anew for each sea (seconds for each)"),
-    text("--highest", "LENGTH", "highest H_s looked at (default: 30 m)", 30.0, read=_HEIGHT),
-    results_folder("out/<case>-operability"),
 )
 
 

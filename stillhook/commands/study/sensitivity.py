@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from models.basics import InputError, read_quantity
+from models.basics import InputError, check_range, read_quantity
 
 from ...text import Progress, csv_text
-from ..declare import CASE, DESIGN, checked, group, repeated, results_folder, switch, text, whole
+from ..declare import CASE, DESIGN, options, within
 from ..given import case_words, given_case
 from ..given_design import design_words, given_design
 from ..working import conclude, prepared, working
@@ -24,41 +24,32 @@ def _share(option: str, text: str) -> float:
         share = read_quantity(text, "ratio")
     except InputError as error:
         raise InputError(f"{option} must be a share, as in '10 %', got {error}") from None
-    return checked(option, share, low=-0.9, high=10.0)
+    owner, _, name = option.rpartition(": ")
+    return check_range(owner, name, share, low=-0.9, high=10.0)
 
 
 ARGUMENTS = (
     CASE,
     DESIGN,
-    whole("--second", "second derivatives of the N numbers with the largest effect", 6, low=0),
-    text(
-        "--plus",
-        "SHARE",
-        "move each gain by this share and compute all anew, as Figure 32 of the 1975 thesis "
-        "does (default: '10 %%')",
-        0.1,
-        read=_share,
+    options(
+        """
+        --second N [6]  second derivatives of the N numbers with the largest effect
+        --plus SHARE [10 %]  move each gain by this share and compute all anew, as Figure 32 of the
+            1975 thesis does (default: '10 %%')
+
+        over whole ranges: Sobol's indices and Morris's screening:
+        --ranges  study ranges too; without --spread or --vary: payload mass 30 %% either way,
+            stiffness 20 %%, drag 50 %%, the telemetry up to 20 ms later
+        --spread FILE  a spread file (.yaml); implies --ranges
+        --vary PATH=RANGE ...  vary a number evenly, as in payload.mass=30%% or
+            'sensors.telemetry.delay=20 ms..80 ms'; implies --ranges
+        --samples N [1024]  base points of the indices, a power of two; numbers + 2 cases each
+        --seed N [0]  seed of the draws
+        """,
+        second=within(low=0),
+        plus=_share,
     ),
-    group(
-        "over whole ranges: Sobol's indices and Morris's screening",
-        switch(
-            "--ranges",
-            "study ranges too; without --spread or --vary: payload mass 30 %% either way, "
-            "stiffness 20 %%, drag 50 %%, the telemetry up to 20 ms later",
-        ),
-        text("--spread", "FILE", "a spread file (.yaml); implies --ranges"),
-        repeated(
-            "--vary",
-            "PATH=RANGE",
-            "vary a number evenly, as in payload.mass=30%% or 'sensors.telemetry.delay="
-            "20 ms..80 ms'; implies --ranges",
-        ),
-        whole(
-            "--samples", "base points of the indices, a power of two; numbers + 2 cases each", 1024
-        ),
-        whole("--seed", "seed of the draws", 0),
-    ),
-    results_folder("out/<case>-sensitivity"),
+    options("--out DIR  folder for the results (default: out/<case>-sensitivity)"),
 )
 
 

@@ -28,7 +28,7 @@ from ...sweeps import (
     write_sweep,
 )
 from ...text import OutputFolder, count, picture
-from ..declare import case_argument, choice, group, one_of, repeated, switch, text, whole
+from ..declare import OPTIONAL_CASE, options, within
 from ..given import case_words, given_case, parse_options, split_pairs
 from ..given_design import design_words, given_design
 from ..lists import names
@@ -40,86 +40,52 @@ if TYPE_CHECKING:
 _MOST = 100  # of the worst cases that are told
 
 ARGUMENTS = (
-    case_argument(optional=True),  # none with --resume
-    group(
-        "who is tried",
-        one_of(
-            text("--design", "FILE", "a design that was written (design.yaml)"),
-            text(
-                "--gains",
-                "A=..,a=..,a1=..,a2=..",
-                "gains, or parameters by name (default: the gains that the case has in use)",
-            ),
-            text(
-                "--controller",
-                "NAME",
-                "another controller, with --mode time, as in mpc (see `stillhook scenarios`)",
-            ),
-        ),
-        text("--structure", "NAME", "whose parameters --gains are (default: payload-feedback)"),
-        switch(
-            "--follow",
-            "make the controller for each case, and design a design anew (default: it is made for "
-            "the nominal case, and the plant is another)",
-        ),
-    ),
-    group(
-        "what varies (default: mass, stiffness, drag and delay)",
-        text("--spread", "FILE", "a spread file (.yaml)"),
-        repeated(
-            "--vary",
-            "PATH=RANGE",
-            "vary a number evenly, as in payload.mass=30%% (either way) or "
-            "'delay=20 ms..80 ms'; adds to --spread",
-        ),
-        text(
-            "--faults",
-            "A,B,..",
-            "vary what fails, with --mode time: dropouts, outages, delay-jumps, sensor-bias, "
-            "mru-bias, limit-cuts",
-            read=names,
-        ),
-        whole("--samples", "number of cases (default: 10000; with --mode time 256)"),
-        text(
-            "--sampling", "METHOD", "sobol (default), lhs, random, grid, corners or given", "sobol"
-        ),
-        whole("--seed", "seed of the draws", 0),
-        choice(
-            "--mode",
-            ("frequency", "time"),
-            "the linear loop (default), or nonlinear runs in time",
-            "frequency",
-        ),
-    ),
-    group(
-        "in the time domain (--mode time)",
-        text("--duration", "TIME", "length of a run (default: 10 min)", "10 min"),
-        text("--settle", "TIME", "when its statistics begin"),
-        text("--scenario", "NAME", "the operation (default: hold)", "hold"),
-        repeated("--option", "KEY=VALUE", "an option of the operation", "options"),
-        whole("--masses", "masses along the rope (default: the case's)"),
-        whole("--first", "number of the first case, for a part of a longer sweep", 0),
-        switch("--common-seed", "let all cases meet the same sea and noise"),
-    ),
-    group(
-        "where it runs, with --mode time",
-        whole("--jobs", "processes (default: one for each core)"),
-        text(
-            "--cluster",
-            "ADDRESS",
-            "a dask scheduler, as in tcp://10.0.0.1:8786, or local:4 for four processes here",
-        ),
-        text("--resume", "DIR", "go on with a sweep that was stopped, from its folder alone"),
-    ),
-    group(
-        "results",
-        text(
-            "--out",
-            "DIR",
-            "folder for the results (default: out/<case>-sweep); with --mode time the same "
-            "command again goes on with what is there",
-        ),
-        whole("--worst", "how many of the worst", 5, low=0, high=_MOST),
+    OPTIONAL_CASE,
+    options(
+        """
+        who is tried:
+        --design FILE  a design that was written (design.yaml)
+        | --gains A=..,a=..,a1=..,a2=..  gains, or parameters by name (default: the gains that the
+            case has in use)
+        | --controller NAME  another controller, with --mode time, as in mpc (see `stillhook
+            scenarios`)
+        --structure NAME  whose parameters --gains are (default: payload-feedback)
+        --follow  make the controller for each case, and design a design anew (default: it is made
+            for the nominal case, and the plant is another)
+
+        what varies (default: mass, stiffness, drag and delay):
+        --spread FILE  a spread file (.yaml)
+        --vary PATH=RANGE ...  vary a number evenly, as in payload.mass=30%% (either way) or
+            'delay=20 ms..80 ms'; adds to --spread
+        --faults A,B,..  vary what fails, with --mode time: dropouts, outages, delay-jumps,
+            sensor-bias, mru-bias, limit-cuts
+        --samples N  number of cases (default: 10000; with --mode time 256)
+        --sampling METHOD [sobol]  sobol (default), lhs, random, grid, corners or given
+        --seed N [0]  seed of the draws
+        --mode {frequency,time} [frequency]  the linear loop (default), or nonlinear runs in time
+
+        in the time domain (--mode time):
+        --duration TIME [10 min]  length of a run (default: 10 min)
+        --settle TIME  when its statistics begin
+        --scenario NAME [hold]  the operation (default: hold)
+        --option KEY=VALUE ...  an option of the operation
+        --masses N  masses along the rope (default: the case's)
+        --first N [0]  number of the first case, for a part of a longer sweep
+        --common-seed  let all cases meet the same sea and noise
+
+        where it runs, with --mode time:
+        --jobs N  processes (default: one for each core)
+        --cluster ADDRESS  a dask scheduler, as in tcp://10.0.0.1:8786, or local:4 for four
+            processes here
+        --resume DIR  go on with a sweep that was stopped, from its folder alone
+
+        results:
+        --out DIR  folder for the results (default: out/<case>-sweep); with --mode time the same
+            command again goes on with what is there
+        --worst N [5]  how many of the worst
+        """,
+        faults=names,
+        worst=within(low=0, high=_MOST),
     ),
 )
 
@@ -171,7 +137,7 @@ def _swept(arguments: argparse.Namespace) -> Swept:
                 "duration": arguments.duration,
                 "settle": arguments.settle,
                 "scenario": arguments.scenario,
-                "options": parse_options(arguments.options),
+                "options": parse_options(arguments.option),
                 "masses": arguments.masses,
                 "design_follows": arguments.follow,
                 "common_seed": arguments.common_seed,
@@ -322,7 +288,7 @@ def _only_in_time(arguments: argparse.Namespace) -> None:
         "--faults": arguments.faults is not None,
         "--settle": arguments.settle is not None,
         "--scenario": arguments.scenario != "hold",
-        "--option": bool(arguments.options),
+        "--option": bool(arguments.option),
         "--masses": arguments.masses is not None,
         "--common-seed": arguments.common_seed,
         "--first": arguments.first != 0,

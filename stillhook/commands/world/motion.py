@@ -16,34 +16,26 @@ from models.hook import HookSurvey
 
 from ...seas import motion_report, own_place
 from ...text import OutputFolder
-from ..declare import CASE, real, results_folder, text
+from ..declare import CASE, options
 from ..given import case_words, given_case
 from ..lists import axis
 from ..working import conclude, prepared
 
 ARGUMENTS = (
     CASE,
-    text(
-        "--headings",
-        "A,B,.. or LOW..HIGH",
-        "where the waves travel to, relative to the bow [deg]: 180 is a head sea, 90 comes "
-        "from starboard (default: every 15 degrees)",
-        read=axis(15.0, -360.0, 360.0),
+    options(
+        """
+        --headings A,B,.. or LOW..HIGH  where the waves travel to, relative to the bow [deg]: 180 is
+            a head sea, 90 comes from starboard (default: every 15 degrees)
+        --tp A,B,.. or LOW..HIGH  peak periods [s]; a range goes in steps of one second (default:
+            5..16)
+        --fractile P [0.9]  probability that the largest value of the exposure time stays below the
+            second extreme that is told
+        --out DIR  folder for the results (default: out/<case>-motion)
+        """,
+        headings=axis(15.0, -360.0, 360.0),
+        tp=axis(1.0, 1.0, 40.0),
     ),
-    text(
-        "--tp",
-        "A,B,.. or LOW..HIGH",
-        "peak periods [s]; a range goes in steps of one second (default: 5..16)",
-        read=axis(1.0, 1.0, 40.0),
-    ),
-    real(
-        "--fractile",
-        "P",
-        "probability that the largest value of the exposure time stays below the second "
-        "extreme that is told",
-        0.9,
-    ),
-    results_folder("out/<case>-motion"),
 )
 
 

@@ -7,11 +7,14 @@ import shlex
 from pathlib import Path
 
 from ...text import Report
-from ..declare import positional, switch
+from ..declare import options
 from ..working import conclude
 
-FORCE = switch("--force", "overwrite the file if it exists")
-ARGUMENTS = (positional("file", "the file to write"), FORCE)
+FORCE = options("--force  overwrite the file if it exists")
+ARGUMENTS = (
+    options("file  the file to write"),
+    FORCE,
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -7,12 +7,12 @@ import json
 import sys
 
 from ...text import Report
-from ..declare import positional
+from ..declare import options
 from ..working import conclude
 from .new import FORCE, written
 
 ARGUMENTS = (
-    positional("file", "the file to write (default: standard output)", optional=True),
+    options("[file]  the file to write (default: standard output)"),
     FORCE,
 )
 

@@ -19,29 +19,28 @@ from models.sea import read_seas, write_scatter
 
 from ...seas import records_report, records_table, sea_report
 from ...text import csv_text, told_once
-from ..declare import choice, positional, real, results_folder, text, whole
+from ..declare import options, within
 from ..working import conclude, prepared
 
 _CASES = {".yaml", ".yml", ".toml"}
 _STEP = {"low": 0.01, "high": 20.0}  # width of a class [m], [s]
 
 ARGUMENTS = (
-    positional(
-        "file",
-        "a file of wave spectra (NDBC, Spotter, SWAN, WAVEWATCH III, ERA5 and more), or a "
-        "case (bundled, .yaml or .toml) to see its sea",
+    options(
+        """
+        file  a file of wave spectra (NDBC, Spotter, SWAN, WAVEWATCH III, ERA5 and more), or a case
+            (bundled, .yaml or .toml) to see its sea
+        --read-as NAME  format of the file (default: found out)
+        --record N  record to show, counted from 0 in the order of time (default: the highest)
+        --beyond {decay,zero} [decay]  what a spectrum is above its last frequency (default: decay,
+            as 1/omega^5)
+        --height-step M [0.5]  width of the scatter diagram's classes of H_s [m]
+        --period-step S [1.0]  width of its classes of T_p [s]
+        --out DIR  folder for the results (default: out/<file>-sea)
+        """,
+        height_step=within(**_STEP),
+        period_step=within(**_STEP),
     ),
-    text("--read-as", "NAME", "format of the file (default: found out)"),
-    whole("--record", "record to show, counted from 0 in the order of time (default: the highest)"),
-    choice(
-        "--beyond",
-        ("decay", "zero"),
-        "what a spectrum is above its last frequency (default: decay, as 1/omega^5)",
-        "decay",
-    ),
-    real("--height-step", "M", "width of the scatter diagram's classes of H_s [m]", 0.5, **_STEP),
-    real("--period-step", "S", "width of its classes of T_p [s]", 1.0, **_STEP),
-    results_folder("out/<file>-sea"),
 )
 
 

@@ -14,84 +14,59 @@ from models.vessel.hull import Hull
 from models.vessel.readers import check_long_waves, write_raos
 
 from ...seas import hull_report
-from ..declare import changed_words, choice, group, real, switch, text, whole
+from ..declare import changed_words, options, within
 from ..lists import numbers, parse_range
 from ..working import conclude, prepared_table, working
 
 _STAGE = "computing waves on the hull"
 
 ARGUMENTS = (
-    group(
-        "the hull: main dimensions, or a mesh",
-        choice("--shape", ("ship", "box"), "what the main dimensions make (default: ship)", "ship"),
-        real("--length", "L", "of the waterline [m]"),
-        real("--beam", "B", "of the waterline [m]"),
-        real(
-            "--draught",
-            "T",
-            "[m]; with --mesh: where the waterline is above the lowest point "
-            "(default: z = 0 of the file)",
-        ),
-        real("--block", "C", "block coefficient", 0.7),
-        real("--midship", "C", "midship section coefficient", 0.96),
-        text(
-            "--transom",
-            "WIDTH,DEPTH",
-            "of the transom over beam and draught (default: 0.9,0.3)",
-            (0.9, 0.3),
-            read=numbers(2),
-        ),
-        text("--mesh", "FILE", "a mesh: .stl, .gdf, .pnl, .hst, .mar; z up, x forward"),
-        real("--scale", "F", "metres per unit of length of the mesh", 1.0),
-    ),
-    group(
-        "how it is loaded",
-        real("--kg", "Z", "centre of gravity above the keel [m]; or"),
-        real("--gm", "GM", "metacentric height [m]"),
-        text(
-            "--radii",
-            "ROLL,PITCH,YAW",
-            "radii of gyration [m] (default: 0.37 beam, 0.25 length, 0.25 length)",
-            (None, None, None),
-            read=numbers(3),
-        ),
-        real(
-            "--roll-damping",
-            "SHARE",
-            "damping of roll beyond that of its waves, over the critical",
-            0.05,
-        ),
-    ),
-    group(
-        "water and waves",
-        real("--depth", "D", "[m] (default: deep)"),
-        real("--density", "RHO", "[kg/m3]", 1025.0),
-        text(
-            "--frequencies",
-            "LOW..HIGH",
-            "of the coefficients [rad/s] (default: 0.15..2.0)",
-            "0.15..2.0",
-        ),
-        whole(
-            "--count",
-            "how many of them (default: 0.05 rad/s apart, closer for long ships)",
-            low=4,
-            high=400,
-        ),
-        real(
-            "--heading-step", "DEG", "between headings, all round [deg]", 15.0, low=1.0, high=90.0
-        ),
-    ),
-    group(
-        "the computation",
-        whole("--panels", "of our own hulls", 600),
-        switch("--no-lid", "no lid against irregular frequencies"),
-        whole("--threads", "how many to use (default: one for each core)", low=1, high=1024),
-        switch("--no-cache", "compute it anew, and keep nothing"),
-        text("--name", "NAME", "what the vessel is called"),
-        text(
-            "--out", "PATH", "a .nc or .csv file, or a folder (default: out/<name of the vessel>)"
-        ),
+    options(
+        """
+        the hull: main dimensions, or a mesh:
+        --shape {ship,box} [ship]  what the main dimensions make (default: ship)
+        --length L  of the waterline [m]
+        --beam B  of the waterline [m]
+        --draught T  [m]; with --mesh: where the waterline is above the lowest point (default: z = 0
+            of the file)
+        --block C [0.7]  block coefficient
+        --midship C [0.96]  midship section coefficient
+        --transom WIDTH,DEPTH [0.9,0.3]  of the transom over beam and draught (default: 0.9,0.3)
+        --mesh FILE  a mesh: .stl, .gdf, .pnl, .hst, .mar; z up, x forward
+        --scale F [1.0]  metres per unit of length of the mesh
+
+        how it is loaded:
+        --kg Z  centre of gravity above the keel [m]; or
+        --gm GM  metacentric height [m]
+        --radii ROLL,PITCH,YAW  radii of gyration [m] (default: 0.37 beam, 0.25 length, 0.25 length)
+        --roll-damping SHARE [0.05]  damping of roll beyond that of its waves, over the critical
+
+        water and waves:
+        --depth D  [m] (default: deep)
+        --density RHO [1025.0]  [kg/m3]
+        --frequencies LOW..HIGH [0.15..2.0]  of the coefficients [rad/s] (default: 0.15..2.0)
+        --count N  how many of them (default: 0.05 rad/s apart, closer for long ships)
+        --heading-step DEG [15.0]  between headings, all round [deg]
+
+        the computation:
+        --panels N [600]  of our own hulls
+        --no-lid  no lid against irregular frequencies
+        --threads N  how many to use (default: one for each core)
+        --no-cache  compute it anew, and keep nothing
+        --name NAME  what the vessel is called
+        --out PATH  a .nc or .csv file, or a folder (default: out/<name of the vessel>)
+        """,
+        length=within(),
+        beam=within(),
+        draught=within(),
+        transom=numbers(2),
+        kg=within(),
+        gm=within(),
+        radii=numbers(3),
+        depth=within(),
+        count=within(low=4, high=400),
+        heading_step=within(low=1.0, high=90.0),
+        threads=within(low=1, high=1024),
     ),
 )
 
@@ -112,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
             hull,
             kg=arguments.kg,
             gm=arguments.gm,
-            radii=arguments.radii,
+            radii=arguments.radii or (None, None, None),
             roll_damping=arguments.roll_damping,
             omega=usual_frequencies(hull, low, high)
             if arguments.count is None

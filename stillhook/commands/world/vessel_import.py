@@ -11,46 +11,38 @@ from models.vessel.readers import check_long_waves, read_raos, write_raos
 
 from ...seas import rao_report
 from ...text import told_once
-from ..declare import choice, positional, real, switch, text
+from ..declare import options, within
 from ..lists import numbers
 from ..working import conclude, prepared_table
 
 ARGUMENTS = (
-    positional(
-        "file",
-        "a RAO file: CSV, WAMIT .4, OrcaFlex .yml, Capytaine .nc, MSS .mat, ShipX .re1; or a "
-        "bundled vessel",
+    options(
+        """
+        file  a RAO file: CSV, WAMIT .4, OrcaFlex .yml, Capytaine .nc, MSS .mat, ShipX .re1; or a
+            bundled vessel
+        --read-as {csv,netcdf,wamit,orcaflex,capytaine,mss,shipx}  what it is (default: its contents
+            tell)
+        --out PATH  a .csv or .nc file, or a folder (default: out/<name of the vessel>)
+        --speed V  which forward speed [m/s]
+        --body BODY  which body of several
+        --length L  WAMIT's ULEN [m] (default: 1)
+        --waves {period,frequency}  first column of a WAMIT file (default: the heave of long waves
+            tells)
+        --symmetry {none,xz plane,yz plane,xz and yz planes,circular}  of the vessel, to fill in
+            headings, if the file is silent
+        --depth D  water depth [m]
+        --origin X,Y,Z  the point whose motions they are, if the file is silent
+        --vessel-type NAME  which of an OrcaFlex file
+        --draught NAME  which of an OrcaFlex vessel type
+        --roll-damping SHARE  to add, over the critical (Capytaine)
+        --no-check  take the file even if it contradicts the limits of long waves
+        """,
+        speed=within(),
+        length=within(),
+        depth=within(),
+        origin=numbers(3),
+        roll_damping=within(),
     ),
-    choice(
-        "--read-as",
-        ("csv", "netcdf", "wamit", "orcaflex", "capytaine", "mss", "shipx"),
-        "what it is (default: its contents tell)",
-    ),
-    text("--out", "PATH", "a .csv or .nc file, or a folder (default: out/<name of the vessel>)"),
-    real("--speed", "V", "which forward speed [m/s]"),
-    text("--body", "BODY", "which body of several"),
-    real("--length", "L", "WAMIT's ULEN [m] (default: 1)"),
-    choice(
-        "--waves",
-        ("period", "frequency"),
-        "first column of a WAMIT file (default: the heave of long waves tells)",
-    ),
-    choice(
-        "--symmetry",
-        ("none", "xz plane", "yz plane", "xz and yz planes", "circular"),
-        "of the vessel, to fill in headings, if the file is silent",
-    ),
-    real("--depth", "D", "water depth [m]"),
-    text(
-        "--origin",
-        "X,Y,Z",
-        "the point whose motions they are, if the file is silent",
-        read=numbers(3),
-    ),
-    text("--vessel-type", "NAME", "which of an OrcaFlex file"),
-    text("--draught", "NAME", "which of an OrcaFlex vessel type"),
-    real("--roll-damping", "SHARE", "to add, over the critical (Capytaine)"),
-    switch("--no-check", "take the file even if it contradicts the limits of long waves", "check"),
 )
 
 

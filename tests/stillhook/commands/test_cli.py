@@ -433,9 +433,9 @@ WRONG_WORDS = {
     ),
     "gain that is none": (
         "evaluate thesis-1975 --gains A=1,b=2",
-        "--gains: must be numbers for A, a, a1 and a2, as in A=1,a=0,a1=0,a2=0.5; got 'b=2'",
+        "--gains: must be numbers for A, a, a1 and a2, as in A=1,a=0,a1=0,a2=0.5, got 'b=2'",
     ),
-    "gain without value": ("evaluate thesis-1975 --gains a,a1=2", "--gains: must be .*; got 'a'"),
+    "gain without value": ("evaluate thesis-1975 --gains a,a1=2", "--gains: must be .*, got 'a'"),
     "gain twice": (
         "evaluate thesis-1975 --gains a=1,a=2,a1=3,a2=4",
         "--gains: a is given twice",

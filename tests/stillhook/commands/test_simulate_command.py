@@ -362,7 +362,7 @@ WRONG = {
         "simulate: --tip must be 3 numbers with commas between, got '1,2'",
     ),
     "no seeds": ("thesis-1975 --seeds 0", r"simulate: --seeds must be in \[1, 10000\], got 0"),
-    "no hours": ("thesis-1975 --hours -1", r"simulate: --hours must be in \(0, 10000\], got -1.0"),
+    "no hours": ("thesis-1975 --hours -1", r"simulate: --hours must be in \(0, 10000\], got '-1'"),
     "duration of another kind": (
         "thesis-1975 --duration '3 m'",
         r"simulate: --duration must be a time in .*, got '3 m', which is a length",
