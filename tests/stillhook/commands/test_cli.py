@@ -407,10 +407,10 @@ def test_all_errors_of_a_file_come_at_once(run):
 WRONG_WORDS = {
     "missing file": (
         "check none.yaml",
-        "none.yaml: no such case file or bundled case; bundled cases: .*",
+        "none.yaml: no such case file or bundled case; known here: .*",
     ),
     "nearly a name": ("optimise subsea-crne", ".*did you mean 'subsea-crane'\\?"),
-    "a folder": ("check .", r"\.: is a folder; a case file is wanted"),
+    "a folder": ("check .", r"\.: is a folder; a file is wanted"),
     "change without value": (
         "check thesis-1975 --set rope.length",
         "--set: must be PATH=VALUE, as in rope.length=800, got 'rope.length'",
@@ -533,7 +533,7 @@ def test_a_folder_that_may_not_be_written_to_is_found_out_first(run, monkeypatch
 
 
 def test_an_interrupted_search_keeps_the_case(run, monkeypatch):
-    def interrupted(case, structure, *, starts, seed, progress):
+    def interrupted(case, structure, *, starts, progress, **rest):
         progress("starts", 3, starts)
         raise KeyboardInterrupt
 
