@@ -148,7 +148,10 @@ def test_the_months_of_a_scatter_table_are_one_sea():
     ("text", "message"),
     [
         ("significant_height,occurrence\n1,1\n", "peak_period .* is missing"),
-        ("significant_height,peak_period,occurrence\n1,a,1\n", ":2: peak_period must be a number"),
+        (
+            "significant_height,peak_period,occurrence\n1,a,1\n",
+            ":2: peak_period must be a finite number",
+        ),
         ("significant_height,peak_period,occurrence\n1,8,0\n", "occurrence"),
     ],
 )

@@ -18,7 +18,7 @@ from models.hook import HookMotion
 from models.plant import consistent_drag
 from models.spread import Spread, Uniform
 from synth.loop import Assessment
-from synth.sensitivity.fixed_design import fixed_design
+from synth.sensitivity.fixed_design import FixedDesign
 from synth.sweeps import FrequencyEngine
 
 FloatArray = npt.NDArray[np.float64]
@@ -111,10 +111,11 @@ QUESTIONS = {
 
 def alone(engine: FrequencyEngine, row: FloatArray) -> Assessment | None:
     """The same controller on the same case through state space; None if it is unstable."""
-    own = fixed_design(engine.design)
+    own = FixedDesign.of(engine.design)
     moved = engine.spread.gains(row)
     values = [moved.get(name, value) for name, value in zip(own.names, own.values, strict=True)]
-    return replace(own, values=tuple(values), drag=None).assessment(engine.spread.case_at(row))
+    case = engine.spread.case_at(row)
+    return replace(own, case=case, values=tuple(values), drag=None).assessment()
 
 
 def with_drag(view: Assessment, coefficient: float) -> Assessment:
