@@ -26,7 +26,7 @@ Nothing is divided by what may be zero: but for the controller's own poles, whic
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -289,7 +289,7 @@ class Chain:
         return self.closed(*self.ends(np.zeros((1, 1)))), self._per_drag * slope
 
     def moments(
-        self, outputs: Sequence[str], nodes: SweepNodes, shaken: Shaken, drag: FloatArray
+        self, outputs: Iterable[str], nodes: SweepNodes, shaken: Shaken, drag: FloatArray
     ) -> dict[str, FloatArray]:
         """Return variances of outputs and of their rates by all rules, (m, 2, rules) each.
 

@@ -85,16 +85,17 @@ class SolvedRows:
     peak
         M_s, (n,); NaN where it was not asked for.
     moments
-        Variances of each output and of its rate by all rules, (n, 2, rules).
+        Variances of each output, and of its rate where that is wanted, by all rules, (n, 1 or 2,
+        rules).
     """
 
-    def __init__(self, numbers: PlantNumbers, outputs: Sequence[str], rules: int = 1) -> None:
+    def __init__(self, numbers: PlantNumbers, orders: Mapping[str, int], rules: int = 1) -> None:
         count = len(numbers)
         self.numbers = numbers
         self.drag = np.full(count, np.nan)
         self.stable = np.zeros(count, dtype=bool)
         self.peak = np.full(count, np.nan)
-        self.moments = {name: np.full((count, 2, rules), np.nan) for name in outputs}
+        self.moments = {name: np.full((count, k, rules), np.nan) for name, k in orders.items()}
 
     def sigma(self, output: str) -> FloatArray:
         """Return the standard deviation of an output, (n,)."""
@@ -169,8 +170,9 @@ class DesignRows:
         self.unresolved = 0  # ... and those that none of them resolved
         consistent = bool(np.isnan(self._pilots.numbers.fixed_drag).any())
         # The drag agrees with the velocity.
-        self._outputs = tuple(dict.fromkeys([*outputs, *([VELOCITY] * consistent)]))
-        self._second, self._peaks, self._start = tuple(second), peaks, start
+        wanted = [*outputs, *([VELOCITY] * consistent)]
+        self._orders = {name: 2 if name in second else 1 for name in wanted}
+        self._peaks, self._start = peaks, start
         delayed = case.sensors.telemetry.delay > 0.0 or "sensors.telemetry.delay" in spread.paths
         three = question.structure.name == "payload-feedback"
         alone = self.lumps.masses.size == 1 and not (delayed or consistent or self._noisy)
@@ -190,7 +192,7 @@ class DesignRows:
             If a row is no valid case.
         """
         batch = self._batch(rows)
-        solved = SolvedRows(batch.numbers, self._outputs)
+        solved = SolvedRows(batch.numbers, self._orders)
         # All rows on common nodes first; those whose two rules disagree begin again on panels half
         # as long, and so on: narrow resonances are few, and pay for themselves.
         at: IndexArray = np.arange(len(rows))
@@ -260,10 +262,9 @@ class DesignRows:
         while len(panels) < _MOST_PANELS:
             found = self._solved(self._pilots, self._nodes_on(panels, apart=True), alone=True)
             error = np.zeros(len(panels))
-            for name, column in found.moments.items():
-                orders = column if name in self._second else column[:, :1]
+            for column in found.moments.values():
                 with np.errstate(all="ignore"):
-                    share = np.abs(orders[:, :, 1:]) / orders[:, :, :1]
+                    share = np.abs(column[:, :, 1:]) / column[:, :, :1]
                 error = np.maximum(error, np.nanmax(share, axis=(0, 1), initial=0.0))
             coarse = error > _SHARE * self.accuracy
             if not coarse.any():
@@ -307,11 +308,10 @@ class DesignRows:
     def _doubt(self, found: SolvedRows, level: int) -> IndexArray:
         """Return the stable rows whose two rules disagree."""
         error = np.zeros(found.stable.size)
-        for name, column in found.moments.items():
+        for column in found.moments.values():
             if column.shape[2] > 1:
-                orders = column if name in self._second else column[:, :1]
                 with np.errstate(all="ignore"):
-                    gap = np.abs(orders[:, :, 1] - orders[:, :, 0]) / orders[:, :, 0]
+                    gap = np.abs(column[:, :, 1] - column[:, :, 0]) / column[:, :, 0]
                 error = np.maximum(error, gap.max(axis=1))
         limit = self.accuracy if level < _LEVELS else max(self.accuracy, _LAST)
         return np.flatnonzero(found.stable & ~(error <= limit))
@@ -329,7 +329,7 @@ class DesignRows:
 
         `alone` leaves stability and M_s out: all count as stable.
         """
-        found = SolvedRows(batch.numbers, self._outputs, len(nodes.weights))
+        found = SolvedRows(batch.numbers, self._orders, len(nodes.weights))
         ratios = self.sea.ratios(batch.rows, nodes.omega)
         shaken = Shaken(
             factors=self.sea.factors(batch.rows),
@@ -339,13 +339,10 @@ class DesignRows:
         )
         found.drag[:] = batch.numbers.fixed_drag
         if self.spring:
-            springs, orders = self._springs(batch), 2 if self._second else 1
+            springs = self._springs(batch)
             found.stable[:] = springs.stable
-            if self._outputs:
-                with np.errstate(all="ignore"):
-                    moments = springs.moments(self._outputs, nodes, shaken, orders=orders)
-                for name, columns in moments.items():
-                    found.moments[name][:, :orders] = columns
+            with np.errstate(all="ignore"):
+                found.moments |= springs.moments(self._orders, nodes, shaken)
             return found
         loops = self._chains(batch, np.zeros(1))
         at = np.arange(len(batch))
@@ -388,11 +385,11 @@ class DesignRows:
                 # At the very edge the motion that calms a loop is that of its own instability.
                 agreed = np.where(agreed <= _EDGE * edge[rows], np.inf, agreed)
                 found.drag[rows] = np.where(free[rows], agreed, found.drag[rows])
-            if self._outputs:
+            if self._orders:
                 drag = np.where(np.isfinite(found.drag[rows]), found.drag[rows], 0.0)
-                moments = chain.moments(self._outputs, nodes, shaken, drag)
+                moments = chain.moments(self._orders, nodes, shaken, drag)
                 for name, column in moments.items():
-                    found.moments[name][rows] = column
+                    found.moments[name][rows] = column[:, : self._orders[name]]
 
 
 def _velocity_of(parts: Sequence[FloatArray], edge: FloatArray) -> Velocity:

@@ -17,7 +17,7 @@ cache.  All variances then are its products with a few powers of the frequency, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -110,24 +110,24 @@ class SpringLoops:
         return np.broadcast_to(hurwitz(self.closed), (len(self),))
 
     def moments(
-        self, outputs: Sequence[str], nodes: SweepNodes, shaken: Shaken, *, orders: int
+        self, orders: Mapping[str, int], nodes: SweepNodes, shaken: Shaken
     ) -> dict[str, FloatArray]:
         """Return variances of outputs, and of their rates, by all rules, (n, orders, rules) each.
 
         Parameters
         ----------
-        outputs, nodes, shaken
-            Names of outputs, the nodes, and what shakes the loops, without noise.
         orders
-            2 with the rates, 1 without.
+            By output: 2 with its rate, 1 without.
+        nodes, shaken
+            The nodes, and what shakes the loops, without noise.
         """
         # Every variance is sum_m c_m int omega^2m S / |Den|^2, c_m of the output's |numerator|^2:
         # so 1/|Den|^2 is made once, and multiplied once with all powers, weights and rules.
         weights = nodes.sea if shaken.ratios is None else nodes.weights
         x = (nodes.omega / self.reference) ** 2
-        squares = {name: squared(self._scaled(self._numerators[name]())) for name in outputs}
-        highest = max(len(c) for c in squares.values()) + orders - 1
-        powers = np.stack([x**m for m in range(highest)])
+        squares = {name: squared(self._scaled(self._numerators[name]())) for name in orders}
+        highest = max((len(c) + orders[name] - 1 for name, c in squares.items()), default=0)
+        powers = x ** np.arange(highest)[:, None]
         right = (weights[:, None, :] * powers[None]).reshape(-1, x.size).T.copy()
         sums = np.empty((len(self), right.shape[1]))
         even, odd, y = self._halves(self.closed, nodes.omega)
@@ -141,9 +141,9 @@ class SpringLoops:
         folded = sums.reshape(len(self), len(weights), highest)
         found = {}
         for name, square in squares.items():
-            columns = np.zeros((len(self), orders, len(weights)))
+            columns = np.zeros((len(self), orders[name], len(weights)))
             for m, c in enumerate(square):
-                for order in range(orders if _there(c) else 0):
+                for order in range(orders[name] if _there(c) else 0):
                     columns[:, order] += c[:, None] * folded[:, :, m + order]
             columns[:, 1:] *= self.reference**2
             found[name] = columns * shaken.factors[:, None, None]

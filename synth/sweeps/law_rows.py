@@ -8,7 +8,7 @@ states C(s, p) in plain arithmetic, so columns of parameters give all rows at on
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from models.spread import GAINS, Spread
 from ..question import GAINS as THESIS
 from ..question import DesignQuestion
 from ..structures import ParametrisedController
-from .numbers import at_rows
+from .numbers import at_rows, part_of
 
 _NUDGE = 0.01  # of a parameter's size, to see whether the controller's poles move with it
 _SAME = 1e-9
@@ -46,16 +46,8 @@ class LawColumns:
 
     def part(self, index: IndexArray) -> LawColumns:
         """Return some of the rows."""
-
-        def some(column: Any) -> Any:
-            return column[index] if len(column) > 1 else column
-
-        return LawColumns(
-            law=self.law,
-            measurements=self.measurements,
-            values=tuple(some(column) for column in self.values),
-            poles=some(self.poles),
-        )
+        values = tuple(part_of(column, index) for column in self.values)
+        return replace(self, values=values, poles=part_of(self.poles, index))
 
     @property
     def swiftest(self) -> float:

@@ -11,15 +11,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from models.basics import FloatArray, IndexArray, InputError
+from models.basics import ComplexArray, FloatArray, IndexArray, InputError
 from models.case import Case
 from models.operation import PREFIX as FAULTS
 from models.plant import PlantData
 from models.spread import DRAG, GAINS, Spread, with_payload
+
+Column = TypeVar("Column", FloatArray, ComplexArray)
 
 _AGREE = 1e-12
 _NEWTON = 30
@@ -86,20 +88,14 @@ class PlantNumbers:
     def __getitem__(self, name: str) -> FloatArray:
         return self.values[name]
 
-    def part(self, index: slice | IndexArray) -> PlantNumbers:
+    def part(self, index: IndexArray) -> PlantNumbers:
         """Return some of the plants."""
-
-        def some(column: FloatArray) -> FloatArray:
-            return column if column.size < self.count else column[index]
-
         return replace(
             self,
-            count=len(range(*index.indices(self.count)))
-            if isinstance(index, slice)
-            else len(index),
-            values={name: some(column) for name, column in self.values.items()},
-            fixed_drag=some(self.fixed_drag),
-            sensors={name: some(column) for name, column in self.sensors.items()},
+            count=len(index),
+            values={name: part_of(column, index) for name, column in self.values.items()},
+            fixed_drag=part_of(self.fixed_drag, index),
+            sensors={name: part_of(column, index) for name, column in self.sensors.items()},
         )
 
     @property
@@ -304,6 +300,11 @@ def _first_root(eps: FloatArray) -> FloatArray:
     return nu
 
 
+def part_of(column: Column, rows: IndexArray) -> Column:
+    """Return a column's values of some rows; the one value where all rows have the same."""
+    return column[rows] if len(column) > 1 else column
+
+
 def at_rows(column: FloatArray, rows: IndexArray) -> FloatArray:
     """Return a column's values of some rows, (m, 1); (1, 1) where all rows have the same."""
-    return column[rows][:, None] if column.size > 1 else column[:, None]
+    return part_of(column, rows)[:, None]
