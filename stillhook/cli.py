@@ -154,7 +154,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         if arguments.command is None:
             parser.print_help(sys.stderr)
             return BAD_INPUT
-        status = _run(arguments)
+        if arguments.json:
+            arguments.quiet = False  # what came of it is told whole
+        with warnings.catch_warnings():  # what a command sets about warnings ends with it
+            status: int = arguments.run(arguments)
         # What is still in the buffer can fail too: a reader that has gone, a full disk.
         sys.stdout.flush()
         return status
@@ -169,14 +172,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         if "--debug" in words:
             raise
         return _failed(error)
-
-
-def _run(arguments: argparse.Namespace) -> int:
-    if arguments.json:
-        arguments.quiet = False  # what came of it is told whole
-    with warnings.catch_warnings():  # what a command sets about warnings ends with it
-        status: int = arguments.run(arguments)
-    return status
 
 
 def _failed(error: Exception) -> int:

@@ -83,13 +83,18 @@ def counting(arguments: argparse.Namespace) -> Iterator[Progress]:
             shown=not arguments.quiet, pace=lambda speed: f"{number(60.0 * speed, 2)}/min"
         ) as tell,
     ):
+        yield asking(stop, tell)
 
-        def step(what: str, done: int, total: int) -> None:
-            if stop():
-                raise KeyboardInterrupt
-            tell(what, done, total)
 
-        yield step
+def asking(stop: Stop, tell: Progress) -> Progress:
+    """Return what tells the progress, and ends the computation where the user has asked to."""
+
+    def step(what: str, done: int, total: int) -> None:
+        if stop():
+            raise KeyboardInterrupt
+        tell(what, done, total)
+
+    return step
 
 
 @contextlib.contextmanager

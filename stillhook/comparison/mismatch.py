@@ -151,9 +151,9 @@ def _value(name: str, path: str, value: object, case: Case) -> object:
     field = _field(path, case)
     sign = -1.0 if text[0] == "-" else 1.0
     size = text[1:].strip()
-    if size.endswith("%"):
-        return field.nominal * (1.0 + sign * 0.01 * _number(name, size[:-1], value))
     try:
+        if size.endswith("%"):
+            return field.nominal * (1.0 + sign * float(parse_quantity(size, "ratio")))
         return field.nominal + sign * float(parse_quantity(size, field.kind))
     except InputError as error:
         raise InputError(f"{_OWNER} {name}: {error}") from None
@@ -171,10 +171,3 @@ def _field(path: str, case: Case) -> Field:
             "a share or an amount"
         )
     return found
-
-
-def _number(name: str, text: str, value: object) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"{_OWNER}: {name}: must be a share such as +30%, got {value!r}") from None

@@ -222,10 +222,8 @@ class Campaign:
         self._names = {each.name: each for each in self.contenders}
         if self.store is None:
             return
-        for task in self._designs():
-            law = self.store.law(task.name, task.height)
-            if law is not None:
-                self.laws[task.group] = law
+        wanted = {task.group for task in self._designs()}
+        self.laws |= {at: law for at, law in self.store.laws.items() if at in wanted}
         for task in self._runs():
             contender = self._names[task.name]
             if self._waits(task) or not contender.portable:

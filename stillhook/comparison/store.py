@@ -35,6 +35,11 @@ def question_of(question: ComparisonQuestion) -> dict[str, Any]:
 class Store:
     """Results on disk, in a journal.
 
+    Attributes
+    ----------
+    laws
+        Designs by what was needed and height [m].
+
     Parameters
     ----------
     path
@@ -49,8 +54,8 @@ class Store:
     """
 
     def __init__(self, path: Path, question: ComparisonQuestion) -> None:
+        self.laws: dict[tuple[str, float], StoredDesign] = {}
         self._cells: dict[tuple[str, str, float, int], Cell] = {}
-        self._laws: dict[tuple[str, float], StoredDesign] = {}
         self.journal = Journal(path, "comparison", question_of(question), self._take)
 
     def cell(
@@ -58,10 +63,6 @@ class Store:
     ) -> Cell | None:
         """Return the result of a run, if there is one of this very contender."""
         return self._cells.get((contender.name, _identity(contender, law), height, seed))
-
-    def law(self, needs: str, height: float) -> StoredDesign | None:
-        """Return a design, if there is one."""
-        return self._laws.get((needs, height))
 
     def add_cell(self, contender: Contender, law: StoredDesign | None, cell: Cell) -> None:
         """Keep the result of a run."""
@@ -77,7 +78,7 @@ class Store:
             cell = Cell(**values)
             self._cells[cell.contender, rest[0], cell.height, cell.seed] = cell
         else:
-            self._laws[rest[0], float(rest[1])] = StoredDesign(**values)
+            self.laws[rest[0], float(rest[1])] = StoredDesign(**values)
 
 
 def _identity(contender: Contender, law: StoredDesign | None) -> str:

@@ -42,7 +42,7 @@ from ...text import (
 from ..declare import CASE, changed_words, options, within
 from ..given import case_words
 from ..lists import numbers, quantity
-from ..working import Stop, kept_in, place_for, prepared, stoppable, tidy
+from ..working import Stop, asking, kept_in, place_for, prepared, stoppable, tidy
 from .simulate_given import TIME, SimulationRequest, asked_of, sine
 
 _MEGABYTE = 1e6
@@ -179,12 +179,7 @@ def _with_gains(
     from ...designs import design_text
 
     with progress(shown=shown) as tell:
-
-        def step(stage: str, done: int, total: int) -> None:
-            if stop():
-                raise KeyboardInterrupt
-            tell(stage, done, total)
-
+        step = asking(stop, tell)
         design = optimise_gains(asked.case, "payload-feedback", progress=step)
     folder.write("design.yaml", design_text(design))
     if design.margins is None and not asked.every:
