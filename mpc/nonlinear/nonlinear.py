@@ -26,7 +26,7 @@ from ..linear import WinchMPC, WinchOptions, path_of_sea
 from .mean_torque import start_torque
 from .responses import with_drift
 from .shooting import Known, Linearisation, Shooting
-from .stage import make_stage
+from .stage import force_law, make_stage
 
 _OWNER = "nonlinear predictive control"
 _APPLIED = HEARD.index("drive.applied")
@@ -70,7 +70,7 @@ class NonlinearMPC(WinchMPC):
     iterations
         Gauss-Newton steps in a sample.
     drag, slack, losses, travel
-        What is nonlinear, as for `mpc.nonlinear.stage.make_stage`.  Losses of the gear are left out
+        What is nonlinear, as for `mpc.nonlinear.stage.force_law`.  Losses of the gear are left out
         unless asked for: they cost three times the time of all else and gained three per cent.
     mean_torque
         Whether a move is the mean torque of a sample, which the drive can hold at its peak
@@ -125,15 +125,9 @@ class NonlinearMPC(WinchMPC):
         if options.get("name") is None:
             self.name = f"nonlinear-{self.name}"
         self.iterations = int(iterations)
-        self.stage = make_stage(
-            self.model.winch,
-            drag=drag,
-            slack=slack,
-            losses=losses,
-            travel=travel,
-            mean=mean_torque,
-            compiled=compiled,
-        )
+        winch = self.model.winch
+        law = force_law(winch, drag=drag, slack=slack, losses=losses, travel=travel)
+        self.stage = make_stage(winch, law, mean=mean_torque, compiled=compiled)
         model = self.model
         if mean_torque:
             model = replace(model, winch=self.stage.winch)

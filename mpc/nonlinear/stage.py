@@ -109,14 +109,7 @@ class Stage(ReadOnlyArrays):
 
 
 def make_stage(
-    winch: SampledWinch,
-    *,
-    drag: bool = True,
-    slack: Sequence[int] | None = None,
-    losses: bool = False,
-    travel: DrumTravel | None = None,
-    mean: bool = True,
-    compiled: bool | None = None,
+    winch: SampledWinch, law: ForceLaw, *, mean: bool = True, compiled: bool | None = None
 ) -> Stage:
     """Return one sample of a winch with what is nonlinear in it.
 
@@ -124,14 +117,8 @@ def make_stage(
     ----------
     winch
         The sampled winch.
-    drag
-        Whether the payload's drag is quadratic.
-    slack
-        Springs, counted from the drum, that can go slack; by default the first and the last.
-    losses
-        Whether the gear's losses and the Coulomb friction are there, if the case has any.
-    travel
-        Layers of the drum; by default its radius does not change.
+    law
+        Its forces.
     mean
         Whether the input is the mean torque of a sample (`mpc.nonlinear.mean_torque`), else that at
         its start.
@@ -140,24 +127,9 @@ def make_stage(
 
     Raises
     ------
-    InputError
-        If a number is out of its range.
     SolverError
         If C was demanded and there is no compiler.
     """
-    springs = (0, winch.masses - 1) if slack is None else tuple(slack)
-    if any(k not in range(winch.masses) for k in springs):
-        raise InputError(
-            f"{_OWNER}: slack must be springs from 0 to {winch.masses - 1}, got {springs}"
-        )
-    data = winch.data
-    law = force_law(
-        winch,
-        drag=drag and data.quadratic_drag != winch.drag,
-        slack=springs,
-        losses=losses and (data.gear_efficiency < 1.0 or data.coulomb_friction > 0.0),
-        travel=travel,
-    )
     y = ca.SX.sym("y", len(law.arguments))
     n = law.function(y)
     J = ca.jacobian(n, y)
@@ -235,10 +207,10 @@ class ForceLaw:
 def force_law(
     winch: SampledWinch,
     *,
-    drag: bool,
-    slack: tuple[int, ...],
-    losses: bool,
-    travel: DrumTravel | None,
+    drag: bool = True,
+    slack: Sequence[int] | None = None,
+    losses: bool = False,
+    travel: DrumTravel | None = None,
 ) -> ForceLaw:
     """Return the forces of a winch.
 
@@ -249,13 +221,25 @@ def force_law(
     drag
         Whether the payload's drag is quadratic.
     slack
-        Springs, counted from the drum, that can go slack.
+        Springs, counted from the drum, that can go slack; by default the first and the last.
     losses
-        Whether the gear has losses that follow its direction, and the motor Coulomb friction.
+        Whether the gear has losses that follow its direction, and the motor Coulomb friction, if
+        the case has any.
     travel
-        Layers of the drum; None for a drum of one radius.
+        Layers of the drum; by default its radius does not change.
+
+    Raises
+    ------
+    InputError
+        If there is no such spring.
     """
     data, rope = winch.data, _Rope(winch)
+    springs = (0, winch.masses - 1) if slack is None else tuple(slack)
+    if any(k not in range(winch.masses) for k in springs):
+        raise InputError(
+            f"{_OWNER}: slack must be springs from 0 to {winch.masses - 1}, got {springs}"
+        )
+    losses = losses and (data.gear_efficiency < 1.0 or data.coulomb_friction > 0.0)
     arguments: dict[str, Argument] = {}
     columns: dict[str, FloatArray] = {}
     forces: list[ca.SX] = []
@@ -282,7 +266,7 @@ def force_law(
         columns[name] = column
         forces.append(force)
 
-    if drag:
+    if drag and data.quadratic_drag != winch.drag:
         v = of(_VELOCITY)
         act("drag", rope.on_payload, winch.drag * v - data.quadratic_drag * ca.fabs(v) * v)
     held: dict[int, ca.SX] = {}  # tensions as they are
@@ -291,14 +275,14 @@ def force_law(
         angle, ratio, radius = of(_ANGLE), data.gear_ratio, data.drum_radius
         haul, now = travel.haul(angle, ca.SX(radius), ca.SX(ratio))
         changes = haul - radius / ratio * angle, now / radius
-    for k in sorted({*slack, *((0,) if travel is not None else ())}):
+    for k in sorted({*springs, *((0,) if travel is not None else ())}):
         linear = of(f"spring.{k}")
         whole = linear
         if k == 0 and travel is not None:
             more = (changes[1] - 1.0) * rope.haul_per_angle * of(_SPEED)
             whole = linear + rope.stiffness[0] * (changes[0] + rope.damping_time * more)
         at_rest = smooth(k, ca.SX(rope.hanging[k])) - rope.hanging[k]
-        held[k] = smooth(k, whole) - at_rest if k in slack else whole
+        held[k] = smooth(k, whole) - at_rest if k in springs else whole
         act(f"slack.{k}", rope.column(k), held[k] - linear)
     if losses or travel is not None:
         speed, force = of(_SPEED), ca.SX(0)

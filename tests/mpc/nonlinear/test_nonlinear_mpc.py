@@ -15,7 +15,7 @@ from models.sensing import HEARD, Measurement
 from mpc.linear import LinearMPC
 from mpc.nonlinear import NonlinearMPC
 from mpc.nonlinear.mean_torque import mean_torque, start_torque
-from mpc.nonlinear.stage import make_stage
+from mpc.nonlinear.stage import force_law, make_stage
 from mpc.programme import kkt_residual
 from mpc.winch import ProcessNoise, Weights
 from mpc.winch.sampled import sampled_winch
@@ -47,7 +47,8 @@ def a_sea(controller: LinearMPC, size: float, seed: int) -> FloatArray:
 @pytest.mark.parametrize("name", ["thesis-1975", "thesis-1975-rope", "subsea-crane"])
 def test_linear_plant_and_forces_together_are_the_nonlinear_plant(name: str) -> None:
     winch = sampled_winch(sh.load_case(name))
-    stage = make_stage(winch, slack=range(winch.masses), losses=True, compiled=False)
+    law = force_law(winch, slack=range(winch.masses), losses=True)
+    stage = make_stage(winch, law, compiled=False)
     plant = build_plant(winch.data, winch.masses)
     rest = plant.operating_point(MEAN_LOSSES)
     lossy = {"winch.gear_switching": 0.5} if winch.data.gear_efficiency < 1.0 else {}
@@ -74,7 +75,8 @@ def test_linear_plant_and_forces_together_are_the_nonlinear_plant(name: str) -> 
 
 
 def test_derivatives_of_the_forces_are_finite_differences(crane: sh.Case) -> None:
-    stage = make_stage(sampled_winch(crane), losses=True, compiled=False)
+    winch = sampled_winch(crane)
+    stage = make_stage(winch, force_law(winch, losses=True), compiled=False)
     rng = np.random.default_rng(1)
     scale = np.maximum(stage.rest, 1.0)
     y = stage.rest * rng.normal(0.5, 0.5, size=(40, len(stage.rest))) + rng.normal(size=(40, 1))
@@ -120,7 +122,8 @@ def sample_errors(name: str, sample_time: float) -> tuple[float, float]:
     def error(found: FloatArray) -> float:
         return float((np.abs(found[shared] - true) / (np.abs(true) + 1.0)).max())
 
-    stage = make_stage(winch, mean=False, slack=range(winch.masses), compiled=False)
+    law = force_law(winch, slack=range(winch.masses))
+    stage = make_stage(winch, law, mean=False, compiled=False)
     linear = winch.A @ x + winch.B[:, 0] * d + winch.from_hook @ ends
     return error(advanced(stage, x, d, ends, np.zeros(2))), error(linear)
 
