@@ -46,6 +46,7 @@ from ..winch import (
     plan_model,
     prediction_model,
     regulator,
+    sampled_winch,
     tune_weights,
     with_noise,
 )
@@ -160,7 +161,8 @@ class WinchMPC(ABC):
                 weights = replace(weights, stiffness=1.0)
         self.case, self.sample_time, self.weights = case, T, weights
         # Two models: the estimator believes the case, and plans are made on a stiffer rope.
-        believed = with_noise(prediction_model(case, sample_time=T, masses=masses), weights.noise)
+        winch = sampled_winch(case, sample_time=T, masses=masses)
+        believed = with_noise(prediction_model(winch), weights.noise)
         self.model = plan_model(believed, weights.stiffness)
         self.regulator = regulator(self.model, weights.torque)
         self.estimator = WinchEstimator(believed)

@@ -42,7 +42,7 @@ from models.plant import MEASUREMENTS, ShapingFilter, fit_shaping_filter
 from models.sensing import MEASURED, MruModel, SensorModel
 
 from ..programme import noisy_hold, root_of
-from .sampled import SampledWinch, sampled_winch
+from .sampled import SampledWinch
 
 _OWNER = "prediction model"
 CONSTANTS = (
@@ -195,37 +195,15 @@ class PredictionModel(ReadOnlyArrays):
         )
 
 
-def prediction_model(
-    case: Case,
-    *,
-    sample_time: float = 0.05,
-    masses: int | None = None,
-    drag: float | None = None,
-    off: Mapping[str, float] | None = None,
-) -> PredictionModel:
-    """Return the prediction model of a case, next to certain of the world: see `with_noise`.
-
-    Parameters
-    ----------
-    case
-        Vessel, sea, rope, payload, winch and sensors.
-    sample_time
-        T [s].
-    masses
-        Masses along the rope; by default those of the case.
-    drag
-        Linear drag coefficient of the payload [N s/m]; see `mpc.winch.sampled.sampled_winch`.
-    off
-        Factors on the plant's numbers; see `mpc.winch.sampled.sampled_winch`.
+def prediction_model(winch: SampledWinch) -> PredictionModel:
+    """Return the prediction model of a winch, next to certain of the world: see `with_noise`.
 
     Raises
     ------
-    InputError
-        If a number is out of its range.
     SolverError
         If the hook's spectrum cannot be fitted.
     """
-    winch = sampled_winch(case, sample_time=sample_time, masses=masses, drag=drag, off=off)
+    case = winch.case
     hook, T, n = HookMotion.from_case(case), winch.sample_time, winch.size
     sea = sea_filter(hook)
     sea_A, sea_Q = noisy_hold(sea.A, sea.B, T)

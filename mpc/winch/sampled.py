@@ -129,6 +129,16 @@ class SampledWinch(ReadOnlyArrays):
         """Return the input d [N m] of a drive command at a motor speed [rad/s]."""
         return (command - self.rest_command - self.back * speed) * self.gain
 
+    def off(self, **factors: float) -> SampledWinch:
+        """Return the winch of the same case with factors on numbers of the plant."""
+        return sampled_winch(
+            self.case,
+            sample_time=self.sample_time,
+            masses=self.masses,
+            drag=self.drag,
+            off=factors,
+        )
+
     @cached_property
     def steady(self) -> FloatArray:
         """Input that holds the payload in its place against each of the constants, (2,)."""

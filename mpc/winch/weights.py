@@ -30,6 +30,7 @@ from models.case import Case
 from .planning import plan_model
 from .prediction import PredictionModel, ProcessNoise, prediction_model, with_noise
 from .regulation import regulator
+from .sampled import sampled_winch
 from .unsaturated import Unsaturated
 
 #: Plants that the controller has to get along with, as factors on the plant's numbers.
@@ -179,7 +180,7 @@ def _tuned(question: _Question) -> Weights:
     """Search for the weights: once, though several controllers are made for the same case."""
     limit = question.limit
     model = prediction_model(
-        question.case, sample_time=question.sample_time, masses=question.masses
+        sampled_winch(question.case, sample_time=question.sample_time, masses=question.masses)
     )
     # As robust as can be had: (stable where throttled, M_s bounded on the plants that are off).
     wanted = [(False, True), (False, False)]
@@ -211,13 +212,7 @@ def _search(
     bounded
         Whether M_s has to be bounded there.
     """
-    winch = model.winch
-    others = [
-        prediction_model(
-            winch.case, sample_time=winch.sample_time, masses=winch.masses, off=factors
-        )
-        for factors in OFF
-    ]
+    others = [prediction_model(model.winch.off(**factors)) for factors in OFF]
     throttling = others if throttled else []
     planned = plan_model(model, STIFFER)
     heave, total = model.waves[0], _SCREENED + len(_FIRST) + 2 * _POLISHED

@@ -20,6 +20,7 @@ from mpc.winch import (
     with_noise,
 )
 from mpc.winch.regulation import feedback_row
+from mpc.winch.sampled import sampled_winch
 from mpc.winch.unsaturated import Unsaturated, _plant
 from mpc.winch.weights import OFF
 
@@ -33,7 +34,7 @@ STIFF, SAME = 1.4, 1.0
 
 
 def loop_of(name: str, weights: Weights, stiffness: float) -> Unsaturated:
-    model = with_noise(prediction_model(case_of(name, 1.25)), weights.noise)
+    model = with_noise(prediction_model(sampled_winch(case_of(name, 1.25))), weights.noise)
     return Unsaturated(
         model=model, regulator=regulator(plan_model(model, stiffness), weights.torque)
     )
@@ -42,7 +43,8 @@ def loop_of(name: str, weights: Weights, stiffness: float) -> Unsaturated:
 def highest_growth(name: str, weights: Weights, stiffness: float, share: float) -> float:
     loop = loop_of(name, weights, stiffness)
     return max(
-        loop.growth(prediction_model(case_of(name, 1.25), off=off), share=share) for off in OFF
+        loop.growth(prediction_model(sampled_winch(case_of(name, 1.25), off=off)), share=share)
+        for off in OFF
     )
 
 
@@ -63,7 +65,7 @@ def test_on_one_spring_other_loads_and_ropes_leave_the_sensitivity_far_below_two
     loop = loop_of("thesis-1975", WEIGHTS["thesis-1975"], STIFF)
     omega = np.geomspace(0.02, 60.0, 300)
     for off in OFF:
-        plant = prediction_model(case_of("thesis-1975", 1.25), off=off)
+        plant = prediction_model(sampled_winch(case_of("thesis-1975", 1.25), off=off))
         found = np.abs(loop.sensitivity(omega, plant=plant))
         assert found.max() < 1.5
         assert found == pytest.approx(np.abs(sensitivity_on(loop, plant, omega)), rel=1e-6)
@@ -91,7 +93,7 @@ def sensitivity_on(loop: Unsaturated, plant: PredictionModel, omega: np.ndarray)
 
 @pytest.mark.parametrize("name", ["thesis-1975", "thesis-1975-rope", "subsea-crane"])
 def test_what_rests_for_the_estimator_rests_for_the_plan(name):
-    model = with_noise(prediction_model(case_of(name)), WEIGHTS[name].noise)
+    model = with_noise(prediction_model(sampled_winch(case_of(name))), WEIGHTS[name].noise)
     planned = plan_model(model, STIFF)
     here, there = model.winch, planned.winch
     size = model.scale[: here.size]
@@ -108,7 +110,7 @@ def test_what_rests_for_the_estimator_rests_for_the_plan(name):
 
 
 def test_a_plan_on_the_rope_that_is_there_is_the_model_itself():
-    model = prediction_model(case_of("thesis-1975"))
+    model = prediction_model(sampled_winch(case_of("thesis-1975")))
     assert plan_model(model, 1.0) is model
     with pytest.raises(sh.InputError, match="stiffness"):
         replace(ROPE, stiffness=0.0)

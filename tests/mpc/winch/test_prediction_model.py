@@ -109,7 +109,7 @@ def test_steady_input_holds_the_payload_against_a_constant_force_and_torque(name
 
 def test_the_model_of_the_sea_has_the_spectrum_of_the_hook():
     case = case_of("thesis-1975")
-    model, hook = prediction_model(case), HookMotion.from_case(case)
+    model, hook = prediction_model(sampled_winch(case)), HookMotion.from_case(case)
     at = model.sea_at
     added = (model.G @ model.G.T)[at, at]
     P = scipy.linalg.solve_discrete_lyapunov(model.A[at, at], added)
@@ -121,7 +121,7 @@ def test_the_model_of_the_sea_has_the_spectrum_of_the_hook():
 
 
 def test_late_signals_are_linear_between_what_is_on_its_way():
-    model = prediction_model(case_of("subsea-crane"))
+    model = prediction_model(sampled_winch(case_of("subsea-crane")))
     T = model.winch.sample_time
     rng = np.random.default_rng(3)
     chi = [rng.normal(size=model.size)]
@@ -139,7 +139,7 @@ def test_late_signals_are_linear_between_what_is_on_its_way():
 
 
 def test_a_force_on_the_payload_is_felt_by_its_accelerometer():
-    model = prediction_model(case_of("thesis-1975"))
+    model = prediction_model(sampled_winch(case_of("thesis-1975")))
     mass = build_plant(model.winch.case).data.payload_mass + 16_200.0
     row = model.now[0]
     assert row[model.constants_at][0] == pytest.approx(1.0 / mass, rel=1e-3)
@@ -148,7 +148,7 @@ def test_a_force_on_the_payload_is_felt_by_its_accelerometer():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_filter_covariance_solves_its_equation_and_missing_signals_make_it_worse(name):
-    model = with_noise(prediction_model(case_of(name)), WEIGHTS[name].noise)
+    model = with_noise(prediction_model(sampled_winch(case_of(name))), WEIGHTS[name].noise)
     P = kalman_covariance(model)
     everything = np.ones(len(model.R), dtype=bool)
     gain = kalman_gain(model.C, model.R, P, everything)
@@ -167,7 +167,7 @@ def test_filter_covariance_solves_its_equation_and_missing_signals_make_it_worse
 
 @pytest.mark.parametrize("name", NAMES)
 def test_regulator_is_what_a_long_backward_recursion_of_the_whole_state_ends_at(name):
-    model = prediction_model(case_of(name))
+    model = prediction_model(sampled_winch(case_of(name)))
     found = regulator(model, 0.1)
     winch = model.winch
     n, nz = winch.size, len(found.Phi)
@@ -195,7 +195,9 @@ def test_regulator_is_what_a_long_backward_recursion_of_the_whole_state_ends_at(
 
 
 def test_sensitivity_agrees_with_python_control():
-    model = with_noise(prediction_model(case_of("thesis-1975")), WEIGHTS["thesis-1975"].noise)
+    model = with_noise(
+        prediction_model(sampled_winch(case_of("thesis-1975"))), WEIGHTS["thesis-1975"].noise
+    )
     loop = Unsaturated(model=model, regulator=regulator(model, 0.03))
     T = model.winch.sample_time
     omega = np.geomspace(0.05, 50.0, 40)
@@ -219,7 +221,7 @@ def test_sensitivity_agrees_with_python_control():
 
 def test_payload_in_the_modelled_sea_agrees_with_a_long_simulation_of_the_model():
     case = case_of("thesis-1975")
-    truth = prediction_model(case)
+    truth = prediction_model(sampled_winch(case))
     model = with_noise(truth, WEIGHTS["thesis-1975"].noise)
     loop = Unsaturated(model=model, regulator=regulator(model, 0.3))
     rng = np.random.default_rng(5)
@@ -244,30 +246,28 @@ def test_payload_in_the_modelled_sea_agrees_with_a_long_simulation_of_the_model(
 def test_tuned_weights_are_stable_on_every_plant_that_they_have_to_get_along_with():
     case = case_of("thesis-1975", 1.25)
     weights = tune_weights(case)
-    model = with_noise(prediction_model(case), weights.noise)
+    model = with_noise(prediction_model(sampled_winch(case)), weights.noise)
     planned = plan_model(model, weights.stiffness)
     loop = Unsaturated(model=model, regulator=regulator(planned, weights.torque))
     assert loop.max_sensitivity() == pytest.approx(weights.max_sensitivity)
     assert weights.max_sensitivity <= 2.0
     for off in OFF:
-        plant = prediction_model(case, off=off)
+        plant = prediction_model(sampled_winch(case, off=off))
         assert loop.growth(plant) < 1.0
         for share in (0.45, 0.7):  # of the torque, where the drive saturates
             assert loop.growth(plant, share=share) < 1.0 + 1e-6
     assert tune_weights(case) is weights  # asked again, it need not search
     assert max(weights.payload_rms) < 0.02 * model.waves[0]
     # Better than where the search began, by the measure that it has.
-    first = with_noise(prediction_model(case), WEIGHTS["thesis-1975"].noise)
+    first = with_noise(prediction_model(sampled_winch(case)), WEIGHTS["thesis-1975"].noise)
     begun = Unsaturated(model=first, regulator=regulator(first, 0.1))
-    assert weights.payload_rms[0] < begun.rms_under(prediction_model(case))[0]
+    assert weights.payload_rms[0] < begun.rms_under(prediction_model(sampled_winch(case)))[0]
 
 
 def test_a_drive_saturates_where_the_sea_asks_for_more_than_its_peak():
-    assert [saturates(prediction_model(case_of("thesis-1975", h))) for h in (0.5, 1.25)] == [
-        False,
-        True,
-    ]
-    assert not saturates(prediction_model(case_of("subsea-crane")))
+    winches = [sampled_winch(case_of("thesis-1975", h)) for h in (0.5, 1.25)]
+    assert [saturates(prediction_model(winch)) for winch in winches] == [False, True]
+    assert not saturates(prediction_model(sampled_winch(case_of("subsea-crane"))))
 
 
 @pytest.mark.ci
