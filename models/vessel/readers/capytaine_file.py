@@ -42,28 +42,9 @@ def parse_capytaine(
 ) -> VesselRaos:
     """Return the motions that a Capytaine NetCDF holds, or that follow from what it holds.
 
-    Parameters
-    ----------
-    owner, data
-        The file's path, for messages, and its bytes; if they are HDF5, known to be readable by
-        :func:`models.basics.hdf5_check.check_hdf5`.
-    roll_damping
-        Damping of roll beyond that of the waves it makes, over the critical [-].  Given, the
-        motions are computed anew even if the file has them.
-    body
-        Which body, where there are several.
-    depth, speed
-        Which water depth [m] and forward speed [m/s], where there are several.
-    inertia, stiffness
-        Mass and hydrostatic stiffness (6, 6) about the rotation centre, surge to yaw, where the
-        file has none.
-    origin
-        The rotation centre [m], where the file does not tell it.
-
-    Returns
-    -------
-    VesselRaos
-        Motions of the rotation centre; `notes` tell what was done.
+    Arguments are those of `read_raos`.  With a damping of roll the motions are computed anew, even
+    if the file has them.  They are those of the rotation centre, which `origin` is where the file
+    does not tell it; inertia and stiffness are about it, surge to yaw.
 
     Raises
     ------

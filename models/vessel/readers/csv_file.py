@@ -61,11 +61,6 @@ def looks_like_csv(text: str) -> bool:
 def parse_csv(owner: str, text: str) -> VesselRaos:
     """Return the table of a CSV file.
 
-    Parameters
-    ----------
-    owner, text
-        The file's path, for messages, and what is in it.
-
     Raises
     ------
     InputError

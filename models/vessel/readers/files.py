@@ -4,7 +4,8 @@
 
 A file is known by its contents; its name only breaks ties, so that a WAMIT file that was renamed
 is still one.  Whatever a reader trips over comes out as an
-:class:`models.basics.checks.InputError`.
+:class:`models.basics.checks.InputError`: what a library makes of a damaged file is anybody's guess,
+and is caught here, once for all of them.
 """
 
 from __future__ import annotations
@@ -119,7 +120,8 @@ def read_raos(
     options
         What the file leaves open; each format knows some of these:
 
-        - speed: which forward speed of the file [m/s] (MSS, ShipX, Capytaine).
+        - speed: which forward speed of the file [m/s], the lowest if left out (MSS, ShipX,
+          Capytaine).
         - body: which body of the file (WAMIT: a number from 1; Capytaine: a name).
         - length: WAMIT's ULEN [m], 1 m if left out.
         - depth: water depth [m], where the file does not tell (WAMIT, OrcaFlex) or has several
@@ -215,7 +217,7 @@ def file_format_of(owner: str, data: bytes) -> str:
     """
     head = data[:8]
     if head.startswith(_HDF5):
-        return "netcdf" if is_ours(owner, data) else "capytaine"
+        return "netcdf" if is_ours(data) else "capytaine"
     if head.startswith(b"CDF"):
         return "capytaine"
     if head.startswith(b"MATLAB"):

@@ -79,66 +79,39 @@ def parse_netcdf(owner: str, data: bytes) -> VesselRaos:
     It is read as the HDF5 file that it is, without the layers that label data sets: they are slow
     to import, and complain on their own when a damaged file cannot be opened.
 
-    Parameters
-    ----------
-    owner, data
-        The file's path, for messages, and its bytes.
-
     Raises
     ------
     InputError
-        If the file is damaged, or something of it is missing or is not what it should be.
+        If it is another file.
     """
     import h5py  # type: ignore[import-untyped]
 
-    try:
-        with h5py.File(io.BytesIO(data), "r") as file:
-            attrs = {key: file.attrs[key] for key in file.attrs}
-            columns = {key: np.asarray(file[key][()]) for key in _VARIABLES}
-        modes = [decoded(mode) for mode in columns["mode"].ravel()]
-        if decoded(attrs.get("format", "")) != FORMAT or modes != list(MODES):
-            raise InputError(f"{owner}: this is no NetCDF file of RAOs that Stillhook wrote")
-        real, imag = (
-            np.asarray(columns[key], dtype=np.float64) for key in ("rao_real", "rao_imag")
-        )
-        x, y, z = np.ravel(attrs["origin"]).tolist()
-        px, py = np.ravel(attrs["phase_origin"]).tolist()
-        return VesselRaos(
-            name=decoded(attrs["name"]),
-            omega=np.asarray(columns["omega"], dtype=np.float64),
-            heading=np.asarray(columns["heading"], dtype=np.float64),
-            values=real + 1j * imag,
-            origin=(x, y, z),
-            phase_origin=(px, py),
-            depth=float(np.ravel(attrs["depth"])[0]),
-            speed=check_range(owner, "speed", np.ravel(attrs["speed"])[0]),
-            source=decoded(attrs["source"]),
-            notes=tuple(str(note) for note in json.loads(decoded(attrs["notes"]))),
-        )
-    except InputError:
-        raise
-    except Exception as error:  # h5py raises nearly anything on a damaged file
-        raise InputError(
-            f"{owner}: this is not a whole file of RAOs: {type(error).__name__}, {str(error)[:120]}"
-        ) from error
+    with h5py.File(io.BytesIO(data), "r") as file:
+        attrs = {key: file.attrs[key] for key in file.attrs}
+        columns = {key: np.asarray(file[key][()]) for key in _VARIABLES}
+    modes = [decoded(mode) for mode in columns["mode"].ravel()]
+    if decoded(attrs.get("format", "")) != FORMAT or modes != list(MODES):
+        raise InputError(f"{owner}: this is no NetCDF file of RAOs that Stillhook wrote")
+    real, imag = (np.asarray(columns[key], dtype=np.float64) for key in ("rao_real", "rao_imag"))
+    x, y, z = np.ravel(attrs["origin"]).tolist()
+    px, py = np.ravel(attrs["phase_origin"]).tolist()
+    return VesselRaos(
+        name=decoded(attrs["name"]),
+        omega=np.asarray(columns["omega"], dtype=np.float64),
+        heading=np.asarray(columns["heading"], dtype=np.float64),
+        values=real + 1j * imag,
+        origin=(x, y, z),
+        phase_origin=(px, py),
+        depth=float(np.ravel(attrs["depth"])[0]),
+        speed=check_range(owner, "speed", np.ravel(attrs["speed"])[0]),
+        source=decoded(attrs["source"]),
+        notes=tuple(str(note) for note in json.loads(decoded(attrs["notes"]))),
+    )
 
 
-def is_ours(owner: str, data: bytes) -> bool:
-    """Say whether an HDF5 file says that it is the project's own.
-
-    Raises
-    ------
-    InputError
-        If it cannot even be opened.
-    """
+def is_ours(data: bytes) -> bool:
+    """Say whether an HDF5 file says that it is the project's own."""
     import h5py
 
-    try:
-        with h5py.File(io.BytesIO(data), "r") as found:
-            told = decoded(found.attrs.get("format", ""))
-    except Exception as error:  # h5py raises nearly anything on a damaged file
-        raise InputError(
-            f"{owner}: cannot be opened as NetCDF/HDF5: {' '.join(str(error).split())[:120]}; is "
-            "the file cut off?"
-        ) from error
-    return told == FORMAT
+    with h5py.File(io.BytesIO(data), "r") as found:
+        return decoded(found.attrs.get("format", "")) == FORMAT

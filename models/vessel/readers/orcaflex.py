@@ -62,16 +62,8 @@ def parse_orcaflex(
 ) -> VesselRaos:
     """Return the RAOs of one draught of one vessel type.
 
-    Parameters
-    ----------
-    owner, text
-        The file's path, for messages, and what is in it.
-    kind
-        `displacement`; or `load` for the wave loads, whose `values` are then N/m and N m/m.
-    vessel_type, draught
-        Their names in the file; if left out, the first that has RAOs.
-    depth
-        Water depth for which they hold [m]; the vessel type does not tell.
+    Arguments are those of `read_raos`; by default the first that has RAOs.  Those of the `kind`
+    `load` are the wave loads, whose `values` are then N/m and N m/m.
 
     Raises
     ------
@@ -229,31 +221,13 @@ def _point(
 def _vessel_types(owner: str, text: str) -> tuple[list[dict[str, Any]], list[FloatArray]]:
     """Return the vessel types of a file, and the tables that they point at.
 
-    Parameters
-    ----------
-    owner, text
-        The file's path, for messages, and what is in it.
-
-    Returns
-    -------
-    tuple[list[dict], list[FloatArray]]
-        The vessel types; where one of them has a table of RAOs, the text "@table 3" stands for
-        the third table (rows, 13).
-
-    Raises
-    ------
-    InputError
-        If the file is no YAML, or has no vessel type.
+    Where one of them has a table of RAOs, the text "@table 3" stands for the third table, with 13
+    columns.
     """
     from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
 
     pruned, tables = _pruned(owner, text)
-    try:
-        found = YAML(typ="safe", pure=True).load(pruned)
-    except (YAMLError, ValueError, TypeError, KeyError, RecursionError, AttributeError) as error:
-        what = " ".join(str(error).split())[:160]
-        raise InputError(f"{owner}: cannot be read as an OrcaFlex file (YAML): {what}") from error
+    found = YAML(typ="safe", pure=True).load(pruned)
     types = found.get("VesselTypes") if isinstance(found, dict) else None
     if not isinstance(types, list) or not types or not all(isinstance(t, dict) for t in types):
         raise InputError(f"{owner}: {_NO_TYPES}")

@@ -67,14 +67,7 @@ class _Lines:
 
 
 def parse_shipx(owner: str, text: str, *, speed: float | None = None) -> VesselRaos:
-    """Return the motions at one speed.
-
-    Parameters
-    ----------
-    owner, text
-        The file's path, for messages, and what is in it.
-    speed
-        Which speed of the file [m/s]; the lowest if left out.
+    """Return the motions at one speed; arguments are those of `read_raos`.
 
     Raises
     ------
@@ -93,14 +86,10 @@ def parse_shipx(owner: str, text: str, *, speed: float | None = None) -> VesselR
     _, _, draught = lines.next(3, "length, breadth and draught")
     lines.next(2, "the centre of gravity")
     counts = lines.next(4, "the numbers of speeds, headings, frequencies and modes")
+    most = {"speeds": 100, "headings": 1000, "frequencies": 5000, "modes": 6}
     speeds, headings, frequencies, modes = (
         int(check_range(owner, f"number of {what}", value, low=1, high=high))
-        for what, value, high in zip(
-            ("speeds", "headings", "frequencies", "modes"),
-            counts,
-            (100, 1000, 5000, 6),
-            strict=True,
-        )
+        for (what, high), value in zip(most.items(), counts, strict=True)
     )
     if modes != 6:
         raise InputError(f"{owner}: number of modes must be 6, got {modes}")

@@ -56,24 +56,10 @@ def parse_wamit(
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
     depth: float = math.inf,
 ) -> VesselRaos:
-    """Return the motions of one body.
+    """Return the motions of one body; arguments are those of `read_raos`.
 
-    Parameters
-    ----------
-    owner, text
-        The file's path, for messages, and what is in it; the vessel is called after it.
-    body
-        Which body, from 1; must be given if there are several.
-    length
-        The run's ULEN [m]; 1 m if left out.
-    waves
-        Whether the first column is the `period` [s] or the `frequency` [rad/s]; if left out, the
-        heave of the longest waves tells.
-    origin
-        Where the body's axes have their origin, in the frame that the hook is given in [m]; WAMIT's
-        incident wave has zero phase there unless the body was moved off the global origin.
-    depth
-        Water depth of the run [m].
+    The vessel is called after the file.  WAMIT's incident wave has zero phase at the body's origin
+    unless the body was moved off the global one.
 
     Raises
     ------
