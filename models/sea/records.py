@@ -18,7 +18,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, InputError, check_choice, check_range, file_stamp, read_bytes
+from ..basics import (
+    FloatArray,
+    InputError,
+    check_ascending,
+    check_choice,
+    check_range,
+    file_stamp,
+    read_bytes,
+)
 from .library_files import FORMATS, read_with_library
 from .ndbc import is_ndbc, read_ndbc
 from .quality import QualityControl, RawRecords, TimeArray, sift
@@ -191,8 +199,6 @@ class SeaRecords:
         InputError
             If there is no such record.
         """
-        from .sea import SeaSpectrum
-
         last = len(self) - 1
         if not 0 <= record <= last:
             raise InputError(f"record must be in [0, {last}] in {self.source}, got {record}")
@@ -268,23 +274,11 @@ def read_seas(path: str | Path, *, file_format: str | None = None) -> SeaRecords
 @lru_cache(maxsize=4)
 def _read(path: str, file_format: str | None, stamp: tuple[int, int]) -> SeaRecords:
     del stamp  # a part of the cache's key: a file may change under its name
-    return SeaRecords.from_raw(_read_raw(path, file_format), path)
-
-
-def _read_raw(path: str, file_format: str | None) -> RawRecords:
-    """Read a file of a given or a guessed format.
-
-    Raises
-    ------
-    InputError
-        If the format is unknown, or its reader refuses the file.
-    """
     if file_format is not None:
-        check_choice(str(path), "the format", file_format, FORMATS)
+        check_choice(path, "the format", file_format, FORMATS)
     name = file_format or _guess_format(path)
-    if name == "ndbc":
-        return read_ndbc(path)
-    return read_with_library(path, name)
+    raw = read_ndbc(path) if name == "ndbc" else read_with_library(path, name)
+    return SeaRecords.from_raw(raw, path)
 
 
 def _guess_format(path: str) -> str:
@@ -350,8 +344,6 @@ def _check_frequencies(frequency: FloatArray, density: FloatArray, source: str) 
         )
     if not 3 <= frequency.size <= MOST_ROWS:
         raise InputError(f"{source}: must have 3 to {MOST_ROWS} frequencies, got {frequency.size}")
-    if not np.all(np.isfinite(frequency)) or np.any(np.diff(frequency) <= 0.0):
-        raise InputError(f"{source}: the frequencies must be strictly ascending numbers")
-    if frequency[0] < 0.0 or frequency[-1] > 9.5:
-        wrong = frequency[0] if frequency[0] < 0.0 else frequency[-1]
-        raise InputError(f"{source}: the frequencies must be in [0, 9.5] Hz, got {wrong:g}")
+    check_ascending(source, "frequency", frequency)
+    for end in (float(frequency[0]), float(frequency[-1])):
+        check_range(source, "frequency", end, low=0.0, high=9.5, unit="Hz")
