@@ -218,48 +218,34 @@ def _search(
     heave, total = model.waves[0], _SCREENED + len(_FIRST) + 2 * _POLISHED
     done = 0
 
-    def judged(point: FloatArray) -> tuple[float, float, Weights] | None:
-        weight, force, torque, rope, sensors = 10.0 ** np.clip(point, _LOW, _HIGH)
-        noise = ProcessNoise(
-            force=float(force), torque=float(torque), rope=float(rope), sensors=float(sensors)
-        )
-        believed = with_noise(model, noise)
-        try:
-            loop = Unsaturated(model=believed, regulator=regulator(planned, float(weight)))
-            rms: tuple[float, ...] = ()
-            for plant in (*others, model):  # most candidates fail on one that is off: those first
-                rms = (loop.rms_under(plant)[0], *rms)
-                if not math.isfinite(rms[0]):
-                    return None
-        except SolverError:
-            return None
-        rms = (rms[0], *reversed(rms[1:]))
-        growth = max((loop.growth(plant, share=_SHARE) for plant in throttling), default=0.0)
-        peaks = (np.abs(loop.sensitivity(_NODES, plant=plant)).max() for plant in others)
-        peak = float(max(peaks)) if bounded else 1.0
-        return (
-            growth,
-            peak,
-            Weights(
-                torque=float(weight),
-                noise=noise,
-                max_sensitivity=loop.max_sensitivity(),
-                payload_rms=rms,
-                forecast_error=loop.forecast_error(_AHEAD),
-            ),
-        )
-
     best: tuple[float, Weights | None] = (math.inf, None)
 
     def cost(point: FloatArray) -> float:
         nonlocal done, best
         done += 1
         progress(min(1.0, done / total))
-        found = judged(point)
         outside = float(np.maximum(point - _HIGH, 0.0).sum() + np.maximum(_LOW - point, 0.0).sum())
-        if found is None:
+        weight, force, torque, rope, sensors = (10.0 ** np.clip(point, _LOW, _HIGH)).tolist()
+        noise = ProcessNoise(force=force, torque=torque, rope=rope, sensors=sensors)
+        try:
+            loop = Unsaturated(model=with_noise(model, noise), regulator=regulator(planned, weight))
+            rms: list[float] = []
+            for plant in (*others, model):  # most candidates fail on one that is off: those first
+                rms.append(loop.rms_under(plant)[0])
+                if not math.isfinite(rms[-1]):
+                    return 50.0 + outside
+        except SolverError:
             return 50.0 + outside
-        growth, peak, weights = found
+        growth = max((loop.growth(plant, share=_SHARE) for plant in throttling), default=0.0)
+        peaks = (np.abs(loop.sensitivity(_NODES, plant=plant)).max() for plant in others)
+        peak = float(max(peaks)) if bounded else 1.0
+        weights = Weights(
+            torque=weight,
+            noise=noise,
+            max_sensitivity=loop.max_sensitivity(),
+            payload_rms=(rms[-1], *rms[:-1]),
+            forecast_error=loop.forecast_error(_AHEAD),
+        )
         over = max(0.0, math.log(weights.max_sensitivity / limit))
         over += max(0.0, math.log(peak / (_OTHERS * limit)))
         grows = max(0.0, growth - _STEADY)
