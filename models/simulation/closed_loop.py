@@ -203,7 +203,7 @@ def _look(plant: Plant, sensors: SensorModel, names: Sequence[str], motions: int
     """
     x, u = ca.SX.sym("x", len(plant.states)), ca.SX.sym("u")
     moved, p = ca.SX.sym("moved", 3 * motions), ca.SX.sym("p", len(names))
-    y, z = _plant(plant, x, u, moved, p)
+    _, y, z = plant.function(x, u, disturbances(moved), p[: len(plant.parameters)])
     signals = _named(plant.outputs, z) | {"motor.angle": x[plant.states.index("motor.angle")]}
     signals |= {f"measured.{end}": y[i] for i, end in enumerate(reversed(MOTION))}
     raw, applied = ca.cse([sensors.raw(signals), signals["drive.applied"]])
@@ -223,7 +223,7 @@ def _log(
     sensed, flags = ca.SX.sym("sensed", len(sensors.row)), ca.SX.sym("flags", len(FLAGS))
     p_of, flag = _named(names, p), _named(FLAGS, flags)
     u = p_of["drive.hold"] + flag["engaged"] * (asked - p_of["drive.hold"])
-    _, z = _plant(plant, x, u, moved, p)
+    _, _, z = plant.function(x, u, disturbances(moved), p[: len(plant.parameters)])
     now = _named(plant.outputs, z)
     loss = (now["motor.torque"] / p_of["motor.continuous_torque"]) ** 2
     warmer = rise + p_of["motor.share"] * (p_of["motor.rated_rise"] * loss - rise)
@@ -242,12 +242,6 @@ def _log(
     }
     outputs = [ca.densify(v) for v in ca.cse([u, warmer, ca.vertcat(*log.values())])]
     return ca.Function("log", [x, asked, rise, moved, sensed, flags, p], outputs), tuple(log)
-
-
-def _plant(plant: Plant, x: ca.SX, u: ca.SX, moved: ca.SX, p: ca.SX) -> tuple[ca.SX, ca.SX]:
-    triples = [(moved[k], moved[k + 1], moved[k + 2]) for k in range(0, moved.numel(), 3)]
-    _, y, z = plant.function(x, u, disturbances(triples), p[: len(plant.parameters)])
-    return y, z
 
 
 def _named(names: Sequence[str], values: ca.SX) -> dict[str, ca.SX]:

@@ -32,9 +32,6 @@ Value: TypeAlias = Any
 # What moves the plant over a step, as the right-hand side takes it.
 Driven = TypeVar("Driven")
 
-Ends = Sequence[tuple[ca.SX, ca.SX, ca.SX]]
-"""Displacement, velocity and acceleration of every motion at one moment, the hook's first."""
-
 MAX_SUBSTEPS = 1000
 _ROUNDING = 1e-9  # [-] of a frequency, or of a ratio of times
 
@@ -117,10 +114,10 @@ def braked_step(plant: Plant, parameters: Sequence[str], motions: int, step: flo
     inertia = p[parameters.index("winch.inertia")]
     capacity = brake * p[parameters.index("brake.torque")]
 
-    first, last = _moved(ends, 0, motions), _moved(ends, 3 * motions, motions)
-    middle: Ends = [_between(*pair, step) for pair in zip(first, last, strict=True)]
+    first, last = ends[: 3 * motions], ends[3 * motions :]
+    middle = _between(first, last, step)
 
-    def free(at: ca.SX, moved: Ends) -> ca.SX:
+    def free(at: ca.SX, moved: ca.SX) -> ca.SX:
         return plant.function(at, u, disturbances(moved), of_plant)[0]
 
     # What the brake would have to hold, and whether it can, is asked once, at the start of the
@@ -131,7 +128,7 @@ def braked_step(plant: Plant, parameters: Sequence[str], motions: int, step: flo
     turning = ca.if_else(resting, ca.sign(net), ca.sign(x[speed]))
     friction = capacity * turning / inertia
 
-    def rhs(at: ca.SX, moved: Ends) -> ca.SX:
+    def rhs(at: ca.SX, moved: ca.SX) -> ca.SX:
         rate = ca.SX(free(at, moved))
         rate[speed] = ca.if_else(held, 0, rate[speed] - friction)
         rate[angle] = ca.if_else(held, 0, rate[angle])
@@ -146,23 +143,24 @@ def braked_step(plant: Plant, parameters: Sequence[str], motions: int, step: flo
     return ca.Function("braked_step", [x, u, ends, brake, p], [dense])
 
 
-def disturbances(moved: Ends) -> ca.SX:
-    """Return the plant's w: heave, heave rate, no force, no set-point, whatever else moves."""
-    (heave, rate, _), *others = moved
-    return ca.vertcat(heave, rate, 0, 0, *(end for other in others for end in other))
+def disturbances(moved: ca.SX) -> ca.SX:
+    """Return the plant's w: heave, heave rate, no force, no set-point, whatever else moves.
+
+    Parameters
+    ----------
+    moved
+        Displacement, velocity and acceleration of every motion, the hook's first (3 motions,).
+    """
+    return ca.vertcat(moved[:2], 0, 0, moved[3:])
 
 
-def _moved(ends: ca.SX, at: int, motions: int) -> list[tuple[ca.SX, ca.SX, ca.SX]]:
-    return [(ends[k], ends[k + 1], ends[k + 2]) for k in range(at, at + 3 * motions, 3)]
-
-
-def _between(
-    first: tuple[ca.SX, ca.SX, ca.SX], last: tuple[ca.SX, ca.SX, ca.SX], step: float
-) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Return a motion in the middle of a step; its acceleration is that of the velocity's cubic."""
-    (_, v0, a0), (_, v1, a1) = first, last
-    z, v = hermite_midpoint(*first, *last, step)
-    return z, v, 1.5 * (v1 - v0) / step - 0.25 * (a0 + a1)
+def _between(first: ca.SX, last: ca.SX, step: float) -> ca.SX:
+    """Return the motions in the middle of a step; an acceleration is of the velocity's cubic."""
+    motions = first.numel() // 3
+    z0, v0, a0 = ca.vertsplit(ca.reshape(first, 3, motions))
+    z1, v1, a1 = ca.vertsplit(ca.reshape(last, 3, motions))
+    z, v = hermite_midpoint(z0, v0, a0, z1, v1, a1, step)
+    return ca.vec(ca.vertcat(z, v, 1.5 * (v1 - v0) / step - 0.25 * (a0 + a1)))
 
 
 @dataclass(frozen=True, kw_only=True)
