@@ -107,7 +107,6 @@ def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) ->
     z_rows = np.stack(list(z.values())).transpose(2, 0, 1)
     y_rows = np.stack([sensor * z[name] for name in MEASUREMENTS]).transpose(2, 0, 1)
     return PlantResponse(
-        omega=points.imag,
         s=points,
         zw=z_rows[:, :, 1:],
         zu=z_rows[:, :, :1],

@@ -205,7 +205,6 @@ class LinearPlant(ReadOnlyArrays):
         rows[:, :ny] *= np.exp(-points[:, None] * np.array(self.delays))[:, :, None]
         y, z = rows[:, :ny, :width], rows[:, ny:, :width]
         return PlantResponse(
-            omega=points.imag,
             s=points,
             zw=z[:, :, nu:],
             zu=z[:, :, :nu],

@@ -9,11 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
-import numpy as np
-import numpy.typing as npt
-
-from ..basics import ComplexArray, InputError, pick
+from ..basics import ComplexArray, FloatArray, pick
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -25,18 +23,16 @@ class PlantResponse:
 
     Parameters
     ----------
-    omega
-        Frequencies, the imaginary parts of s [rad/s], (k,).
+    s
+        The points in the complex plane [1/s], (k,).
     zw, zu, yw, yu
         Blocks, (k, nz, nw), (k, nz, nu), (k, ny, nw), (k, ny, nu), complex.  Disturbances
         that are the rate of another one are folded into it, so nw counts independent ones.
     inputs, disturbances, measurements, outputs
         Names along the axes.
-    s
-        The points in the complex plane [1/s], (k,); i omega unless given.
     """
 
-    omega: npt.NDArray[np.float64]
+    s: ComplexArray
     zw: ComplexArray
     zu: ComplexArray
     yw: ComplexArray
@@ -45,30 +41,15 @@ class PlantResponse:
     disturbances: tuple[str, ...]
     measurements: tuple[str, ...]
     outputs: tuple[str, ...]
-    s: ComplexArray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        omega = np.array(self.omega, dtype=np.float64).reshape(-1)
-        s = 1j * omega if self.s is None else np.array(self.s, dtype=np.complex128)
-        nz, nw = len(self.outputs), len(self.disturbances)
-        ny, nu = len(self.measurements), len(self.inputs)
-        arrays = {"omega": omega, "s": s}
-        for name, rows, columns in (
-            ("zw", nz, nw),
-            ("zu", nz, nu),
-            ("yw", ny, nw),
-            ("yu", ny, nu),
-        ):
-            block = np.array(getattr(self, name), dtype=np.complex128)
-            if block.shape != (omega.size, rows, columns):
-                raise InputError(
-                    f"plant response: {name} must have the shape {(omega.size, rows, columns)} "
-                    f"of its frequencies and names, got {block.shape}"
-                )
-            arrays[name] = block
-        for name, array in arrays.items():
+        for array in (self.s, self.zw, self.zu, self.yw, self.yu):
             array.setflags(write=False)
-            object.__setattr__(self, name, array)
+
+    @cached_property
+    def omega(self) -> FloatArray:
+        """Frequencies, the imaginary parts of the points [rad/s], (k,)."""
+        return self.s.imag.copy()
 
     def column(self, output: str, disturbance: str) -> ComplexArray:
         """Return the open-loop response of `output` to `disturbance`, (k,).
