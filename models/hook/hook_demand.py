@@ -68,64 +68,50 @@ class MotionFigures:
     Attributes
     ----------
     name, unit
-        Which motion, `displacement`, `velocity` or `acceleration`, and its unit.
-    rms
-        Standard deviation.
-    zero_crossing_period
-        T_z of this motion [s].
-    width
-        Spectral width [-].
+        Which motion, `displacement`, `velocity` or `acceleration`, and its unit u.
+    m0, m1, m2
+        Its spectral moments [u^2 (rad/s)^n].
     duration
         Exposure time of the extremes [s].
     """
 
     name: str
     unit: str
-    rms: float
-    zero_crossing_period: float
-    width: float
+    m0: float
+    m1: float
+    m2: float
     duration: float = THREE_HOURS
 
     @property
+    def rms(self) -> float:
+        """Standard deviation [u]."""
+        return math.sqrt(max(self.m0, 0.0))
+
+    @property
+    def zero_crossing_period(self) -> float:
+        """T_z [s]."""
+        return zero_crossing_period(max(self.m0, 0.0), max(self.m2, 0.0))
+
+    @property
+    def width(self) -> float:
+        """Spectral width [-]."""
+        if self.m1 <= 0.0:
+            return 0.0
+        return math.sqrt(max(self.m0 * self.m2 / self.m1**2 - 1.0, 0.0))
+
+    @property
     def significant_amplitude(self) -> float:
-        """2 sigma."""
+        """2 sigma [u]."""
         return 2.0 * self.rms
 
     @property
     def largest(self) -> float:
-        """Most probable maximum in the exposure time."""
+        """Most probable maximum in the exposure time [u]."""
         return self.rms * peak_factor(self.zero_crossing_period, self.duration)
 
     def fractile(self, probability: float) -> float:
-        """Return what the largest maximum stays below with this probability."""
+        """Return what the largest maximum stays below with this probability [u]."""
         return self.rms * fractile_factor(self.zero_crossing_period, probability, self.duration)
-
-    @classmethod
-    def from_moments(
-        cls, moments: FloatArray, derivative: int, duration: float = THREE_HOURS
-    ) -> MotionFigures:
-        """Return the figures of a motion.
-
-        Parameters
-        ----------
-        moments
-            Moments of order 0 to 6 of the displacement (7,).
-        derivative
-            0 displacement, 1 velocity, 2 acceleration.
-        duration
-            Exposure time [s].
-        """
-        m0, m1, m2 = (float(m) for m in moments[2 * derivative : 2 * derivative + 3])
-        name, unit = _MOTIONS[derivative]
-        width = math.sqrt(max(m0 * m2 / m1**2 - 1.0, 0.0)) if m1 > 0.0 else 0.0
-        return cls(
-            name=name,
-            unit=unit,
-            rms=math.sqrt(max(m0, 0.0)),
-            zero_crossing_period=zero_crossing_period(max(m0, 0.0), max(m2, 0.0)),
-            width=width,
-            duration=duration,
-        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -196,25 +182,30 @@ class HookDemand:
             probability=probability,
         )
 
-    @property
-    def motions(self) -> tuple[MotionFigures, MotionFigures, MotionFigures]:
-        """Displacement, velocity and acceleration."""
-        return self.displacement, self.velocity, self.acceleration
-
     @cached_property
+    def motions(self) -> tuple[MotionFigures, ...]:
+        """Displacement [m], velocity [m/s] and acceleration [m/s2]."""
+        return tuple(
+            MotionFigures(name=name, unit=unit, m0=m0, m1=m1, m2=m2, duration=self.duration)
+            for (name, unit), (m0, m1, m2) in zip(
+                _MOTIONS, (map(float, self.moments[n : n + 3]) for n in (0, 2, 4)), strict=True
+            )
+        )
+
+    @property
     def displacement(self) -> MotionFigures:
         """The displacement [m]."""
-        return MotionFigures.from_moments(self.moments, 0, self.duration)
+        return self.motions[0]
 
-    @cached_property
+    @property
     def velocity(self) -> MotionFigures:
         """The velocity [m/s]: the rope's speed at the winch."""
-        return MotionFigures.from_moments(self.moments, 1, self.duration)
+        return self.motions[1]
 
-    @cached_property
+    @property
     def acceleration(self) -> MotionFigures:
         """The acceleration [m/s2]."""
-        return MotionFigures.from_moments(self.moments, 2, self.duration)
+        return self.motions[2]
 
     @property
     def peak_power(self) -> float:

@@ -39,7 +39,7 @@ from ..vessel import (
     vessel_raos,
 )
 from .encounter import Encounter, speed_along
-from .hook_demand import ORDERS, HookDemand, MotionFigures, fractile_factor
+from .hook_demand import ORDERS, HookDemand, fractile_factor
 
 HEADINGS = tuple(float(b) for b in range(0, 360, 15))
 PEAK_PERIODS = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0)
@@ -105,13 +105,6 @@ class HookSurvey(ReadOnlyArrays):
             duration=self.own.duration,
             probability=self.probability,
         )
-
-    def largest(self, motion: str = "velocity") -> FloatArray:
-        """Return most probable maxima in the exposure time (s, h, t)."""
-        order = _MOTIONS.index(motion)
-        flat = self.moments.reshape(-1, 7)
-        found = [MotionFigures.from_moments(m, order, self.own.duration).largest for m in flat]
-        return np.array(found).reshape(self.moments.shape[:-1])
 
     @cached_property
     def best(self) -> tuple[int, int]:
@@ -204,21 +197,17 @@ def hook_motion(
             )
         rao = hook_rao(case.vessel, owner=case.label)
         waves = _Waves.of(seas, rao.omega)
-        found = waves.moments(rao.gain(waves.omega))
-        return HookSurvey(
-            case=case, headings=np.array([]), peak_periods=periods, points=(),
-            moments=found[None, None], steep=steep, own=own, probability=fractile,
-        )  # fmt: skip
-    angles = np.radians(
-        check_finite("hook", "headings", HEADINGS if headings is None else headings)
-    )
-    if angles.ndim != 1 or not angles.size:
-        raise InputError("hook: headings must be at least one angle [deg]")
-    place = case.vessel.hook_point
-    assert place is not None  # the section's own check
-    sides = (place, across(place)) if both_sides and abs(place[1]) > 1e-9 else (place,)
-    waves = _Waves.of(seas, vessel_raos(case.vessel, case.label).omega)
-    table = np.array([[_point(case, waves, side, angle) for angle in angles] for side in sides])
+        angles, sides = np.array([]), tuple[Point, ...]()
+        table = waves.moments(rao.gain(waves.omega))[None, None]
+    else:
+        asked = check_finite("hook", "headings", HEADINGS if headings is None else headings)
+        if asked.ndim != 1 or not asked.size:
+            raise InputError("hook: headings must be at least one angle [deg]")
+        angles, place = np.radians(asked), case.vessel.hook_point
+        assert place is not None  # the section's own check
+        sides = (place, across(place)) if both_sides and abs(place[1]) > 1e-9 else (place,)
+        waves = _Waves.of(seas, vessel_raos(case.vessel, case.label).omega)
+        table = np.array([[_point(case, waves, side, angle) for angle in angles] for side in sides])
     return HookSurvey(
         case=case, headings=angles, peak_periods=periods, points=sides, moments=table,
         steep=steep, own=own, probability=fractile,
