@@ -55,13 +55,11 @@ class LoopRecursion:
 
     Parameters
     ----------
-    fused
-        (s, r, p) -> (s', log), with the controller inside; None for a controller in Python.
-    measure, advance
-        (s, r, p) -> (s', m) and (s, [r, u], p) -> (s', log); one after the other they are one
-        sample.
-    states, row, signals
-        Names of s, r and the log.
+    functions
+        (s, r, p) -> (s', log), with the controller inside; or, for a controller in Python,
+        (s, r, p) -> (s', m) and (s, [r, u], p) -> (s', log), one after the other a sample.
+    states, signals
+        Names of s and the log.
     motions
         Names of what moves, the hook first; of each the row holds displacement, velocity and
         acceleration at the ends of every integration step.
@@ -77,11 +75,8 @@ class LoopRecursion:
         State at rest.
     """
 
-    fused: ca.Function | None
-    measure: ca.Function
-    advance: ca.Function
+    functions: tuple[ca.Function, ...]
     states: tuple[str, ...]
-    row: tuple[str, ...]
     signals: tuple[str, ...]
     motions: tuple[str, ...]
     units: Mapping[str, str]
@@ -134,22 +129,20 @@ def build_closed_loop(
         "motor.temperature",
         *(f"controller.{i}" for i in range(begin.size)),
     )
-    points = [
-        (j, name, end) for j in range(step.substeps + 1) for name in motions for end in MOTION
-    ]
-    row = (*(f"{n}.{e}.{j}" for j, n, e in points), *sensors.row, *FLAGS)
+    width = 3 * len(motions)
+    ends = width * (step.substeps + 1)  # numbers of all motions at the ends of every step
+    columns = ends + len(sensors.row) + len(FLAGS)
     values = {**parameters, **_own_parameters(case, step.sample_time, hold)}
 
     # Many steps as calls of one function compile many times faster than written out, and run
     # faster too; one or two are faster written out.
     # (The two kinds of symbol have the same methods; the type of one stands for both.)
     kind = cast("type[ca.SX]", ca.SX if step.substeps <= 2 else ca.MX)
-    s, r = kind.sym("s", len(names)), kind.sym("r", len(row))
+    s, r = kind.sym("s", len(names)), kind.sym("r", columns)
     p, asked = kind.sym("p", len(values)), kind.sym("u")
     x, of_sensors, of_controller = s[:nx], s[nx : nx + ns], s[nx + ns + 2 :]
     last, rise = s[nx + ns], s[nx + ns + 1]
-    width = 3 * len(motions)
-    moved, sensed, flags = r[:width], r[len(points) : len(row) - len(FLAGS)], r[-len(FLAGS) :]
+    moved, sensed, flags = r[:width], r[ends : ends + len(sensors.row)], r[-len(FLAGS) :]
 
     look = _look(plant, sensors, tuple(values), len(motions))
     logged, signals = _log(plant, sensors, tuple(values), len(motions))
@@ -162,28 +155,29 @@ def build_closed_loop(
         u, warmer, log = logged(x, command, rise, moved, sensed, flags, p)
         after = x
         for j in range(step.substeps):
-            ends = r[j * width : (j + 2) * width]
-            after = one_step(after, u, ends, flags[FLAGS.index("brake")], p)
+            both = r[j * width : (j + 2) * width]
+            after = one_step(after, u, both, flags[FLAGS.index("brake")], p)
         return [ca.vertcat(after, seen, u, warmer, controller), log]
 
     # With the controller inside nothing leaves the recursion in a sample; otherwise it is cut where
     # the measurement goes out and the command comes in.
-    fused = None
+    functions: tuple[ca.Function, ...]
     if recursion is not None:
         # The sensors see the plant before the command: a command acts on the sample it is made in.
         following, command = recursion.function(of_controller, m)
-        fused = _function("sample", [s, r, p], sample(command, seen, following))
+        functions = (_function("sample", [s, r, p], sample(command, seen, following)),)
+    else:
+        given = [s, ca.vertcat(r, asked), p]
+        functions = (
+            _function("measure", [s, r, p], [ca.vertcat(x, seen, s[nx + ns :]), m]),
+            _function("advance", given, sample(asked, of_sensors, of_controller)),
+        )
     numbers = np.array(list(values.values()))
     at_rest = look(start, hold, np.zeros(width), numbers)[0]
     units = {**plant.units, **_UNITS, "drive.command": plant.units["drive.command"]}
     return LoopRecursion(
-        fused=fused,
-        measure=_function("measure", [s, r, p], [ca.vertcat(x, seen, s[nx + ns :]), m]),
-        advance=_function(
-            "advance", [s, ca.vertcat(r, asked), p], sample(asked, of_sensors, of_controller)
-        ),
+        functions=functions,
         states=names,
-        row=row,
         signals=signals,
         motions=motions,
         units={name: units.get(name, "-") for name in signals},

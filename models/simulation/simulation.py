@@ -294,7 +294,6 @@ def prepare(
         hold=rest.command,
         recursion=recursion,
     )
-    functions = (loop.measure, loop.advance) if loop.fused is None else (loop.fused,)
     return Simulation(
         case=case,
         controller=controller,
@@ -302,7 +301,7 @@ def prepare(
         options=options,
         hook=SpectrumMotion.from_case(case) if options.hook is None else options.hook,
         loop=loop,
-        kernels=tuple(Kernel(function, compiled=options.compiled) for function in functions),
+        kernels=tuple(Kernel(function, compiled=options.compiled) for function in loop.functions),
         sensors=sensors,
         schedule=Schedule(scenario=scenario, sample_time=sample_time),
         rest=rest,
