@@ -152,8 +152,9 @@ class PlantData:
         """
         rope, payload, winch, sensors = case.rope, case.payload, case.winch, case.sensors
         motor = winch.motor
-        dc = motor if motor.type == "dc" else None
-        ac = motor if motor.type == "ac" else None
+        kept: tuple[str, ...] = ("torque_bandwidth", "speed_gain")
+        if motor.type == "dc":
+            kept = ("resistance", "torque_constant", "back_emf_constant", "inductance")
         bandwidth, telemetry = sensors.payload.bandwidth, sensors.telemetry
         return cls(
             axial_stiffness=rope.ea,
@@ -174,12 +175,7 @@ class PlantData:
             coulomb_friction=motor.coulomb_friction,
             friction_speed=motor.friction_speed,
             motor=motor.type,
-            resistance=dc.resistance if dc else math.nan,
-            torque_constant=dc.torque_constant if dc else 1.0,
-            back_emf_constant=dc.back_emf_constant if dc else 0.0,
-            inductance=dc.inductance if dc else 0.0,
-            torque_bandwidth=ac.torque_bandwidth if ac else math.inf,
-            speed_gain=ac.speed_gain if ac else 0.0,
+            **{name: getattr(motor, name) for name in kept},
             sensor_bandwidth=math.inf if isinstance(bandwidth, str) else bandwidth,
             telemetry_bandwidth=math.inf if telemetry.bandwidth is None else telemetry.bandwidth,
             delay=telemetry.delay,

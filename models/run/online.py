@@ -180,7 +180,6 @@ class Cycles:
             if self.stored:
                 heights = np.sort(crests.astype(np.float64) - troughs)
                 found["significant"] = float(heights[-math.ceil(self.count / 3) :].mean())
-                found["significant_source"] = "cycles"
         return found
 
     def _crossed_at(self, signal: FloatArray, i: int, first: int) -> float:

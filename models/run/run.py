@@ -59,8 +59,8 @@ class Timings:
     ----------
     wall_seconds
         Time it took [s].
-    steps, steps_per_second
-        Integration steps, and how many in a second of wall time.
+    steps
+        Integration steps.
     real_time_factor
         Simulated time over wall time.
     controller_median, controller_p99, controller_max
@@ -71,7 +71,6 @@ class Timings:
 
     wall_seconds: float
     steps: int
-    steps_per_second: float
     real_time_factor: float
     controller_median: float = math.nan
     controller_p99: float = math.nan
@@ -99,7 +98,6 @@ class Timings:
         return cls(
             wall_seconds=wall_seconds,
             steps=steps,
-            steps_per_second=steps / wall,
             real_time_factor=duration / wall,
             controller_median=float(median),
             controller_p99=float(p99),

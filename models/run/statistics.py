@@ -10,7 +10,7 @@ counted from `settle` on, but for touch-down, which is an event of the whole run
 A cycle runs from one up-crossing of a signal's level to the next (zero for motions, the static
 value for torque and tension); its height is crest minus trough.  "Significant" is the mean height
 of the highest third of the cycles (Sverdrup and Munk 1947), not four standard deviations; where
-the cycles were too many to be kept it is, and says so.
+the cycles were too many to be kept it is.
 """
 
 from __future__ import annotations

@@ -60,9 +60,8 @@ class SignalStatistics:
         Highest crest and deepest trough (negative) of a cycle from the level, and the largest
         double amplitude within one cycle [u].
     significant
-        Mean height of the highest third of the cycles [u], or four standard deviations.
-    significant_source
-        "cycles", or "4 sigma" if there were none or too many to keep.
+        Mean height of the highest third of the cycles [u]; four standard deviations if there were
+        none, or too many to keep.
     crests, troughs
         Crest and trough of every cycle from the level (cycles,) [u], in single precision; empty
         if they were too many to keep.
@@ -83,7 +82,6 @@ class SignalStatistics:
     trough: float = math.nan
     height: float = math.nan
     significant: float = math.nan
-    significant_source: str = "4 sigma"
     crests: npt.NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, np.float32))
     troughs: npt.NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, np.float32))
 
