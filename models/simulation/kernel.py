@@ -218,22 +218,15 @@ class _Interpreted:
 
 def _in_form(function: ca.Function) -> ca.Function:
     """Return the function under our name, its outputs dense."""
-    if function.n_in() != 3 or function.n_out() != 2:
+    inputs = [function.sparsity_in(i) for i in range(function.n_in())]
+    outputs = [function.sparsity_out(i) for i in range(function.n_out())]
+    columns = all(size.size2() == 1 or not size.numel() for size in inputs + outputs)
+    dense = all(size.is_dense() for size in inputs)
+    counted = len(inputs) == 3 and len(outputs) == 2
+    if not (counted and columns and dense and inputs[0].numel() == outputs[0].numel()):
         raise InputError(
-            "kernel: the recursion must be a function (s, r, p) -> (s_next, out), "
-            f"got {function.n_in()} inputs and {function.n_out()} outputs"
-        )
-    inputs = [function.sparsity_in(i) for i in range(3)]
-    outputs = [function.sparsity_out(i) for i in range(2)]
-    for name, size in zip(("s", "r", "p", "s_next", "out"), inputs + outputs, strict=True):
-        if size.numel() and size.size2() != 1:
-            raise InputError(f"kernel: {name} of the recursion must be a column, got {size.dim()}")
-    if any(not size.is_dense() for size in inputs):
-        raise InputError("kernel: the inputs of the recursion must be dense")
-    if outputs[0].numel() != inputs[0].numel():
-        raise InputError(
-            f"kernel: s_next of the recursion must have the {inputs[0].numel()} numbers of s, "
-            f"got {outputs[0].numel()}"
+            "kernel: the recursion must be a function (s, r, p) -> (s_next, out) of dense columns, "
+            f"s_next as long as s, got {function}"
         )
     kind: Any = ca.SX if function.is_a("SXFunction") else ca.MX
     symbols = [kind.sym(name, size) for name, size in zip("srp", inputs, strict=True)]

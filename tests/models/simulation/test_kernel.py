@@ -596,19 +596,15 @@ def test_wrong_shapes_of_one_step_are_refused(
 
 def test_functions_of_another_form_are_refused() -> None:
     s, r, p = ca.SX.sym("s", 2), ca.SX.sym("r", 3), ca.SX.sym("p", 1)
-    wrong = {
-        "got 2 inputs and 2 outputs": ([s, r], [s, r]),
-        "got 3 inputs and 1 outputs": ([s, r, p], [s]),
-        "must have the 2 numbers of s, got 3": ([s, r, p], [r, s]),
-        "out of the recursion must be a column, got 1x3": ([s, r, p], [s, r.T]),
-        "r of the recursion must be a column, got 1x3": ([s, ca.SX.sym("r", 1, 3), p], [s, p]),
-        "the inputs of the recursion must be dense": (
-            [s, ca.SX.sym("r", ca.Sparsity(2, 1)), p],
-            [s, p],
-        ),
-    }
-    for said, (inputs, outputs) in wrong.items():
-        with pytest.raises(InputError, match=said):
+    for inputs, outputs in (
+        ([s, r], [s, r]),
+        ([s, r, p], [s]),
+        ([s, r, p], [r, s]),
+        ([s, r, p], [s, r.T]),
+        ([s, ca.SX.sym("r", 1, 3), p], [s, p]),
+        ([s, ca.SX.sym("r", ca.Sparsity(2, 1)), p], [s, p]),
+    ):
+        with pytest.raises(InputError, match=r"of dense columns, s_next as long as s, got f:\("):
             Kernel(ca.Function("f", inputs, outputs))
 
 
