@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..basics import FloatArray, check_range
+from ..basics import FloatArray
 from .scenario import Scenario
 
 # A sample that falls on the start or the end of something by intention should not miss it by the
@@ -58,9 +58,6 @@ class Schedule:
 
     scenario: Scenario
     sample_time: float
-
-    def __post_init__(self) -> None:
-        check_range("schedule", "sample_time", self.sample_time, low=0.0, unit="s", open_low=True)
 
     def block(self, start: int, count: int) -> ScheduleBlock:
         """Return rows `start` to `start + count`, the same whatever was asked before."""

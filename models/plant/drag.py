@@ -15,9 +15,8 @@ from collections.abc import Callable
 from scipy.optimize import brentq
 from scipy.special import erf
 
-from ..basics import SolverError, check_range
+from ..basics import SolverError
 
-_OWNER = "drag"
 _ROUNDS = 12  # of finding nodes for a drag; two are the rule
 _SETTLED = 1e-3  # relative change of a drag for which adapted nodes need not change
 
@@ -35,14 +34,7 @@ def gaussian_gain(sigma: float, current: float = 0.0) -> float:
         Standard deviation of the velocity [m/s].
     current
         Steady velocity U of the payload relative to the water [m/s].
-
-    Raises
-    ------
-    InputError
-        If `sigma` is negative or a number is not finite.
     """
-    check_range(_OWNER, "sigma", sigma, low=0.0, unit="m/s")
-    check_range(_OWNER, "current", current, unit="m/s")
     if sigma == 0.0:
         return 2.0 * abs(current)
     ratio = current / sigma
@@ -63,13 +55,7 @@ def stochastic_equivalent(quadratic: float, sigma: float, current: float = 0.0) 
         Standard deviation of the payload's velocity [m/s].
     current
         Steady velocity of the payload relative to the water [m/s].
-
-    Raises
-    ------
-    InputError
-        If an argument is out of range.
     """
-    check_range(_OWNER, "quadratic", quadratic, low=0.0, unit="N s2/m2")
     return quadratic * gaussian_gain(sigma, current)
 
 
@@ -100,12 +86,9 @@ def consistent_drag(
 
     Raises
     ------
-    InputError
-        If an argument is out of range.
     SolverError
         If the motion does not shrink however large the drag: the plant is unstable with any.
     """
-    check_range(_OWNER, "quadratic", quadratic, low=0.0, unit="N s2/m2")
     if quadratic == 0.0:
         return 0.0
 
@@ -161,12 +144,9 @@ def settled_drag(
 
     Raises
     ------
-    InputError
-        If `quadratic` is out of range.
     SolverError
         If no C agrees with the motion it leads to, or none has nodes.
     """
-    check_range(_OWNER, "quadratic", quadratic, low=0.0, unit="N s2/m2")
     if quadratic == 0.0:
         return 0.0
     current = start or quadratic

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..basics import FloatArray, check_range
+from ..basics import FloatArray
 
 
 def pade_state_space(
@@ -36,14 +36,7 @@ def pade_state_space(
     -------
     tuple of arrays
         A (order, order), B (order, 1), C (1, order), D (1, 1).
-
-    Raises
-    ------
-    InputError
-        If the delay or the order is out of range.
     """
-    check_range("pade", "delay", delay, low=0.0, unit="s", open_low=True)
-    check_range("pade", "order", order, low=1, high=12)
     coefficients = [
         math.factorial(2 * order - k)
         / (math.factorial(k) * math.factorial(order - k))

@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 
-from ..basics import check_range
-
 if TYPE_CHECKING:
     from ..case import Case
 
@@ -32,20 +30,10 @@ class DrumTravel:
     inward
         (haul paid out at which it happens, as a positive number [m], radius from there on [m])
         for paying out, ascending.
-
-    Raises
-    ------
-    InputError
-        If a radius is not above zero or a haul is negative.
     """
 
     outward: tuple[tuple[float, float], ...] = ()
     inward: tuple[tuple[float, float], ...] = ()
-
-    def __post_init__(self) -> None:
-        for haul, radius in (*self.outward, *self.inward):
-            check_range("drum travel", "haul", haul, low=0.0, unit="m")
-            check_range("drum travel", "radius", radius, low=0.0, unit="m", open_low=True)
 
     @classmethod
     def from_case(cls, case: Case) -> DrumTravel:

@@ -29,13 +29,11 @@ from ..basics import (
     ComplexArray,
     FloatArray,
     ReadOnlyArrays,
-    check_range,
-    check_seed,
     read_only,
 )
 from ..rig import MRU
 from .draws import MRU_ERROR, draw
-from .telemetry import Interval, Size, check_intervals, during
+from .telemetry import Interval, Size, during
 
 PERFECT = MRU(noise_floor=0.0, noise_fraction=0.0)
 """A unit that shows the hook's motion as it is: that of a case which says nothing of one."""
@@ -111,11 +109,6 @@ class MruModel:
         Mean frequency of the hook's heave [rad/s], such as rms velocity over rms displacement;
         None if it is not known.
 
-    Raises
-    ------
-    InputError
-        If a number is out of its range.
-
     Notes
     -----
     High-pass: second-order Butterworth, s^2/(s^2 + sqrt(2) w s + w^2) with w = 2 pi over the
@@ -142,16 +135,6 @@ class MruModel:
     outages: Sequence[Interval] = ()
     heave_frequency: float | None = None
     biases: Sequence[Bias] = ()
-
-    def __post_init__(self) -> None:
-        check_range("MRU", "sample_time", self.sample_time, low=0.0, unit="s", open_low=True)
-        check_range("MRU", "heave_rms", self.heave_rms, low=0.0, unit="m")
-        check_seed("MRU", self.seed)
-        if self.heave_frequency is not None:
-            frequency = self.heave_frequency
-            check_range("MRU", "heave_frequency", frequency, low=0, unit="rad/s", open_low=True)
-        object.__setattr__(self, "outages", check_intervals("MRU", "outages", self.outages))
-        object.__setattr__(self, "biases", check_intervals("MRU", "biases", self.biases, BIAS))
 
     @property
     def delay(self) -> float:

@@ -27,7 +27,6 @@ from ..basics import (
     InputError,
     ReadOnlyArrays,
     check_range,
-    check_seed,
 )
 from ..rig import Telemetry
 from .draws import TELEMETRY, draw
@@ -82,11 +81,6 @@ class TelemetrySchedule:
     late
         (start, end, extra) [s]: messages sent in the interval are late by so much more.
 
-    Raises
-    ------
-    InputError
-        If the sample time, the seed or an interval makes no sense.
-
     Notes
     -----
     A message sent at sample j arrives at t = j Ts + delay + U(0, jitter).  Messages may overtake
@@ -111,14 +105,6 @@ class TelemetrySchedule:
     outages: Sequence[Interval] = ()
     broken: Sequence[Interval] = ()
     late: Sequence[Late] = ()
-
-    def __post_init__(self) -> None:
-        check_range("telemetry", "sample_time", self.sample_time, low=0, unit="s", open_low=True)
-        check_seed("telemetry", self.seed)
-        for name in ("outages", "broken"):
-            checked = check_intervals("telemetry", name, getattr(self, name))
-            object.__setattr__(self, name, checked)
-        object.__setattr__(self, "late", check_intervals("telemetry", "late", self.late, LATE))
 
     @cached_property
     def lags(self) -> range:

@@ -113,7 +113,7 @@ def run_simulation(
                 state, log, found = stepper.run(state, chunk, p, at)
                 chunk = chunk[len(log) :]
                 good = _finite(log)  # up to the divergence everything is kept
-                accumulator.update(log[:good], at * dt)
+                accumulator.update(log[:good])
                 store.add(log[:good])
                 if good < len(log):
                     raise _DivergedError

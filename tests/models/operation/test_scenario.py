@@ -197,10 +197,6 @@ class TestSchedule:
         assert schedule.parameters_at(300) == {"drive.power_limit": 2e5, **drag}
         assert schedule.parameters_at(301) == drag
 
-    def test_sample_time_is_checked(self):
-        with pytest.raises(InputError, match="schedule: sample_time must be above 0 s, got "):
-            Schedule(scenario=scenario(), sample_time=0.0)
-
 
 class TestScenario:
     def test_events_say_what_happens(self):

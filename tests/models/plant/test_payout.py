@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from one_run import simulate
 from still_motion import StillMotion
 
-from models import InputError, load_case
+from models import load_case
 from models.operation import Scenario, scenario_named
 from models.operation.profile import Move, Profile
 from models.plant import DrumTravel
@@ -141,10 +141,3 @@ def test_engaging_is_without_a_bump() -> None:
         assert (run["motor.speed"][run.time < 59.9] == 0.0).all()
         assert (run["motor.speed"][-50:] == 0.0).all()
     assert jumps["20 s"] < 0.2 * jumps["0 s"]
-
-
-def test_bad_travel_is_refused() -> None:
-    with pytest.raises(InputError, match="drum travel: radius must be"):
-        DrumTravel(outward=((1.0, 0.0),))
-    with pytest.raises(InputError, match="drum travel: haul must be"):
-        DrumTravel(inward=((-1.0, 1.0),))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,6 @@ import scipy.signal
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models import InputError
 from models.rig import MRU
 from models.sensing import MruModel
 
@@ -297,21 +295,6 @@ def test_outage_holds_the_last_values():
     assert np.array_equal(block.heave[20:40], np.full(20, free.heave[19]))
     assert np.array_equal(block.heave_rate[20:40], np.full(20, free.heave_rate[19]))
     assert np.array_equal(block.heave[40:], free.heave[40:])
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"sample_time": -1.0}, "MRU: sample_time must be above 0 s, got -1.0"),
-        ({"heave_rms": math.nan}, "MRU: heave_rms must be at least 0 m, got nan"),
-        ({"heave_frequency": 0.0}, "MRU: heave_frequency must be above 0 rad/s, got 0.0"),
-        ({"seed": -3}, "MRU: seed must be a whole number of at least 0, got -3"),
-        ({"outages": [(1.0, 1.0)]}, "MRU: outages must be pairs (start, end) in s with start"),
-    ],
-)
-def test_refused(arguments, message):
-    with pytest.raises(InputError, match=re.escape(message)):
-        model(NOISY, **arguments)
 
 
 def replace_delay(mru, delay):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ import scipy.stats
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from models import InputError
 from models.rig import Telemetry
 from models.sensing import TelemetrySchedule
 from models.sensing.draws import TELEMETRY, draw
@@ -257,28 +255,6 @@ class TestGaps:
     def test_ends_of_an_interval_meet_samples_in_spite_of_rounding(self):
         inside = during([(0.7, 2.1)], np.arange(30), 0.1)  # 0.7/0.1 = 6.999999999999999
         assert np.flatnonzero(inside).tolist() == list(range(7, 21))
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"sample_time": 0.0}, "telemetry: sample_time must be above 0 s, got 0.0"),
-        ({"seed": -1}, "telemetry: seed must be a whole number of at least 0, got -1"),
-        ({"seed": 1.5}, "telemetry: seed must be a whole number of at least 0, got 1.5"),
-        (
-            {"outages": [(2.0, 1.0)]},
-            "telemetry: outages must be pairs (start, end) in s with start < end, got (2.0, 1.0)",
-        ),
-        (
-            {"broken": [3.0]},
-            "telemetry: broken must be pairs (start, end) in s with start < end, got 3.0",
-        ),
-    ],
-)
-def test_refused(arguments, message):
-    given_ = {"telemetry": Telemetry(), "sample_time": TS, "seed": 0} | arguments
-    with pytest.raises(InputError, match=re.escape(message)):
-        TelemetrySchedule(**given_)
 
 
 def runs_of(flags):

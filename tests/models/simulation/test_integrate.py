@@ -279,16 +279,6 @@ def test_bundled_plants_get_a_step() -> None:
             "integration: a sample of 0.1 s would take 10000 steps, at most 1000 are allowed; "
             "the plant's fastest mode is at 1e+05 rad/s and allows 1e-05 s a step",
         ),
-        (
-            {"extra_rates": (-1.0,)},
-            "integration: extra_rates must be at least 0 rad/s, got -1.0",
-        ),
-        ({"sample_time": -0.1}, "integration: sample_time must be above 0 s, got -0.1"),
-        ({"A": np.ones(3)}, "integration: A must be one square matrix or several, got shape (3,)"),
-        (
-            {"A": [[math.inf]]},
-            "integration: A must be finite numbers, got inf at index 0, 0",
-        ),
     ],
 )
 def test_wrong_input_is_told_in_one_sentence(arguments: dict[str, object], said: str) -> None:
