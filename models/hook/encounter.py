@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import GRAVITY, FloatArray, InputError, check_finite, read_only, wave_number
+from ..basics import GRAVITY, FloatArray, ReadOnlyArrays, read_only, wave_number
 from ..case import Case
 from ..vessel import HeaveRao, hook_operators, rao_of_hook, vessel_raos
 
@@ -64,7 +64,7 @@ def speed_along(case: Case, headings: npt.ArrayLike) -> FloatArray:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Encounter:
+class Encounter(ReadOnlyArrays):
     """How a vessel that moves through the water meets the waves.
 
     Attributes
@@ -84,19 +84,6 @@ class Encounter:
     weights: FloatArray
     operators: tuple[HeaveRao, ...] | None = None
     depth: float = math.inf
-
-    def __post_init__(self) -> None:
-        """Check the lengths and make the arrays read-only."""
-        along = np.atleast_1d(check_finite("encounter", "along", self.along))
-        weights = np.atleast_1d(check_finite("encounter", "weights", self.weights))
-        many = along.size if self.operators is None else len(self.operators)
-        if weights.shape != along.shape or many != along.size:
-            raise InputError(
-                f"encounter: along, weights and operators must be equally many, got {along.size}, "
-                f"{weights.size} and {many}"
-            )
-        object.__setattr__(self, "along", read_only(along))
-        object.__setattr__(self, "weights", read_only(weights))
 
     @classmethod
     def from_case(cls, case: Case, *, hook: bool = True) -> Encounter | None:

@@ -29,7 +29,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, InputError, check_range, check_seed
+from ..basics import FloatArray, InputError, check_range
 from ..case import Case
 from ..hook import HookMotion
 from .hermite import MotionBlock, interpolated
@@ -255,7 +255,6 @@ class SineMotion:
     def motion(self, duration: float, step: float, seed: int) -> Motion:
         """Return the sine, exact at every row; the seed plays no part."""
         del seed
-        _check("sine motion", duration, step)
         omega = 2.0 * math.pi / self.period
 
         def evaluate(start: int, count: int) -> MotionBlock:
@@ -311,15 +310,7 @@ class SpectrumMotion:
         return _NODE_STEPS[-1]
 
     def motion(self, duration: float, step: float, seed: int) -> Motion:
-        """Return the motion; a block of it is only computed when it is read.
-
-        Raises
-        ------
-        InputError
-            If the duration is shorter than a step, or the seed is negative.
-        """
-        _check("random motion", duration, step)
-        check_seed("random motion", seed)
+        """Return the motion; a block of it is only computed when it is read."""
         own = seed if self.purpose is None else seed_for(seed, self.purpose)
         pieces = LongRecord(self.hook, duration, self.node_step, own)
         return Motion(
@@ -343,8 +334,3 @@ def _times(motion: MotionBlock, share: MotionBlock) -> MotionBlock:
     """Return the product of a motion and a share that changes in time, and its derivatives."""
     (z, v, a), (s, rate, change) = motion, share
     return s * z, s * v + rate * z, s * a + 2.0 * rate * v + change * z
-
-
-def _check(owner: str, duration: float, step: float) -> None:
-    check_range(owner, "step", step, low=0.0, unit="s", open_low=True)
-    check_range(owner, "duration", duration, low=step, unit="s")

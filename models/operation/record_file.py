@@ -209,8 +209,6 @@ class RecordMotion:
             If the record is shorter than the duration: it is not repeated.
         """
         del seed
-        check_range(self.description, "step", step, low=0.0, unit="s", open_low=True)
-        check_range(self.description, "duration of a run", duration, low=step, unit="s")
         last = self.displacement.size - 1
         if duration > self.duration * (1.0 + 1e-9):
             raise InputError(

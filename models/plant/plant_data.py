@@ -208,7 +208,6 @@ def masses_for_bandwidth(data: PlantData, omega_max: float) -> int:
     InputError
         If more than 40 masses would be needed.
     """
-    check_range("rope", "omega_max", omega_max, low=0.0, unit="rad/s", open_low=True)
     if data.lumping == "thesis" and data.masses is not None:
         return data.masses
     rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)

@@ -240,7 +240,6 @@ class Surroundings:
         b sqrt(d)/m with d the penetration of a landing at 2 m/s onto the spring alone.  A rope
         that pulls from above is not in them.
         """
-        check_range("surroundings", "payload_mass", payload_mass, low=0.0, unit="kg", open_low=True)
         contact = self.seabed or self.deck
         if contact is None:
             return ()

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, check_range
+from ..basics import FloatArray
 
 # The maximum-likelihood estimate of the shape is regular above -1/2 only (Smith 1985), and above 1
 # the excess has no mean: no motion nor force of a winch is like that.
@@ -52,7 +52,6 @@ def cluster_maxima(values: npt.ArrayLike, threshold: float, gap: int) -> FloatAr
     [4.0, 5.0]
     """
     x = np.asarray(values, dtype=np.float64)
-    check_range("extremes", "gap", gap, low=1)
     over = np.flatnonzero(x > threshold)
     if over.size == 0:
         return np.zeros(0)

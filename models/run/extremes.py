@@ -120,8 +120,6 @@ def gumbel_maximum(
         If there are fewer than `FEWEST_MAXIMA`, or all are equal.
     """
     x = check_finite("extremes", "maxima", maxima).ravel()
-    check_range("extremes", "block", block, low=0.0, unit="s", open_low=True)
-    check_range("extremes", "duration", duration, low=0.0, unit="s", open_low=True)
     if x.size < FEWEST_MAXIMA:
         raise InputError(
             f"extremes: Gumbel's law wants at least {FEWEST_MAXIMA} block maxima, got {x.size}; "
@@ -181,8 +179,6 @@ def pareto_maximum(
         If there are fewer than `FEWEST_PEAKS`, or not all are above the threshold.
     """
     x = check_finite("extremes", "peaks", peaks).ravel()
-    check_range("extremes", "exposure", exposure, low=0.0, unit="s", open_low=True)
-    check_range("extremes", "duration", duration, low=0.0, unit="s", open_low=True)
     if x.size < FEWEST_PEAKS:
         raise InputError(
             f"extremes: the Pareto law wants at least {FEWEST_PEAKS} peaks over the threshold of "

@@ -19,7 +19,6 @@ from ..basics import (
     InputError,
     Interval,
     Share,
-    check_range,
     fall_time,
     mean_interval,
     share,
@@ -84,15 +83,6 @@ class Summary:
         """
         if not runs:
             raise InputError("summary of runs: at least one run is wanted, got none")
-        check_range(
-            "summary of runs",
-            "confidence",
-            confidence,
-            low=0,
-            high=1,
-            open_low=True,
-            open_high=True,
-        )
         found = [_statistics(run) for run in runs]
         columns: dict[str, list[float]] = {}
         units: dict[str, str] = {}

@@ -135,11 +135,6 @@ class Run:
         "completed", "diverged", "interrupted" or another single word, and the sentence to read.
     timings
         How fast it was.
-
-    Raises
-    ------
-    InputError
-        If the shapes of `time`, `values` and `signals` do not agree.
     """
 
     case: Case
@@ -161,7 +156,7 @@ class Run:
     timings: Timings
 
     def __post_init__(self) -> None:
-        """Check the shapes and make everything read-only."""
+        """Make everything read-only."""
         for name in ("time", "values"):
             view = np.asarray(getattr(self, name), dtype=np.float64).view()
             view.setflags(write=False)
@@ -170,12 +165,6 @@ class Run:
         object.__setattr__(self, "events", tuple(self.events))
         units = {name: self.units.get(name, "") for name in self.signals}
         object.__setattr__(self, "units", MappingProxyType(units))
-        wanted = (self.time.size, len(self.signals))
-        if self.time.ndim != 1 or self.values.shape != wanted:
-            raise InputError(
-                f"run: values must have a row for each time and a column for each signal, "
-                f"{wanted}, got {self.values.shape}"
-            )
 
     @property
     def completed(self) -> bool:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import White, check_range
+from ..basics import White
 from ..case import Case
 from ..hook import HookMotion
 from ..plant import (
@@ -90,7 +90,6 @@ def sensed_plant(
     InputError
         If a number is out of its range.
     """
-    check_range("sensed plant", "drag", drag, low=0.0, unit="N s/m")
     if isinstance(case, Case) and sensors is None:
         sensors = case.sensors
     return with_sensors(build_plant(case, masses).linearise(drag=drag), sensors)

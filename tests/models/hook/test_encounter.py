@@ -11,7 +11,7 @@ from barge import barge_case
 from hypothesis import given
 from hypothesis import strategies as st
 
-from models.basics import GRAVITY, InputError, PhysicsWarning, wave_number
+from models.basics import GRAVITY, PhysicsWarning, wave_number
 from models.hook import Encounter, HookMotion
 from models.hook.encounter import speed_along
 from models.sea import SeaSpectrum
@@ -160,8 +160,3 @@ def test_a_speed_that_the_file_knows_nothing_of_is_told(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         HookMotion.from_case(case, warn=False)
-
-
-def test_lengths_that_differ_are_refused():
-    with pytest.raises(InputError, match="must be equally many, got 2, 1 and 2"):
-        Encounter(along=[1.0, 2.0], weights=[1.0])

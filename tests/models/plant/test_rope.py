@@ -76,21 +76,6 @@ def test_modes_in_the_limits_of_a_light_and_a_heavy_rope() -> None:
         fixed_top_modes(1e8, 1000.0, 0.0, 1e5, 2)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((0.0, 100.0, 1.0, 1e3, 1), "axial_stiffness must be above 0 N, got 0.0"),
-        ((1e8, -1.0, 1.0, 1e3, 1), "length must be above 0 m, got -1.0"),
-        ((1e8, 100.0, -1.0, 1e3, 1), "mass_per_length must be at least 0 kg/m, got -1.0"),
-        ((1e8, 100.0, 1.0, 0.0, 1), "payload_mass must be above 0 kg, got 0.0"),
-        ((1e8, 100.0, 1.0, 1e3, 0), "count must be at least 1, got 0"),
-    ],
-)
-def test_bad_ropes_are_named(arguments: tuple[float, ...], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        fixed_top_modes(*arguments)  # type: ignore[arg-type]
-
-
 def test_damping_time_is_that_of_the_first_mode() -> None:
     first = fixed_top_modes(*ROPE, 1)[0]
     assert replace(BASE, damping_ratio=0.03).damping_time == pytest.approx(0.06 / first)
@@ -143,17 +128,6 @@ def test_thesis_lumping_makes_the_payload_heavier_and_converges_slowly() -> None
 
 def test_third_of_the_rope_is_right_to_a_percent() -> None:
     assert errors("distributed", [1], 0)[0] < 2e-3
-
-
-@pytest.mark.parametrize("masses", [0, 41, 2.5])
-def test_lumping_refuses_what_it_cannot_do(masses: float) -> None:
-    with pytest.raises(InputError, match="masses must be"):
-        lump_rope(masses)  # type: ignore[arg-type]
-
-
-def test_lumping_is_one_of_two() -> None:
-    with pytest.raises(InputError, match="lumping must be 'distributed' or 'thesis', got 'none'"):
-        lump_rope(3, "none")
 
 
 # ---- how many masses

@@ -324,10 +324,6 @@ class TestWhole:
                 lambda: Surroundings(seabed=Seabed(below=1.0), deck=Deck(below=1.0)),
                 "surroundings: give a seabed or a deck, got both",
             ),
-            (
-                lambda: Surroundings(seabed=Seabed(below=1.0)).stiffness_rates(0.0),
-                "surroundings: payload_mass must be above 0 kg, got 0.0",
-            ),
         ],
     )
     def test_bad_numbers(self, make, message):
