@@ -20,6 +20,7 @@ moves with every number too.  With theta the number and all slopes logarithmic,
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -34,11 +35,12 @@ from .differences import StepError, derivative
 from .fields import Number, numbers_of
 from .fixed_design import FixedDesign
 from .gradient import Gradient, sensitivity_gradient, variance_gradient
-from .results import FIGURES, Elasticity, Sensitivity
+from .results import Elasticity, Sensitivity
 from .slopes import PlantSlopes, changed
 
 _OUTPUTS = {"payload_rms": PAYLOAD, "torque_rms": "motor.torque", "speed_rms": "motor.speed"}
 _PEAK = "peak of |S| "
+_SHAKING = ("sea.", "vessel.", "sensors.")  # sections that the disturbances' spectra depend on
 _TIE = 0.999  # peaks of this share of the largest count as tied
 _SECOND = 0.01  # share of a number for its second derivative
 
@@ -197,7 +199,7 @@ def _gradients(assessment: Assessment, fixed: FixedDesign) -> dict[str, Gradient
 
 def _density_slopes(fixed: FixedDesign, number: Number, omega: FloatArray) -> dict[str, FloatArray]:
     """Return d S / d number at the nodes by disturbance, where the number shakes anything."""
-    if not number.path.startswith(fixed.shaken_by):
+    if not number.path.startswith(_SHAKING):
         return {}
 
     def densities(value: float) -> FloatArray:
@@ -224,5 +226,4 @@ def _with_curvature(fixed: FixedDesign, entry: Elasticity) -> Elasticity:
         found = _first(other, None, entry.path)[1] if other is not None else []
         ends.append(found[0].payload_rms if found else np.nan)
     curvature = float((ends[0] - ends[1]) / (2.0 * _SECOND))
-    values = {name: getattr(entry, name) for name in ("path", "value", "unit", *FIGURES)}
-    return Elasticity(**values, curvature=curvature if np.isfinite(curvature) else None)
+    return replace(entry, curvature=curvature if np.isfinite(curvature) else None)

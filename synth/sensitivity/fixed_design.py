@@ -79,11 +79,6 @@ class FixedDesign:
         """The case's own linear drag, if it gives one [N s/m]."""
         return self.case.payload.fixed_drag or 0.0
 
-    @property
-    def shaken_by(self) -> tuple[str, ...]:
-        """Sections of the case that the disturbances' spectra depend on."""
-        return ("sea.", "vessel.", "sensors.")
-
     @cached_property
     def disturbances(self) -> tuple[Disturbance, ...]:
         """What shakes the plant."""
