@@ -15,6 +15,7 @@ from synth.design import Design, Tuning
 
 from .named import CONTROLLER_TEXTS
 from .recipe import Make, Recipe, feedback, gains_in_use, recipe_of
+from .stored_design import EAGER, HALF
 
 GROUPS = ("brake", "linear", "predictive", "own", "reference", "floor")
 """What contenders are: brake, linear laws, causal prediction, the user's own, those that know
@@ -78,8 +79,20 @@ def _linear(name: str, needs: str, what: str, knows: str, make: Make | None = No
     return Contender(name=name, what=what, knows=knows, group="linear", recipe=own)
 
 
-_PAYLOAD = "payload by telemetry; plant and sea of the case when it was designed"
-_BOTH = "payload and motion reference unit; plant and sea of the case when it was designed"
+# What is designed: the structure, what it is, what it hears.
+_DESIGNED = {
+    "feedback": ("payload-feedback", "three optimised gains", "payload by telemetry"),
+    "combined": (
+        "combined", "optimised feedback and feed-forward", "payload and motion reference unit"
+    ),
+}  # fmt: skip
+# How it is designed: ending of the name, that of what is needed (`design_law`), in words.
+_WAYS = (
+    ("", "", "within the drive's limits"),
+    (HALF, HALF, "within the drive's limits in a sea of half the height"),
+    (EAGER, EAGER, "as if the drive had no limits"),
+    ("-no-antiwindup", EAGER, "as if the drive had no limits, and without anti-windup"),
+)
 _SEEN = "all sensors, up to now; plant of the case"
 _ALL = (
     _named("none", "nothing", "brake"),
@@ -88,44 +101,16 @@ _ALL = (
     _linear(
         "thesis", "", "the gains that the case has in use", "payload by telemetry", gains_in_use
     ),
-    _linear(
-        "feedback",
-        "payload-feedback",
-        "three optimised gains on the payload's motion, within the drive's limits",
-        _PAYLOAD,
+    *(
+        _linear(
+            f"{name}{ending}",
+            f"{structure}{needs}",
+            f"{what}, {how}",
+            f"{heard}; plant and sea of the case when it was designed",
+        )
+        for name, (structure, what, heard) in _DESIGNED.items()
+        for ending, needs, how in _WAYS
     ),
-    _linear(
-        "feedback-half",
-        "payload-feedback-half",
-        "three optimised gains, within the drive's limits in a sea of half the height",
-        _PAYLOAD,
-    ),
-    _linear(
-        "feedback-eager",
-        "payload-feedback-eager",
-        "three optimised gains, as if the drive had no limits",
-        _PAYLOAD,
-    ),
-    _linear(
-        "feedback-no-antiwindup",
-        "payload-feedback-eager",
-        "the eager one without anti-windup",
-        _PAYLOAD,
-    ),
-    _linear(
-        "combined",
-        "combined",
-        "optimised feedback and feed-forward with anti-windup, within the drive's limits",
-        _BOTH,
-    ),
-    _linear(
-        "combined-half",
-        "combined-half",
-        "the same, within the drive's limits in a sea of half the height",
-        _BOTH,
-    ),
-    _linear("combined-eager", "combined-eager", "the same, as if the drive had no limits", _BOTH),
-    _linear("combined-no-antiwindup", "combined-eager", "the eager one without anti-windup", _BOTH),
     _named("mpc", f"{_SEEN}; the sea's spectrum", "predictive"),
     _named("mpc-ar", f"{_SEEN}; nothing of the sea", "predictive"),
     _named("nonlinear-mpc", f"{_SEEN}, its limits and drag; the sea's spectrum", "predictive"),
