@@ -90,10 +90,6 @@ def test_the_signal_and_its_derivative_are_proper() -> None:
 
 
 def test_bad_requests_are_refused() -> None:
-    with pytest.raises(InputError, match="order must be 4, 6 or 8, got 5"):
-        fit_shaping_filter(np.ones_like, (0.1, 1.0), order=5)
-    with pytest.raises(InputError, match=r"band\[1\] must be above 1"):
-        fit_shaping_filter(np.ones_like, (1.0, 0.5))
     with pytest.raises(InputError, match="must hold variance, got 0"):
         fit_shaping_filter(np.zeros_like, (0.1, 1.0))
 
