@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import ComplexArray, FloatArray, InputError, SolverError, one_thread
+from models.basics import ComplexArray, FloatArray, InputError, Quadrature, SolverError, one_thread
 from models.case import Case
 
 from ..loop import Assessment, consistent_coefficient
@@ -242,9 +242,14 @@ class View:
         The drag begins where the last one agreed.
         """
         problem = question.problem
-        nodes = partial(cost_nodes, problem)
         controller = problem.law.controller([float(v) for v in values])
         loop = problem.plant, controller, problem.disturbances
+        last: list[Quadrature] = []
+
+        def nodes(poles: ComplexArray) -> Quadrature:
+            last.append(cost_nodes(problem, poles))
+            return last[-1]
+
         if problem.drag is not None and coefficient is None:
             try:
                 coefficient = self._drag = consistent_coefficient(
@@ -253,4 +258,5 @@ class View:
             except SolverError:
                 return None
         grid = partial(margin_nodes, problem, per_decade=_PER_DECADE)
-        return Assessment(*loop, drag=problem.drag, coefficient=coefficient, nodes=nodes, grid=grid)
+        same = (lambda _: last[-1]) if last else nodes  # what the drag was found on does
+        return Assessment(*loop, drag=problem.drag, coefficient=coefficient, nodes=same, grid=grid)

@@ -21,7 +21,7 @@ from models.basics import (
     adaptive_nodes,
     peak_factor,
 )
-from models.plant import LinearPlant, settled_drag
+from models.plant import LinearPlant, consistent_drag, settled_drag
 
 from .controller import LinearController, closed_loop_plant, closed_loop_poles
 from .disturbance import Disturbance
@@ -34,6 +34,7 @@ _RTOL = 1e-8  # of every variance
 _GRID_PER_DECADE = 150
 _LOW = 0.3  # of the largest value on the grid, below which no peak between its points is looked for
 _SAME_NODES = 0.05  # relative change of the drag for which nodes made from poles do
+_VERGE = 1e-5  # damping ratio below which only its own nodes see a pole
 
 Nodes = Callable[[ComplexArray], Quadrature]
 Grid = Callable[[ComplexArray], FloatArray]
@@ -372,10 +373,12 @@ def consistent_coefficient(
             plant, controller, disturbances, drag=drag, coefficient=coefficient, nodes=nodes
         )
 
+    at = np.nan  # the coefficient that the nodes are for
     plain = loop(drag.reference)  # the plant as it is, decomposed once for all
 
     def about(coefficient: float) -> Callable[[float], float]:
-        calm, found = np.inf, loop(coefficient).quadrature([drag.velocity])
+        nonlocal at
+        at, calm, found = coefficient, np.inf, loop(coefficient).quadrature([drag.velocity])
         names = [*(d.name for d in disturbances), drag.force]
         *shaken, felt = plain._responses([drag.velocity], names, found.omega)[0]
         pairs = zip(disturbances, shaken, strict=True)
@@ -394,9 +397,16 @@ def consistent_coefficient(
         return velocity
 
     begin = drag.reference if start is None else start
-    # Nodes that do not adapt are as good for a loop with a little more drag.
-    settled = {} if nodes is None else {"settled": _SAME_NODES}
-    found = settled_drag(drag.quadratic, about, begin, **settled)
+    if nodes is None:
+        found = settled_drag(drag.quadratic, about, begin)
+    else:
+        # Nodes that do not adapt are as good for a loop with a little more drag, unless it is on
+        # the verge of stability, where nothing but its own nodes sees how it swings.
+        found = settled_drag(drag.quadratic, about, begin, settled=_SAME_NODES)
+        damping = [PoleRegion.of(loop(C).poles).damping for C in (found, at)]
+        if damping[0] < max(0.5 * damping[1], _VERGE):
+            found = consistent_drag(drag.quadratic, lambda C: about(C)(C))
+            about(found)
     if not loop(found).stable:
         raise SolverError(f"drag: the loop is unstable at {found:.4g} N s/m but not with less")
     return found

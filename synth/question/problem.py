@@ -26,7 +26,6 @@ from ..structures import ParametrisedController
 
 Values = Sequence[float] | FloatArray
 
-PADE = 5  # order of the delay model that the stability guard sees
 _SLOW = 1e-4  # no real pole slower than this share of the plant's slowest one
 _DECAY = 1e-9  # a pole must lie this far left, relative to the size of the largest one
 
@@ -52,11 +51,6 @@ class Problem:
     drag: DragElement | None = None
 
     @cached_property
-    def rational(self) -> LinearPlant:
-        """The plant with Pade models for its delays, for the stability guard."""
-        return self.plant.without_delays(PADE)
-
-    @cached_property
     def slow_point(self) -> float:
         """Point -decay on the real axis that no closed-loop pole may pass [1/s]."""
         sizes = np.abs(self.plant.poles())
@@ -72,7 +66,7 @@ class Problem:
 
     @cached_property
     def modelled(self) -> tuple[LinearPlant, ComplexArray]:
-        """The plant whose poles limits are on, and the poles of its delay models [1/s]."""
+        """The plant with Pade models for its delays, and the poles of these models [1/s]."""
         return with_delay_models(self.plant)
 
     @cached_property
@@ -87,7 +81,7 @@ class Problem:
 
     def loop_poles(self, values: Values, coefficient: float | None = None) -> ComplexArray:
         """Return the closed loop's poles [1/s], delays as Pade models."""
-        matrix = self.loop_matrix(self.rational, values, coefficient)
+        matrix = self.loop_matrix(self.modelled[0], values, coefficient)
         return np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
 
     def loop_matrix(

@@ -54,8 +54,6 @@ from ..structures import (
 )
 from .problem import Problem
 
-_LATE = 0.2  # delay beyond which the guard's model of it needs a higher order [s]
-_HIGH_ORDER = 12
 GAINS = ("A", "a", "a1", "a2")
 """The thesis's gains; the amplifier A multiplies the others."""
 
@@ -84,16 +82,6 @@ class SampledNoise:
     def density(self, omega: Any) -> Any:
         """Return the one-sided density per rad/s at `omega` [rad/s]."""
         return self.spectrum(omega)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _LateProblem(Problem):
-    """A problem whose delay is so long that the guard of the search needs more of it."""
-
-    @cached_property
-    def rational(self) -> LinearPlant:
-        """The plant with Pade models of high order for its delays."""
-        return self.plant.without_delays(_HIGH_ORDER)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -171,8 +159,7 @@ class DesignQuestion:
 
     def problem_with(self, limits: Sequence[Limit]) -> Problem:
         """Return the problem with other limits."""
-        late = max(self.plant.delays, default=0.0) > _LATE
-        return (_LateProblem if late else Problem)(
+        return Problem(
             plant=self.plant,
             law=self.law,
             disturbances=disturbances(self.spectra, self.plant.independent_disturbances),

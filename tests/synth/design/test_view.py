@@ -49,7 +49,7 @@ def agree(name: str, count: int, seed: int) -> None:
 @pytest.mark.ci
 @pytest.mark.parametrize("name", CASES)
 def test_a_look_agrees_with_a_verified_design(name: str) -> None:
-    agree(name, 5, 3)
+    agree(name, 12, 3)
 
 
 @pytest.mark.slow
