@@ -258,7 +258,7 @@ def evaluated(
     `how` begins its status; `growth` [1/s] is told where `assessment` is None.
     """
     if assessment is None:
-        status = "unstable: no drag agrees with the motion"
+        status = "unstable: on the verge with any drag that agrees with the motion"
         if growth > 0.0:
             status = f"unstable: grows by a factor e every {1.0 / growth:.3g} s"
         return recorded(question, parameters, None, {}, ok=False, status=status)

@@ -20,6 +20,7 @@ from models.basics import (
     SolverError,
     adaptive_nodes,
     peak_factor,
+    spectral_nodes,
 )
 from models.plant import LinearPlant, consistent_drag, settled_drag
 
@@ -397,9 +398,16 @@ def consistent_coefficient(
         return velocity
 
     begin = drag.reference if start is None else start
+    found = None
     if nodes is None:
-        found = settled_drag(drag.quadratic, about, begin)
-    else:
+        try:
+            found = settled_drag(drag.quadratic, about, begin)
+        except SolverError:
+            if any(d.band is None for d in disturbances):
+                raise
+            # On the verge of stability no cut finds a peak, but it is known where it stands.
+            nodes = partial(_known_nodes, disturbances)
+    if found is None:
         # Nodes that do not adapt are as good for a loop with a little more drag, unless it is on
         # the verge of stability, where nothing but its own nodes sees how it swings.
         found = settled_drag(drag.quadratic, about, begin, settled=_SAME_NODES)
@@ -410,6 +418,13 @@ def consistent_coefficient(
     if not loop(found).stable:
         raise SolverError(f"drag: the loop is unstable at {found:.4g} N s/m but not with less")
     return found
+
+
+def _known_nodes(disturbances: Sequence[Disturbance], poles: ComplexArray) -> Quadrature:
+    """Return nodes that are made from the poles of a loop [1/s] alone."""
+    low, high, half_line = integration_band(disturbances, poles)
+    splits = [w for d in disturbances for w in d.splits]
+    return spectral_nodes(low, high, splits=splits, poles=_off_axis(poles), half_line=half_line)
 
 
 def _off_axis(poles: ComplexArray) -> list[complex]:

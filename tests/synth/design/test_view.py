@@ -58,6 +58,25 @@ def test_looks_agree_with_a_thousand_verified_designs(name: str) -> None:
     agree(name, 250, 4)
 
 
+@pytest.mark.ci
+def test_a_loop_that_swings_by_itself_without_its_drag_is_seen_on_the_verge() -> None:
+    """Its pole is 4e-5 1/s from the axis, where nodes for a little more drag do not see it."""
+    gains = {"A": 2.275003319, "a": 3.517917461, "a1": 34.96444923, "a2": 8.398323470}
+    case = load_case("subsea-crane")
+    look, design = prepare(case).evaluate(gains), evaluate_gains(case, gains)
+    assert look.stable
+    assert design.margins is not None
+    assert look.drag == pytest.approx(design.drag, rel=1e-6)
+    assert look.payload_rms == pytest.approx(design.payload_rms, rel=1e-6)
+
+    # No drag holds this one off the axis.
+    gains = {"A": 0.889238533, "a": 48.22058768, "a1": 27.66414557, "a2": 6.365940700}
+    look, design = prepare(case).evaluate(gains), evaluate_gains(case, gains)
+    assert not look.stable
+    assert design.margins is None
+    assert "on the verge" in design.status
+
+
 def test_the_curves_are_those_of_the_figures() -> None:
     look = prepare(load_case("thesis-1975")).evaluate(THESIS)
 
