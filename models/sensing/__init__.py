@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         ENCODER,
         MEASURED,
         SAMPLE_TIME,
+        SENSORS,
         aboard,
         sensed_line_at,
         sensed_plant,

@@ -42,6 +42,8 @@ MEASURED = (
     "motor.speed",
     "rope.tension",
 )
+#: The section of `sensors` that puts a measurement aboard; the others always are.
+SENSORS = {"mru.heave": "mru", "mru.heave_rate": "mru", "rope.tension": "load_cell"}
 #: What the drive's own encoder shows.
 ENCODER = ("drum.haul", "motor.speed")
 #: What disturbs the sensors, besides the plant's own disturbances.
@@ -183,13 +185,8 @@ def with_sensors(plant: LinearPlant, sensors: Sensors | None) -> LinearPlant:
 
 def aboard(case: Case) -> tuple[str, ...]:
     """Return what is measured aboard, of `MEASURED`: what the case names, and the encoder."""
-    sensors = case.sensors
-    missing = {
-        "mru.heave": sensors.mru is None,
-        "mru.heave_rate": sensors.mru is None,
-        "rope.tension": sensors.load_cell is None,
-    }
-    return tuple(name for name in MEASURED if not missing.get(name, False))
+    missing = [name for name, sensor in SENSORS.items() if getattr(case.sensors, sensor) is None]
+    return tuple(name for name in MEASURED if name not in missing)
 
 
 def sensed_line_at(

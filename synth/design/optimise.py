@@ -20,7 +20,6 @@ from scipy.optimize import brentq
 from models.basics import InputError, check_range, one_thread
 from models.case import Case
 from models.plant import MAX_MASSES
-from models.sensing import aboard
 
 from ..loop import Assessment
 from ..question import (
@@ -35,7 +34,7 @@ from ..question import (
     pose_family,
 )
 from ..search import Progress, search, with_bests
-from ..structures import LowOrderFeedback, structure_named
+from ..structures import LowOrderFeedback, structures_aboard
 from .design import Design
 from .high_order import high_order_gains
 from .infeasible import Shortfall, shortfall
@@ -113,8 +112,9 @@ def optimise_gains(
     Raises
     ------
     InputError
-        If there is no such structure, parameter, objective or change, a limit lies below the static
-        load, or no gains of its own keep the limits of a member, for the regret.
+        If there is no such structure, parameter, objective or change, a structure hears a sensor
+        that the case does not name, a limit lies below the static load, or no gains of its own keep
+        the limits of a member, for the regret.
     """
     check_range("optimise_gains", "starts", starts, low=1)
 
@@ -126,7 +126,9 @@ def optimise_gains(
 
     if isinstance(structure, str):
         return optimised(structure, int(starts), progress, guesses)
-    names = structures_aboard(case) if structure is None else tuple(dict.fromkeys(structure))
+    names = (
+        structures_aboard(case, NESTED) if structure is None else tuple(dict.fromkeys(structure))
+    )
     if not names:
         raise InputError("optimise_gains: structure must name at least one structure, got none")
     few = max(1, -(-int(starts) // _SHARE))
@@ -139,13 +141,6 @@ def optimise_gains(
     chosen = _simplest(designs)
     others = tuple(design for design in designs if design is not chosen)
     return replace(chosen, alternatives=others)
-
-
-def structures_aboard(case: Case) -> tuple[str, ...]:
-    """Return the structures of `NESTED` whose sensors a case names, the simplest first."""
-    heard = set(aboard(case))
-    named = {name: structure_named(name, case) for name in NESTED}
-    return tuple(name for name, made in named.items() if heard.issuperset(made.measurements))
 
 
 def _simplest(designs: Sequence[Design]) -> Design:

@@ -50,6 +50,7 @@ from ..structures import (
     ParametrisedController,
     PayloadFeedback,
     WinchStructure,
+    structure_aboard,
     structure_named,
 )
 from .problem import Problem
@@ -223,9 +224,9 @@ def pose(
     Raises
     ------
     InputError
-        If there is no such structure, or the case lacks what a design needs.
+        If there is no such structure, or the case lacks what a design needs, such as a sensor.
     """
-    named = structure_named(structure, built_for or case)
+    named = structure_aboard(structure, built_for or case)
     data = PlantData.from_case(case)
     shaken = known if known is not None and _same_sea(case, known.case) else None
     hook = HookMotion.from_case(case) if shaken is None else shaken.hook

@@ -28,6 +28,11 @@ if TYPE_CHECKING:
     )
     from .whitened import shaped
     from .winch_diagram import TRANSPARENT, WinchLaw, WinchStructure
-    from .winch_structures import structure_named, structure_names
+    from .winch_structures import (
+        structure_aboard,
+        structure_named,
+        structure_names,
+        structures_aboard,
+    )
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -7,12 +7,12 @@ they are put together is said in `synth.structures.winch_diagram`.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from models.basics import pick
+from models.basics import InputError, pick
 from models.case import Case
 from models.plant import PlantData, fixed_top_modes
-from models.sensing import aboard
+from models.sensing import SENSORS, aboard
 
 from .blocks import FilterSection, Integral, LeadLag, Notch, RollOffFilter
 from .drum_speed import SteadyMotion
@@ -40,6 +40,34 @@ _HIGH_ORDER = re.compile(r"high-order(?:-([1-9]\d?))?$")
 def structure_names() -> tuple[str, ...]:
     """Return the names of the structures."""
     return tuple(DESCRIPTIONS)
+
+
+def structures_aboard(case: Case, names: Sequence[str] = tuple(DESCRIPTIONS)) -> tuple[str, ...]:
+    """Return those of some structures whose sensors a case names, in their order."""
+    heard = set(aboard(case))
+    return tuple(n for n in names if heard.issuperset(structure_named(n, case).measurements))
+
+
+def structure_aboard(name: str, case: Case) -> PayloadFeedback | WinchStructure | LowOrderFeedback:
+    """Return a structure for a case that names all its sensors, see `structure_named`.
+
+    A sensor that a case does not name is not aboard; one without errors has to be named as such,
+    as ``sensors.mru: {noise_floor: 0, noise_fraction: 0}``.
+
+    Raises
+    ------
+    InputError
+        If there is no structure of that name, or a sensor that it hears is not aboard.
+    """
+    structure = structure_named(name, case)
+    missing = [heard for heard in structure.measurements if heard not in aboard(case)]
+    if missing:
+        sensors = " and ".join(dict.fromkeys(f"sensors.{SENSORS[heard]}" for heard in missing))
+        raise InputError(
+            f"{case.label}: {name} hears {missing[0]}, which is not aboard: add {sensors}, or take "
+            f"one of {', '.join(structures_aboard(case))}"
+        )
+    return structure
 
 
 def structure_named(name: str, case: Case) -> PayloadFeedback | WinchStructure | LowOrderFeedback:

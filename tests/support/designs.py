@@ -12,6 +12,9 @@ from synth import Design, evaluate_gains
 from synth.design import LimitUse
 from synth.question import pose
 
+#: A reference unit and a load cell without errors, as changes of a case.
+PERFECT_MRU = {"sensors.mru": {"noise_floor": 0.0, "noise_fraction": 0.0}}
+PERFECT_CELL = {"sensors.load_cell": {"bandwidth": 1e5}}
 THESIS_GAINS = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
 
 

@@ -45,13 +45,13 @@ ARGUMENTS = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Optimise, show and save; return 0 if the design is ok, 1 if not."""
-    from synth.structures import structure_named
+    from synth.structures import structure_aboard
 
     case = given_case(arguments)
     asked, fixed = arguments.structure, parse_fixed(arguments.fix)
     members = [case.replace(changes) for changes in parse_members(arguments.member)]
     for name in asked or ():
-        structure_named(name, case)  # an unknown name ends here, before any file
+        structure_aboard(name, case)  # a name that cannot be ends here, before any file
     folder = prepared(arguments, case.name)
     folder.write("case.yaml", case.to_yaml())
     from synth import optimise_gains

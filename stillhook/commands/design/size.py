@@ -45,7 +45,7 @@ ARGUMENTS = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Size, or co-design, show and save; return 0 if a verified design came out, 1 if not."""
-    from synth.structures import structure_named
+    from synth.structures import structure_aboard
 
     if arguments.co_design == (arguments.target is not None):
         raise InputError(
@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.radius and not arguments.co_design:
         raise InputError("size: --radius goes with --co-design")
     case = given_case(arguments)
-    structure_named(arguments.structure, case)
+    structure_aboard(arguments.structure, case)
     folder = prepared(arguments, case.name, "-size")
     if arguments.co_design:
         return _co_designed(case, arguments, folder)

@@ -21,9 +21,10 @@ ARGUMENTS = (
     CASE,
     options(
         """
-        --structures A,B,..  which (default: all): payload-feedback, payload-feedback-rolloff,
-            -lead, -notch, -integral, drum-feedback, feed-forward, combined, constant-tension,
-            low-order-N; on request high-order, the best found of any order
+        --structures A,B,..  which (default: all that the case's sensors allow): payload-feedback,
+            payload-feedback-rolloff, -lead, -notch, -integral, drum-feedback, feed-forward,
+            combined, constant-tension, low-order-N; on request high-order, the best found of any
+            order
         --out DIR  folder for the results (default: out/<name of the case>)
         --starts N [8]  starts of each search
         --seed N [0]  seed of the starts
@@ -36,12 +37,12 @@ ARGUMENTS = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Compare structures on a case; return 0 if one of them is ok, else 1."""
-    from synth.structures import structure_named, structure_names
+    from synth.structures import structure_aboard, structures_aboard
 
-    wanted = tuple(dict.fromkeys(arguments.structures or structure_names()))
     case = given_case(arguments)
+    wanted = tuple(dict.fromkeys(arguments.structures or structures_aboard(case)))
     for name in wanted:
-        structure_named(name, case)  # an unknown name ends here, not after minutes
+        structure_aboard(name, case)  # a name that cannot be ends here, not after minutes
     folder = prepared(arguments, case.name)
     folder.write("case.yaml", case.to_yaml())
     designs: list[Design] = []

@@ -31,10 +31,10 @@ ARGUMENTS = (
 def run(arguments: argparse.Namespace) -> int:
     """Price everything, show and save; return 0 if there is an optimum to begin with, else 1."""
     from synth.sizing import worth
-    from synth.structures import structure_named
+    from synth.structures import structure_aboard
 
     case = given_case(arguments)
-    structure_named(arguments.structure, case)
+    structure_aboard(arguments.structure, case)
     folder = prepared(arguments, case.name, "-worth")
     folder.write("case.yaml", case.to_yaml())
     with working(arguments) as step:

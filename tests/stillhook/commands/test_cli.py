@@ -462,6 +462,16 @@ WRONG_WORDS = {
         "optimise thesis-1975 --starts 0",
         r"optimise: --starts must be in \[1, 4096\], got 0",
     ),
+    "no reference unit": (
+        "optimise thesis-1975 --structure feed-forward",
+        "thesis-1975: feed-forward hears mru.heave, which is not aboard: add sensors.mru, or take "
+        "one of payload-feedback, .*, low-order-4",
+    ),
+    "no load cell": (
+        "structures thesis-1975 --structures payload-feedback,constant-tension",
+        "thesis-1975: constant-tension hears rope.tension, which is not aboard: add "
+        "sensors.load_cell, or take one of payload-feedback, .*",
+    ),
     "no member": (
         "optimise thesis-1975 --member rope.length",
         r"--member: must be PATH=VALUE\[;PATH=VALUE..\], as in rope.damping_ratio=0.0002, got "

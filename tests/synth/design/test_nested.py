@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from designs import PERFECT_MRU
 
 from models import Case, load_case
 from models.basics import one_thread
@@ -37,7 +38,7 @@ FORWARD = {
 @pytest.fixture(scope="module")
 def late() -> Case:
     return load_case("thesis-1975").replace(
-        {"sensors.telemetry.delay": 0.05, "limits.gain_margin_down": 0.5}
+        {"sensors.telemetry.delay": 0.05, "limits.gain_margin_down": 0.5, **PERFECT_MRU}
     )
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from designs import THESIS_GAINS, thesis_design
+from designs import PERFECT_CELL, PERFECT_MRU, THESIS_GAINS, thesis_design
 
+import stillhook as sh
 from models import InputError, load_case
 from models.sensing import sensed_line_at
-from synth.design import evaluate_gains, optimise_gains
+from synth.design import evaluate_gains, optimise_gains, prepare
 from synth.question import PAYLOAD
 
 FED = {
@@ -48,7 +49,7 @@ def test_an_amplifier_of_its_own_multiplies_the_gains() -> None:
 
 
 def test_parameters_of_any_structure_are_evaluated() -> None:
-    design = evaluate_gains(load_case("thesis-1975"), FED, "feed-forward")
+    design = evaluate_gains(load_case("thesis-1975").replace(PERFECT_MRU), FED, "feed-forward")
     assert design.parameters == FED
     assert design.gains == {}
     assert design.verification is not None
@@ -71,7 +72,40 @@ def test_parameters_of_any_structure_are_evaluated() -> None:
 )
 def test_what_cannot_be_evaluated_is_refused(gains: object, structure: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        evaluate_gains(load_case("thesis-1975"), gains, structure)
+        evaluate_gains(load_case("thesis-1975").replace(PERFECT_MRU), gains, structure)
+
+
+FIRST = "payload-feedback, payload-feedback-rolloff, "
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "message"),
+    [
+        ("feed-forward", {}, f"feed-forward hears mru.heave, .*: add sensors.mru, .* {FIRST}"),
+        ("combined", PERFECT_CELL, "combined hears mru.heave, .*: add sensors.mru, .*-tension"),
+        ("constant-tension", PERFECT_MRU, "rope.tension, .*: add sensors.load_cell, .*combined"),
+    ],
+)
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda case, name: optimise_gains(case, name),
+        lambda case, name: optimise_gains(case, ["payload-feedback", name]),
+        lambda case, name: evaluate_gains(case, {}, name),
+        lambda case, name: prepare(case, name),
+        lambda case, name: sh.size_winch(case, target=0.1, structure=name),
+        lambda case, name: sh.co_design(case, structure=name),
+        lambda case, name: sh.worth(case, structure=name),
+        lambda case, name: sh.optimise_robust(
+            case, sh.Family.of(case, {"rope.length": (1500.0, 2000.0)}), structure=name
+        ),
+    ],
+    ids=["optimise", "several", "evaluate", "prepare", "size", "co_design", "worth", "robust"],
+)
+def test_a_structure_whose_sensor_is_not_aboard_is_refused(ask, name, changes, message) -> None:
+    case = load_case("thesis-1975").replace(changes)
+    with pytest.raises(InputError, match=message):
+        ask(case, name)
 
 
 def test_noise_does_not_shrink_with_the_largest_sea() -> None:

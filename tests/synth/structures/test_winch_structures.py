@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from designs import PERFECT_MRU
 from scipy.stats import qmc
 
 from models import Case, load_case
@@ -45,7 +46,7 @@ def crane() -> Case:
 
 @pytest.fixture(scope="module")
 def spring() -> Case:
-    return load_case("thesis-1975").replace({"sensors.telemetry.delay": 0.05})
+    return load_case("thesis-1975").replace({"sensors.telemetry.delay": 0.05, **PERFECT_MRU})
 
 
 @pytest.fixture(scope="module")
