@@ -67,16 +67,18 @@ CALLS = (
     "bound CASES/thesis-1975.yaml --quiet",
 )
 
+_UNIT = "--set 'sensors.mru={noise_floor: 0, noise_fraction: 0}'"
+
 #: Calls whose files are kept as well; OUT is an empty folder.
 WRITERS = (
     "new OUT/mine.yaml",
     "schema OUT/schema.json",
     "evaluate CASES/thesis-1975.yaml --no-bound --quiet --out OUT",
     "optimise CASES/thesis-1975.yaml --starts 1 --no-bound --quiet --out OUT",
-    "optimise CASES/thesis-1975.yaml --structure feed-forward --starts 1 --no-bound --quiet "
-    "--out OUT",
-    "structures CASES/thesis-1975.yaml --structures payload-feedback,feed-forward --starts 1 "
-    "--no-bound --quiet --out OUT",
+    f"optimise CASES/thesis-1975.yaml {_UNIT} --structure feed-forward --starts 1 --no-bound "
+    "--quiet --out OUT",
+    f"structures CASES/thesis-1975.yaml {_UNIT} --structures payload-feedback,feed-forward "
+    "--starts 1 --no-bound --quiet --out OUT",
     "sensitivity CASES/thesis-1975.yaml --second 0 --quiet --out OUT",
     "sensitivity CASES/thesis-1975.yaml --second 0 --vary payload.mass=5% "
     "--vary rope.axial_stiffness=5% --samples 32 --quiet --out OUT",

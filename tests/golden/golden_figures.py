@@ -383,16 +383,19 @@ STRUCTURES: dict[tuple[str, str], dict[str, float]] = {
 }
 
 
-def structure_case(name: str) -> sh.Case:
+def structure_case(name: str, structure: str = "") -> sh.Case:
     """Return the case that a structure is looked at on."""
-    return case(name).replace(_LATE_NOISY) if name == "thesis-1975" else case(name)
+    if name != "thesis-1975":
+        return case(name)
+    cell = {"sensors.load_cell": {"bandwidth": 1e5}} if structure == "constant-tension" else {}
+    return case(name).replace({**_LATE_NOISY, **cell})
 
 
 @group()
 def structures(found: Figures) -> None:
     """Every structure with parameters that stand here."""
     for (name, structure), parameters in STRUCTURES.items():
-        posed = pose(structure_case(name), structure)
+        posed = pose(structure_case(name, structure), structure)
         controller = posed.controller(parameters)
         problem = posed.problem
         view = Assessment(posed.plant, controller, problem.disturbances, drag=problem.drag)
