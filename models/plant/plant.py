@@ -79,17 +79,6 @@ class OperatingPoint:
     outputs: Mapping[str, float]
     residual: float
 
-    def __str__(self) -> str:
-        """Return a small tree of the static values."""
-        return (
-            "OperatingPoint\n"
-            f"├ rope tension at the drum: {self.tension / 1e3:.4g} kN\n"
-            f"├ rope elongation: {self.elongations.sum():.4g} m\n"
-            f"├ motor torque: {self.torque / 1e3:.4g} kN m\n"
-            f"├ drive command: {self.command:.4g}\n"
-            f"└ residual: {self.residual:.1e}"
-        )
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Plant(Equations):
@@ -224,20 +213,6 @@ class Plant(Equations):
             rates=RATES,
             units=self.units,
             static={**hauling.outputs, "drive.command": hauling.command},
-        )
-
-    def __str__(self) -> str:
-        """Return a small tree of what the plant is made of."""
-        data = self.data
-        return (
-            f"Plant with {len(self.states)} states\n"
-            f"├ rope: {data.rope_length:g} m as {self.masses} "
-            f"{'mass' if self.masses == 1 else 'masses'} ({data.lumping})\n"
-            f"├ payload: {data.payload_mass / 1e3:.4g} t with added mass, "
-            f"{data.payload_weight / 1e3:.4g} kN in water\n"
-            f"├ motor: {data.motor}, drum radius {data.drum_radius:.4g} m, "
-            f"gear {data.gear_ratio:g}\n"
-            f"└ outputs: {', '.join(self.outputs)}"
         )
 
 

@@ -156,14 +156,6 @@ class Kernel:
         """Pickle the function and the wish; the library is found again where it is opened."""
         return functools.partial(Kernel, compiled=self._asked), (self._given,)
 
-    @override
-    def __repr__(self) -> str:
-        how = "C" if self.compiled else "CasADi's virtual machine"
-        return (
-            f"Kernel({self.states} states, {self.row_size} per row, {self.parameters} parameters, "
-            f"{self.outputs} outputs, in {how})"
-        )
-
 
 class _Compiled:
     """The recursion as C; it works in place: `state` is changed, `out` filled."""

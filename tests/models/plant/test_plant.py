@@ -66,7 +66,6 @@ def test_operating_point_holds_the_load(data: PlantData) -> None:
     own_state = [n for n in ("motor.current", "motor.torque") if n in plant.states]
     still = [i for i, name in enumerate(plant.states) if name not in own_state]
     np.testing.assert_allclose(rest.x[still], 0.0, atol=1e-9)
-    assert f"{tension / 1e3:.4g} kN" in str(rest)
 
 
 def test_static_elongation_tends_to_that_of_a_hanging_rope() -> None:
@@ -509,8 +508,7 @@ def test_masses_are_chosen_or_given() -> None:
     auto = replace(ROPE, masses=None)
     assert build_plant(auto).masses == auto.chosen_masses() > 10
     assert build_plant(auto, masses=3).masses == 3
-    assert "2000 m as 3 masses (distributed)" in str(build_plant(auto, masses=3))
-    assert "as 1 mass (thesis)" in str(build_plant(THESIS))
+    assert build_plant(THESIS).masses == 1
     with pytest.raises(InputError, match=r"masses must be in \[1, 40\], got 41"):
         build_plant(auto, masses=41)
 
