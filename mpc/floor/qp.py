@@ -30,7 +30,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
 from models.basics import FloatArray, SolverError
@@ -134,43 +133,15 @@ class _Assembly:
     def _dynamics(self) -> tuple[sp.csc_matrix, FloatArray]:
         """From block to block; the first row block fixes y[0] where the start is given."""
         problem, n = self._problem, self._n
-        rows: list[npt.NDArray[np.int64]] = []
-        columns: list[npt.NDArray[np.int64]] = []
-        values: list[FloatArray] = []
-        b: list[FloatArray] = []
-        count = 0
-
-        def put(block: FloatArray, column: npt.NDArray[np.int64]) -> None:
-            """Put (k, n, w) entries below each other, at columns (k,)."""
-            nonlocal count
-            i, j = np.nonzero(np.abs(block).max(axis=0) > _ENTRY)
-            k = np.arange(len(block))[:, None]
-            rows.append((count + n * k + i).ravel())
-            columns.append((column[:, None] + j).ravel())
-            values.append(block[:, i, j].ravel())
-
+        first = sp.block_diag([_repeated(g.maps[0], g.blocks) for g in self._groups], format="csr")
+        after = sp.block_diag([_repeated(g.maps[-1], g.blocks) for g in self._groups], format="csr")
+        drift = np.concatenate([g.drift[:, -1].ravel() for g in self._groups])
+        # After the last block nothing follows: the end of a record is free.
+        A, b = after[:-n] - first[n:], -drift[:-n]
         if problem.start is not None:
-            put(np.eye(n)[None], np.zeros(1, dtype=np.int64))
-            b.append(problem.start - problem.still[0])
-            count += n
-        for at, g in enumerate(self._groups):
-            width = n + self._m * g.length
-            start = g.offset + width * np.arange(g.blocks, dtype=np.int64)
-            end = g.offset + g.blocks * width
-            following = np.append(start[1:], end)
-            # After the last block nothing follows: the end of a record is free.
-            if at == len(self._groups) - 1:
-                start, following = start[:-1], following[:-1]
-            if len(start):
-                put(np.broadcast_to(g.maps[-1], (len(start), *g.maps[-1].shape)), start)
-                put(np.broadcast_to(-np.eye(n), (len(start), n, n)), following)
-                b.append(-g.drift[: len(start), -1].ravel())
-                count += n * len(start)
-        if not rows:
-            return sp.csc_matrix((0, self.variables)), np.zeros(0)
-        entries = (np.concatenate(rows), np.concatenate(columns))
-        A = sp.csc_matrix((np.concatenate(values), entries), (count, self.variables))
-        return A, np.concatenate(b)
+            A = sp.vstack([first[:n], A])
+            b = np.concatenate([problem.start - problem.still[0], b])
+        return sp.csc_matrix(A), b
 
     def _limits(self, rows: int) -> tuple[sp.csc_matrix, FloatArray, FloatArray]:
         problem, plant = self._problem, self._problem.plant
@@ -197,7 +168,7 @@ class _Assembly:
             lower = np.hstack([-1.0 - flat, -hang.reshape(g.blocks, -1)])
             span = slice(g.rows, g.rows + lower.size)
             low[span], high[span] = lower.ravel(), upper.ravel()
-            parts.append(sp.kron(sp.eye(g.blocks), sp.csr_matrix(g.G), format="csr"))
+            parts.append(_repeated(g.G, g.blocks))
         return sp.csc_matrix(sp.block_diag(parts, format="csc")), low, high
 
     def solution(self, x: FloatArray, prices: FloatArray, iterations: int) -> RecordSolution:
@@ -257,7 +228,6 @@ def _group(
     if not math.isfinite(problem.minimum_tension):
         hang = hang[:, :0]
     G = np.concatenate([windows.reshape(-1, width), hang.reshape(-1, width)])
-    G[np.abs(G) < _ENTRY] = 0.0
     return _Group(
         first=first,
         blocks=blocks,
@@ -268,6 +238,12 @@ def _group(
         G=G,
         drift=drift,
     )
+
+
+def _repeated(block: FloatArray, count: int) -> sp.csr_matrix:
+    """Return a block on a diagonal, so many times."""
+    kept = sp.csr_matrix(np.where(np.abs(block) > _ENTRY, block, 0.0))
+    return sp.kron(sp.eye(count), kept, format="csr")
 
 
 def _stacked(blocks: FloatArray) -> sp.csc_matrix:
