@@ -137,11 +137,11 @@ class _Assembly:
         after = sp.block_diag([_repeated(g.maps[-1], g.blocks) for g in self._groups], format="csr")
         drift = np.concatenate([g.drift[:, -1].ravel() for g in self._groups])
         # After the last block nothing follows: the end of a record is free.
-        A, b = after[:-n] - first[n:], -drift[:-n]
+        A, b = sp.csc_matrix(after[:-n] - first[n:]), -drift[:-n]
         if problem.start is not None:
-            A = sp.vstack([first[:n], A])
+            A = sp.csc_matrix(sp.vstack([first[:n], A]))
             b = np.concatenate([problem.start - problem.still[0], b])
-        return sp.csc_matrix(A), b
+        return A, b
 
     def _limits(self, rows: int) -> tuple[sp.csc_matrix, FloatArray, FloatArray]:
         problem, plant = self._problem, self._problem.plant

@@ -91,7 +91,6 @@ FORMATS: Mapping[str, Reader] = {
 _BUNDLED = {
     "osv-83m": "offshore support vessel, 83 m, from our own hull lines by Capytaine",
 }
-_SUFFIXES = (".nc", ".csv")
 _HDF5 = b"\x89HDF"
 _LARGEST = 1e4  # m/m or rad/m: no vessel moves so
 
@@ -204,7 +203,7 @@ def write_raos(path: str | Path, raos: VesselRaos) -> Path:
 
 def bundled_vessels() -> tuple[tuple[str, str], ...]:
     """Return the vessels that come with the toolkit: name and description."""
-    return tuple((name, about) for name, about in _BUNDLED.items() if _bundled(name) is not None)
+    return tuple(_BUNDLED.items())
 
 
 def file_format_of(owner: str, data: bytes) -> str:
@@ -292,18 +291,13 @@ def _complex(value: complex) -> str:
 
 def _place(path: str | Path) -> Path:
     """Return the file of a path, or of the name of a bundled vessel."""
-    name = str(path)
-    if name in _BUNDLED:
-        return (None if Path(path).exists() else _bundled(name)) or Path(path)
-    if not Path(name).suffix and "\x00" not in name and not Path(name).exists():
-        every = ", ".join(known for known, _ in bundled_vessels())
+    name, place = str(path), Path(path)
+    there = "\x00" in name or bool(place.suffix) or place.exists()
+    if name in _BUNDLED and not there:
+        return Path(str(resources("models.vessel"))) / "data" / f"{name}.csv"
+    if not there:
         raise InputError(
             f"{name}: there is no such file, and no bundled vessel of this name "
-            f"(there is: {every or 'none'})"
+            f"(there is: {', '.join(_BUNDLED)})"
         )
-    return Path(path)
-
-
-def _bundled(name: str) -> Path | None:
-    folder = Path(str(resources("models.vessel"))) / "data"
-    return next((f for s in _SUFFIXES if (f := folder / f"{name}{s}").is_file()), None)
+    return place
