@@ -15,6 +15,7 @@ import numpy.typing as npt
 from models.basics import GRAVITY, FloatArray
 from synth.operability import AtDepth, Criterion, Operability
 
+from ..designs import LIMITS
 from ..text import (
     AFTER,
     BEFORE,
@@ -53,14 +54,22 @@ _FAR = 3.0  # times what can be reached: beyond, a limit is not shown
 def limit_text(criterion: Criterion) -> str:
     """Return a limit with its bound, as ``motor speed 2000 rpm``."""
     if criterion.limit is None:
-        return criterion.label
+        return criterion.name
     bound = (
         quantity(criterion.bound, "rpm")
         if criterion.unit == "rad/s"
         else quantity(criterion.bound, criterion.unit)
     )
     kind = {"payload.rms": " rms", "payload.significant": " sign.", "payload.max": " max."}
-    return f"{criterion.label} {bound}{kind.get(criterion.name, '')}"
+    return f"{_label(criterion.name)} {bound}{kind.get(criterion.name, '')}"
+
+
+def _label(name: str) -> str:
+    """Return a criterion in words."""
+    if name in LIMITS:
+        return LIMITS[name][0]
+    own = {"stability": "stability", "payload.speed": "payload speed"}
+    return own.get(name, "payload motion")
 
 
 def line_of(name: str) -> tuple[str, Any]:
@@ -275,7 +284,7 @@ def _finding(study: Operability, at: AtDepth, h: int) -> str:
         return "Nothing binds below the steepest seas"
     low, high = float(finite.min()), float(finite.max())
     names, counts = np.unique(contour.binding[h][real], return_counts=True)
-    label = {c.name: c.label for c in contour.criteria}[str(names[counts.argmax()])]
+    label = _label(str(names[counts.argmax()]))
     span = f"{low:.2g} m" if math.isclose(low, high, rel_tol=0.02) else f"{low:.2g} to {high:.2g} m"
     who = "" if "loop" in at.contours else ", drum held"
     return f"Workable up to H_s {span}{who}; most often bound by {label}"

@@ -19,22 +19,6 @@ from models.plant import LinearPlant
 from ..limits import PAYLOAD, Continuous, Limit, Minimum, Peak, Rms, drive_limits
 
 _BROKEN = 10.0  # excess of what is broken beyond measure
-_LABELS = {
-    "payload.rms": "payload motion",
-    "payload.significant": "payload motion",
-    "payload.max": "payload motion",
-    "payload.speed": "payload speed",
-    "motor.torque.peak": "motor torque, peak",
-    "motor.torque.continuous": "motor torque, continuous",
-    "motor.speed.peak": "motor speed",
-    "motor.voltage.peak": "motor voltage",
-    "motor.current.peak": "motor current, peak",
-    "motor.current.continuous": "motor current, continuous",
-    "motor.power.peak": "motor power",
-    "rope.tension.peak": "rope tension, peak",
-    "rope.tension.least": "rope tension, least",
-    "stability": "stability",
-}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,11 +62,6 @@ class Criterion:
     name: str
     limit: Limit | None
     shown: float = 1.0
-
-    @property
-    def label(self) -> str:
-        """The criterion in words."""
-        return _LABELS.get(self.name, self.name)
 
     @property
     def bound(self) -> float:
