@@ -15,7 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
-from models.basics import BoolArray, FloatArray, SolverError, balanced_truncation, solve_riccati
+from models.basics import (
+    BoolArray,
+    FloatArray,
+    SolverError,
+    balanced_truncation,
+    solve_lyapunov,
+    solve_riccati,
+)
 from models.plant import LinearPlant
 
 from ..loop import LinearController
@@ -63,12 +70,6 @@ def estimator(plant: LinearPlant, W: FloatArray, V: FloatArray, U: FloatArray) -
     return LqgEstimator(gain=-found.gain.T, V=V, Y=found.X)
 
 
-def state_covariance(plant: LinearPlant, feedback: LqgRegulator) -> FloatArray:
-    """Return the covariance of the state, (n, n), under u = K x and white noises of intensity 1."""
-    covariance = solve_continuous_lyapunov(plant.A + plant.B @ feedback.gain, -plant.E @ plant.E.T)
-    return np.asarray(0.5 * (covariance + covariance.T))
-
-
 def projected(plant: LinearPlant, feedback: LqgRegulator, mask: BoolArray) -> FloatArray:
     """Return the gain on what is measured, (nu, ny), that comes closest to a state feedback.
 
@@ -76,7 +77,8 @@ def projected(plant: LinearPlant, feedback: LqgRegulator, mask: BoolArray) -> Fl
     outside `mask`, (nu, ny), kept at zero; exact where the measurements hold the state.
     """
     heard = plant.C + plant.D @ feedback.gain
-    covariance = state_covariance(plant, feedback)
+    loop = plant.A + plant.B @ feedback.gain
+    covariance = solve_lyapunov(loop, plant.E @ plant.E.T)
     gain = np.zeros(mask.shape)
     for i, free in enumerate(mask):
         row = heard[free] @ covariance

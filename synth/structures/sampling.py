@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -94,15 +95,7 @@ class SampledLoop:
         settled = f(self.recursion.initial, self.rest.values)[0]
         blocks = [ca.jacobian(out, by) for out in (following, command) for by in (xc, m)]
         found = ca.Function("jacobians", [xc, m], blocks).call([settled, ca.DM(self.rest.values)])
-        into_state, into_measured, on_state, on_measured = (
-            np.asarray(block.full(), dtype=np.float64) for block in found
-        )
-        return Jacobians(
-            into_state=into_state,
-            into_measured=into_measured,
-            on_state=on_state,
-            on_measured=on_measured,
-        )
+        return Jacobians(*(np.asarray(block.full(), dtype=np.float64) for block in found))
 
     @cached_property
     def world(self) -> World:
@@ -140,8 +133,7 @@ class SampledLoop:
         return world
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Jacobians:
+class Jacobians(NamedTuple):
     """xc_next = into_state xc + into_measured m; u = on_state xc + on_measured m."""
 
     into_state: FloatArray

@@ -169,18 +169,14 @@ class _Winch:
     def demands(self) -> dict[str, Demand]:
         design = self.design
         found = case_demands(design.case, self.data, self.coarse.plant, design.masses)
-        if not any(name.startswith("payload.") for name in design.controller.measurements):
-            # Who does not hear the payload cannot keep it from drifting with the ship.
-            found = {
-                name: replace(demand, enforced=demand.enforced and demand.kind != "low_frequency")
-                for name, demand in found.items()
-            }
-        if not design.drive_kept:
-            found = {
-                name: replace(demand, enforced=demand.enforced and not demand.drive)
-                for name, demand in found.items()
-            }
-        return found
+        # Who does not hear the payload cannot keep it from drifting with the ship.
+        deaf = not any(name.startswith("payload.") for name in design.controller.measurements)
+        return {
+            name: replace(demand, enforced=False)
+            if (deaf and demand.kind == "low_frequency") or (demand.drive and not design.drive_kept)
+            else demand
+            for name, demand in found.items()
+        }
 
     @cached_property
     def coarse_moments(self) -> dict[str, tuple[float, ...]]:
