@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .drum_speed import DrumSpeedLoop, SteadyMotion
     from .fixed import Fixed
     from .low_order import LowOrder, LowOrderFeedback, LowOrderLaw
-    from .lqg import LqgEstimator, LqgRegulator, estimator, reduced, regulator, weighing
+    from .lqg import LqgEstimator, LqgRegulator, estimator, reduced, regulator, shaped, weighing
     from .recursive import RecursiveController, Signals, checked_sample_time, make_recursion
     from .sampled_controller import Matrices, low_pass_matrices, sampled, tracking_gain
     from .sampling import SampledLoop, sampled_loop
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
         Structure,
         pace,
     )
-    from .whitened import shaped
     from .winch_diagram import TRANSPARENT, WinchLaw, WinchStructure
     from .winch_structures import (
         structure_aboard,

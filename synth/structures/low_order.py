@@ -48,6 +48,7 @@ from .lqg import (
     reduced,
     regulator,
     weighing,
+    whitened,
 )
 from .structure import (
     PAYLOAD_MEASUREMENTS,
@@ -60,7 +61,6 @@ from .structure import (
     gain_scales,
     pace,
 )
-from .whitened import whitened
 
 _PADE = 4  # of the delays, in the designs that candidates are made of
 _SIDE = 12  # so many regulators times so many filters

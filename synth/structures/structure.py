@@ -22,8 +22,7 @@ from models.basics import ComplexArray, FloatArray, InputError, check_range, pic
 from models.plant import LinearPlant
 
 from ..loop import Disturbance, LinearController, closed_loop_matrix
-from .lqg import designs, projected
-from .whitened import whitened
+from .lqg import designs, projected, whitened
 
 Bounds = Mapping[str, tuple[float, float]]
 

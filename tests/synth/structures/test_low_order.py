@@ -26,8 +26,7 @@ from synth.loop import Disturbance, LinearController, disturbances
 from synth.question import Problem
 from synth.search.starts import candidates, crossover_grid
 from synth.structures import LowOrder, ParametrisedController, reduced, weighing
-from synth.structures.lqg import designs, regulator
-from synth.structures.whitened import whitened
+from synth.structures.lqg import designs, regulator, whitened
 
 WHITE = {"f": White(1.0), "n": White(0.01)}
 WEIGHTS = {"x": 1.0, "effort": 0.1}
