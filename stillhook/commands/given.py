@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import shlex
 import warnings
 from collections.abc import Mapping, Sequence
@@ -142,16 +141,11 @@ def parse_gains(text: str, structure: str = "payload-feedback") -> dict[str, flo
     """
     plain = structure == "payload-feedback"
     form = "numbers for A, a, a1 and a2, as in A=1,a=0,a1=0,a2=0.5" if plain else "NAME=NUMBER,.."
-    gains: dict[str, float] = {}
-    for name, value in split_pairs("--gains", form, text.split(","), empty=True).items():
-        if plain and name not in _NAMES:
-            raise InputError(f"--gains: must be {form}, got {f'{name}={value}'!r}")
-        try:
-            gains[name] = float(value)
-        except ValueError:
-            raise InputError(f"--gains: {name} must be a number, got {value!r}") from None
-        if not math.isfinite(gains[name]):
-            raise InputError(f"--gains: {name} must be a finite number, got {value!r}")
+    pairs: dict[str, Any] = split_pairs("--gains", form, text.split(","), empty=True)
+    odd = [f"{name}={value}" for name, value in pairs.items() if plain and name not in _NAMES]
+    if odd:
+        raise InputError(f"--gains: must be {form}, got {odd[0]!r}")
+    gains = {name: check_range("--gains", name, value) for name, value in pairs.items()}
     missing = [name for name in _NAMES[1:] if plain and name not in gains]
     if missing:
         raise InputError(f"--gains: {' and '.join(missing)} must be given too, got {text!r}")

@@ -442,7 +442,7 @@ WRONG_WORDS = {
     ),
     "gain in words": (
         "evaluate thesis-1975 --gains a=much,a1=3,a2=4",
-        "--gains: a must be a number, got 'much'",
+        "--gains: a must be a finite number, got 'much'",
     ),
     "gain without end": (
         "evaluate thesis-1975 --gains a=inf,a1=3,a2=4",
