@@ -28,8 +28,8 @@ from models.operation import scenario_names
 from stillhook import cli
 from stillhook.commands.given import parse_options
 from stillhook.commands.run import simulate as command
-from stillhook.commands.run.scenarios import CONTROLLER_TEXTS
 from stillhook.commands.run.simulate_given import parse_controllers
+from stillhook.controllers import CONTROLLER_TEXTS
 from synth.controllers import CONTROLLERS
 
 CALM = ("thesis-1975", "--set", "sea.significant_height=0.3")
@@ -533,7 +533,7 @@ def test_commands_to_go_on_with_work(run):
     assert parsed[0].case == "with space/case.yaml"
     assert parsed[0].controller == "all"
     assert (parsed[1].seeds, parsed[2].animate) == (10, True)
-    assert parsed[1].options == ["distance=1 m"]
+    assert parsed[1].option == ["distance=1 m"]
     assert parsed[1].hours == 0.02
     again = run(*found[1], "--quiet", "--no-figures", "--traces", "none")
     assert again.status == 0
@@ -545,7 +545,7 @@ def test_scenarios_lists_operations_and_controllers(run):
     assert ending.status == 0
     for name in (*scenario_names(), *CONTROLLERS):
         assert re.search(rf"^  {name} +\S", ending.out, re.MULTILINE)
-    assert set(CONTROLLER_TEXTS) == set(CONTROLLERS)
+    assert set(CONTROLLER_TEXTS) > set(CONTROLLERS)
     assert max(map(len, ending.out.splitlines())) <= 80
 
 
