@@ -25,21 +25,20 @@ from ..loop import (
     LoopResponses,
     at_least,
     counted_poles,
-    crossings,
     exp,
+    imag,
     joined,
     level_ends,
     log,
     real,
-    refine_minima,
     sqrt,
     value_of,
 )
 from ..structures import ParametrisedController
+from .places import SHIFT, beside, crossings, peaks
 from .problem import Goal, Problem
 
 _FAINT = 1e-3  # loop gains whose crossings of the axis no gain margin is about
-_SHIFT = 1e-6  # relative, of a frequency or a parameter, of differences
 _SMALL = 1e-3  # of its typical size: a parameter below it is shifted as if it were that
 _SINGLE, _NUDGE = 1e-9, 1e-15  # product of unit eigenvectors below which poles are pulled apart
 _LEAST_CYCLES = float(np.exp(0.5))  # of a peak: a factor of one, below which the log turns negative
@@ -206,13 +205,13 @@ class LoopNumbers:
         if fresh is None:
             return found
         for take, (omega, curve) in zip(takes, found[:], strict=True):
-            there = size(omega, value_of(curve))
 
-            def away(w: FloatArray, take: Callable[[LoopResponses], Any] = take) -> FloatArray:
-                return -size(w, value_of(take(fresh(w, False))))
+            def sized(w: FloatArray, take: Callable[[LoopResponses], Any] = take) -> FloatArray:
+                return size(w, value_of(take(fresh(w, False))))
 
-            at, _ = refine_minima(away, omega, -there, there > above)
-            found.append((at, self._padded(take(fresh(at, isinstance(curve, Dual))))))
+            at = peaks(sized, omega, size(omega, value_of(curve)), above)
+            if at.size:
+                found.append((at, self._padded(take(fresh(at, isinstance(curve, Dual))))))
         return found
 
     @cached_property
@@ -247,13 +246,13 @@ class LoopNumbers:
                 break
         product = np.where(product == 0.0, 1.0, product)
         scales = [_SMALL * p.scale for p in problem.law.parameters]
-        steps = np.diag(_SHIFT * np.maximum(np.abs(values), scales))
+        steps = np.diag(SHIFT * np.maximum(np.abs(values), scales))
         slopes = []
         ends = [[(values + sign * step, drag) for sign in (1.0, -1.0)] for step in steps]
         widths = [2.0 * step.sum() for step in steps]
         if problem.drag is not None:
-            ends.append([(values, drag * (1.0 + sign * _SHIFT)) for sign in (1.0, -1.0)])
-            widths.append(2.0 * _SHIFT)  # of its logarithm
+            ends.append([(values, drag * (1.0 + sign * SHIFT)) for sign in (1.0, -1.0)])
+            widths.append(2.0 * SHIFT)  # of its logarithm
         for (more, less), width in zip(ends, widths, strict=True):
             change = problem.loop_matrix(plant, *more) - problem.loop_matrix(plant, *less)
             slopes.append(np.einsum("ik,ij,jk->k", left.conj(), change / width, right) / product)
@@ -271,22 +270,12 @@ class LoopNumbers:
         found = []
         for i, d in enumerate(self.differences):
             gain = value_of(d) - 1.0
-            at = crossings(
-                partial(_height, fresh, i),
-                self.omega,
-                gain.imag,
-                np.abs(gain) > _FAINT,
-            )
-            ends = self.omega[[0, -1]][level_ends(gain)]
-            for places, moves in ((at, True), (ends, False)):
-                loop = self._padded(fresh(places, isinstance(d, Dual)).difference(i) - 1.0)
-                if isinstance(loop, Dual):
-                    slope = loop.slope
-                    if moves:
-                        rate = _rate(fresh, places, i)
-                        slope = slope - rate * slope.imag / rate.imag
-                    loop = Dual(loop.value.real, slope.real)
-                found.append(real(loop)[..., value_of(real(loop)) < 0.0])
+            at = crossings(partial(_height, fresh, i), self.omega, gain.imag, np.abs(gain) > _FAINT)
+            loop, rate = self._moving(fresh, at, i, isinstance(d, Dual))
+            crossed = real(loop) - imag(loop) * (rate.real / rate.imag)
+            ends = (d - 1.0)[..., [0, -1]]
+            for on in (crossed, real(ends)[..., level_ends(gain)]):
+                found.append(on[..., value_of(on) < 0.0])
         return joined(found)
 
     @cached_property
@@ -299,18 +288,26 @@ class LoopNumbers:
         for i, d in enumerate(self.differences):
             size = np.abs(value_of(d) - 1.0) - 1.0
             at = crossings(partial(_excess, fresh, i), self.omega, size)
-            loop = self._padded(fresh(at, isinstance(d, Dual)).difference(i) - 1.0)
+            loop, rate = self._moving(fresh, at, i, isinstance(d, Dual))
             gain = value_of(loop)
             turn = np.mod(np.angle(-gain), 2.0 * np.pi)
             if not isinstance(loop, Dual):
                 found.append(turn / at)
                 continue
-            rate = _rate(fresh, at, i)
             grows = (np.conj(gain) * rate).real
             shift = -(np.conj(gain) * loop.slope).real / grows  # of the crossover, [rad/s]
             turns = ((loop.slope + rate * shift) / gain).imag
             found.append(Dual(turn / at, turns / at - turn / at**2 * shift))
         return joined(found)
+
+    def _moving(
+        self, fresh: Fresh, omega: FloatArray, index: int, slopes: bool
+    ) -> tuple[Any, ComplexArray]:
+        """Return L at frequencies [rad/s], and dL/d omega by central differences, (k,) each."""
+        both = self._padded(fresh(beside(omega), slopes).difference(index) - 1.0)
+        above, below = both[..., : omega.size], both[..., omega.size :]
+        rate = (value_of(above) - value_of(below)) / (2.0 * SHIFT * omega)
+        return (above + below) * 0.5, np.asarray(rate)
 
     @cached_property
     def _moments(self) -> Mapping[tuple[str, int], Any]:
@@ -391,9 +388,3 @@ def _height(fresh: Fresh, index: int, omega: FloatArray) -> FloatArray:
 def _excess(fresh: Fresh, index: int, omega: FloatArray) -> FloatArray:
     """Return |L| - 1, (k,)."""
     return np.abs(_gain(fresh(omega, False), index)) - 1.0
-
-
-def _rate(fresh: Fresh, omega: FloatArray, index: int) -> ComplexArray:
-    """Return dL/d omega by central differences, (k,)."""
-    ends = [_gain(fresh(omega * (1.0 + step), False), index) for step in (_SHIFT, -_SHIFT)]
-    return np.asarray((ends[0] - ends[1]) / (2.0 * _SHIFT * omega))
