@@ -7,10 +7,11 @@ r"""Sequential quadratic programming on few variables and many rows.
 
 An exact penalty on the largest row (Nocedal and Wright, *Numerical Optimization*, 2nd ed., ch. 17
 and 18): the slack keeps every quadratic programme feasible, so that a start may break its limits.
-The Hessian of the Lagrangian begins as differences of its exact slopes and is kept up by damped
-BFGS; rows that cannot come into play within a step stay out of its quadratic programme, which
-DAQP solves by a dual active set.  Points at which the loop is unstable are never evaluated: a
-spectral integral is finite there too.
+The Hessian of the Lagrangian is the model of the curvature that comes with each evaluation, and
+what the slopes tell beyond it by the symmetric rank-one formula.  Steps keep within a box that
+grows and shrinks with how well they were foretold; rows that cannot come into play within it stay
+out of the quadratic programme, which DAQP solves by a dual active set.  Points at which the loop is
+unstable are never evaluated: a spectral integral is finite there too.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ _SLACK = 1e-8  # curvature of the slack, which the quadratic programme wants pos
 _FLAT = 1e-8  # least curvature of the model
 _FLOOR = 1e-4  # of the model, relative to its mean curvature
 _SHARE = 1e-3  # of the model's curvature that every direction has at least
-_STEP = 1e-5  # relative, of differences
 _LEAST = 0.1  # a variable near zero is given this share of the size that moves something by one
 _ROOM, _LEAST_ROOM = 0.5, 1e-9  # how far, relatively, a variable may move at first and at last
 _MOST_ROOM = 4.0
-_HALVINGS = 8
+_CLOSER, _STALLED = 0.3, 12  # of the room, after a step that failed; such steps in a row at most
 _SOUND = 1e-4  # share of the reduction promised that a step must keep
-_STIFF = 1.5  # weight of the rows over the sum of their multipliers
+_FIRST_WEIGHT, _LIGHTER = 10.0, 0.3  # of the rows, and how fast it falls
+_STIFF, _LEAST_PRICE = 1.5, 0.1  # weight over the sum of the multipliers, and that sum at least
 _HEAVY = 1e4  # of the penalty: if rows are broken still, nothing near mends them
 _HOPELESS = 0.999  # share of what rows are broken by that is left where nothing near mends them
 INFEASIBLE = "the limits exclude each other"
@@ -139,17 +140,11 @@ def descend(
     at = evaluate(x)
     if not at.finite:
         return _ended(x, at, np.zeros(at.rows.size), np.zeros(at.equations.size), "no number", 0)
-    rest: FloatArray | None = None  # of the Hessian beside the model of the curvature
-    room, weight = _ROOM, 10.0
-    stalled = 0
+    rest = np.zeros((x.size, x.size))  # of the Hessian beside the model of the curvature
+    room, weight, stalled = _ROOM, _FIRST_WEIGHT, 0
     prices, equation_prices = np.zeros(at.rows.size), np.zeros(at.equations.size)
     for k in range(most):
         size = np.where(logarithmic, 1.0, _sizes(x, at))
-        if rest is None:
-            rest = np.zeros((x.size, x.size))
-            if k:
-                rest = _differences(evaluate, x, size, at, prices, equation_prices, high)
-                rest -= at.curvature
         hessian = at.curvature + rest
         reach = room * size
         box = np.maximum(low - x, -reach), np.minimum(high - x, reach)
@@ -165,8 +160,12 @@ def descend(
             if slack > _HOPELESS * at.broken and np.all(np.abs(step) < 0.5 * reach):
                 return _ended(x, at, prices, equation_prices, INFEASIBLE, k)
         prices, equation_prices = new_prices, new_equation_prices
-        if slack <= _KEPT and weight < _STIFF * total:
-            weight = 2.0 * _STIFF * total
+        if slack <= _KEPT:
+            # No heavier than it must be: a stiff penalty creeps along rows that are curved.
+            enough = _STIFF * max(total, _LEAST_PRICE)
+            weight = (
+                2.0 * enough if weight < enough else max(_LIGHTER * weight, min(weight, enough))
+            )
         model = float(at.slope @ step + 0.5 * step @ hessian @ step)
         promised = weight * (at.broken - slack) - model
         if promised <= tolerance:
@@ -174,23 +173,23 @@ def descend(
                 return _ended(x, at, prices, equation_prices, "", k + 1)
             if weight >= _HEAVY or slack > _KEPT:
                 return _ended(x, at, prices, equation_prices, INFEASIBLE, k)
-        merit = at.objective + weight * at.broken
-        ahead, share = _ahead(evaluate, stable, x, step, merit, weight, promised, at, hessian, box)
-        if ahead is None:
-            room *= 0.2
+        moved, new, share = _tried(evaluate, stable, x, step, weight, promised, at, hessian, box)
+        length = float(np.max(np.abs(moved - x) / size))
+        if new is not None:  # what a step that failed tells of the curvature is worth as much
+            rest = _updated(rest, moved - x, at, new, prices, equation_prices)
+        if new is None or share < _SOUND:
+            room = _CLOSER * min(room, length)
             stalled += 1
-            if stalled == 2:
-                rest = None  # by differences: what the updates have gathered may mislead
-            if room < _LEAST_ROOM or stalled > 4:
+            if room < _LEAST_ROOM or stalled > _STALLED:
                 small = promised <= max(1e2 * tolerance, _NOTHING) and at.broken <= 1e2 * _KEPT
                 done = "" if small else "no step helps"
                 return _ended(x, at, prices, equation_prices, done, k + 1)
             continue
         stalled = 0
-        moved, new = ahead
-        limited = bool(np.any(np.abs(step) >= 0.99 * reach))
-        room = min(_MOST_ROOM, 2.0 * room) if share == 1.0 and limited else room * max(share, 0.25)
-        rest = _updated(rest, moved - x, at, new, prices, equation_prices)
+        if share > 0.75 and np.any(np.abs(step) >= 0.99 * reach):
+            room = min(_MOST_ROOM, 2.0 * room)
+        elif share < 0.25:
+            room = 0.5 * min(room, length)
         x, at = moved, new
         if prices.size != at.rows.size:
             prices = np.zeros(at.rows.size)
@@ -272,63 +271,43 @@ def _quadratic(
     return answer[:n] * reach, max(0.0, float(answer[n])), prices, equation_prices
 
 
-def _ahead(
+def _tried(
     evaluate: Callable[[FloatArray], Evaluation],
     stable: Callable[[FloatArray], bool],
     x: FloatArray,
     step: FloatArray,
-    merit: float,
     weight: float,
     promised: float,
     at: Evaluation,
     hessian: FloatArray,
     box: tuple[FloatArray, FloatArray],
-) -> tuple[tuple[FloatArray, Evaluation] | None, float]:
-    """Return where a step, or a share of it, leads to, and the share; None if nowhere better."""
-    share = 1.0
-    for k in range(_HALVINGS):
-        there = x + share * step
-        if stable(there):
-            new = evaluate(there)
-            # A hair of slack: at the answer itself the merit only rounds.
-            wanted = merit - _SOUND * share * promised + 1e-12 * (1.0 + abs(merit))
-            if new.finite and new.objective + weight * new.broken <= wanted:
-                return (there, new), share
-            if k == 0 and new.finite and new.rows.size == at.rows.size:
-                # Rows curve: a second step takes up what the first one left broken.
-                rows = new.rows - at.jacobian @ step
-                equations = new.equations - at.equation_slopes @ step
-                again = _quadratic(at, rows, equations, hessian, box, weight)
-                if again is not None and stable(x + again[0]):
-                    bent = evaluate(x + again[0])
-                    if bent.finite and bent.objective + weight * bent.broken <= wanted:
-                        return (x + again[0], bent), 1.0
-        share *= 0.5 if k < 3 else 0.25
-    return None, share
+) -> tuple[FloatArray, Evaluation | None, float]:
+    """Return where a step leads to, what is there, and the share of what it promised that it kept.
 
+    There is nothing where the loop is unstable.
+    """
+    merit = at.objective + weight * at.broken
 
-def _differences(
-    evaluate: Callable[[FloatArray], Evaluation],
-    x: FloatArray,
-    sizes: FloatArray,
-    at: Evaluation,
-    prices: FloatArray,
-    equation_prices: FloatArray,
-    high: FloatArray,
-) -> FloatArray:
-    """Return the Hessian of the Lagrangian by differences of its slope."""
-    here = at.lagrangian_slope(prices, equation_prices)
-    hessian = np.zeros((x.size, x.size))
-    for i in range(x.size):
-        size = _STEP * sizes[i]
-        there = x.copy()
-        there[i] += size if x[i] + size <= high[i] else -size
-        new = evaluate(there)
-        if not new.finite or new.rows.size != at.rows.size:
-            hessian[i, i] = 1.0 / sizes[i] ** 2
-            continue
-        hessian[i] = (new.lagrangian_slope(prices, equation_prices) - here) / (there[i] - x[i])
-    return 0.5 * (hessian + hessian.T)
+    def kept(new: Evaluation) -> float:
+        # A hair of slack: at the answer itself the merit only rounds.
+        gained = merit - new.objective - weight * new.broken + 1e-12 * (1.0 + abs(merit))
+        return gained / promised
+
+    there = x + step
+    new = evaluate(there) if stable(there) else None
+    if new is None or not new.finite:
+        return there, None, -np.inf
+    share = kept(new)
+    if share < 0.25 and new.rows.size == at.rows.size and weight * new.broken > 0.1 * promised:
+        # Rows curve: a second step takes up what the first one left broken.
+        rows = new.rows - at.jacobian @ step
+        equations = new.equations - at.equation_slopes @ step
+        again = _quadratic(at, rows, equations, hessian, box, weight)
+        if again is not None and stable(x + again[0]):
+            bent = evaluate(x + again[0])
+            if bent.finite and kept(bent) > share:
+                return x + again[0], bent, kept(bent)
+    return there, new, share
 
 
 def _convex(curvature: FloatArray, model: FloatArray) -> FloatArray:
