@@ -52,7 +52,7 @@ NESTED = (
 _AS_STILL = 1.05  # of the stillest design's motion, with which a simpler one is preferred
 _ROUGHEST = 0.99  # of the largest sea that any structure can do
 _SHARE = 4  # of the starts that each of several structures has
-_RESUMED = 5  # ends of a search that the next one, on more masses, begins from
+_RESUMED = 3  # ends of a search that the next one, on more masses, begins from
 _HAIR = 1e-4  # relative excess over a limit in the largest sea
 _CALMER = 3.0  # logarithm of what the largest sea may have to be calmer by, for the sensors' noise
 
@@ -289,9 +289,11 @@ def _again(
     known: Sequence[Sequence[float]] = (),
 ) -> Tuning:
     """Return the answer for more members or more rope masses, from the ends of a search."""
-    ends = [s.end for s in sorted(tuning.starts, key=lambda s: s.cost) if s.converged][:_RESUMED]
+    ranked = sorted((s for s in tuning.starts if s.converged), key=lambda s: -s.cost)
+    apart = {f"{s.cost:.4g}": s.end for s in ranked}  # of starts that agree one
+    ends = [*reversed(apart.values())][:_RESUMED]
     if tuning.found.solved is not None:
-        ends = [tuning.found.solved.values, *ends]
+        ends = [tuning.found.solved.values, *ends[1:]]
     if family.objective is Objective.REGRET:
         family = with_bests(family, seed, ends, progress)
     found = search(family, 1, seed, ends, progress, only_guesses=True)

@@ -1,9 +1,10 @@
 """Multi-start search: many starts on moderate nodes, the best answers polished on fine ones.
 
-    Family -> starts -> descent from each -> distinct answers -> polished -> Found
+    Family -> starts -> rough descents -> places -> starts far about the best -> more places
+           -> descents to the end -> distinct answers -> polished -> Found
 
-A single plant is a family of one.  The descents stop once eight starts, and most of them, agree on
-the best place.
+A single plant is a family of one.  The first descents stop once six of them, and most, come by one
+place; what they all miss is looked for about the best.
 """
 
 from __future__ import annotations
@@ -19,16 +20,15 @@ from ..loop import Assessment
 from ..question import FamilyLoop, FamilyProblem, Goal, Problem, Values
 from .polishing import KEPT, assess, polish, settle, stated
 from .programme import Solution
-from .starts import begin_points, briskest, start_coefficients
+from .starts import begin_points, briskest, scattered, start_coefficients
 
 Progress = Callable[[str, int, int], None]
 
 AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
-_ENOUGH, _MOST = 8, 0.7  # starts, and share of all, that agree on the best answer: no more needed
+_ENOUGH, _MOST = 6, 0.6  # starts, and share of all, that come by one place: no more are needed
+_SCATTER, _MOST_SCATTER, _HOPS = 2, 12, 3  # starts about the best, by parameter; most; how often
 _NEAR, _BESIDE = 0.05, 0.25  # of log cost and parameters, relative: on the way to one end
 _POLISHED = 6  # distinct answers that are polished at most
-_MORE, _LEAST_MORE = 2, 6  # times the starts, and at least, that are tried roughly beside them
-_MOST_MORE = 108  # ... and at most, over the number of parameters
 _BEHIND = 0.2  # of the log cost, that a rough answer may lie behind the best one
 _RESERVE = 16  # further starts for a search of which none arrived
 _VIOLATION = 3  # starts of the least violation
@@ -148,11 +148,14 @@ def search(
     begins = [guess for guess in kept if family.stable(guess)] if only_guesses else []
     if not begins:
         # The reserve is picked together with the starts, so that it lies apart from them.
-        begins = begin_points(family, _rough(family, starts, len(kept)) + _RESERVE, seed, kept)
+        begins = begin_points(family, max(starts, len(kept)) + _RESERVE, seed, kept)
     if not begins:
         return Found(solved=None)
     reference = briskest(family, begins)
-    records, first = _descents(family, begins, reference, starts, len(kept), tell)
+    places = _places(family, begins, reference, max(starts, len(kept)), len(kept), tell)
+    if not only_guesses:
+        _hopped(family, places, reference, starts, seed, tell)
+    records, first = _descents(family, places, reference, starts, tell)
     if not first:
         solved = least_violation(family, begins, reference)
         assessments, excess = assess(family, solved)
@@ -186,37 +189,80 @@ def search(
     )
 
 
-def _descents(
+def _places(
     family: FamilyProblem,
     begins: Sequence[FloatArray],
     reference: FloatArray,
-    starts: int,
+    count: int,
     guesses: int,
     tell: Progress,
-) -> tuple[tuple[Start, ...], list[Solution]]:
-    """Return the records of the starts, and the answers of those that arrived.
-
-    All of them go roughly where they lead, which is cheap; of the places where they come by, the
-    best few are gone to the end of.
-    """
-    drags = start_coefficients(family)
+) -> list[_Place]:
+    """Return where starts roughly lead, until enough of them agree."""
     places: list[_Place] = []
-    count = min(_rough(family, starts, guesses), len(begins))
     for k, begin in enumerate(begins):
         if k >= count and any(place.arrived for place in places):
             break  # the reserve is for a search of which no start has arrived yet
         if k >= guesses and _agreed(places):
             break
         tell("starts", min(k, count - 1), count)
-        # By discs and by true margins in turns: each of them finds basins that the other misses.
-        exact = k % 2 == 1
-        coarse = settle(family, begin, drags, reference=reference, rounds=1, exact=exact)
-        place = next((p for p in places if _same(family, p.coarse, coarse)), None)
-        if place is None:
-            place = _Place(coarse)
-            places.append(place)
-        place.begins.append(begin)
+        _come_by(family, places, begin, start_coefficients(family), reference)
     tell("starts", count, count)
+    return places
+
+
+def _come_by(
+    family: FamilyProblem,
+    places: list[_Place],
+    begin: FloatArray,
+    coefficients: Sequence[float | None],
+    reference: FloatArray,
+) -> None:
+    """Add a start to the places where it leads."""
+    # By discs and by true margins in turns: each of them finds basins that the other misses.
+    exact = sum(len(place.begins) for place in places) % 2 == 1
+    coarse = settle(family, begin, coefficients, reference=reference, rounds=1, exact=exact)
+    place = next((p for p in places if _same(family, p.coarse, coarse)), None)
+    if place is None:
+        place = _Place(coarse)
+        places.append(place)
+    place.begins.append(begin)
+
+
+def _hopped(
+    family: FamilyProblem,
+    places: list[_Place],
+    reference: FloatArray,
+    starts: int,
+    seed: int,
+    tell: Progress,
+) -> None:
+    """Add the places that starts far about the best one lead to, and about any that is better."""
+    count = min(_SCATTER * min(starts, len(family.parameters)), _MOST_SCATTER)
+    best: _Place | None = None
+    for _ in range(_HOPS):
+        arrived = [place for place in places if place.arrived]
+        if not arrived or min(arrived, key=lambda p: p.coarse.objective) is best:
+            return
+        best = min(arrived, key=lambda p: p.coarse.objective)
+        begins = scattered(family, best.coarse.values, count, seed)
+        for k, begin in enumerate(begins):
+            tell("hops", k, len(begins))
+            _come_by(family, places, begin, best.coarse.coefficients, reference)
+        tell("hops", len(begins), len(begins))
+
+
+def _descents(
+    family: FamilyProblem,
+    places: Sequence[_Place],
+    reference: FloatArray,
+    starts: int,
+    tell: Progress,
+) -> tuple[tuple[Start, ...], list[Solution]]:
+    """Return the records of the starts, and the answers of those that arrived.
+
+    Of the places where they come by, the best few are gone to the end of.
+    """
+    drags = start_coefficients(family)
     ranked = sorted(places, key=lambda p: (not p.arrived, p.coarse.objective))[: max(1, starts)]
     for k, place in enumerate(ranked):
         best = min((p.solved.objective for p in ranked if p.solved is not None), default=np.inf)
@@ -241,13 +287,6 @@ def _descents(
     return tuple(records), first
 
 
-def _rough(family: FamilyProblem, starts: int, guesses: int) -> int:
-    """Return how many starts go roughly where they lead: more where there are few parameters."""
-    drawn = max(0, starts - guesses)
-    most = _MOST_MORE // max(1, len(family.parameters))
-    return guesses + drawn + min(max(_LEAST_MORE, _MORE * drawn), most)
-
-
 class _Place:
     """A place where descents come by: the rough answer, who came by, and where it leads."""
 
@@ -262,13 +301,9 @@ class _Place:
 
 
 def _agreed(places: Sequence[_Place]) -> bool:
-    """Return whether so many descents agree on the best place that no more are needed."""
-    arrived = [place for place in places if place.arrived]
-    if not arrived:
-        return False
-    best = min(arrived, key=lambda p: p.coarse.objective)
-    total = sum(len(place.begins) for place in arrived)
-    return len(best.begins) >= max(_ENOUGH, _MOST * total)
+    """Return whether so many starts come by one place that more of their kind would too."""
+    arrived = [len(place.begins) for place in places if place.arrived]
+    return max(arrived, default=0) >= max(_ENOUGH, _MOST * sum(arrived))
 
 
 def _same(family: FamilyProblem, one: Solution, other: Solution) -> bool:

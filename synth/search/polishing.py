@@ -37,6 +37,7 @@ def stated(
     *,
     reference: FloatArray,
     relaxed: Sequence[str] = (),
+    rough: bool = False,
     fine: bool = False,
     exact: bool = False,
 ) -> Programme:
@@ -48,8 +49,8 @@ def stated(
         The family, and where it stands: searched parameters, and drag coefficients [N s/m].
     goal, reference, relaxed
         As `Programme` takes them.
-    fine
-        On nodes for eight digits.
+    rough, fine
+        For four digits, or on nodes for eight.
     exact
         With margins held where they are measured.
     """
@@ -70,7 +71,7 @@ def stated(
             nodes.append(cost_nodes(shaken, poles, fine=fine))
         per_decade = _FINE_PER_DECADE if fine else _PER_DECADE
         omega.append(margin_nodes(scenario.problem, poles, per_decade))
-    tolerance = 1e-13 if fine else 1e-6
+    tolerance = 1e-13 if fine else 1e-4 if rough else 1e-6
     return Programme(
         family,
         nodes,
@@ -108,7 +109,7 @@ def settle(
         Where the variable of the goal begins.
     rounds
         Most renewals of the nodes; the first of them, far from the answer, holds margins by discs,
-        which see a limit before it is broken.
+        which see a limit before it is broken.  One alone goes only roughly to the end.
     reach, tighten
         See `Programme.solve`.
     """
@@ -122,6 +123,7 @@ def settle(
             goal,
             reference=reference,
             relaxed=relaxed,
+            rough=rounds == 1,
             fine=fine,
             exact=exact or fine or k > 0,
         )

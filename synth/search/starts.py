@@ -33,6 +33,9 @@ from ..structures import pace
 from .nodes import around, cost_nodes, margin_nodes
 
 _CANDIDATES = 512
+_ENOUGH = 8  # stable ones: no more are made of unstable ones
+_SCATTERED, _FAR = 9, 1.5  # candidates about an answer (a power of two), and how far in decades
+_FROM_ZERO = 0.1  # of its scale: about which a parameter is scattered that is smaller
 _SPREAD = 0.5  # least distance of two starts, in decades over all parameters
 _LEASH = 1e-3  # price of moving a parameter by a factor of e, squared
 _PHASE_ONE_STEPS = 60  # Nelder-Mead iterations per parameter and start
@@ -71,23 +74,44 @@ def begin_points(
     abscissas = np.array([family.abscissa(point, enough=0.0) for point in every])
     settled = abscissas < _STABLE
     stable, beside = every[settled], int(np.count_nonzero(settled[len(every) - beside :]))
-    if len(stable) < count:
+    wanted = count - len(first)
+    if len(stable) < min(wanted, _ENOUGH):
         # Phase I moves the least unstable ones; those that are stable need no moving.
         rest = np.where(abscissas < 0.0, np.inf, abscissas)
-        found = stabilise(family, every, rest, count)
+        found = stabilise(family, every, rest, min(wanted, _ENOUGH))
         stable = np.vstack([*[f[None] for f in found], stable])
-    if not len(stable):
-        return first
-    wanted = count - len(first)
     kinds = np.split(np.arange(len(stable)), [len(stable) - beside])
+    return [*first, *_picked(family, stable, kinds, wanted)]
+
+
+def scattered(family: FamilyProblem, values: FloatArray, count: int, seed: int) -> list[FloatArray]:
+    """Return starting points far about an answer: screened candidates with its signs.
+
+    Up to a factor of thirty either way in every parameter at once, for the answers that lie where
+    a parameter has gone to its end: few descents from elsewhere lead there.
+    """
+    drawn = qmc.Sobol(values.size, seed=seed).random_base2(_SCATTERED)
+    middle = np.copysign(np.maximum(np.abs(values), _FROM_ZERO * family.scales), values)
+    low, high = np.array([(p.low, p.high) for p in family.parameters]).T
+    points = np.clip(middle * 10.0 ** (_FAR * (2.0 * drawn - 1.0)), low, high)
+    stable = np.array([point for point in points if family.stable(point)])
+    return _picked(family, stable, [np.arange(len(stable))], count)
+
+
+def _picked(
+    family: FamilyProblem, stable: FloatArray, kinds: Sequence[Any], count: int
+) -> list[FloatArray]:
+    """Return the most promising of stable points, spread out, the kinds of them in turns."""
+    if not len(stable):
+        return []
     orders = [
-        [at[i] for i in pick_spread(stable[at], merit[at], family.scales, wanted)]
+        [at[i] for i in pick_spread(stable[at], merit[at], family.scales, count)]
         for merit in _merits(family, stable)
         for at in kinds
     ]
     # In turns: the quickest to keep the limits, and the most still with limits to mend.
     turns = dict.fromkeys(int(i) for turn in zip_longest(*orders) for i in turn if i is not None)
-    return [*first, *(stable[i] for i in list(turns)[:wanted])]
+    return [stable[i] for i in list(turns)[:count]]
 
 
 def candidates(problem: Problem, count: int, seed: int) -> FloatArray:
