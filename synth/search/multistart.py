@@ -25,6 +25,7 @@ from .starts import begin_points, briskest, scattered, start_coefficients
 Progress = Callable[[str, int, int], None]
 
 AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
+_LEAST = 10  # starts that are drawn at least, if no six agree before
 _ENOUGH, _MOST = 6, 0.6  # starts, and share of all, that come by one place: no more are needed
 _SCATTER, _MOST_SCATTER, _HOPS = 2, 12, 3  # starts about the best, by parameter; most; how often
 _NEAR, _BESIDE = 0.05, 0.25  # of log cost and parameters, relative: on the way to one end
@@ -145,14 +146,15 @@ def search(
     tell = progress or (lambda stage, done, total: None)
     family = FamilyProblem.of(asked)
     kept = [np.asarray(guess, dtype=np.float64) for guess in guesses]
+    count = len(kept) + max(starts - len(kept), _LEAST)
     begins = [guess for guess in kept if family.stable(guess)] if only_guesses else []
     if not begins:
         # The reserve is picked together with the starts, so that it lies apart from them.
-        begins = begin_points(family, max(starts, len(kept)) + _RESERVE, seed, kept)
+        begins = begin_points(family, count + _RESERVE, seed, kept)
     if not begins:
         return Found(solved=None)
     reference = briskest(family, begins)
-    places = _places(family, begins, reference, max(starts, len(kept)), len(kept), tell)
+    places = _places(family, begins, reference, count, len(kept), tell)
     if not only_guesses:
         _hopped(family, places, reference, starts, seed, tell)
     records, first = _descents(family, places, reference, starts, tell)
