@@ -17,11 +17,7 @@ from models.basics import BoolArray, FloatArray
 Curve = Callable[[FloatArray], FloatArray]
 
 SHIFT = 1e-6  # relative, of a frequency, of differences
-_CLOSER = (
-    0.3,
-    0.05,
-    0.01,
-)  # width of a parabola about a peak, in that between its known neighbours
+_CLOSER = (0.3, 0.05, 0.01)  # width of parabolas about a peak, over its neighbours' distance
 _STEPS = 2  # Newton's, towards a crossing
 
 
