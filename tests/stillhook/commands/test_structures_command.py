@@ -16,8 +16,8 @@ from stillhook.designs.structures import share_of, structures
 from stillhook.text import markdown, picture
 from synth.question import PAYLOAD
 
-MRU = ["--set", "sensors.mru={noise_floor: 0, noise_fraction: 0}"]
-FAST = [*MRU, "--set", "sensors.telemetry.delay=25 ms", "--starts", "2"]
+UNIT = "sensors.mru={noise_floor: 0, noise_fraction: 0.02}"
+FAST = ["--set", UNIT, "--set", "sensors.telemetry.delay=25 ms", "--starts", "2"]
 NOISY = {"sensors.mru": {"noise_floor": 0.0, "noise_fraction": 0.02}}
 
 
@@ -119,16 +119,7 @@ def test_structures_command_compares_and_writes(
 
 def test_optimise_takes_a_structure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
-    line = [
-        "optimise",
-        "thesis-1975",
-        *FAST,
-        *MRU,
-        "--structure",
-        "feed-forward",
-        "--out",
-        str(out),
-    ]
+    line = ["optimise", "thesis-1975", *FAST, "--structure", "feed-forward", "--out", str(out)]
     assert main(line) == 0
     said = capsys.readouterr().out
     assert "heave.gain" in said
