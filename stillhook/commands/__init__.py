@@ -6,7 +6,6 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .given import case_words, gains_text, given_case, parse_gains
-    from .given_design import given_design
     from .lists import axis
     from .working import Stop, conclude, counting, kept_in, stoppable, tidy, working
 else:

@@ -26,7 +26,7 @@ _FEEDBACK_SAMPLE = 0.01  # of a design, unless told otherwise [s]
 
 CONTROLLER_TEXTS: Mapping[str, str] = MappingProxyType(
     {
-        "feedback": "the gains of a design, on what comes up from the payload",
+        "feedback": "a design, or the three gains that the case has in use",
         "feedback-no-antiwindup": "the same without anti-windup, for a controller with states",
         "feed-forward": "the drum pays out 0.9 of the hook's speed",
         "feed-forward-lead": "the same, with the delays of sensor and drive made up for",

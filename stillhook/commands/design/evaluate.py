@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import argparse
 
-from ..declare import CASE, DESIGN, NO_BOUND, options
+from ..declare import CASE, NAMED_DESIGN, NO_BOUND, options
 from ..given import case_words, given_case
 from ..given_design import given_design
 from ..working import conclude, prepared, working
 
 ARGUMENTS = (
     CASE,
-    DESIGN,
+    NAMED_DESIGN,
     options("--out DIR  folder for the results (default: none)"),
     NO_BOUND,
 )
@@ -24,7 +24,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     folder = None if arguments.out is None else prepared(arguments, case.name)
     with working(arguments) as tell:
-        design = given_design(case, arguments)
+        design = given_design(case, arguments, search=False)
         if folder is not None:
             write_report(folder, design=design, bound=arguments.bound, progress=tell)
     structure = "" if design.gains else f" --structure {design.structure}"

@@ -7,7 +7,7 @@ import argparse
 from ...text import Report, ReportSection
 from ..declare import CASE, DESIGN, options, within
 from ..given import case_words, given_case, split_pairs
-from ..given_design import given_design
+from ..given_design import given_design, with_design
 from ..working import conclude, working
 
 _USUAL = {"payload.mass": 0.3, "stiffness": 0.2, "drag": 0.5}
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
         ok=found.ok,
         sections=[ReportSection("", rest)],
     )
-    return conclude(report, arguments, following=again)
+    return conclude(with_design(report, design, case, arguments), arguments, following=again)
 
 
 def parse_off(texts: list[str]) -> dict[str, float | str]:

@@ -41,8 +41,9 @@ from ...text import (
 )
 from ..declare import CASE, changed_words, options, within
 from ..given import case_words
+from ..given_design import names_design, with_design
 from ..lists import numbers, quantity
-from ..working import Stop, asking, kept_in, place_for, prepared, stoppable, tidy
+from ..working import Stop, asking, kept_in, place_for, prepared, stoppable, tidy, working
 from .simulate_given import TIME, SimulationRequest, asked_of, sine
 
 _MEGABYTE = 1e6
@@ -75,9 +76,12 @@ ARGUMENTS = (
         --tip X,Y,Z  --hook holds heave, roll and pitch of the vessel; the crane's tip is so far
             forward, to port and up [m]
 
-        the feedback's gains (default: those of the case):
+        the feedback's design:
         --design FILE  a design that was written, as in out/CASE/design.yaml
-        | --gains A=..,a=..,a1=..,a2=..  the gains
+        | --gains A=..,a=..,a1=..,a2=..  gains, or parameters by name (default: the gains that the
+            case has in use; else the best design is found, half a minute once)
+        --structure NAME  whose parameters these are (default: payload-feedback); without --gains
+            its best ones are found
 
         how:
         --sample-time TIME  of the controller, as in '20 ms'
@@ -117,7 +121,7 @@ def run(arguments: argparse.Namespace) -> int:
     with tidy(place), stoppable() as stop:
         folder = prepared(arguments, place)
         try:
-            asked = _with_gains(asked, folder, stop, shown=not arguments.quiet)
+            asked = _with_design(asked, arguments, folder, stop)
             total = len(asked.controllers) * len(asked.seeds) * asked.duration
             with progress(
                 shown=not arguments.quiet, pace=lambda speed: f"{number(speed, 2)} x real time"
@@ -167,23 +171,21 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if all(runs.completed for runs in compared) else 1
 
 
-def _with_gains(
-    asked: SimulationRequest, folder: OutputFolder, stop: Stop, *, shown: bool
+def _with_design(
+    asked: SimulationRequest, arguments: argparse.Namespace, folder: OutputFolder, stop: Stop
 ) -> SimulationRequest:
-    """Return what is asked with gains for the feedback, optimised if there are none."""
+    """Return what is asked with a design for the feedback, the best if there is none."""
     wanted = any(name.startswith("feedback") for name in asked.controllers)
-    if not wanted or asked.design or asked.gains or asked.case.gains is not None:
+    if not wanted or names_design(asked.case, arguments):
         return asked
-    from synth import optimise_gains
+    from ...designs import best_design, design_text
 
-    from ...designs import design_text
-
-    with progress(shown=shown) as tell:
+    with working(arguments) as tell:
         step = asking(stop, tell)
-        design = optimise_gains(asked.case, "payload-feedback", progress=step)
+        design = best_design(asked.case, arguments.structure, progress=step)
     folder.write("design.yaml", design_text(design))
-    if design.margins is None and not asked.every:
-        raise SynthesisError(f"no gains for the feedback: {design.status}")
+    if not design.parameters and not asked.every:
+        raise SynthesisError(f"no design for the feedback: {design.status}")
     return replace(asked, design=design)
 
 
@@ -241,6 +243,7 @@ def _question(asked: SimulationRequest, arguments: argparse.Namespace) -> dict[s
         "options": list(arguments.option),
         "hook": "the case's own sea" if hook is None else hook.description,
         "seeds": list(asked.seeds),
+        "structure": None if design is None else design.structure,
         "gains": dict(design.parameters) if design is not None else asked.gains,
         "command": _again(arguments, case_words(arguments)),
     }
@@ -252,12 +255,10 @@ def _show(
     folder: OutputFolder,
     arguments: argparse.Namespace,
 ) -> None:
-    out, design = console(), asked.design
-    if design is not None and arguments.design is None:
-        mark = "ok" if design.ok else "NOT OK"
-        out.print(f"The case has no gains in use, so they were optimised: {mark}: {design.status}")
-        out.print()
+    out = console()
     report = runs_report([*found.compared.values()])
+    if asked.design is not None:
+        report = with_design(report, asked.design, asked.case, arguments)
     left = [
         f"left out: {error if name in str(error) else f'{name}: {error}'}"
         for name, error in found.left_out.items()
@@ -286,8 +287,8 @@ def _next(
     """Return commands to go on with, each with what it does."""
     words = case_words(arguments, folder)
     own: dict[str, object] = {}
-    if asked.design is not None and arguments.design is None:
-        own["design"] = folder.path / "design.yaml"
+    if asked.design is not None and not names_design(asked.case, arguments):
+        own = {"design": folder.path / "design.yaml", "structure": None}
     rows = []
     if len(asked.controllers) == 1:
         rows.append(

@@ -71,7 +71,9 @@ def asked_of(arguments: argparse.Namespace) -> SimulationRequest:
 
     names = parse_controllers(arguments.controller)
     options = parse_options(arguments.option)
-    gains = None if arguments.gains is None else parse_gains(arguments.gains)
+    gains = None
+    if arguments.gains is not None and arguments.structure is None:
+        gains = parse_gains(arguments.gains)
     case = given_case(arguments)
     scenario = scenario_named(arguments.scenario, case, **options)
     hook = _hook(arguments)
@@ -157,8 +159,15 @@ def _fitting(lasting: float, hook: MotionSource | None, sample_time: float | Non
 
 
 def _design(arguments: argparse.Namespace, case: Case) -> Design | None:
+    structure = arguments.structure
     if arguments.design is None:
-        return None
+        if arguments.gains is None or structure is None:
+            return None
+        from synth import evaluate_gains
+
+        return evaluate_gains(case, parse_gains(arguments.gains, structure), structure)
+    if structure is not None:
+        raise InputError("simulate: give --design, or --structure and --gains, not both")
     import sys
 
     from ...designs import load_design

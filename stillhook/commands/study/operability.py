@@ -7,23 +7,20 @@ design is unstable, works in no sea at all, or a point did not.
 from __future__ import annotations
 
 import argparse
-import shlex
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.basics import InputError
 
-from ...text import OutputFolder, Progress, csv_text, pictures
+from ...text import OutputFolder, csv_text, pictures
 from ..declare import CASE, DESIGN, options
-from ..given import case_words, gains_text, given_case
-from ..given_design import design_words, given_design
+from ..given import case_words, given_case
+from ..given_design import design_words, given_design, with_design
 from ..lists import axis, quantity
 from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
-    from models import Case
-    from synth.design import Design
     from synth.operability import Operability
 
 _HEIGHT = quantity("length", 0.0, 1e3, open_low=True)
@@ -33,8 +30,7 @@ ARGUMENTS = (
     DESIGN,
     options(
         """
-        --held  no design: the drum held and a perfect winch only (default: the case's gains, or the
-            best ones where it has none)
+        --held  no design: the drum held and a perfect winch only
         --tp LOW..HIGH[/STEP]|A,B,..  peak periods [s], as in 5..15, 5..15/0.5 or 6,8,10 (default:
             4..18, or those of the scatter diagram)
         --headings LOW..HIGH[/STEP]|A,B,..  headings [deg], where the waves travel to, 180 head sea,
@@ -69,6 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.held and (arguments.design or arguments.gains or arguments.reoptimise):
         raise InputError("operability: --held goes without --design, --gains and --reoptimise")
     case = given_case(arguments)
+    source = case if arguments.held else given_design(case, arguments)
     folder = prepared(arguments, case.name, "-operability")
     from synth.operability import operability
 
@@ -76,7 +73,6 @@ def run(arguments: argparse.Namespace) -> int:
 
     angles = arguments.headings
     with working(arguments) as step:
-        source = case if arguments.held else _design(case, arguments, step)
         study = operability(
             source,
             periods=arguments.tp,
@@ -94,6 +90,8 @@ def run(arguments: argparse.Namespace) -> int:
         step("verify", 0, 1)
         checks = study.verify()
         report = operability_report(study, checks)
+        if study.design is not None:
+            report = with_design(report, study.design, case, arguments)
         folder.write("case.yaml", study.case.to_yaml())
         folder.write("operability.csv", study.to_csv())
         folder.write("operability.nc", netcdf(study.dataset))
@@ -104,22 +102,11 @@ def run(arguments: argparse.Namespace) -> int:
     return conclude(report, arguments, folder, _next(study, arguments, folder))
 
 
-def _design(case: Case, arguments: argparse.Namespace, step: Progress) -> Design:
-    """Return the design that was asked for, or the best gains where the case has none."""
-    if arguments.design is None and arguments.gains is None and case.gains is None:
-        from synth import optimise_gains
-
-        return optimise_gains(case, "payload-feedback", progress=step)
-    return given_design(case, arguments)
-
-
 def _next(
     study: Operability, arguments: argparse.Namespace, folder: OutputFolder
 ) -> list[tuple[str, str]]:
     words = case_words(arguments, folder)
-    given = design_words(arguments)
-    if study.design is not None and not given:
-        given = [f"--gains {shlex.quote(gains_text(study.design.parameters))}"]
+    given = ["--held"] if arguments.held else design_words(arguments)
     design = "".join(f" {word}" for word in given)
     rows = []
     if not study.wanted:

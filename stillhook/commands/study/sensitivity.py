@@ -10,7 +10,7 @@ from models.basics import InputError, check_range, read_quantity
 from ...text import Progress, csv_text
 from ..declare import CASE, DESIGN, options, within
 from ..given import case_words, given_case
-from ..given_design import design_words, given_design
+from ..given_design import design_words, given_design, with_design
 from ..working import conclude, prepared, working
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
         wide = _over_ranges(design, arguments, step)
     from ...designs import indices_table, moved_table, sensitivity_report
 
-    report = sensitivity_report(study, moved, wide)
+    report = with_design(sensitivity_report(study, moved, wide), design, case, arguments)
     folder.write("sensitivity.csv", study.to_csv())
     folder.write("moved.csv", csv_text(moved_table(moved)))
     if wide is not None:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from models import Case
 from models.basics import InputError
 from models.spread import Spread
+from synth.design import Design
 from synth.sweeps import ATTRIBUTE, law_of
 
 from ...sweeps import (
@@ -30,7 +31,7 @@ from ...sweeps import (
 from ...text import OutputFolder, count, picture
 from ..declare import OPTIONAL_CASE, options, within
 from ..given import case_words, given_case, parse_options, split_pairs
-from ..given_design import design_words, given_design
+from ..given_design import design_words, given_design, with_design
 from ..lists import names
 from ..working import conclude, counting, place_for, tidy
 
@@ -46,10 +47,11 @@ ARGUMENTS = (
         who is tried:
         --design FILE  a design that was written (design.yaml)
         | --gains A=..,a=..,a1=..,a2=..  gains, or parameters by name (default: the gains that the
-            case has in use)
+            case has in use; else the best design is found, half a minute once)
         | --controller NAME  another controller, with --mode time, as in mpc (see `stillhook
             scenarios`)
-        --structure NAME  whose parameters --gains are (default: payload-feedback)
+        --structure NAME  whose parameters --gains are (default: payload-feedback); without them
+            its best ones are found
         --follow  make the controller for each case, and design a design anew (default: it is made
             for the nominal case, and the plant is another)
 
@@ -312,7 +314,10 @@ def _concluded(swept: Swept, arguments: argparse.Namespace) -> int:
         _figures(swept, folder, arguments.format or "png")
     report = sweep_report(result, swept.case.name, worst=most)
     following = _next(swept, worst, law, arguments)
-    return conclude(report, arguments, folder, following, brief=report.sections[:1])
+    brief = report.sections[:1]
+    if isinstance(swept.design, Design):  # no controller by its name
+        report = with_design(report, swept.design, swept.case, arguments)
+    return conclude(report, arguments, folder, following, brief=brief)
 
 
 def _worst_design(swept: Swept, folder: OutputFolder, worst: list[int]) -> Path | None:
@@ -333,8 +338,6 @@ def _worst_design(swept: Swept, folder: OutputFolder, worst: list[int]) -> Path 
 
 def _figures(swept: Swept, folder: OutputFolder, kind: str) -> None:
     """Draw and write the figures."""
-    from synth.design import Design
-
     linear = isinstance(swept.design, Design)
     in_time = swept.result.attrs.get("mode") == "time"
     design: Any = swept.design if linear and not in_time else None

@@ -8,6 +8,12 @@ from endings import Ending
 from stillhook import cli
 
 
+@pytest.fixture(autouse=True)
+def no_designs(tmp_path, monkeypatch):
+    """Keep the designs that are found apart from those of other tests, and of whoever runs them."""
+    monkeypatch.setattr("stillhook.designs.kept_design.cache_folder", lambda: tmp_path / ".cache")
+
+
 @pytest.fixture
 def run(capsys, tmp_path, monkeypatch):
     """Run the command line in a scratch folder, in this process."""

@@ -73,7 +73,6 @@ def test_quietly_it_says_one_sentence(tmp_path, capsys, study):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["subsea-crane"], "the case has none in use"),
         (["thesis-1975", "--plus", "much"], "--plus must be a share, as in '10 %'"),
         (["thesis-1975", "--plus", "-2"], "--plus must be in [-0.9, 10], got -2"),
         (["thesis-1975", "--second", "-1"], "--second must be at least 0, got -1"),

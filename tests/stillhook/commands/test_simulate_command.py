@@ -171,14 +171,20 @@ def test_a_design_for_another_case_is_a_warning(run):
     assert ending.err == "warning: design.yaml: is a design for thesis-1975, not mine\n"
 
 
-def test_a_case_without_gains_gets_the_best_ones_first(run, monkeypatch):
-    monkeypatch.setattr("synth.optimise_gains", lambda case, *named, **rest: thesis_design())
+def test_a_case_without_gains_gets_the_best_design_first(run, monkeypatch):
+    asked = []
+
+    def found(case, structure, **rest):
+        asked.append(structure)
+        return thesis_design()
+
+    monkeypatch.setattr("synth.optimise_gains", found)
     ending = run("simulate", *CALM, "--set", "gains=null", *SHORT, "--out", "here")
     assert ending.status == 0
-    assert " ".join(ending.out.split()).startswith(
-        "The case has no gains in use, so they were optimised: NOT OK: stable; breaks "
-        "max_sensitivity thesis-1975, feedback"
-    )
+    said = " ".join(ending.out.split())
+    assert "design: payload-feedback, found for this case, NOT OK (stable; breaks" in said
+    assert "give --design to use another" in said
+    assert asked == [None]
     assert sh.load_design("here/design.yaml").gains == thesis_design().gains
     assert "--design here/design.yaml" in ending.out
 
@@ -187,7 +193,7 @@ def test_a_case_without_stabilising_gains_ends_with_1(run, monkeypatch):
     monkeypatch.setattr("synth.optimise_gains", lambda case, *named, **rest: loopless_design())
     ending = run("simulate", *CALM, "--set", "gains=null", *SHORT)
     assert (ending.status, ending.out) == (1, "")
-    assert "no gains for the feedback: no stabilising gains were found" in ending.err
+    assert "no design for the feedback: no stabilising gains were found" in ending.err
 
 
 # hook and scenarios

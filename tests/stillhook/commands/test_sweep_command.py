@@ -128,7 +128,7 @@ def test_a_case_that_does_not_hold_is_told_by_the_exit_status(tmp_path, capsys):
         (["thesis-1975", *TIME, "--cluster", "here"], "engine must be serial, processes, local:N"),
         (["thesis-1975", *TIME, "--faults", "delay-jumps"], "fault.at must be before the end"),
         (["thesis-1975", "--worst", "-1"], r"--worst must be in"),
-        (["subsea-crane"], "the case has none in use; give them, as in --gains"),
+        (["landing", "--set", "sensors.mru=null", "--structure", "feed-forward"], "hears mru"),
     ],
 )
 def test_what_is_wrong_is_said_in_a_sentence(words, message, tmp_path, capsys):

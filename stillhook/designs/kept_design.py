@@ -1,0 +1,81 @@
+"""The best design of a case (`best_design`) for whoever names none: found once, and kept.
+
+    case [, structure] --> best_design --> cache, or optimise_gains --> Design
+
+Several commands ask the same of the same case, and a search takes half a minute.  Its answer is
+kept in the user's cache folder, as a design file under a digest of all that it depends on: the
+case, the structure and the code.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from models.basics import InputError, cache_folder
+from models.case import Case
+from synth.design import Design
+
+from ..keeper import versions
+from .design_file import load_design, save_design
+
+if TYPE_CHECKING:
+    from ..text import Progress
+
+KEPT = 64
+"""How many designs are kept; those longest unused go first."""
+
+
+def best_design(
+    case: Case, structure: str | None = None, *, progress: Progress | None = None
+) -> Design:
+    """Return what `synth.optimise_gains` answers for a case: from the cache, where it is there.
+
+    Parameters
+    ----------
+    case
+        The case.
+    structure
+        Name of the structure; by default those that the case's sensors allow.
+    progress
+        Called as progress(stage, done, total).
+
+    Raises
+    ------
+    InputError
+        As by `synth.optimise_gains`.
+    """
+    from synth import optimise_gains
+
+    about = {
+        "case": case.to_dict(),
+        "structure": structure,
+        "versions": versions("synth.design.optimise"),
+    }
+    digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()[:40]
+    folder = cache_folder() / "designs"
+    place = folder / f"{digest}.yaml"
+    with contextlib.suppress(InputError):  # none there, or not whole
+        found = replace(load_design(place), case=case)
+        with contextlib.suppress(OSError):
+            os.utime(place)
+        return found
+    found = optimise_gains(case, structure, progress=progress)
+    with contextlib.suppress(OSError, InputError):
+        folder.mkdir(parents=True, exist_ok=True)
+        save_design(found, place)
+        _tidy(folder)
+    return found
+
+
+def _tidy(folder: Path) -> None:
+    """Remove the designs longest unused."""
+    kept = sorted(folder.glob("*.yaml"), key=lambda p: p.stat().st_mtime, reverse=True)
+    for path in kept[KEPT:]:
+        with contextlib.suppress(OSError):
+            path.unlink()
