@@ -274,6 +274,7 @@ def _written(folder: OutputFolder) -> str:
     traces = [path for path in folder.written if path.parent.name == "runs"]
     suffixes = {path.suffix for path in folder.written}
     text = f"Written to {folder.path}: summary.md, summary.json, events.csv"
+    text += ", design.yaml" * any(path.name == "design.yaml" for path in folder.written)
     text += ", figures" * (".svg" in suffixes) + ", animation.gif" * (".gif" in suffixes)
     if traces:
         size = sum(path.stat().st_size for path in traces) / _MEGABYTE
