@@ -22,6 +22,8 @@ from .problem import Values
 from .question import DesignQuestion, with_masses
 
 _MODES = 5.0  # every rope mode below this many crossovers belongs in the plant
+_ONE_MODE = 1.05  # ratio of frequencies on the same mode
+_HARMLESS = 0.05  # share by which |S| on a mode lies below its peak
 _KEPT = 1e-3  # relative excess on the rope as it is over a limit that its masses keep
 
 
@@ -35,7 +37,7 @@ def masses_for(question: DesignQuestion, loop: Assessment) -> int:
     if data.masses is not None or not crossovers.size:
         return question.masses
     try:
-        wanted = masses_for_bandwidth(data, _MODES * float(crossovers.max()))
+        wanted = masses_for_bandwidth(data, _MODES * _crossover(loop))
     except InputError:
         return MAX_MASSES
     if wanted > question.masses or data.lumping == "thesis":
@@ -89,6 +91,22 @@ def on_enough_masses(
         question = finer(question, masses)
         growth = question.problem.growth(values)
     return question, None, growth
+
+
+def _crossover(loop: Assessment) -> float:
+    """Return the highest crossover [rad/s] that is not one of two on the same harmless mode.
+
+    A mode with hardly any damping stands out above a gain of one far above the bandwidth.  Its
+    place matters where |S| on it is about its peak; else the rope itself is looked at anyhow.
+    """
+    found = list(loop.margins.crossovers)
+    distance = np.min([np.abs(1.0 + gain) for gain in loop.gains], axis=0)
+    while len(found) > 2 and found[-1] < _ONE_MODE * found[-2]:
+        mode = (loop.grid > found[-2] / _ONE_MODE) & (loop.grid < found[-1] * _ONE_MODE)
+        if loop.max_sensitivity * distance[mode].min(initial=np.inf) < 1.0 + _HARMLESS:
+            break
+        del found[-2:]
+    return float(found[-1])
 
 
 def _sensitivity_on_the_rope(question: DesignQuestion, loop: Assessment, above: float) -> float:

@@ -1,0 +1,44 @@
+"""Rope masses that a loop asks for: by its crossover, and by what holds on the rope as it is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from models import load_case
+from models.sensing import sensed_line_at
+from synth.question import masses_for, pose
+
+LIGHT: dict[str, Any] = {"rope.damping_ratio": 2e-4}
+# Combined, optimal with a second member with a tenth of the rope's damping.
+BOTH = [12.5618, 17.2308, 42.9685, 7.5, 0.920736, 3.01522, 2.0, 0.0377744, 4.23995]
+
+
+@pytest.mark.parametrize("changes", [{}, LIGHT], ids=["the case", "hardly any damping"])
+def test_a_mode_that_stands_out_far_above_the_bandwidth_asks_for_no_masses(
+    changes: dict[str, Any],
+) -> None:
+    question = pose(load_case("subsea-crane").replace(changes), "combined", 15)
+    loop = question.problem.assess(BOTH)
+    # Of the rope's own modes at 26 and 40 rad/s the gain is one on either side.
+    assert (loop.margins.crossovers.max() > 20.0) == bool(changes)
+    assert masses_for(question, loop) == 15
+    # Nothing is lost by it: on the rope as it is the limit of 2 holds too.
+    controller = loop.controller
+    omega = np.geomspace(0.1, 100.0, 200_001)
+    drag = question.drag_in(loop)
+    line = sensed_line_at(question.case, 1j * omega, drag=drag, data=question.data)
+    heard = line.select(measurements=controller.measurements)
+    gain = -np.einsum("kij,kji->k", controller.response_at(1j * omega), heard.yu)
+    peak = float((1.0 / np.abs(1.0 + gain)).max())
+    assert peak == pytest.approx(loop.max_sensitivity, rel=1e-3)
+    assert peak < 2.0
+
+
+def test_a_peak_that_is_higher_on_the_rope_asks_for_masses() -> None:
+    question = pose(load_case("subsea-crane").replace(LIGHT), masses=15)
+    loop = question.problem.assess([4.0597, 13.539, 7.7354])
+    assert loop.max_sensitivity <= 2.0 * (1.0 + 1e-3)
+    assert masses_for(question, loop) > 15
