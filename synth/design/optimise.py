@@ -33,7 +33,7 @@ from ..question import (
     pose,
     pose_family,
 )
-from ..search import Progress, search, with_bests
+from ..search import KEPT, Found, Progress, polish, search, with_bests
 from ..structures import LowOrderFeedback, structures_aboard
 from .design import Design
 from .high_order import high_order_gains
@@ -175,7 +175,7 @@ def _optimised(
     known = starts_from(question, guesses) or nested_starts(question, starts, seed, progress)
     count = starts + len(known)
     known = [*known, *gains_in_use(question)]
-    tuning = _answer(posed, count, seed, known, progress)
+    posed, tuning = _answer(posed, count, seed, known, progress)
     while (wanted := _masses_wanted(posed, tuning)) > posed.masses:
         # The rope turned out to need more masses: the ends of the search are the guesses.
         posed = posed.on(wanted)
@@ -271,13 +271,18 @@ def _answer(
     progress: Progress | None,
     *,
     drive: bool = True,
-) -> Tuning:
-    """Return the answer of the case alone, and from where its search ended that of the family."""
-    alone, family = (one.problem if drive else one.without_drive for one in (posed.alone, posed))
+) -> tuple[PosedFamily, Tuning]:
+    """Return the answer of the case alone, and from where its search ended that of the family.
+
+    The family stands on the rope masses that the answer of the case alone asks for.
+    """
+    alone = posed.alone.problem if drive else posed.alone.without_drive
     tuning = tuning_of(alone, no_worse(alone, search(alone, starts, seed, known, progress), known))
     if len(posed.questions) == 1:
-        return tuning
-    return _again(family, tuning, starts, seed, progress, known)
+        return posed, tuning
+    posed = posed.on(max(posed.masses, _masses_wanted(posed.alone, tuning)))
+    family = posed.problem if drive else posed.without_drive
+    return posed, _again(family, tuning, starts, seed, progress, known)
 
 
 def _again(
@@ -288,19 +293,44 @@ def _again(
     progress: Progress | None,
     known: Sequence[Sequence[float]] = (),
 ) -> Tuning:
-    """Return the answer for more members or more rope masses, from the ends of a search."""
+    """Return the answer for more members or more rope masses, from the ends of a search.
+
+    The answer is polished where it stands.  What else the search came upon is gone to the end of
+    only where it was better before than the answer is now, as neither members nor masses gain much.
+    """
+    solved = tuning.found.solved
     ranked = sorted((s for s in tuning.starts if s.converged), key=lambda s: -s.cost)
-    apart = {f"{s.cost:.4g}": s.end for s in ranked}  # of starts that agree one
-    ends = [*reversed(apart.values())][:_RESUMED]
-    if tuning.found.solved is not None:
-        ends = [tuning.found.solved.values, *ends[1:]]
+    apart = {f"{s.cost:.4g}": s for s in ranked}  # of starts that agree one
+    others = [*reversed(apart.values())][:_RESUMED]
+    ends = [start.end for start in others]
+    if solved is not None:
+        ends = [solved.values, *ends[1:]]
     if family.objective is Objective.REGRET:
         family = with_bests(family, seed, ends, progress)
-    found = search(family, 1, seed, ends, progress, only_guesses=True)
+    found = None
+    if tuning.ok and family.objective is not Objective.REGRET:
+        found = _where_it_stands(family, tuning.found)
+    if found is None or any(start.cost < family.total(found.costs) for start in others[1:]):
+        found = search(family, 1, seed, ends, progress, only_guesses=True)
     again = tuning_of(family, no_worse(family, found, known))
     if not again.ok and tuning.ok:
         again = tuning_of(family, search(family, starts, seed, ends[:1], progress))
     return replace(again, starts=tuning.starts, agreed=tuning.agreed)
+
+
+def _where_it_stands(family: FamilyProblem, found: Found) -> Found | None:
+    """Return an answer for more members or rope masses, polished; None if it cannot be kept."""
+    solved, reference = found.solved, found.reference
+    if solved is None or reference is None:
+        return None
+    drags = solved.coefficients
+    drags += drags[-1:] * (len(family.scenarios) - len(drags))
+    if not family.stable(solved.values, drags):
+        return None
+    polished, assessments, excess = polish(family, replace(solved, coefficients=drags), reference)
+    if not polished.converged or excess > KEPT:
+        return None
+    return replace(found, solved=polished, assessments=assessments, excess=excess)
 
 
 def _best_possible(
@@ -312,7 +342,7 @@ def _best_possible(
 ) -> Design:
     """Return the best design in the largest feasible sea, for a drive that is too small."""
     case = posed.first.case
-    free = _answer(posed, starts, seed, known, progress, drive=False)
+    posed, free = _answer(posed, starts, seed, known, progress, drive=False)
     if not free.ok:
         status = f"whatever the drive: {free.status}"
         return _family_design(posed, replace(free, status=status), drive_kept=False)

@@ -56,6 +56,14 @@ def test_a_member_that_is_not_what_is_claimed_fails_the_check(both: Design) -> N
 
 
 @pytest.mark.ci
+def test_a_tenth_of_the_ropes_damping_costs_little() -> None:
+    case = load_case("subsea-crane")
+    design = optimise_gains(case, "combined", members=[{"rope.damping_ratio": 2e-4}])
+    assert design.ok, design.status
+    assert design.family_rms < 20.2e-3  # 19.87 mm for the case alone
+
+
+@pytest.mark.ci
 def test_one_that_is_alone_keeps_no_margin_in_the_other(both: Design) -> None:
     alone = optimise_gains(both.case, "payload-feedback")
     assert alone.payload_rms < both.payload_rms
