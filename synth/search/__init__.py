@@ -1,7 +1,8 @@
 """The search for the parameters of a structure.
 
 In comes a `Problem`, out comes `Found`: the best of many descents by sequential quadratic
-programming, polished until no limit is broken between the nodes, and every start's record.  Nothing in it is verified yet.
+programming, polished until no limit is broken between the nodes, and every start's record.
+Nothing in it is verified yet.
 """
 
 from typing import TYPE_CHECKING
