@@ -16,7 +16,7 @@ if TYPE_CHECKING:
         load_design,
         save_design,
     )
-    from .kept_design import best_design
+    from .kept_design import best_design, keep_best
     from .report import design_report, write_report
     from .robust import robust_report, scenario_table, schedule_report
     from .sensitivity import Wide, indices_table, moved_table, sensitivity_report

@@ -52,25 +52,34 @@ def best_design(
     """
     from synth import optimise_gains
 
-    about = {
-        "case": case.to_dict(),
-        "structure": structure,
-        "versions": versions("synth.design.optimise"),
-    }
-    digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()[:40]
-    folder = cache_folder() / "designs"
-    place = folder / f"{digest}.yaml"
+    place = _place(case, structure)
     with contextlib.suppress(InputError):  # none there, or not whole
         found = replace(load_design(place), case=case)
         with contextlib.suppress(OSError):
             os.utime(place)
         return found
     found = optimise_gains(case, structure, progress=progress)
-    with contextlib.suppress(OSError, InputError):
-        folder.mkdir(parents=True, exist_ok=True)
-        save_design(found, place)
-        _tidy(folder)
+    keep_best(found, structure)
     return found
+
+
+def keep_best(found: Design, structure: str | None) -> None:
+    """Keep what `synth.optimise_gains` answered for a case and a structure, asked as by default."""
+    place = _place(found.case, structure)
+    with contextlib.suppress(OSError, InputError):
+        place.parent.mkdir(parents=True, exist_ok=True)
+        save_design(found, place)
+        _tidy(place.parent)
+
+
+def _place(case: Case, structure: str | None) -> Path:
+    about = {
+        "case": case.to_dict(),
+        "structure": structure,
+        "versions": versions("synth.design.optimise"),
+    }
+    digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()[:40]
+    return cache_folder() / "designs" / f"{digest}.yaml"
 
 
 def _tidy(folder: Path) -> None:

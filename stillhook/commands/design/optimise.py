@@ -56,14 +56,15 @@ def run(arguments: argparse.Namespace) -> int:
     folder.write("case.yaml", case.to_yaml())
     from synth import optimise_gains
 
-    from ...designs import design_data, design_report, write_report
+    from ...designs import design_data, design_report, keep_best, write_report
 
+    one = asked[0] if asked is not None and len(asked) == 1 else asked
     design: Design | None = None
     try:
         with working(arguments) as tell:
             design = optimise_gains(
                 case,
-                asked[0] if asked is not None and len(asked) == 1 else asked,
+                one,
                 members=members,
                 objective=arguments.objective,
                 fixed=fixed,
@@ -71,6 +72,10 @@ def run(arguments: argparse.Namespace) -> int:
                 seed=arguments.seed,
                 progress=tell,
             )
+            # Other commands then need not search for it again.
+            plain = not members and not fixed and (arguments.starts, arguments.seed) == (16, 0)
+            if plain and (one is None or isinstance(one, str)):
+                keep_best(design, one)
             write_report(folder, design=design, bound=arguments.bound, progress=tell)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(_kept(folder, design)) from None

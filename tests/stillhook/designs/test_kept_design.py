@@ -8,7 +8,9 @@ from dataclasses import replace
 import pytest
 from designs import thesis_design
 
-from stillhook.designs import best_design, kept_design
+from models import load_case
+from stillhook.cli import main
+from stillhook.designs import best_design, kept_design, load_design
 
 CASE = thesis_design().case
 
@@ -75,3 +77,24 @@ def test_a_cache_that_cannot_be_written_only_costs_time(searches, tmp_path, monk
     assert best_design(CASE).ok == thesis_design().ok
     assert best_design(CASE).case is CASE
     assert len(searches) == 2
+
+
+def test_what_optimise_found_is_not_searched_for_again(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("STILLHOOK_CACHE", str(tmp_path / "cache"))
+    line = [
+        "optimise",
+        "thesis-1975",
+        "--structure",
+        "payload-feedback",
+        "--no-figures",
+        "--no-bound",
+    ]
+    main([*line, "--out", str(tmp_path / "out")])
+    written = load_design(tmp_path / "out" / "design.yaml")
+
+    def nothing(*_, **__):
+        raise AssertionError("searched again")
+
+    monkeypatch.setattr("synth.optimise_gains", nothing)
+    again = best_design(load_case("thesis-1975"), "payload-feedback")
+    assert again.parameters == written.parameters
