@@ -1,522 +1,585 @@
 r"""The peers of the gain synthesis: what an engineer would reach for without it.
 
-Both answer the question that `synth.design.tuning` answers, the least payload variance within the
-limits, for the feedback u = -(k_2 P'' + k_1 P' + k_0 P):
+Both look for the least rms of the payload's motion within all limits of a case:
 
-* `differential_evolution`, on an objective that is written for speed: everything that does not
-  depend on the gains is computed once, and a whole generation is evaluated by array operations.
-* `slsqp`, on python-control objects: the way it is done by hand.
+* `evolve`, SciPy's differential evolution, on an objective that is written for speed: the exact
+  rope's responses are sampled once, and a whole generation is evaluated by array operations;
+* `slsqp`, SciPy's, on python-control objects: the way it is done by hand, the rope in masses.
 
-They share with `synth` the plant's matrices and its frequency responses, not the closed loop:
-1 + L, the variances, the drag and the peaks are computed here, by formulas of their own.
+They take the plant's responses, the spectra, the limits' figures and the structure's transfer
+functions from the toolkit; how the loop is closed, its stability, the drag that agrees with the
+motion, variances, peaks and margins are computed here, by formulas of their own.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import scipy.optimize
 
-from models.basics import Quadrature, spectral_nodes
-from models.hook import HookMotion
-from models.plant import LinearPlant
-from synth.limits import Limit, LowFrequency, MaxSensitivity
-from synth.loop import Assessment, DragElement, LinearController, disturbances
-from synth.structures import PayloadFeedback
+from models.basics import spectral_nodes
+from models.sensing import sensed_line_at
+from synth.limits import (
+    Continuous,
+    GainMargin,
+    GainMarginDown,
+    Limit,
+    LowFrequency,
+    MaxSensitivity,
+    Minimum,
+    Peak,
+    Power,
+)
+from synth.question import DesignQuestion, held_poles
 
-if TYPE_CHECKING:
-    import control
-
-__all__ = ["Answer", "Exact", "PythonControlLoop", "SampledLoop", "Task", "evolve", "slsqp"]
+__all__ = ["Answer", "ControlLoops", "Measured", "SampledLine", "evolve", "slsqp"]
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
 HOOK, PAYLOAD = "hook.heave", "payload.displacement"
 VELOCITY, FORCE = "payload.velocity", "payload.force"
-PADE = 5  # order of the delay model in the stability test
+PADE = 5  # order of the delay model of python-control
 _PENALTY = 20.0  # on the logarithm of an excess; the limits' prices are of the order of one
 _UNSTABLE = 1e3
 _BOTTOM, _TOP = 1e-3, 300.0  # of the sensitivity grid [rad/s]
 _LIVELY = (0.3, 60.0)  # where loops around a payload on a rope move
 _THIN = 15  # points per decade elsewhere
-_LIGHT = 0.05  # damping below which an open-loop resonance is narrower than that grid
-_ABOUT = np.linspace(-5.0, 5.0, 41)  # ... and gets points of its own, in units of its decay
-_VALLEYS = 3
-_STEPS = np.array([-0.5, 0.0, 0.5])  # from a pole's frequency, in units of its decay
+_LIGHT = 0.1  # damping below which a resonance of the plant gets points of its own
+_ABOUT = np.linspace(-3.0, 3.0, 13)  # ... in units of its decay
+_SLOW = 12  # frequencies at which the slow motion is looked at
+_FAINT = 1e-9  # use of a margin whose axis no loop crosses
+_AT_ONCE = 48  # candidates whose arrays fit the processor's cache
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Task:
-    """One question for all three.
+class Measured:
+    """What loops do, (b,) each: log rms, log of use over bound by limit, how far from stable.
 
-    Parameters
-    ----------
-    name
-        How the table calls it.
-    plant, hook, structure
-        What `synth.question.question.pose` makes of a case.
-    limits
-        Of these kinds: `MaxSensitivity` (always there) and `LowFrequency`.
-    box
-        Half-width of the search box of each of the gains A a, A a_1, A a_2; the box is
-        symmetric, so that it holds both signs of each.
-    drag
-        Quadratic drag that has to agree with the motion, or None to keep the plant's own.
+    `turns` is zero for a stable loop with a drag of its own, else how far 1 + L goes round.
     """
 
-    name: str
-    plant: LinearPlant
-    hook: HookMotion
-    structure: PayloadFeedback
-    limits: tuple[Limit, ...]
-    box: tuple[float, float, float]
-    drag: DragElement | None = None
+    log_rms: FloatArray
+    excess: FloatArray  # (limits, b)
+    turns: FloatArray
 
     @property
-    def max_sensitivity(self) -> float:
-        """The bound on M_s."""
-        return next(lim.bound for lim in self.limits if isinstance(lim, MaxSensitivity))
+    def stable(self) -> npt.NDArray[np.bool_]:
+        """Whether a loop is stable."""
+        return np.asarray(self.turns == 0.0)
 
     @property
-    def low_frequency(self) -> LowFrequency | None:
-        """The limit on slow motion, if there is one."""
-        return next((lim for lim in self.limits if isinstance(lim, LowFrequency)), None)
-
-    def exact(self, gains: Sequence[float] | FloatArray) -> Exact:
-        """Return what gains really do: adaptive quadrature, peaks refined off any grid."""
-        law = self.structure.measurements
-        gain = [[-float(gains[law.index(name)]) for name in self.plant.measurements]]
-        loop = Assessment(
-            self.plant,
-            LinearController.static(gain, self.plant.measurements, self.plant.inputs),
-            disturbances({HOOK: self.hook}, self.plant.independent_disturbances),
-            drag=self.drag,
-        )
-        if self.drag is None and not loop.stable:
-            return Exact(rms=np.inf, max_sensitivity=np.inf, excess=np.inf)
-        uses = [limit.use(limit.measure(loop)) for limit in self.limits]
-        return Exact(
-            rms=loop.sigma(PAYLOAD),
-            max_sensitivity=loop.margins.max_sensitivity,
-            excess=max(uses) - 1.0,
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Exact:
-    """A design measured without grids: rms [m], M_s, largest relative excess over a limit."""
-
-    rms: float
-    max_sensitivity: float
-    excess: float
+    def objective(self) -> FloatArray:
+        """The logarithm of the rms, and penalties; of unstable loops, how unstable they are."""
+        value = self.log_rms + _PENALTY * np.maximum(self.excess, 0.0).sum(axis=0)
+        return np.where(self.stable & np.isfinite(value), value, _UNSTABLE * (1.0 + self.turns))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Answer:
-    """What a peer found: gains A a, A a_1, A a_2, time [s] and evaluations of its objective."""
+    """What a peer found: the law's parameters, processor time [s], loops evaluated."""
 
-    gains: FloatArray
+    values: FloatArray
     seconds: float
     evaluations: int
     objective: float
 
 
-class SampledLoop:
-    """The closed loop of many gains at once, on frequencies that are fixed beforehand.
+class _Places:
+    """Where a case's loops are looked at: quadrature nodes and a grid for the margins [rad/s]."""
+
+    def __init__(self, question: DesignQuestion, *, per_panel: int, per_decade: int) -> None:
+        sources = question.problem.disturbances
+        bands = [source.band for source in sources if source.band is not None]
+        low, high = min(band[0] for band in bands), max(band[1] for band in bands)
+        held = held_poles(question.data, question.drag_before, _LIVELY[1])
+        poles = np.concatenate([question.plant.poles(), held])
+        lively = (poles.imag > 0.0) & (poles.imag < _LIVELY[1]) & (poles.real < 0.0)
+        poles = poles[lively]
+        self.nodes = spectral_nodes(
+            max(low, 1e-2 * _BOTTOM),
+            high,
+            splits=[omega for source in sources for omega in source.splits],
+            poles=[complex(pole) for pole in poles],
+            per_panel=per_panel,
+            panels_per_decade=4.0,
+        )
+        light = poles[np.abs(poles.real) < _LIGHT * poles.imag]
+        pieces = [
+            (light.imag[:, None] + np.abs(light.real)[:, None] * _ABOUT).ravel(),
+            np.geomspace(_BOTTOM, _TOP, int(_THIN * np.log10(_TOP / _BOTTOM))),
+            np.geomspace(*_LIVELY, int(per_decade * np.log10(_LIVELY[1] / _LIVELY[0]))),
+        ]
+        grid = np.unique(np.concatenate(pieces))
+        self.grid = grid[(grid >= _BOTTOM) & (grid <= _TOP)]
+        slow = [limit for limit in question.limits if isinstance(limit, LowFrequency)]
+        self.slow = np.geomspace(1e-2, 1.0, _SLOW) * (slow[0].below if slow else 1.0)
+        self.density = np.array([s.density(self.nodes.omega) for s in sources]) * self.nodes.weights
+
+
+class SampledLine:
+    """Loops of many parameter vectors at once, on the exact rope at frequencies fixed beforehand.
 
     Parameters
     ----------
-    task
-        The question.
+    question
+        The case and the structure.
     per_panel
-        Quadrature nodes on a panel; panels end at every kink of the RAO's table.
+        Quadrature nodes on a panel; panels shrink towards the poles of plant and rope and end at
+        every kink of the RAO's table.
     per_decade
-        Points of the sensitivity grid, which is denser at the open loop's resonances.  Each
-        loop's highest peaks are looked at between the points too, and so is the neighbourhood
-        of its poles: on a plain grid the search finds the gains whose peak it does not see.
+        Points of the margin grid where loops move.
+    tighter
+        By what share the limit on M_s is tightened, for peaks between two points.
     """
 
-    def __init__(self, task: Task, *, per_panel: int = 8, per_decade: int = 120) -> None:
-        self.task = task
-        plant = task.plant
-        poles = plant.poles()
-        light = poles[(poles.imag > 0.0) & (np.abs(poles.real) < _LIGHT * poles.imag)]
-        self.nodes = quadrature(task, per_panel)
-        self.grid = _grid(light, per_decade)
-        self._density = task.hook.density(self.nodes.omega) * self.nodes.weights
-        self._at_nodes = _Sampled(task, self.nodes.omega)
-        self._at_grid = _Sampled(task, self.grid)
-        self._rational = plant.without_delays(PADE)
-        self._fed_back = self._rational.C[_columns(task)]
-        self._force = self._rational.disturbances.index(FORCE)
-        self._velocity = self._rational.outputs.index(VELOCITY)
-        low = task.low_frequency
-        self._at_low = (
-            None if low is None else _Sampled(task, np.geomspace(1e-3 * low.below, low.below, 12))
+    def __init__(
+        self,
+        question: DesignQuestion,
+        *,
+        per_panel: int = 4,
+        per_decade: int = 80,
+        tighter: float = 0.0,
+    ) -> None:
+        self.question, self.tighter = question, tighter
+        self.places = places = _Places(question, per_panel=per_panel, per_decade=per_decade)
+        self._at_nodes = _Sampled(question, places.nodes.omega)
+        self._at_grid = _Sampled(question, places.grid)
+        self._at_slow = _Sampled(question, places.slow)
+
+    def measure(self, values: FloatArray) -> Measured:
+        """Return what the loops of parameter vectors (b, n) do."""
+        parts = [self._measure(values[k : k + _AT_ONCE]) for k in range(0, len(values), _AT_ONCE)]
+        return Measured(
+            log_rms=np.concatenate([part.log_rms for part in parts]),
+            excess=np.concatenate([part.excess for part in parts], axis=1),
+            turns=np.concatenate([part.turns for part in parts]),
         )
 
-    def objective(self, gains: FloatArray, max_sensitivity: float) -> FloatArray:
-        """Return log rms plus penalties for a bound on M_s, of gains (3, m) or (3,)."""
-        columns = gains.reshape(3, -1)
-        log_rms, peaks, decay, slow = self.measure(columns)
-        value = log_rms + _PENALTY * np.maximum(0.0, np.log(peaks / max_sensitivity))
-        low = self.task.low_frequency
-        if low is not None:
-            value += _PENALTY * np.maximum(0.0, np.log(slow / low.bound))
-        result = np.where(decay < 0.0, value, _UNSTABLE * (1.0 + np.maximum(decay, 0.0)))
-        return np.asarray(result if gains.ndim > 1 else result[0], dtype=np.float64)
+    def _measure(self, values: FloatArray) -> Measured:
+        with np.errstate(all="ignore"):  # of candidates far outside
+            loops = self._at_nodes.close(values)
+            added, found = self._drag(loops)
+            moments = self._moments(loops, added)
+            difference = self._at_grid.close(values).difference(added)
+            slow = np.abs(self._at_slow.close(values).moved(PAYLOAD, added)[0]).max(axis=1)
+            rows = [
+                np.log(_use(limit, moments, difference, slow, self.places.grid))
+                + (self.tighter if isinstance(limit, MaxSensitivity) else 0.0)
+                for limit in self.question.limits
+            ]
+            log_rms = 0.5 * np.log(moments[PAYLOAD][0])
+            turns = _turns(difference)
+        return Measured(
+            log_rms=log_rms,
+            excess=np.array(rows),
+            turns=np.where(found, turns, 1.0 + np.nan_to_num(turns, nan=10.0)),
+        )
 
-    def measure(self, gains: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return log rms, M_s, spectral abscissa and the slow motion's ratio of gains (3, m).
+    def _drag(self, loops: _Closed) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+        """Return the drag coefficient less the plant's own, and whether there is one, (b,).
 
-        Where no drag agrees with the motion the abscissa is infinite.
+        Newton's method on log C = log(slope sigma_v(C)) for all at once.
         """
-        loop = self._at_nodes.close(gains)
-        power = loop.motion.real**2 + loop.motion.imag**2
-        added = np.zeros(gains.shape[1])
-        found = np.ones(gains.shape[1], dtype=np.bool_)
-        if self.task.drag is not None:
-            added, found = self._consistent(power, loop.velocity, self.task.drag)
-            damped = 1.0 + added * loop.velocity
-            power /= damped.real**2 + damped.imag**2
-        poles = self._poles(gains, added)
-        peaks = self._peaks(gains, added, poles)
-        slow = np.zeros(gains.shape[1])
-        if self._at_low is not None:
-            at_low = self._at_low.close(gains)
-            slow = np.abs(at_low.motion / (1.0 + added * at_low.velocity)).max(axis=0)
-        decay = np.where(found, poles.real.max(axis=1), np.inf)
-        return 0.5 * np.log(self._density @ power), peaks, decay, slow
-
-    def _consistent(
-        self, power: FloatArray, velocity: ComplexArray, drag: DragElement
-    ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-        """Return the drag coefficient less the plant's own, and whether there is one.
-
-        Newton's method on log C = log(slope sigma_v(C)), from well above, for all at once.
-        """
-        squared = (self.nodes.omega**2 * self._density)[:, None] * power
-        log_c = np.full(power.shape[1], np.log(3.0 * drag.reference))
+        drag = self.question.drag
+        assert drag is not None
+        hook, noise = loops.powers(VELOCITY, np.zeros(len(loops.plain)), self.places.density)
+        omega = loops.force[VELOCITY]
+        power = hook + noise
+        log_c = np.full(len(power), np.log(drag.reference))
         step = np.full_like(log_c, np.inf)
         for _ in range(25):
-            c = np.exp(log_c)
-            damped = 1.0 + (c - drag.reference) * velocity
-            density = squared / (damped.real**2 + damped.imag**2)
-            variance = density.sum(axis=0)
-            excess = log_c - np.log(drag.slope) - 0.5 * np.log(variance)
-            slope = 1.0 + (density * (c * velocity / damped).real).sum(axis=0) / variance
-            step = np.clip(-excess / np.maximum(slope, 0.3), -0.5, 0.5)
+            c = np.exp(log_c)[:, None]
+            damped = 1.0 + (c - drag.reference) * omega
+            density = power / (damped.real**2 + damped.imag**2)
+            variance = density.sum(axis=1)
+            off = log_c - np.log(drag.slope) - 0.5 * np.log(variance)
+            slope = 1.0 + (density * (c * omega / damped).real).sum(axis=1) / variance
+            step = np.clip(np.nan_to_num(-off / np.maximum(slope, 0.3)), -0.5, 0.5)
             log_c = log_c + step
-            if float(np.max(np.abs(step))) < 1e-8:
+            if float(np.max(np.abs(step))) < 1e-7:
                 break
         return np.exp(log_c) - drag.reference, np.abs(step) < 1e-5
 
-    def _poles(self, gains: FloatArray, added: FloatArray) -> ComplexArray:
-        """Return the closed loop's poles, (m, n), with Pade models for the delays."""
-        plant = self._rational
-        matrices = plant.A - np.einsum("i,jm,jk->mik", plant.B[:, 0], gains, self._fed_back)
-        if self.task.drag is not None:
-            # What the drag does to the payload, and what of it the accelerometer feels at once.
-            felt = plant.F[_columns(self.task), self._force] @ gains
-            push = plant.E[:, self._force] - felt[:, None] * plant.B[:, 0]
-            velocity = plant.Cz[self._velocity]
-            matrices = matrices - (added[:, None] * push)[:, :, None] * velocity
-        return np.asarray(np.linalg.eigvals(matrices), dtype=np.complex128)
-
-    def _peaks(self, gains: FloatArray, added: FloatArray, poles: ComplexArray) -> FloatArray:
-        """Return M_s, (m,): the grid, tops of parabolas on it, and beside the loop's poles."""
-        at_grid = self._at_grid.close(gains).difference(added)
-        depth = np.log(at_grid.real**2 + at_grid.imag**2)
-        half = poles.shape[1] // 2
-        upper = np.take_along_axis(poles, np.argsort(-poles.imag, axis=1)[:, :half], axis=1)
-        beside = upper.imag[:, :, None] + np.abs(upper.real)[:, :, None] * _STEPS
-        omega = np.hstack([self._tops(depth), beside.reshape(len(poles), -1)])
-        omega = np.clip(omega, _BOTTOM, _TOP)
-        sampled = _Sampled(self.task, omega.ravel(), omega.shape)
-        near = sampled.close(gains[:, :, None]).difference(added[:, None])
-        largest = np.maximum(np.exp(-0.5 * depth.min(axis=0)), 1.0 / np.abs(near).min(axis=1))
-        return np.asarray(largest, dtype=np.float64)
-
-    def _tops(self, depth: FloatArray) -> FloatArray:
-        """Return where parabolas through the deepest valleys on the grid have their bottom, (m, 3).
-
-        A peak of |S| between two points of the grid is a place that a search will find.
-        """
-        x = np.log(self.grid)[:, None]
-        left = (depth[1:-1] - depth[:-2]) / (x[1:-1] - x[:-2])
-        right = (depth[2:] - depth[1:-1]) / (x[2:] - x[1:-1])
-        curvature = (right - left) / (x[2:] - x[:-2])
-        slope = left + curvature * (x[1:-1] - x[:-2])
-        valley = (left < 0.0) & (right > 0.0)
-        deepest = np.argsort(np.where(valley, depth[1:-1], np.inf), axis=0)[:_VALLEYS]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            bottom = np.where(valley, x[1:-1] - 0.5 * slope / curvature, x[1:-1])
-        return np.asarray(np.exp(np.take_along_axis(bottom, deepest, axis=0)).T, dtype=np.float64)
+    def _moments(self, loops: _Closed, added: FloatArray) -> dict[str, tuple[FloatArray, ...]]:
+        """Return the moments m_0 and m_2 of every output that cost and limits speak of."""
+        omega = self.places.nodes.omega
+        found: dict[str, tuple[FloatArray, ...]] = {}
+        for name in loops.force:
+            sea, noise = loops.powers(name, added, self.places.density)
+            power = sea + noise
+            found[name] = (power.sum(axis=1), power @ omega**2)
+        return found
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Closed:
-    """Closed loops with the plant's own drag: 1 + L, P/Z, and payload velocity per force.
+    """Closed loops with the plant's own drag at k points; (b, k) each.
 
-    `open_velocity` is that of the plant alone.  More drag by c turns P/Z into P/Z over
-    1 + c velocity, and 1 + L into (1 + L)(1 + c velocity)/(1 + c open_velocity).
+    1 + L; responses to the hook and to a force on the payload by output; commands to each noise,
+    and the plant's response to a command.  More drag by c is a force -c v: it turns a response z
+    into z - z_F c v / (1 + c v_F), and 1 + L into (1 + L)(1 + c v_F)/(1 + c v_F, open).
     """
 
     plain: ComplexArray
-    motion: ComplexArray
-    velocity: ComplexArray
+    hook: dict[str, ComplexArray]
+    force: dict[str, ComplexArray]
+    commanded: dict[str, ComplexArray]
+    noises: list[ComplexArray]
     open_velocity: ComplexArray
+
+    def moved(self, name: str, added: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return the responses of an output to the hook and to a command's noise."""
+        c = added[:, None]
+        held = c * self.force[name] / (1.0 + c * self.force[VELOCITY])
+        return (
+            self.hook[name] - held * self.hook[VELOCITY],
+            self.commanded[name] - held * self.commanded[VELOCITY],
+        )
+
+    def powers(
+        self, name: str, added: FloatArray, density: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return what the sea and what all noises add to an output's variance at each node."""
+        hook, command = self.moved(name, added)
+        noise = sum(
+            ((g.real**2 + g.imag**2) * d for g, d in zip(self.noises, density[1:], strict=True)),
+            np.zeros(1),
+        )
+        return (
+            (hook.real**2 + hook.imag**2) * density[0],
+            (command.real**2 + command.imag**2) * noise,
+        )
 
     def difference(self, added: FloatArray) -> ComplexArray:
         """Return 1 + L with the drag coefficient raised by `added`."""
-        ratio = (1.0 + added * self.velocity) / (1.0 + added * self.open_velocity)
+        c = added[:, None]
+        ratio = (1.0 + c * self.force[VELOCITY]) / (1.0 + c * self.open_velocity)
         return np.asarray(self.plain * ratio, dtype=np.complex128)
 
 
 class _Sampled:
-    """The plant at given frequencies: once (k,) for all loops, or a row (m, k) for each."""
+    """The exact rope, its drive and its sensors at given frequencies [rad/s]."""
 
-    def __init__(self, task: Task, omega: FloatArray, rows: tuple[int, int] | None = None) -> None:
-        plant = task.plant.select(outputs=[PAYLOAD, VELOCITY])
-        response = plant.response(omega)
-        hook, force = (response.disturbances.index(name) for name in (HOOK, FORCE))
-        shape = (omega.size, 1) if rows is None else rows
-        self._many = rows is not None
-        columns = _columns(task)
-        self._yu = self._stacked(response.yu[:, columns, 0], shape)
-        self._y_hook = self._stacked(response.yw[:, columns, hook], shape)
-        self._y_force = self._stacked(response.yw[:, columns, force], shape)
-        self._p_hook = response.zw[:, 0, hook].reshape(shape)
-        self._p_u = response.zu[:, 0, 0].reshape(shape)
-        self._v_force = response.zw[:, 1, force].reshape(shape)
-        self._v_u = response.zu[:, 1, 0].reshape(shape)
+    def __init__(self, question: DesignQuestion, omega: FloatArray) -> None:
+        problem = question.problem
+        self._law, self._s = problem.law, 1j * omega
+        line = sensed_line_at(question.case, self._s, drag=question.drag_before, data=question.data)
+        heard = [line.measurements.index(name) for name in question.plant.measurements]
+        names = [d.name for d in problem.disturbances]
+        assert names[0] == HOOK
+        w = [line.disturbances.index(name) for name in names]
+        force = line.disturbances.index(FORCE)
+        self._yu = np.ascontiguousarray(line.yu[:, heard, 0].T)
+        self._yw = [np.ascontiguousarray(line.yw[:, heard, k].T) for k in (*w, force)]
+        z = {name: line.outputs.index(name) for name in problem.outputs}
+        self._zu = {name: line.zu[:, k, 0] for name, k in z.items()}
+        self._zh = {name: line.zw[:, k, w[0]] for name, k in z.items()}
+        self._zf = {name: line.zw[:, k, force] for name, k in z.items()}
 
-    def close(self, gains: FloatArray) -> _Closed:
-        """Return the loops of `gains`, (3, m), or (3, m, 1) where each has its own frequencies."""
-        difference = 1.0 + self._dot(self._yu, gains)
+    def close(self, values: FloatArray) -> _Closed:
+        """Return the loops of parameter vectors, (b, n)."""
+        (entries,) = self._law.response([column[:, None] for column in values.T], self._s)
+        shape = (len(values), self._s.size)
+
+        def heard(of: ComplexArray) -> ComplexArray:
+            parts = (law * y for law, y in zip(entries, of, strict=True) if np.any(y))
+            return np.asarray(np.broadcast_to(sum(parts), shape), dtype=np.complex128)
+
+        # u = C y, and so u = C y_w w / (1 - C y_u).
+        plain = 1.0 - heard(self._yu)
+        hook, *noises, force = (heard(block) / plain for block in self._yw)
         return _Closed(
-            plain=difference,
-            motion=self._p_hook - self._p_u * self._dot(self._y_hook, gains) / difference,
-            velocity=self._v_force - self._v_u * self._dot(self._y_force, gains) / difference,
-            open_velocity=self._v_force,
+            plain=plain,
+            hook={name: self._zh[name] + zu * hook for name, zu in self._zu.items()},
+            force={name: self._zf[name] + zu * force for name, zu in self._zu.items()},
+            commanded={name: zu / 1.0 for name, zu in self._zu.items()},
+            noises=noises,
+            open_velocity=self._zf[VELOCITY],
         )
 
-    def _stacked(self, block: ComplexArray, shape: tuple[int, int]) -> ComplexArray:
-        return block.T.reshape(3, *shape) if self._many else np.ascontiguousarray(block)
 
-    def _dot(self, block: ComplexArray, gains: FloatArray) -> ComplexArray:
-        if self._many:
-            return np.asarray((block * gains).sum(axis=0), dtype=np.complex128)
-        return np.asarray(block @ gains, dtype=np.complex128)
+def _use(
+    limit: Limit,
+    moments: Mapping[str, tuple[FloatArray, ...]],
+    difference: ComplexArray,
+    slow: FloatArray,
+    omega: FloatArray,
+) -> FloatArray:
+    """Return what is used of a limit, (b,): at most one where it is kept.
+
+    Raises
+    ------
+    TypeError
+        If the limit is of a kind that these peers do not know.
+    """
+
+    def peak(output: str, duration: float) -> FloatArray:
+        m_0, m_2 = moments[output]
+        cycles = duration / (2.0 * np.pi) * np.sqrt(m_2 / m_0)
+        return np.asarray(np.sqrt(2.0 * np.log(np.maximum(cycles, np.exp(0.5))) * m_0))
+
+    if isinstance(limit, MaxSensitivity):
+        return _largest_sensitivity(difference, omega) / limit.bound
+    if isinstance(limit, GainMargin):
+        x = _on_axis(difference)
+        x = np.where(x > -1.0, x, 0.0)
+        return np.asarray(np.maximum(-limit.bound * x.min(axis=1), _FAINT))
+    if isinstance(limit, GainMarginDown):
+        x = _on_axis(difference)
+        x = np.where(x < -1.0, x, -np.inf)
+        return np.asarray(np.maximum(-1.0 / (limit.bound * x.max(axis=1)), _FAINT))
+    if isinstance(limit, LowFrequency):
+        return slow / limit.bound
+    if isinstance(limit, Peak):
+        return (abs(limit.static) + peak(limit.output, limit.duration)) / limit.bound
+    if isinstance(limit, Continuous):
+        return np.sqrt(limit.static**2 + moments[limit.output][0]) / limit.bound
+    if isinstance(limit, Minimum):
+        return peak(limit.output, limit.duration) / (limit.static - limit.bound)
+    if isinstance(limit, Power):
+        torque = abs(limit.static) + peak(limit.torque, limit.duration)
+        return torque * peak(limit.speed, limit.duration) / limit.bound
+    raise TypeError(f"no peer knows the limit {limit.name}")
 
 
-class PythonControlLoop:
-    """The same loop as python-control objects: feedback, frequency responses, poles."""
+def _largest_sensitivity(difference: ComplexArray, omega: FloatArray) -> FloatArray:
+    """Return M_s, (b,): on the grid, and at the tops of parabolas through three of its points."""
+    depth = np.log(difference.real**2 + difference.imag**2)
+    x = np.log(omega)
+    left = (depth[:, 1:-1] - depth[:, :-2]) / (x[1:-1] - x[:-2])
+    right = (depth[:, 2:] - depth[:, 1:-1]) / (x[2:] - x[1:-1])
+    curvature = (right - left) / (x[2:] - x[:-2])
+    slope = left + curvature * (x[1:-1] - x[:-2])
+    valley = (left < 0.0) & (right > 0.0)
+    bottom = np.where(valley, depth[:, 1:-1] - 0.25 * slope**2 / curvature, np.inf)
+    deepest = np.minimum(depth.min(axis=1), bottom.min(axis=1))
+    return np.asarray(np.exp(-0.5 * deepest), dtype=np.float64)
 
-    def __init__(self, task: Task, *, per_panel: int = 8, per_decade: int = 60) -> None:
+
+def _on_axis(difference: ComplexArray) -> FloatArray:
+    """Return L where it crosses the negative real axis, 0 elsewhere, (b, k - 1)."""
+    loop = difference - 1.0
+    below, above = loop[:, :-1], loop[:, 1:]
+    share = below.imag / (below.imag - above.imag)
+    crossing = below.real + share * (above.real - below.real)
+    crosses = (below.imag * above.imag < 0.0) & (crossing < 0.0)
+    return np.asarray(np.where(crosses, crossing, 0.0), dtype=np.float64)
+
+
+def _turns(difference: ComplexArray) -> FloatArray:
+    """Return how far 1 + L goes round, (b,): zero if stable, by the argument principle.
+
+    On the exact rope the plant has one pole at zero and none to the right of it.  1 + L then comes
+    up from -i infinity and must end at one without having gone round: its argument turns back to
+    zero.
+    """
+    start = np.angle(difference[:, 0])
+    end = start + np.angle(difference[:, 1:] / difference[:, :-1]).sum(axis=1)
+    stable = (start < 0.3) & (np.abs(end) < 0.5 * np.pi)
+    return np.where(stable, 0.0, 0.1 + np.abs(end) / (2.0 * np.pi) + np.maximum(start, 0.0))
+
+
+class ControlLoops:
+    """The same loops as python-control objects on rope masses, one at a time; static laws only."""
+
+    def __init__(
+        self, question: DesignQuestion, *, per_panel: int = 4, per_decade: int = 60
+    ) -> None:
         import control
 
-        self.task = task
+        self.question = question
         self._control = control
-        plant = task.plant
+        plant, problem = question.plant, question.problem
         self.system: control.StateSpace = plant.without_delays(PADE).to_control(pade_order=0)
         inputs, outputs = self.system.input_labels, self.system.output_labels
-        measured = [f"measured_{n}" if n in plant.outputs else n for n in plant.measurements]
-        self._measured = [outputs.index(measured[j].replace(".", "_")) for j in _columns(task)]
-        self._input = {name: inputs.index(name.replace(".", "_")) for name in plant.disturbances}
-        self._output = {name: outputs.index(name.replace(".", "_")) for name in (PAYLOAD, VELOCITY)}
-        poles = plant.poles()
-        light = poles[(poles.imag > 0.0) & (np.abs(poles.real) < _LIGHT * poles.imag)]
-        self.nodes = quadrature(task, per_panel)
-        self.grid = _grid(light, per_decade)
-        self._density = task.hook.density(self.nodes.omega) * self.nodes.weights
+        at = {name: name.replace(".", "_") for name in (*plant.outputs, *plant.measurements)}
+        heard = [
+            at[n] if n not in plant.outputs else f"measured_{at[n]}" for n in plant.measurements
+        ]
+        self._heard = [outputs.index(name) for name in heard]
+        self._rows = [outputs.index(at[name]) for name in problem.outputs]
+        self._velocity = outputs.index(at[VELOCITY])
+        self._force = inputs.index(FORCE.replace(".", "_"))
+        # A disturbance, and its rate where the plant has that as an input of its own.
+        self._sources = [
+            [
+                inputs.index(name.replace(".", "_"))
+                for name in (d.name, f"{d.name}_rate")
+                if name in plant.disturbances
+            ]
+            for d in problem.disturbances
+        ]
+        self.places = _Places(question, per_panel=per_panel, per_decade=per_decade)
 
-    def measure(self, gains: FloatArray) -> tuple[float, FloatArray, float, float]:
-        """Return log rms, |1 + L| on the grid, spectral abscissa, slow motion's ratio of (3,)."""
-        added = 0.0
-        if self.task.drag is not None:
-            drag = self.task.drag
-            c = scipy.optimize.newton(
-                lambda log_c: (
-                    log_c
-                    - np.log(
-                        drag.slope * self._sigma(gains, np.exp(log_c) - drag.reference, VELOCITY)
-                    )
-                ),
-                np.log(drag.reference),
-                tol=1e-6,
-                disp=False,
-            )
-            added = float(np.exp(c)) - drag.reference
-        closed = self.closed(gains, added)
-        low = self.task.low_frequency
-        slow = 0.0
-        if low is not None:
-            omega = np.geomspace(1e-3 * low.below, low.below, 12)
-            slow = float(np.abs(self._motion(closed, omega, PAYLOAD)).max())
-        sigma = self._sigma(gains, added, PAYLOAD, closed)
-        with_drag = self.closed(np.zeros(3), added)
-        feedback = self._control.ss([], [], [], [list(gains)])
-        loop = self._control.series(with_drag[self._measured, 0], feedback)
-        distance = np.abs(1.0 + np.ravel(loop(1j * self.grid)))
-        return float(np.log(sigma)), distance, float(closed.poles().real.max()), slow
+    def measure(self, values: FloatArray) -> tuple[float, FloatArray]:
+        """Return log rms, and rows that are at least zero where a limit is kept."""
+        question, places = self.question, self.places
+        drag = question.drag
+        assert drag is not None
+        rows_of = dict(zip(question.problem.outputs, self._rows, strict=True))
 
-    def closed(self, gains: FloatArray, added: float) -> control.StateSpace:
-        """Return the plant with the gains and a further drag coefficient fed back."""
+        def off(log_c: float) -> float:
+            closed = self.closed(values, float(np.exp(log_c)) - drag.reference)
+            power = self._power(closed, [rows_of[VELOCITY]])[0]
+            return float(log_c - np.log(drag.slope) - 0.5 * np.log(power.sum()))
+
+        log_c = scipy.optimize.newton(off, np.log(drag.reference), tol=1e-6, disp=False)
+        added = float(np.exp(log_c)) - drag.reference
+        closed = self.closed(values, added)
+        power = self._power(closed, self._rows)
+        moments: dict[str, tuple[FloatArray, ...]] = {
+            name: (row.sum()[None], (row @ places.nodes.omega**2)[None])
+            for name, row in zip(question.problem.outputs, power, strict=True)
+        }
+        slow = np.abs(self._motion(closed, places.slow, [rows_of[PAYLOAD]], self._sources[0])).max()
+        with_drag = self.closed(np.zeros_like(values), added)
+        law = self._control.ss([], [], [], [self._law(values)])
+        loop = self._control.series(with_drag[self._heard, 0], law)
+        difference = np.asarray(1.0 - np.ravel(loop(1j * places.grid))[None], dtype=np.complex128)
+        rows = [-float(closed.poles().real.max())]
+        for limit in question.limits:
+            if isinstance(limit, MaxSensitivity):
+                rows += list(np.log(limit.bound * np.abs(difference[0])))
+            else:
+                use = _use(limit, moments, difference, np.array([slow]), places.grid)
+                rows.append(-float(np.log(use[0])))
+        return 0.5 * float(np.log(moments[PAYLOAD][0][0])), np.array(rows)
+
+    def closed(self, values: FloatArray, added: float) -> Any:
+        """Return the plant with the law and a further drag coefficient fed back."""
         law = np.zeros((self.system.ninputs, self.system.noutputs))
-        law[0, self._measured] = -gains
-        law[self._input[FORCE], self._output[VELOCITY]] = -added
+        law[0, self._heard] = self._law(values)
+        law[self._force, self._velocity] = -added
         return self._control.feedback(self.system, self._control.ss([], [], [], law), sign=1)
 
-    def _motion(self, system: control.StateSpace, omega: FloatArray, output: str) -> ComplexArray:
-        row = self._output[output]
-        columns = [self._input[HOOK]]
-        columns += [self._input[rate] for rate in self.task.plant.rates]
-        response = system[row, columns](1j * omega)[0]
-        result = response[0] + (1j * omega * response[1:]).sum(axis=0)
-        return np.asarray(result, dtype=np.complex128)
+    def _law(self, values: FloatArray) -> FloatArray:
+        (entries,) = self.question.law.response(list(values), np.array([1j]))
+        return np.array([float(np.real(np.ravel(entry)[0])) for entry in entries])
 
-    def _sigma(
-        self,
-        gains: FloatArray,
-        added: float,
-        output: str,
-        closed: control.StateSpace | None = None,
-    ) -> float:
-        system = self.closed(gains, added) if closed is None else closed
-        motion = self._motion(system, self.nodes.omega, output)
-        return float(np.sqrt(self._density @ np.abs(motion) ** 2))
+    def _motion(
+        self, system: Any, omega: FloatArray, rows: list[int], source: list[int]
+    ) -> ComplexArray:
+        response = system[rows, source](1j * omega, squeeze=False)
+        return np.asarray(sum(response[:, k] * (1j * omega) ** k for k in range(len(source))))
+
+    def _power(self, system: Any, rows: list[int]) -> FloatArray:
+        """Return what each node adds to the variances of outputs, (rows, k)."""
+        every = [k for source in self._sources for k in source]
+        omega = self.places.nodes.omega
+        response = system[rows, every](1j * omega, squeeze=False)
+        power, first = np.zeros((len(rows), omega.size)), 0
+        for source, density in zip(self._sources, self.places.density, strict=True):
+            parts = response[:, first : first + len(source)]
+            motion = sum(parts[:, k] * (1j * omega) ** k for k in range(len(source)))
+            power += np.abs(motion) ** 2 * density
+            first += len(source)
+        return power
 
 
 def evolve(
-    loop: SampledLoop,
+    line: SampledLine,
+    box: FloatArray,
     seed: int,
     *,
-    vectorised: bool = True,
-    max_sensitivity: float | None = None,
     popsize: int = 15,
-    generations: int = 300,
+    generations: int = 1000,
+    agree: float = 1e-5,
 ) -> Answer:
-    """Return SciPy's differential evolution from a seed, on the sampled loop.
+    """Return SciPy's differential evolution from a seed, whole generations at once.
 
-    Its population agrees to 1e-4 in log rms at the end.  No polish: SciPy's is L-BFGS-B,
-    which the kink of the penalty stops.
+    Parameters
+    ----------
+    line
+        The loops.
+    box
+        Ends of every parameter, (n, 2); searched on a logarithm where both are above zero.
+    seed
+        Of the population, which is a Sobol set at the beginning.
+    popsize, generations
+        Members for each parameter, and the most generations.
+    agree
+        Standard deviation of the population's log rms at which it ends.
     """
-    bound = loop.task.max_sensitivity if max_sensitivity is None else max_sensitivity
+    logarithmic = box[:, 0] > 0.0
 
-    def objective(gains: FloatArray) -> Any:
-        return loop.objective(gains, bound)
+    def values(x: FloatArray) -> FloatArray:
+        return np.where(logarithmic, np.exp(np.where(logarithmic, x, 0.0)), x)
 
-    begin = time.perf_counter()
+    count = 0
+
+    def objective(x: FloatArray) -> Any:
+        nonlocal count
+        count += x.shape[1]
+        return line.measure(values(x.T)).objective
+
+    ends = np.where(logarithmic[:, None], np.log(np.where(box > 0.0, box, 1.0)), box)
+    begin = time.process_time()
     found = scipy.optimize.differential_evolution(
         objective,
-        scipy.optimize.Bounds(-np.array(loop.task.box), np.array(loop.task.box)),
+        scipy.optimize.Bounds(ends[:, 0], ends[:, 1]),
         rng=seed,
-        vectorized=vectorised,
-        updating="deferred" if vectorised else "immediate",
+        init="sobol",
+        vectorized=True,
+        updating="deferred",
         popsize=popsize,
         maxiter=generations,
         tol=0.0,
-        atol=1e-4,
-        polish=False,
+        atol=agree,
+        polish=False,  # SciPy's is L-BFGS-B, which the kink of a penalty stops
     )
-    seconds = time.perf_counter() - begin
-    per_call = 3 * popsize if vectorised else 1
     return Answer(
-        gains=np.asarray(found.x, dtype=np.float64),
-        seconds=seconds,
-        evaluations=int(found.nfev) if not vectorised else int(found.nfev) * per_call,
+        values=values(np.asarray(found.x)),
+        seconds=time.process_time() - begin,
+        evaluations=count,
         objective=float(found.fun),
     )
 
 
 def slsqp(
-    loop: PythonControlLoop,
+    measure: Callable[[FloatArray], tuple[float, FloatArray]],
     start: FloatArray,
     *,
     iterations: int = 100,
-    max_sensitivity: float | None = None,
 ) -> Answer:
-    """Return SciPy's SLSQP from starting gains, gradients by differences.
+    """Return SciPy's SLSQP from a start, gradients by differences, infinite where it failed.
 
-    |1 + L| at every frequency of the grid, the slow motion and the spectral abscissa are
-    inequalities.  Points are remembered, so that objective and constraints share them.
+    Every limit, |1 + L| at every frequency of the grid and the spectral abscissa are inequalities.
+    Points are remembered, so that objective and constraints share them.
     """
     scale = np.maximum(np.abs(start), 1e-3 * float(np.abs(start).max()))
-    known: dict[bytes, tuple[float, FloatArray, float, float]] = {}
+    known: dict[bytes, tuple[float, FloatArray]] = {}
 
-    def at(x: FloatArray) -> tuple[float, FloatArray, float, float]:
+    def at(x: FloatArray) -> tuple[float, FloatArray]:
         key = np.asarray(x, dtype=np.float64).tobytes()
         if key not in known:
-            known[key] = loop.measure(np.asarray(x) * scale)
+            known[key] = measure(np.asarray(x) * scale)
         return known[key]
 
-    bound = loop.task.max_sensitivity if max_sensitivity is None else max_sensitivity
-    low = loop.task.low_frequency
-
-    def rows(x: FloatArray) -> FloatArray:
-        _, distance, decay, slow = at(x)
-        further = [-decay] if low is None else [-decay, np.log(low.bound / slow)]
-        return np.append(np.log(bound * distance), further)
-
     minimise: Any = scipy.optimize.minimize  # its overloads tell no lambda from another
-    begin = time.perf_counter()
+    values, objective = np.asarray(start, dtype=np.float64), np.inf
+    begin = time.process_time()
     try:
         with np.errstate(all="ignore"):  # of trial points far outside
             found = minimise(
                 lambda x: at(x)[0],
                 start / scale,
                 method="SLSQP",
-                constraints={"type": "ineq", "fun": rows},
+                constraints={"type": "ineq", "fun": lambda x: at(x)[1]},
                 options={"maxiter": iterations, "ftol": 1e-8},
             )
+        values = np.asarray(found.x * scale, dtype=np.float64)
+        objective = float(found.fun) if found.success else np.inf
     except (ValueError, RuntimeError, np.linalg.LinAlgError):
-        # It strayed to where python-control or the drag has no answer: a start that failed.
-        return Answer(
-            gains=np.asarray(start, dtype=np.float64),
-            seconds=time.perf_counter() - begin,
-            evaluations=len(known),
-            objective=np.inf,
-        )
+        pass  # it strayed to where python-control or the drag has no answer
     return Answer(
-        gains=np.asarray(found.x * scale, dtype=np.float64),
-        seconds=time.perf_counter() - begin,
+        values=values,
+        seconds=time.process_time() - begin,
         evaluations=len(known),
-        objective=float(found.fun) if found.success else np.inf,
+        objective=objective,
     )
-
-
-def quadrature(task: Task, per_panel: int) -> Quadrature:
-    """Return fixed nodes for the payload's variance."""
-    poles = task.plant.poles()
-    swinging = poles[(poles.imag > 0.0) & (np.abs(poles.real) > 1e-9 * np.abs(poles))]
-    return spectral_nodes(
-        *task.hook.band,
-        splits=task.hook.splits,
-        poles=[complex(p) for p in swinging],
-        per_panel=per_panel,
-        panels_per_decade=8.0,
-    )
-
-
-def _columns(task: Task) -> list[int]:
-    """Return where P'', P', P stand among the plant's measurements."""
-    return [task.plant.measurements.index(name) for name in task.structure.measurements]
-
-
-def _grid(light: ComplexArray, per_decade: int) -> FloatArray:
-    """Return frequencies [rad/s], denser where loops move and at the plant's light poles."""
-    low, high = _LIVELY
-    pieces = [
-        (light.imag[:, None] + np.abs(light.real)[:, None] * _ABOUT).ravel(),
-        np.geomspace(_BOTTOM, _TOP, int(_THIN * np.log10(_TOP / _BOTTOM))),
-        np.geomspace(low, high, int(per_decade * np.log10(high / low))),
-    ]
-    grid = np.concatenate(pieces)
-    return np.unique(grid[(grid >= _BOTTOM) & (grid <= _TOP)])

@@ -33,6 +33,7 @@ SCRIPTS: Mapping[str, str] = {
     "structures.csv": "docs/make/structures.py",
     "sweep.csv": "benchmarks/sweep.py",
     "sweep_workers.csv": "benchmarks/sweep_workers.py",
+    "synthesis.csv": "benchmarks/synthesis.py",
 }
 _MADE = re.compile(r"^# Written by (?P<script>\S+) with code (?P<code>[0-9a-f]+)\.")
 
