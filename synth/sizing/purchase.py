@@ -8,7 +8,8 @@ theorem: that of the Lagrangian with the multipliers of every row, for a limit i
 *elasticity* comes from gains that were optimised again with the figure a little better.  Where the
 optimum is smooth they agree; where limits are about to change hands, and for margins that are
 pressed at several frequencies at once, the second one counts.  Last, the figure is made twice as
-good and the gains are optimised once more: what stillness that buys is what the list is sorted by.
+good and the gains are searched for anew, from this optimum and from fresh starts, since the best
+may lie elsewhere then: what stillness that buys is what the list is sorted by.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from models.case import Case
 from ..design import Design, optimise_gains
 from ..limits import Limit
 from ..question import Problem
-from ..search import Progress
+from ..search import Progress, search
 from .follow import Answer, answer_of, asked_by, follow, posed, slope, with_bound
 from .motor import motor_changes
 
@@ -274,7 +275,7 @@ def worth(
     structure
         Controller structure, see `synth.structures.structure_names`.
     starts, seed
-        Size and seed of the search for the optimum.
+        Size and seed of the searches for the optimum, and for that with a figure twice as good.
     progress
         Called as progress(stage, done, total).
 
@@ -306,13 +307,13 @@ def worth(
     rows = []
     for k, item in enumerate(items):
         tell("what each thing is worth", k, len(items))
-        rows.append(_row(design, here, item))
+        rows.append(_row(design, here, item, starts, seed))
     rows.sort(key=lambda row: -row.gain if math.isfinite(row.gain) else 0.0)
     result = replace(result, ok=True, payload_rms=here.payload_rms, rows=tuple(rows))
     return replace(result, status=_sentence(result))
 
 
-def _row(design: Design, here: Answer, item: Item) -> WorthRow:
+def _row(design: Design, here: Answer, item: Item, starts: int, seed: int) -> WorthRow:
     """Return what one figure is worth, by both routes."""
     price = _price(design, here, item)
     factor = 2.0 if item.better > 0 else 0.5
@@ -330,6 +331,7 @@ def _row(design: Design, here: Answer, item: Item) -> WorthRow:
         factor = 2.0 ** (way * share)
         twice = _again(design, here, item, factor, near or here)
         if twice is not None:
+            twice = _searched(twice, starts, seed)
             break
     step = way * item.step / item.value
     elasticity = math.nan if near is None else math.log(near.payload_rms / rms) / (way * _STEP)
@@ -360,6 +362,14 @@ def _again(design: Design, here: Answer, item: Item, factor: float, near: Answer
     if problem is None:
         return None
     return follow(problem, list(dict.fromkeys((near, here))))
+
+
+def _searched(followed: Answer, starts: int, seed: int) -> Answer:
+    """Return the best of an answer that was followed and of what a search finds."""
+    problem = followed.problem
+    fresh = Answer.of(problem, search(problem, starts, seed, guesses=[followed.solved.values]))
+    found = [followed, fresh] if fresh is not None else [followed]
+    return min(found, key=lambda answer: answer.payload_rms)
 
 
 def _changed(design: Design, here: Answer, item: Item, factor: float) -> Problem | None:
