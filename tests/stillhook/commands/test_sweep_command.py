@@ -53,6 +53,7 @@ def test_the_worst_case_of_a_structure_carries_its_own_parameters(resumed, tmp_p
     )
     run(
         "thesis-1975", *CALM, *TIME, "--samples", 4, "--vary", "payload.mass=10 %",
+        "--set", "sensors.mru={noise_floor: 0, noise_fraction: 0}",
         "--structure", "feed-forward", "--gains", gains,
         "--vary", "gains.heave.gain=20 %", "--no-figures", "--out", folder,
     )  # fmt: skip

@@ -134,7 +134,6 @@ def test_a_limit_that_binds_on_a_rope_mode_is_kept_on_the_distributed_rope() -> 
     design = optimise_gains(case, "payload-feedback", starts=4)
     assert design.ok
     assert design.margins is not None
-    assert design.margins.peak > 5.0 * design.margins.crossovers.max()
     bound = design.limits["max_sensitivity"].bound
     assert design.margins.max_sensitivity == pytest.approx(bound, rel=1e-5)
 
@@ -143,8 +142,10 @@ def test_a_limit_that_binds_on_a_rope_mode_is_kept_on_the_distributed_rope() -> 
     heard = ("payload.acceleration", "payload.velocity", "payload.displacement")
     felt = line.yu[:, [line.measurements.index(name) for name in heard], 0]
     loop = gains["A"] * felt @ [gains["a"], gains["a1"], gains["a2"]]
-    on_the_rope = float(np.max(1.0 / np.abs(1.0 + loop)))
-    assert on_the_rope == pytest.approx(bound, rel=1e-3)
+    on_the_rope = 1.0 / np.abs(1.0 + loop)
+    assert np.max(on_the_rope) == pytest.approx(bound, rel=1e-3)
+    far = omega > 5.0 * design.margins.crossovers.max()
+    assert np.max(on_the_rope[far]) == pytest.approx(bound, rel=1e-3)
 
     # As few masses as the crossovers ask for keep it, and the rope does not.
     few = evaluate_gains(case.replace({"rope.masses": 7}), LATE_ON_7)
