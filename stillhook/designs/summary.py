@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 
 from models.rig import DCMotor
-from synth.design import Design, LimitUse
+from synth.design import Design, LimitUse, few_starts
 from synth.question import HOOK, PAYLOAD, difference_text
 
 from ..text import (
@@ -288,7 +288,11 @@ def facts(design: Design, *, bound: bool = True) -> list[tuple[str, str]]:
         drag = f"{quantity(design.drag, 'N s/m')}, fixed by the case"
     rows = [("sea", sea_text(design)), ("rope", rope), ("drag", drag)]
     if design.starts:
-        rows.append(("search", f"{design.agreed} of {len(design.starts)} starts agree"))
+        agree = f"{design.agreed} of {len(design.starts)} starts agree"
+        few = few_starts(design.agreed, len(design.starts))
+        rows.append(
+            ("search", f"{few}; more starts or another seed may do better" if few else agree)
+        )
     if design.verification is not None:
         rows.append(("check", design.verification.status))
     return [*rows, *(bound_rows(design) if bound else ())]

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .infeasible import shortfall
     from .nested import gains_in_use
     from .optimise import design_of, evaluate_gains, optimise_gains, verified
-    from .tuning import LimitUse, Tuning, limit_uses, tune, tuning_of
+    from .tuning import LimitUse, Tuning, few_starts, limit_uses, tune, tuning_of
     from .view import Look, View, prepare
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -246,7 +246,8 @@ def tune(
         if wanted is Objective.REGRET:
             family = with_bests(family, seed, guesses, progress)
         answer = tuning_of(family, search(family, int(starts), seed, guesses, progress))
-    return replace(answer, status=answer.status + _few(answer))
+    few = few_starts(answer.agreed, len(answer.starts)) if answer.ok else ""
+    return replace(answer, status=f"{answer.status}; {few}" if few else answer.status)
 
 
 def limit_uses(
@@ -368,11 +369,9 @@ def verified_members(each: Sequence[Verification]) -> Verification:
     return Verification(ok=all(one.ok for one in each), status=status, checks=checks)
 
 
-def _few(answer: Tuning) -> str:
-    """Return a remark on an answer that few starts reached."""
-    if not answer.ok or answer.agreed >= _FEW:
-        return ""
-    return f"; only {answer.agreed} of {len(answer.starts)} starts reached it"
+def few_starts(agreed: int, starts: int) -> str:
+    """Return the remark on an answer that fewer than four starts reached, "" if more did."""
+    return f"only {agreed} of {starts} starts reached it" if agreed < _FEW else ""
 
 
 def _problem(

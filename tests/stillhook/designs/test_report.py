@@ -7,6 +7,7 @@ import math
 import re
 import xml.etree.ElementTree as ET
 
+import numpy as np
 import pytest
 from designs import infeasible_design, loopless_design, thesis_design, unstable_design
 
@@ -25,6 +26,7 @@ from stillhook.designs.summary import (
     share_table,
 )
 from stillhook.text import json_data, markdown
+from synth.search import Start
 
 FIGURES = ("payload_spectrum", "responses", "nyquist", "limits")
 ALL = {"case.yaml", "design.yaml", "summary.md"} | {
@@ -269,3 +271,16 @@ def test_members_and_held_parameters_are_told():
     assert "made small: the worst of them" in text
     assert "a is held" in text
     assert "made small" not in markdown(design_report(design, bound=False))
+
+
+@pytest.mark.parametrize(
+    ("agreed", "words"),
+    [(4, "4 of 5 starts agree"), (3, "only 3 of 5 starts reached it; more starts or another seed")],
+)
+def test_an_answer_that_few_starts_reached_is_remarked_upon(agreed: int, words: str) -> None:
+    start = Start(
+        begin=np.zeros(3), end=np.ones(3), cost=0.5, converged=True, stable=True, message="",
+        iterations=9,
+    )  # fmt: skip
+    design = dataclasses.replace(thesis_design(), starts=(start,) * 5, agreed=agreed)
+    assert dict(facts(design, bound=False))["search"].startswith(words)
