@@ -13,7 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from synthesis import machine, markdown, plain
+from synthesis import machine
+from tables import markdown, plain
 
 __all__ = ["Minutes", "Results", "Timing", "missed", "report", "solver_figure", "write_files"]
 

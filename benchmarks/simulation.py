@@ -36,7 +36,7 @@ from typing import Any
 import numpy as np
 from simulation_peers import Answer, Peer
 from simulation_report import REST, Comparison, Memory, Speed, missed, report, write_into
-from synthesis import markdown, plain
+from tables import markdown, plain
 
 from models import load_case
 from models.hook import HookMotion

@@ -31,7 +31,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from synthesis import machine, markdown, plain, write_into
+from synthesis import machine, write_into
+from tables import markdown, plain
 
 import stillhook as sh
 from models.case import Case

@@ -286,7 +286,6 @@ def test_margins_command(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["subsea-crane"], "the case has none in use"),
         (["thesis-1975", "--off", "payload.mass"], "--off: must be PATH=SHARE"),
         (["thesis-1975", "--off", "a=1", "--off", "a=2"], "a is given twice"),
         (["thesis-1975", "--draws", "-1"], "--draws must be"),
