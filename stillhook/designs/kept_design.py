@@ -59,13 +59,13 @@ def best_design(
             os.utime(place)
         return found
     found = optimise_gains(case, structure, progress=progress)
-    keep_best(found, structure)
+    keep_best(found, case, structure)
     return found
 
 
-def keep_best(found: Design, structure: str | None) -> None:
+def keep_best(found: Design, case: Case, structure: str | None) -> None:
     """Keep what `synth.optimise_gains` answered for a case and a structure, asked as by default."""
-    place = _place(found.case, structure)
+    place = _place(case, structure)
     with contextlib.suppress(OSError, InputError):
         place.parent.mkdir(parents=True, exist_ok=True)
         save_design(found, place)

@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
             # Other commands then need not search for it again.
             plain = not members and not fixed and (arguments.starts, arguments.seed) == (16, 0)
             if plain and (one is None or isinstance(one, str)):
-                keep_best(design, one)
+                keep_best(design, case, one)
             write_report(folder, design=design, bound=arguments.bound, progress=tell)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(_kept(folder, design)) from None
