@@ -20,6 +20,7 @@ from ..loop import Assessment
 from ..question import FamilyLoop, FamilyProblem, Goal, Problem, Values
 from .polishing import KEPT, assess, polish, settle, stated
 from .programme import Solution
+from .sqp import UNFINISHED
 from .starts import begin_points, briskest, scattered, start_coefficients
 
 Progress = Callable[[str, int, int], None]
@@ -31,6 +32,7 @@ _SCATTER, _MOST_SCATTER, _HOPS = 2, 12, 3  # starts about the best, by parameter
 _NEAR, _BESIDE = 0.05, 0.25  # of log cost and parameters, relative: on the way to one end
 _POLISHED = 6  # distinct answers that are polished at most
 _BEHIND = 0.2  # of the log cost, that a rough answer may lie behind the best one
+_LONGER = 3  # how often a rough descent that ran out of steps goes on
 _RESERVE = 16  # further starts for a search of which none arrived
 _VIOLATION = 3  # starts of the least violation
 _BEST_STARTS = 6  # of the search for the best of one member alone
@@ -223,6 +225,13 @@ def _come_by(
     # By discs and by true margins in turns: each of them finds basins that the other misses.
     exact = sum(len(place.begins) for place in places) % 2 == 1
     coarse = settle(family, begin, coefficients, reference=reference, rounds=1, exact=exact)
+    for _ in range(_LONGER):
+        # Along a flat valley a descent takes long; it is worth its while where it may be the best.
+        best = min((p.coarse.objective for p in places if p.arrived), default=np.inf)
+        if coarse.message != UNFINISHED or coarse.objective > best + _BEHIND:
+            break
+        here, drags = coarse.values, coarse.coefficients
+        coarse = settle(family, here, drags, reference=reference, rounds=1, exact=exact)
     place = next((p for p in places if _same(family, p.coarse, coarse)), None)
     if place is None:
         place = _Place(coarse)
@@ -270,6 +279,8 @@ def _descents(
         best = min((p.solved.objective for p in ranked if p.solved is not None), default=np.inf)
         if place.coarse.objective > best + _BEHIND:
             break
+        if not place.arrived and _agreed(places):
+            break  # a descent that got stuck is no place of its own where others arrive
         tell("descents", k, len(ranked))
         # Discs may lead far off from a start that breaks its limits widely.
         near = place.coarse.converged

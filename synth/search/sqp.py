@@ -40,6 +40,7 @@ _STIFF, _LEAST_PRICE = 1.5, 0.1  # weight over the sum of the multipliers, and t
 _HEAVY = 1e4  # of the penalty: if rows are broken still, nothing near mends them
 _HOPELESS = 0.999  # share of what rows are broken by that is left where nothing near mends them
 INFEASIBLE = "the limits exclude each other"
+UNFINISHED = "maximum of iterations"
 _NOTHING = 1e-7  # of the objective, promised where no step helps: slopes and values round
 _KEPT = 1e-8  # row that counts as kept
 _SKIPPED = 1e-6  # an update along less than this share of a step is left out
@@ -193,7 +194,7 @@ def descend(
         x, at = moved, new
         if prices.size != at.rows.size:
             prices = np.zeros(at.rows.size)
-    return _ended(x, at, prices, equation_prices, "maximum of iterations", most)
+    return _ended(x, at, prices, equation_prices, UNFINISHED, most)
 
 
 def _sizes(x: FloatArray, at: Evaluation) -> FloatArray:
