@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.optimize import brentq
@@ -55,6 +55,8 @@ _SHARE = 4  # of the starts that each of several structures has
 _RESUMED = 3  # ends of a search that the next one, on more masses, begins from
 _HAIR = 1e-4  # relative excess over a limit in the largest sea
 _CALMER = 3.0  # logarithm of what the largest sea may have to be calmer by, for the sensors' noise
+
+_D = TypeVar("_D", bound=Design)
 
 
 @one_thread()
@@ -208,7 +210,7 @@ def _high_order(posed: PosedFamily, order: int | None, progress: Progress | None
         growth = _growth(member, parameters)
         loop = member.assess(parameters) if growth <= 0.0 else None
         designs.append(evaluated(member, parameters, loop, growth=growth))
-    design = _with_members(designs, posed)
+    design = with_members(designs, posed)
     return verified(replace(design, ok=all(one.ok for one in designs)), progress, question)
 
 
@@ -391,7 +393,7 @@ def _kept_in(posed: PosedFamily, parameters: Mapping[str, float], share: float) 
             assessment = calmer.assess(parameters)
             uses = every_use(calmer, assessment, {})
             designs.append(recorded(calmer, parameters, assessment, uses, ok=False, status=""))
-        return _with_members(designs, posed)
+        return with_members(designs, posed)
 
     def over(log_share: float) -> float:
         design = at(log_share)
@@ -428,10 +430,10 @@ def _number(value: float) -> str:
 def _family_design(posed: PosedFamily, tuning: Tuning, *, drive_kept: bool = True) -> Design:
     """Return a tuning as a design, with one for each further member that has a stable loop."""
     each = zip(posed.questions, (tuning, *tuning.members), strict=False)
-    return _with_members([design_of(*pair, drive_kept=drive_kept) for pair in each], posed)
+    return with_members([design_of(*pair, drive_kept=drive_kept) for pair in each], posed)
 
 
-def _with_members(designs: Sequence[Design], posed: PosedFamily) -> Design:
+def with_members(designs: Sequence[_D], posed: PosedFamily) -> _D:
     """Return the first of some designs, the others as its members."""
     first, *others = designs
     return replace(

@@ -11,10 +11,10 @@ begins where the last one agreed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -26,22 +26,28 @@ from ..question import (
     HOOK,
     PAYLOAD,
     DesignQuestion,
+    FamilyProblem,
+    Objective,
+    PosedFamily,
     Values,
-    masses_for,
     on_enough_masses,
-    pose,
+    pose_family,
     with_masses,
 )
-from ..search import KEPT, Solution, cost_nodes, margin_nodes, settle
+from ..search import KEPT, Solution, cost_nodes, margin_nodes, settle, with_bests
 from .design import Design
-from .optimise import checked_parameters, evaluated, verified
+from .optimise import checked_parameters, evaluated, verified, with_members
 
 _PER_DECADE = 40  # margin frequencies; peaks and crossings between them are refined
+
+_D = TypeVar("_D", bound=Design)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Look(Design):
     """What given parameters do, at a glance: a design with its curves, not verified.
+
+    The curves are those of the case; its further `members` are looks with their own.
 
     Attributes
     ----------
@@ -65,12 +71,18 @@ class Look(Design):
 
     @property
     def stable(self) -> bool:
-        """Whether the loop is stable; where it is not, figures are infinite, None or empty."""
-        return self.margins is not None
+        """Whether every member is; where one is not, its figures are infinite, None or empty."""
+        return all(one.margins is not None for one in (self, *self.members))
 
 
 @one_thread()
-def prepare(case: Case, structure: str = "payload-feedback") -> View:
+def prepare(
+    case: Case,
+    structure: str = "payload-feedback",
+    *,
+    members: Sequence[Mapping[str, Any] | Case] = (),
+    objective: str = "worst",
+) -> View:
     """Return the question of a case and a structure, posed once and kept warm.
 
     Parameters
@@ -79,40 +91,44 @@ def prepare(case: Case, structure: str = "payload-feedback") -> View:
         The case.
     structure
         Name of the structure, see `synth.structures.structure_names`.
+    members, objective
+        What else one controller is looked at for, and what is made small over all of them; as
+        `optimise_gains` takes them.
 
     Raises
     ------
     InputError
-        If there is no such structure, or the case lacks what a design needs.
+        If there is no such structure, change or objective, or a case lacks what a design needs.
     """
-    return View(pose(case, structure))
+    return View(pose_family(case, members, structure, objective=objective))
 
 
 class View:
-    """A case and a structure, prepared for many looks.
+    """A case, others like it if there are any, and a structure, prepared for many looks.
 
     Parameters
     ----------
-    question
-        The question, on the rope masses that the case asks for.
-    drag
-        Drag coefficient to begin with [N s/m].
+    posed
+        The questions of all members, on the rope masses that their cases ask for.
+    drags
+        Drag coefficient of each member to begin with [N s/m].
     """
 
-    def __init__(self, question: DesignQuestion, drag: float | None = None) -> None:
-        self.question = question
-        self._drag = drag
-        self._posed = {question.masses: question}
+    def __init__(self, posed: PosedFamily, drags: Sequence[float | None] = ()) -> None:
+        self.posed = posed
+        each = zip(posed.questions, drags or [None] * len(posed.questions), strict=True)
+        self._members = [_Member(*one) for one in each]
+        self._problems: dict[tuple[int, ...], FamilyProblem] = {}
 
     @property
     def case(self) -> Case:
-        """The case."""
-        return self.question.case
+        """The case, the first member."""
+        return self.posed.first.case
 
     @property
     def structure(self) -> str:
         """Name of the structure."""
-        return self.question.structure.name
+        return self.posed.first.structure.name
 
     @one_thread()
     def evaluate(self, gains: object) -> Look:
@@ -128,27 +144,12 @@ class View:
         InputError
             If a parameter is missing, unknown or out of its range.
         """
-        parameters = checked_parameters(self.question, gains)
-        question, loop, growth = self._loop(parameters)
-        design = evaluated(question, parameters, loop, growth=growth)
-        omega = spectrum = np.zeros(0)
-        response = loop_gain = omega.astype(np.complex128)
-        if loop is not None:
-            omega, loop_gain = loop.grid, loop.gains[0]
-            response = loop.response(PAYLOAD, HOOK, omega)
-            spectrum = loop.spectrum(PAYLOAD, omega)
-        return Look(
-            **{field.name: getattr(design, field.name) for field in fields(design)},
-            growth=growth,
-            omega=omega,
-            response=response,
-            spectrum=spectrum,
-            loop_gain=loop_gain,
-        )
+        parameters = checked_parameters(self.posed.first, gains)
+        return self._together([member.look(parameters) for member in self._members])
 
     @one_thread()
     def replace(self, changes: Mapping[str, Any]) -> View:
-        """Return the view of the case with changes by dotted path; see `Case.replace`.
+        """Return the view of every member with changes by dotted path; see `Case.replace`.
 
         Sea, plant and the drum held are kept where the changes leave them as they are.
 
@@ -157,8 +158,10 @@ class View:
         InputError
             If a change is not valid.
         """
-        case = self.case.replace(dict(changes))
-        return View(pose(case, self.structure, known=self.question), self._drag)
+        first, *others = (q.case.replace(dict(changes)) for q in self.posed.questions)
+        objective = self.posed.objective
+        posed = pose_family(first, others, self.structure, objective=objective, known=self.posed)
+        return View(posed, [member.drag for member in self._members])
 
     @one_thread()
     def optimise(self, start: object = None, *, verify: bool = False) -> Design:
@@ -177,64 +180,156 @@ class View:
         Raises
         ------
         InputError
-            If a parameter is missing, unknown or out of its range, or the start is unstable.
+            If a parameter is missing, unknown or out of its range, the start is unstable, or no
+            gains of its own keep the limits of a member, for the regret.
         """
         given = self.case.gains if start is None else start
-        parameters = checked_parameters(self.question, given)
-        question, begin, growth = self._loop(parameters)
-        if begin is None:
-            raise InputError(
-                f"start: must be gains of a stable loop, got one that grows by {growth:.3g} 1/s"
-            )
-        reference = np.array(question.values(parameters))
-        solved, ended = self._descent(question, reference, reference, begin)
-        if ended is not None and (wanted := masses_for(question, ended)) > question.masses:
+        parameters = checked_parameters(self.posed.first, given)
+        begin, questions = [], []
+        for member in self._members:
+            question, loop, growth = member.loop(parameters)
+            if loop is None:
+                raise InputError(
+                    f"start: must be gains of a stable loop, got one that grows by {growth:.3g} 1/s"
+                )
+            begin.append(loop)
+            questions.append(question)
+        posed = replace(self.posed, questions=tuple(questions))
+        reference = np.array(posed.first.values(parameters))
+        solved, ended = self._descent(posed, reference, reference, begin)
+        if ended is not None and (wanted := posed.masses_wanted(ended)) > posed.masses:
             # What a descent arrives at may need more masses than where it began.
-            finer = self._on(question, wanted)
+            finer = posed.on(wanted)
             again = self._assessed(finer, reference)
             if again is not None:
-                question, begin = finer, again
-                solved, ended = self._descent(question, solved.values, reference, ended)
+                posed, begin = finer, again
+                solved, ended = self._descent(posed, solved.values, reference, ended)
         how = "the descent did not converge: the start as it was"
-        design = evaluated(question, parameters, begin, how=how)
+        design = self._design(posed, parameters, begin, how=how)
         if ended is not None:
-            there, rms = question.named([float(v) for v in solved.values]), ended.sigma(PAYLOAD)
-            prices = {name: 0.01 * abs(p) * rms for name, p in solved.prices[0].items()}
-            end = evaluated(question, there, ended, prices, how="one descent from the start")
-            better = end.payload_rms <= design.payload_rms * (1.0 + KEPT)
+            there = posed.first.named([float(v) for v in solved.values])
+            end = self._design(posed, there, ended, solved.prices, how="one descent from the start")
+            reached, before = (
+                self._problem(posed).total([one.payload_rms for one in (d, *d.members)])
+                for d in (end, design)
+            )
+            better = reached <= before * (1.0 + KEPT)
             if (end.ok and (better or not design.ok)) or not (end.ok or design.ok):
                 design = end
-        if design.binding:
-            design = replace(design, status=f"{design.status}, at {', '.join(design.binding)}")
-        if question.drag is not None:
-            self._drag = design.drag
-        return verified(design, None, question) if verify else design
+        every = (design, *design.members)
+        if binding := dict.fromkeys(name for one in every for name in one.binding):
+            design = replace(design, status=f"{design.status}, at {', '.join(binding)}")
+        for member, one in zip(self._members, every, strict=True):
+            if member.question.drag is not None:
+                member.drag = one.drag
+        return verified(design, None, posed.first) if verify else design
 
     def _descent(
-        self, question: DesignQuestion, values: FloatArray, reference: FloatArray, near: Assessment
-    ) -> tuple[Solution, Assessment | None]:
-        """Return where a descent from some values ends, and the loop there if it is stable."""
-        problem = question.problem
-        drags = None if problem.drag is None else (near.coefficient,)
+        self,
+        posed: PosedFamily,
+        values: FloatArray,
+        reference: FloatArray,
+        near: Sequence[Assessment],
+    ) -> tuple[Solution, list[Assessment] | None]:
+        """Return where a descent from some values ends, and the loops there if all are stable."""
+        problem = self._problem(posed, [reference])
+        each = zip(posed.questions, near, strict=True)
+        drags = [None if question.drag is None else loop.coefficient for question, loop in each]
         solved = settle(problem, values, drags, reference=reference, fine=True)
-        end = solved.coefficient
-        if not np.isfinite(solved.objective) or not problem.stable(solved.values, end):
+        ends = solved.coefficients
+        if not np.isfinite(solved.objective) or not problem.stable(solved.values, ends):
             return solved, None
-        return solved, self._assessed(question, solved.values, end)
+        return solved, self._assessed(posed, solved.values, ends)
 
-    def _loop(
+    def _problem(self, posed: PosedFamily, guesses: Sequence[FloatArray] = ()) -> FamilyProblem:
+        """Return the problem on some rope masses, for the regret with the best of each member."""
+        masses = tuple(question.masses for question in posed.questions)
+        if masses not in self._problems:
+            regret = posed.objective is Objective.REGRET
+            found = with_bests(posed.problem, guesses=guesses) if regret else posed.problem
+            self._problems[masses] = found
+        return self._problems[masses]
+
+    def _assessed(
+        self, posed: PosedFamily, values: Values, drags: Sequence[float | None] = ()
+    ) -> list[Assessment] | None:
+        """Return the loop of every member; None where no drag agrees with one of them."""
+        coefficients = drags or [None] * len(posed.questions)
+        each = zip(self._members, posed.questions, coefficients, strict=True)
+        found = [member.assessed(question, values, drag) for member, question, drag in each]
+        loops = [loop for loop in found if loop is not None]
+        return loops if len(loops) == len(found) else None
+
+    def _design(
+        self,
+        posed: PosedFamily,
+        parameters: Mapping[str, float],
+        loops: Sequence[Assessment],
+        prices: Sequence[Mapping[str, float]] = (),
+        *,
+        how: str,
+    ) -> Design:
+        """Return the design of some parameters; prices are of logarithms, by member."""
+        designs = []
+        each = zip(posed.questions, loops, prices or [{}] * len(loops), strict=True)
+        for question, loop, own in each:
+            rms = loop.sigma(PAYLOAD)
+            priced = {name: 0.01 * abs(p) * rms for name, p in own.items()}
+            designs.append(evaluated(question, parameters, loop, priced, how=how))
+        return self._together(designs)
+
+    def _together(self, designs: Sequence[_D]) -> _D:
+        """Return the first of the members' designs with the others, ok if all of them are."""
+        failed = [
+            f"{name}: {one.status}"
+            for name, one in zip(self.posed.names, designs, strict=True)
+            if not one.ok
+        ]
+        design = with_members(designs, self.posed)
+        if len(designs) == 1 or not failed:
+            return design
+        return replace(design, ok=False, status="; ".join(failed))
+
+
+class _Member:
+    """One member's loop, with what is kept from one look to the next."""
+
+    def __init__(self, question: DesignQuestion, drag: float | None) -> None:
+        self.question, self.drag = question, drag
+        self._posed = {question.masses: question}
+
+    def look(self, parameters: Mapping[str, float]) -> Look:
+        """Return what given parameters do in this member."""
+        question, loop, growth = self.loop(parameters)
+        design = evaluated(question, parameters, loop, growth=growth)
+        omega = spectrum = np.zeros(0)
+        response = loop_gain = omega.astype(np.complex128)
+        if loop is not None:
+            omega, loop_gain = loop.grid, loop.gains[0]
+            response = loop.response(PAYLOAD, HOOK, omega)
+            spectrum = loop.spectrum(PAYLOAD, omega)
+        return Look(
+            **{field.name: getattr(design, field.name) for field in fields(design)},
+            growth=growth,
+            omega=omega,
+            response=response,
+            spectrum=spectrum,
+            loop_gain=loop_gain,
+        )
+
+    def loop(
         self, parameters: Mapping[str, float]
     ) -> tuple[DesignQuestion, Assessment | None, float]:
         """Return the question on the masses that suit a loop, the loop (or None), its growth."""
-        return on_enough_masses(self.question, parameters, self._assessed, self._on)
+        return on_enough_masses(self.question, parameters, self.assessed, self.on)
 
-    def _on(self, question: DesignQuestion, masses: int) -> DesignQuestion:
+    def on(self, question: DesignQuestion, masses: int) -> DesignQuestion:
         """Return the question on some rope masses, posed once."""
         if masses not in self._posed:
             self._posed[masses] = with_masses(question, masses)
         return self._posed[masses]
 
-    def _assessed(
+    def assessed(
         self, question: DesignQuestion, values: Values, coefficient: float | None = None
     ) -> Assessment | None:
         """Return a loop on nodes that are made from its poles; None where no drag agrees with it.
@@ -252,8 +347,8 @@ class View:
 
         if problem.drag is not None and coefficient is None:
             try:
-                coefficient = self._drag = consistent_coefficient(
-                    *loop, problem.drag, start=self._drag, nodes=nodes
+                coefficient = self.drag = consistent_coefficient(
+                    *loop, problem.drag, start=self.drag, nodes=nodes
                 )
             except SolverError:
                 return None

@@ -61,10 +61,10 @@ class FamilyQuestion:
         """The largest number of rope masses of any case posed so far."""
         return max([self.nominal.masses, *(q.masses for q in self._posed.values())])
 
-    def question(self, case: Case) -> DesignQuestion:
-        """Return the question of a case like this one."""
+    def question(self, case: Case, known: DesignQuestion | None = None) -> DesignQuestion:
+        """Return the question of a case like this one; what is `known` as `pose` takes it."""
         if case not in self._posed:
-            posed = pose(case, self.structure, self.masses, built_for=self.case)
+            posed = pose(case, self.structure, self.masses, known, built_for=self.case)
             self._posed[case] = posed
         return self._posed[case]
 
@@ -159,6 +159,7 @@ def pose_family(
     objective: str | Objective = Objective.WORST,
     masses: int | None = None,
     held: Mapping[str, float] | None = None,
+    known: PosedFamily | None = None,
 ) -> PosedFamily:
     """Return a case together with changes of it, posed for a structure.
 
@@ -174,6 +175,8 @@ def pose_family(
         ``worst``, ``mean`` or ``regret``; for the last see `synth.search.with_bests`.
     held
         Parameters of the structure that are not searched, by name.
+    known
+        As many members like these, posed: what each has in common with its like is taken from it.
 
     Raises
     ------
@@ -182,10 +185,10 @@ def pose_family(
     """
     cases = [m if isinstance(m, Case) else case.replace(dict(m)) for m in members]
     posed = FamilyQuestion(case, structure, masses)
+    alike = [None] * (1 + len(cases)) if known is None else known.questions
+    questions = map(posed.question, (case, *cases), alike)
     return PosedFamily(
-        questions=tuple(
-            replace(posed.question(one), held=dict(held or {})) for one in (case, *cases)
-        ),
+        questions=tuple(replace(question, held=dict(held or {})) for question in questions),
         names=(case.name, *(difference_text(case, one) for one in cases)),
         objective=Objective.of(objective),
     )

@@ -58,6 +58,83 @@ def test_looks_agree_with_a_thousand_verified_designs(name: str) -> None:
     agree(name, 250, 4)
 
 
+LIGHTER = {"rope.damping_ratio": 0.0002}
+COMBINED = {
+    "payload.acceleration_gain": 12.56,
+    "payload.velocity_gain": 17.23,
+    "payload.position_gain": 42.97,
+    "drum.position_gain": 7.5,
+    "heave.gain": 0.9207,
+    "rolloff.corner": 3.015,
+    "rolloff.damping": 2.0,
+    "heave.lead": 0.03777,
+    "heave.bandwidth": 4.24,
+}
+
+
+@pytest.mark.ci
+def test_a_look_at_a_family_agrees_with_verified_designs_of_its_members() -> None:
+    case = load_case("subsea-crane")
+    view = prepare(case, "combined", members=[LIGHTER])
+    seen = set()
+    for change in ({}, {"drum.position_gain": 6.75}, {"payload.position_gain": 34.4}):
+        gains = {**COMBINED, **change}
+        look = view.evaluate(gains)
+        seen.add(look.ok)
+        (member,) = look.members
+        assert member.case == case.replace(LIGHTER)
+        each = [evaluate_gains(one.case, gains, "combined") for one in (look, member)]
+        for one, design in zip((look, member), each, strict=True):
+            assert one.margins is not None
+            assert design.margins is not None
+            assert one.masses == design.masses
+            assert one.payload_rms == pytest.approx(design.payload_rms, rel=1e-3)
+            worst = design.margins.max_sensitivity
+            assert one.margins.max_sensitivity == pytest.approx(worst, rel=5e-3)
+            assert {u.name for u in one.limits.values() if u.kept} == {
+                u.name for u in design.limits.values() if u.kept
+            }
+        assert look.stable
+        assert look.ok == all(design.ok for design in each)
+        assert look.family_rms == max(look.payload_rms, member.payload_rms)
+    assert seen == {True, False}
+
+
+def test_a_member_that_fails_is_told_and_a_change_reaches_every_member() -> None:
+    case = load_case("thesis-1975")
+    view = prepare(case, members=[{"limits.max_sensitivity": 1.01}], objective="mean")
+    gains = view.optimise(THESIS).gains
+    look = view.evaluate(THESIS)
+    assert not look.ok
+    assert look.objective == "mean"
+    assert "limits.max_sensitivity 1.01: stable; breaks max_sensitivity" in look.status
+    squares = [one.payload_rms**2 for one in (look, *look.members)]
+    assert look.family_rms == pytest.approx(np.sqrt(np.mean(squares)))
+
+    rougher = view.replace({"sea.significant_height": 1.2 * case.sea.significant_height})
+    found = rougher.evaluate(gains)
+    assert [one.case for one in (found, *found.members)] == [
+        q.case.replace({"sea.significant_height": 1.2 * case.sea.significant_height})
+        for q in view.posed.questions
+    ]
+    kept = zip(view.posed.questions, rougher.posed.questions, strict=True)
+    assert all(before.model is after.model for before, after in kept)
+
+
+@pytest.mark.ci
+def test_a_warm_descent_of_a_family_finds_its_optimum_nearby() -> None:
+    case, members = load_case("thesis-1975"), [{"rope.length": 1500.0}]
+    best = optimise_gains(case, "payload-feedback", members=members)
+    start = {name: v * (1.0 if name == "A" else 0.9) for name, v in best.gains.items()}
+
+    design = prepare(case, members=members).optimise(start, verify=True)
+
+    assert design.ok, design.status
+    assert design.verification is not None
+    assert design.family_rms == pytest.approx(best.family_rms, rel=1e-4)
+    assert [one.parameters for one in design.members] == [design.parameters]
+
+
 @pytest.mark.ci
 def test_a_loop_that_swings_by_itself_without_its_drag_is_seen_on_the_verge() -> None:
     """Its pole is 4e-5 1/s from the axis, where nodes for a little more drag do not see it."""
