@@ -13,16 +13,17 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from models.basics import FloatArray, InputError
-from models.plant import MAX_MASSES, masses_for_bandwidth
+from models.plant import MAX_MASSES, PlantResponse, masses_for_bandwidth
 from models.sensing import sensed_line_at
 
 from ..limits import MaxSensitivity
-from ..loop import Assessment, LoopResponses, refine_minima
+from ..loop import Assessment, LinearController, LoopResponses, refine_minima, with_drag
 from .problem import Values
 from .question import DesignQuestion, with_masses
 
 _MODES = 5.0  # every rope mode below this many crossovers belongs in the plant
 _ONE_MODE = 1.05  # ratio of frequencies on the same mode
+_ON_MODE = 64  # points about such a mode
 _HARMLESS = 0.05  # share by which |S| on a mode lies below its peak
 _KEPT = 1e-3  # relative excess on the rope as it is over a limit that its masses keep
 
@@ -37,7 +38,7 @@ def masses_for(question: DesignQuestion, loop: Assessment) -> int:
     if data.masses is not None or not crossovers.size:
         return question.masses
     try:
-        wanted = masses_for_bandwidth(data, _MODES * _crossover(loop))
+        wanted = masses_for_bandwidth(data, _MODES * _crossover(question, loop))
     except InputError:
         return MAX_MASSES
     if wanted > question.masses or data.lumping == "thesis":
@@ -93,17 +94,20 @@ def on_enough_masses(
     return question, None, growth
 
 
-def _crossover(loop: Assessment) -> float:
+def _crossover(question: DesignQuestion, loop: Assessment) -> float:
     """Return the highest crossover [rad/s] that is not one of two on the same harmless mode.
 
     A mode with hardly any damping stands out above a gain of one far above the bandwidth.  Its
     place matters where |S| on it is about its peak; else the rope itself is looked at anyhow.
     """
-    found = list(loop.margins.crossovers)
-    distance = np.min([np.abs(1.0 + gain) for gain in loop.gains], axis=0)
+    found, problem = list(loop.margins.crossovers), question.problem
+    plant = problem.plant
+    if problem.drag is not None and loop.coefficient is not None:
+        plant = with_drag(plant, problem.drag, loop.coefficient)
     while len(found) > 2 and found[-1] < _ONE_MODE * found[-2]:
-        mode = (loop.grid > found[-2] / _ONE_MODE) & (loop.grid < found[-1] * _ONE_MODE)
-        if loop.max_sensitivity * distance[mode].min(initial=np.inf) < 1.0 + _HARMLESS:
+        mode = np.geomspace(found[-2] / _ONE_MODE, found[-1] * _ONE_MODE, _ON_MODE)
+        nearest = _distance(plant.response_at(1j * mode), loop.controller).min()
+        if loop.max_sensitivity * nearest < 1.0 + _HARMLESS:
             break
         del found[-2:]
     return float(found[-1])
@@ -116,9 +120,14 @@ def _sensitivity_on_the_rope(question: DesignQuestion, loop: Assessment, above: 
 
     def distance(omega: FloatArray) -> FloatArray:
         line = sensed_line_at(question.case, 1j * omega, drag=drag, data=question.data)
-        found = LoopResponses.of(line.select(measurements=controller.measurements), controller)
-        loops = range(len(controller.inputs))
-        return np.asarray(np.min([np.abs(found.difference(i)) for i in loops], axis=0))
+        return _distance(line, controller)
 
     near = distance(grid)
     return float(1.0 / refine_minima(distance, grid, near, near < 1.0 / above)[1].min())
+
+
+def _distance(plant: PlantResponse, controller: LinearController) -> FloatArray:
+    """Return |1 + L| of the loop that comes nearest to -1 with it, at the plant's points."""
+    found = LoopResponses.of(plant.select(measurements=controller.measurements), controller)
+    loops = range(len(controller.inputs))
+    return np.asarray(np.min([np.abs(found.difference(i)) for i in loops], axis=0))
