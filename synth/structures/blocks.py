@@ -1,9 +1,8 @@
 r"""Filter sections with parameters, of which controller structures are put together.
 
-Each section is one transfer function with named, bounded parameters.  It says the same thing
-three times, for the optimiser (`response`, numbers or duals), for the guard of its search
-(`characteristic`, the monic denominator) and for everything that runs or checks the controller
-(`matrices`, a state-space form).
+Each section is one transfer function N(s/w)/D(s/w) with named, bounded parameters.  It says its
+two polynomials; what the optimiser wants (`response`, numbers or duals) and what everything wants
+that runs or checks the controller (`matrices`, a state-space form) follow from them.
 
 * `RollOffFilter`: w^2 / (s^2 + 2 z w s + w^2), static gain 1
 * `LeadLag`: (1 + s/w_z) / (1 + s/w_p), static gain 1
@@ -56,12 +55,24 @@ class FilterSection(ABC):
         return tuple(found)
 
     @abstractmethod
-    def response(self, values: Sequence[Any], s: Any) -> Any:
-        """Return the transfer function at s for numbers or `synth.loop.Dual` values."""
+    def fraction(self, values: Sequence[Any]) -> tuple[Any, Sequence[Any], Sequence[Any]]:
+        """Return w [rad/s], and N and D by rising powers of s/w; D is without its last, 1."""
 
-    @abstractmethod
+    def response(self, values: Sequence[Any], s: Any) -> Any:
+        """Return the transfer function at s [1/s] for numbers or `synth.loop.Dual` values."""
+        w, above, below = self.fraction(values)
+        x = s * (1.0 / w)
+        return _polynomial(above, x) / _polynomial([*below, 1.0], x)
+
     def matrices(self, values: Sequence[float]) -> Matrices:
-        """Return A (n, n), B (n, 1), C (1, n), D (1, 1)."""
+        """Return A (n, n), B (n, 1), C (1, n), D (1, 1), its states the size of the signal."""
+        w, above, below = self.fraction(values)
+        n = len(below)
+        above = [*above, *[0.0] * (n + 1 - len(above))]
+        A, B = w * np.eye(n, k=1), w * np.eye(n)[:, -1:]
+        A[-1] = -w * np.array(below)
+        C = np.array([[above[k] - above[n] * below[k] for k in range(n)]])
+        return A, B, C, np.full((1, 1), float(above[n]))
 
     def guess(self, points: FloatArray) -> FloatArray:
         """Return parameter values (m, k) from uniform `points` (m, k): sizes evenly in decades."""
@@ -90,16 +101,10 @@ class RollOffFilter(FilterSection):
 
     bounded = (("corner", "rad/s"), ("damping", ""))
 
-    def response(self, values: Sequence[Any], s: Any) -> Any:
-        """Return the transfer function."""
+    def fraction(self, values: Sequence[Any]) -> tuple[Any, Sequence[Any], Sequence[Any]]:
+        """Return w and the polynomials; see `FilterSection.fraction`."""
         w, z = values
-        return (1.0 / (s * (s + 2.0 * z * w) + w * w)) * (w * w)
-
-    def matrices(self, values: Sequence[float]) -> Matrices:
-        """Return states scaled by the corner: their sizes are those of the signal."""
-        w, z = values
-        A = np.array([[0.0, w], [-w, -2.0 * z * w]])
-        return A, np.array([[0.0], [w]]), np.array([[1.0, 0.0]]), np.zeros((1, 1))
+        return w, (1.0,), (1.0, 2.0 * z)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,16 +122,10 @@ class LeadLag(FilterSection):
 
     bounded = (("zero", "rad/s"), ("pole", "rad/s"))
 
-    def response(self, values: Sequence[Any], s: Any) -> Any:
-        """Return the transfer function."""
+    def fraction(self, values: Sequence[Any]) -> tuple[Any, Sequence[Any], Sequence[Any]]:
+        """Return w and the polynomials; see `FilterSection.fraction`."""
         zero, pole = values
-        return (s + zero) * (1.0 / (s + pole)) * (pole / zero)
-
-    def matrices(self, values: Sequence[float]) -> Matrices:
-        """Return one state, the low-passed input."""
-        zero, pole = values
-        high = pole / zero
-        return np.array([[-pole]]), np.array([[pole]]), np.array([[1.0 - high]]), np.array([[high]])
+        return pole, (1.0, pole / zero), (1.0,)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,17 +144,10 @@ class Notch(FilterSection):
 
     bounded = (("frequency", "rad/s"), ("width", ""), ("depth", ""))
 
-    def response(self, values: Sequence[Any], s: Any) -> Any:
-        """Return the transfer function."""
+    def fraction(self, values: Sequence[Any]) -> tuple[Any, Sequence[Any], Sequence[Any]]:
+        """Return w and the polynomials; see `FilterSection.fraction`."""
         w, b, d = values
-        return (s * (s + 2.0 * b * d * w) + w * w) * (1.0 / (s * (s + 2.0 * b * w) + w * w))
-
-    def matrices(self, values: Sequence[float]) -> Matrices:
-        """Return states scaled by the frequency."""
-        w, b, d = values
-        A = np.array([[0.0, w], [-w, -2.0 * b * w]])
-        C = np.array([[0.0, 2.0 * b * (d - 1.0)]])
-        return A, np.array([[0.0], [w]]), C, np.ones((1, 1))
+        return w, (1.0, 2.0 * b * d, 1.0), (1.0, 2.0 * b)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,14 +165,9 @@ class Integral(FilterSection):
 
     bounded = (("corner", "rad/s"),)
 
-    def response(self, values: Sequence[Any], s: Any) -> Any:
-        """Return the transfer function."""
-        return (1.0 / s) * values[0] + 1.0
-
-    def matrices(self, values: Sequence[float]) -> Matrices:
-        """Return one state, the integral times the corner."""
-        one = np.ones((1, 1))
-        return np.zeros((1, 1)), one * values[0], one, one
+    def fraction(self, values: Sequence[Any]) -> tuple[Any, Sequence[Any], Sequence[Any]]:
+        """Return w and the polynomials; see `FilterSection.fraction`."""
+        return values[0], (1.0, 1.0), (0.0,)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -200,16 +187,10 @@ class LeadTime(FilterSection):
 
     bounded = (("lead", "s"), ("bandwidth", "rad/s"))
 
-    def response(self, values: Sequence[Any], s: Any) -> Any:
-        """Return the transfer function."""
+    def fraction(self, values: Sequence[Any]) -> tuple[Any, Sequence[Any], Sequence[Any]]:
+        """Return w and the polynomials; see `FilterSection.fraction`."""
         time, w = values
-        return (s * time + 1.0) * (1.0 / (s + w)) * w
-
-    def matrices(self, values: Sequence[float]) -> Matrices:
-        """Return one state, the low-passed input."""
-        time, w = values
-        high = time * w
-        return np.array([[-w]]), np.array([[w]]), np.array([[1.0 - high]]), np.array([[high]])
+        return w, (1.0, time * w), (1.0,)
 
 
 def series(first: Matrices, then: Matrices) -> Matrices:
@@ -219,3 +200,11 @@ def series(first: Matrices, then: Matrices) -> Matrices:
     n1, n2 = len(A1), len(A2)
     A = np.block([[A1, np.zeros((n1, n2))], [B2 @ C1, A2]])
     return A, np.vstack([B1, B2 @ D1]), np.hstack([D2 @ C1, C2]), D2 @ D1
+
+
+def _polynomial(coefficients: Sequence[Any], x: Any) -> Any:
+    """Return a polynomial of x from its coefficients by rising powers (Horner)."""
+    *rest, found = coefficients
+    for coefficient in reversed(rest):
+        found = x * found + coefficient
+    return found

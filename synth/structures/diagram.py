@@ -3,23 +3,24 @@ r"""Controllers drawn as a block diagram: weighted sums of measurements behind f
 ::
 
     y --> weights --> sections --+
-                                 +--> sections --> u
+                                 +--> u
     y --> weights --> sections --+
 
-A `Branch` is a weighted sum of measurements behind filters of its own; a `Group` adds branches
-and filters what comes out, so that an integrator which two signals share is there once (two of
-them side by side would have a mode that no input moves).  `DiagramLaw` makes of it what the
-search wants of any structure: response, characteristic polynomial, state space.
+A `Branch` is a weighted sum of measurements behind filters of its own, so that an integrator which
+several signals share is there once (two of them side by side would have a mode that no input
+moves).  `DiagramLaw` makes of the branches what the search wants of any structure: response and
+state space.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import block_diag
 
 from models.basics import FloatArray, pick
 from models.plant import LinearPlant
@@ -40,14 +41,6 @@ class Branch:
     sections: tuple[FilterSection, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Group:
-    """A sum of branches behind filter sections that they share."""
-
-    branches: tuple[Branch, ...]
-    sections: tuple[FilterSection, ...] = ()
-
-
 class DiagramLaw(ParametrisedController):
     """The law of a diagram with one command.
 
@@ -55,8 +48,8 @@ class DiagramLaw(ParametrisedController):
     ----------
     plant
         The plant; measurements that the diagram does not name are not heard.
-    groups
-        The diagram; the command is the sum of the groups.
+    branches
+        The diagram; the command is their sum.
     gains
         Parameters that the weights speak of.
     bounds
@@ -66,30 +59,26 @@ class DiagramLaw(ParametrisedController):
     def __init__(
         self,
         plant: LinearPlant,
-        groups: Sequence[Group],
+        branches: Sequence[Branch],
         gains: Sequence[Parameter],
-        bounds: Bounds | None = None,
+        bounds: Bounds,
     ) -> None:
         self._plant = plant
-        self._groups = tuple(groups)
-        sections: dict[str, FilterSection] = {}
-        for group in self._groups:
-            for section in (*group.sections, *(s for b in group.branches for s in b.sections)):
-                sections[section.name] = section
-        self.sections = sections
-        every = [*gains, *(p for section in sections.values() for p in section.parameters)]
-        given = dict(bounds or {})
-        check_bounds("structure", given, [p.name for p in every])
-        self.parameters = tuple(_bounded(p, given.get(p.name)) for p in every)
+        self._branches = tuple(branches)
+        self.sections = {s.name: s for branch in branches for s in branch.sections}
+        every = [*gains, *(p for section in self.sections.values() for p in section.parameters)]
+        check_bounds("structure", bounds, [p.name for p in every])
+        ranges = [bounds.get(p.name, (p.low, p.high)) for p in every]
+        self.parameters = tuple(
+            replace(p, low=low, high=high) for p, (low, high) in zip(every, ranges, strict=True)
+        )
         self._slices: dict[str, slice] = {}
         at = len(gains)
-        for name, section in sections.items():
+        for name, section in self.sections.items():
             self._slices[name] = slice(at, at + len(section.parameters))
             at += len(section.parameters)
         self._gains = tuple(p.name for p in gains)
-        self.heard = tuple(
-            dict.fromkeys(y for g in self._groups for b in g.branches for y in b.weights)
-        )
+        self.heard = tuple(dict.fromkeys(y for branch in branches for y in branch.weights))
         columns = pick("structure", "measurement", plant.measurements, self.heard)
         self._columns = dict(zip(self.heard, columns, strict=True))
         self._kept: dict[tuple[str, ...], npt.NDArray[np.intp]] = {}
@@ -98,49 +87,44 @@ class DiagramLaw(ParametrisedController):
     def response(self, values: Sequence[Any], s: Any) -> list[list[Any]]:
         """Return C(s), one list of ny entries."""
         row: list[Any] = [0.0] * len(self._plant.measurements)
-        gains = dict(zip(self._gains, values[: len(self._gains)], strict=True))
-        for group in self._groups:
-            outer = self._chain(group.sections, values, s)
-            for branch in group.branches:
-                inner = self._chain(branch.sections, values, s, outer)
-                for name, weight in branch.weights.items():
-                    k = self._columns[name]
-                    term = weight(gains) if inner is None else inner * weight(gains)
-                    row[k] = term if isinstance(row[k], float) else term + row[k]
+        for weights, sections in self._numbered(values):
+            through: Any = None
+            for section, own in sections:
+                step = section.response(own, s)
+                through = step if through is None else through * step
+            for k, weight in weights.items():
+                term = weight if through is None else through * weight
+                row[k] = term if isinstance(row[k], float) else term + row[k]
         return [row]
-
-    def _chain(
-        self, sections: Sequence[FilterSection], values: Sequence[Any], s: Any, start: Any = None
-    ) -> Any:
-        for section in sections:
-            step = section.response(values[self._slices[section.name]], s)
-            start = step if start is None else start * step
-        return start
 
     def controller(self, values: Sequence[float]) -> LinearController:
         """Return the controller in state space; it has zeros for what it does not hear."""
-        gains = dict(zip(self._gains, values[: len(self._gains)], strict=True))
-        A, B, C, D = _parallel([self._group(group, values, gains) for group in self._groups])
-        names = self._plant.measurements, self._plant.inputs
-        return LinearController(A=A, B=B, C=C, D=D, measurements=names[0], inputs=names[1])
-
-    def _group(self, group: Group, values: Sequence[float], gains: Mapping[str, float]) -> Matrices:
         parts, ny = [], len(self._plant.measurements)
-        for branch in group.branches:
+        for weights, sections in self._numbered(values):
             row = np.zeros((1, ny))
-            for name, weight in branch.weights.items():
-                row[0, self._columns[name]] += weight(gains)
-            empty = np.zeros((0, 0)), np.zeros((0, ny)), np.zeros((1, 0)), row
-            parts.append(self._behind(empty, branch.sections, values))
-        return self._behind(_parallel(parts), group.sections, values)
+            row[0, list(weights)] = list(weights.values())
+            part: Matrices = np.zeros((0, 0)), np.zeros((0, ny)), np.zeros((1, 0)), row
+            for section, own in sections:
+                part = series(part, section.matrices([float(v) for v in own]))
+            parts.append(part)
+        A, B, C, D = zip(*parts, strict=True)
+        return LinearController(
+            A=block_diag(*A),
+            B=np.vstack(B),
+            C=np.hstack(C),
+            D=sum(D[1:], D[0]),
+            measurements=self._plant.measurements,
+            inputs=self._plant.inputs,
+        )
 
-    def _behind(
-        self, matrices: Matrices, sections: Sequence[FilterSection], values: Sequence[float]
-    ) -> Matrices:
-        for section in sections:
-            own = [float(v) for v in values[self._slices[section.name]]]
-            matrices = series(matrices, section.matrices(own))
-        return matrices
+    def _numbered(
+        self, values: Sequence[Any]
+    ) -> Iterator[tuple[dict[int, Any], list[tuple[FilterSection, Sequence[Any]]]]]:
+        """Return the weights of each branch by measurement, and its sections with their values."""
+        gains = dict(zip(self._gains, values[: len(self._gains)], strict=True))
+        for branch in self._branches:
+            weights = {self._columns[y]: weight(gains) for y, weight in branch.weights.items()}
+            yield weights, [(s, values[self._slices[s.name]]) for s in branch.sections]
 
     def closed_loop_matrix(self, plant: LinearPlant, values: Sequence[float]) -> FloatArray:
         """Return the state matrix of the loop, without what stands before or behind it.
@@ -178,22 +162,6 @@ class DiagramLaw(ParametrisedController):
     def index(self, name: str) -> int:
         """Return the position of a parameter."""
         return [p.name for p in self.parameters].index(name)
-
-
-def _bounded(parameter: Parameter, limits: tuple[float, float] | None) -> Parameter:
-    if limits is None:
-        return parameter
-    return replace(parameter, low=limits[0], high=limits[1])
-
-
-def _parallel(parts: Sequence[Matrices]) -> Matrices:
-    """Return the sum of systems with the same inputs and one output."""
-    A, B, C, D = parts[0]
-    for A2, B2, C2, D2 in parts[1:]:
-        n, m = len(A), len(A2)
-        A = np.block([[A, np.zeros((n, m))], [np.zeros((m, n)), A2]])
-        B, C, D = np.vstack([B, B2]), np.hstack([C, C2]), D + D2
-    return A, B, C, D
 
 
 def _closure(pattern: npt.NDArray[np.bool_], start: npt.NDArray[np.bool_]) -> Any:

@@ -71,6 +71,8 @@ class SteadyMotion:
     own_gain
         How much of the motor's speed the motor itself takes from the command: K_omega [V s/rad]
         of a DC motor, 1 of a regulated AC motor, 0.
+    regulated
+        Whether the drive has a speed regulator of its own: its command is a speed.
     lag
         Time in which the torque builds up [s].
     per_rope_speed
@@ -81,12 +83,14 @@ class SteadyMotion:
     torque_gain: float
     damping: float
     own_gain: float
+    regulated: bool
     lag: float
     per_rope_speed: float
 
     @classmethod
     def of(cls, data: PlantData) -> SteadyMotion:
         """Return it for a plant's numbers."""
+        regulated = data.motor == "ac" and data.speed_gain > 0.0
         if data.motor == "dc":
             gain, own, lag = (
                 data.torque_constant / data.resistance,
@@ -94,7 +98,6 @@ class SteadyMotion:
                 data.inductance / data.resistance,
             )
         else:
-            regulated = data.speed_gain > 0.0
             gain, own = (data.speed_gain, 1.0) if regulated else (1.0, 0.0)
             lag = 0.0 if math.isinf(data.torque_bandwidth) else 1.0 / data.torque_bandwidth
         return cls(
@@ -102,6 +105,7 @@ class SteadyMotion:
             torque_gain=gain,
             damping=data.viscous_friction + gain * own,
             own_gain=own,
+            regulated=regulated,
             lag=lag,
             per_rope_speed=data.gear_ratio / data.drum_radius,
         )
@@ -183,16 +187,15 @@ class DrumSpeedLoop:
                 _OWNER, "bandwidth", bandwidth, low=0.0, unit="rad/s", open_low=True
             )
         own = motor.damping / motor.inertia
-        regulated = plant.data.motor == "ac" and plant.data.speed_gain > 0.0
-        extra = 0.0 if regulated else max(0.0, wanted - own) * motor.inertia
+        extra = 0.0 if motor.regulated else max(0.0, wanted - own) * motor.inertia
         # The integral must not be faster than the delays allow, however fast the motor itself.
-        reached = min(wanted, own) if regulated else wanted
+        reached = min(wanted, own) if motor.regulated else wanted
         loop = cls(
             motor=motor,
             static=point.command,
             proportional=extra / motor.torque_gain,
             integral=0.25 * motor.inertia * reached**2 / motor.torque_gain,
-            bandwidth=own if regulated else max(own, wanted),
+            bandwidth=own if motor.regulated else max(own, wanted),
             tracking=min(0.5 * reached, 1.0 / sample_time),
             speed_limit=case.winch.speed_limit,
             sample_time=float(sample_time),

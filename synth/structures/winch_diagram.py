@@ -14,8 +14,7 @@ A drive that takes a torque or a voltage holds the drum by a loop of its own,
 with X the haul and Z the hook's heave as the reference unit shows it: the drum is asked to be at
 -f Z(t + tau) and to move at its derivative.  d is what a steady speed costs in command (back-EMF
 and friction over k), known and fed forward.  A drive with a speed regulator of its own takes the
-speed itself, u = -(n/r) [g (X + G Z) + G Z'].  Integral action, where a structure has it, stands
-behind the sum.
+speed itself, u = -(n/r) [g (X + G Z) + G Z'].
 
 Payload feedback alone is the 1975 thesis's eq. 30, u = -A (a P'' + a1 P' + a2 P), behind a
 roll-off, a lead, a notch or integral action.  On top of a drum loop the payload asks for a speed
@@ -39,7 +38,7 @@ from models.plant import LinearPlant, PlantResponse
 from models.sensing import MEASURED
 
 from .blocks import FilterSection, LeadTime
-from .diagram import Branch, DiagramLaw, Group, Weight
+from .diagram import Branch, DiagramLaw, Weight
 from .drum_speed import SteadyMotion
 from .structure import (
     PAYLOAD_MEASUREMENTS,
@@ -75,8 +74,6 @@ class WinchStructure(Structure):
         What it is called.
     motor
         The motor as the drum loop sees it.
-    regulated
-        Whether the drive has a speed regulator of its own: its command is a speed.
     amplifier
         The fixed gain A of payload feedback.
     pace
@@ -93,7 +90,6 @@ class WinchStructure(Structure):
 
     name: str
     motor: SteadyMotion
-    regulated: bool = False
     amplifier: float = 1.0
     pace: float = 1.0
     filters: tuple[FilterSection, ...] = ()
@@ -111,7 +107,7 @@ class WinchStructure(Structure):
     @property
     def measurements(self) -> tuple[str, ...]:
         """Names of what it hears, in the order of the sensed plant."""
-        heard = {y for group in self.groups() for branch in group.branches for y in branch.weights}
+        heard = {y for branch in self.branches() for y in branch.weights}
         return tuple(name for name in MEASURED if name in heard)
 
     def bind(self, plant: LinearPlant) -> ParametrisedController:
@@ -134,89 +130,72 @@ class WinchStructure(Structure):
 
     def gains(self, plant: LinearPlant) -> list[Parameter]:
         """Return the parameters that are not those of sections."""
-        found = []
-        command = plant.units.get(plant.inputs[0], "-")
+        found: list[Parameter] = []
+
+        def add(
+            name: str, unit: str, scale: float, low: float = -np.inf, high: float = np.inf
+        ) -> None:
+            found.append(Parameter(name=name, scale=scale, low=low, high=high, unit=unit))
+
         if self.hears_payload and self.drum:
-            units = ("s", "-", "1/s")
-            for k, (name, unit) in enumerate(zip(ASKED, units, strict=True)):
-                found.append(Parameter(name=name, scale=0.3 * self.pace ** (k - 1), unit=unit))
+            for k, (name, unit) in enumerate(zip(ASKED, ("s", "-", "1/s"), strict=True)):
+                add(name, unit, 0.3 * self.pace ** (k - 1))
         elif self.hears_payload:
             columns = [plant.measurements.index(name) for name in PAYLOAD_MEASUREMENTS]
             scales = gain_scales(plant, [(0, j) for j in columns]) / self.amplifier
             for name, y, scale in zip(_GAINS, PAYLOAD_MEASUREMENTS, scales, strict=True):
-                unit = gain_unit(plant, plant.inputs[0], y)
-                found.append(Parameter(name=name, scale=float(scale), unit=unit))
-        if self.drum and not self.regulated:
+                add(name, gain_unit(plant, plant.inputs[0], y), float(scale))
+        if self.drum and not self.motor.regulated:
             low, high = self.speed_gain(0.0), self.speed_gain(self.widest)
-            unit = f"{command} s/rad"
-            name = "drum.speed_gain"
-            found.append(Parameter(name=name, scale=0.3 * high, low=low, high=high, unit=unit))
+            command = plant.units.get(plant.inputs[0], "-")
+            add("drum.speed_gain", f"{command} s/rad", 0.3 * high, low, high)
         if self.drum:
-            low, high = 1e-3, 0.5 * self.widest
             scale = 0.02 if self.tension is not None else 1.0
-            name = "drum.position_gain"
-            found.append(Parameter(name=name, scale=scale, low=low, high=high, unit="1/s"))
+            add("drum.position_gain", "1/s", scale, 1e-3, 0.5 * self.widest)
         if self.heave:
-            name = "heave.gain"
-            found.append(Parameter(name=name, scale=0.1, low=0.0, high=2.0, unit="-"))
+            add("heave.gain", "-", 0.1, 0.0, 2.0)
         if self.tension is not None:
-            most, name = self.widest / self.tension, "tension.gain"
-            scale = 0.1 * most
-            found.append(Parameter(name=name, scale=scale, low=0.0, high=most, unit="m/s/N"))
+            most = self.widest / self.tension
+            add("tension.gain", "m/s/N", 0.1 * most, 0.0, most)
         return found
 
-    def groups(self) -> list[Group]:
+    def branches(self) -> list[Branch]:
         """Return the diagram."""
-        found = []
         names = zip(PAYLOAD_MEASUREMENTS, ASKED if self.drum else _GAINS, strict=True)
-        if self.hears_payload and not self.drum:
+        if not self.drum:
             weights = {y: _product(-self.amplifier, name) for y, name in names}
-            found.append(Group(branches=(Branch(weights=weights, sections=self.filters),)))
-        if self.drum:
-            branches = [Branch(weights=self._drum_weights())]
-            if self.hears_payload:
-                asked = {y: self._asked(name) for y, name in names}
-                branches.append(Branch(weights=asked, sections=self.filters))
-            if self.heave:
-                lead = LeadTime(name="heave", bandwidth=(1.0, 100.0))
-                branches.append(Branch(weights=self._heave_weights(), sections=(lead,)))
-            found.append(Group(branches=tuple(branches)))
-        return found
+            return [Branch(weights=weights, sections=self.filters)]
+        ratio, loop = self.motor.per_rope_speed, "drum.speed_gain"
+        # A regulated drive is told the speed of the motor itself.
+        gains = () if self.motor.regulated else (loop,)
 
-    def _asked(self, *names: str) -> Weight:
-        """Return the weight of a signal that asks for so much speed of the rope."""
-        ratio, feed = self.motor.per_rope_speed, self.motor.feed
-        plain = _product(-ratio, *names)
-        if self.regulated:
-            return plain
+        def asked(name: str) -> Weight:
+            """Return the weight of a signal that asks for so much speed of the rope."""
+            plain = _product(-ratio, name)
+            return plain if not gains else lambda p: plain(p) * (p[loop] + self.motor.feed)
 
-        def weight(p: Mapping[str, Any]) -> Any:
-            return plain(p) * (p["drum.speed_gain"] + feed)
-
-        return weight
-
-    def _drum_weights(self) -> dict[str, Weight]:
-        ratio, gains = self.motor.per_rope_speed, ("drum.speed_gain", "drum.position_gain")
-        weights = {_HAUL: _product(-ratio, *gains[self.regulated :])}
-        if not self.regulated:
-            weights[_SPEED] = _product(-1.0, "drum.speed_gain")
+        drum = {_HAUL: _product(-ratio, *gains, "drum.position_gain")}
+        if gains:
+            drum[_SPEED] = _product(-1.0, loop)
         if self.tension is not None:
-            weights[_TENSION] = self._asked("tension.gain")
-        return weights
-
-    def _heave_weights(self) -> dict[str, Weight]:
-        ratio, gains = self.motor.per_rope_speed, ("drum.speed_gain", "drum.position_gain")
-        return {
-            _HEAVE: _product(-ratio, *gains[self.regulated :], "heave.gain"),
-            _HEAVE_RATE: self._asked("heave.gain"),
-        }
+            drum[_TENSION] = asked("tension.gain")
+        found = [Branch(weights=drum)]
+        if self.hears_payload:
+            payload = {y: asked(name) for y, name in names}
+            found.append(Branch(weights=payload, sections=self.filters))
+        if self.heave:
+            place = _product(-ratio, *gains, "drum.position_gain", "heave.gain")
+            heave = {_HEAVE: place, _HEAVE_RATE: asked("heave.gain")}
+            lead = LeadTime(name="heave", bandwidth=(1.0, 100.0))
+            found.append(Branch(weights=heave, sections=(lead,)))
+        return found
 
 
 class WinchLaw(DiagramLaw):
     """The law of a winch's structure: where good gains lie."""
 
     def __init__(self, plant: LinearPlant, structure: WinchStructure) -> None:
-        super().__init__(plant, structure.groups(), structure.gains(plant), structure.bounds)
+        super().__init__(plant, structure.branches(), structure.gains(plant), structure.bounds)
         self._structure = structure
         self._names = [p.name for p in self.parameters]
 
@@ -232,7 +211,7 @@ class WinchLaw(DiagramLaw):
 
         if structure.drum:
             bandwidth = structure.widest * 10.0 ** (-1.5 * points[:, -1])
-            if not structure.regulated:
+            if not structure.motor.regulated:
                 put("drum.speed_gain", np.array([structure.speed_gain(b) for b in bandwidth]))
             share = 0.5 * 10.0 ** (-2.0 * uniform["drum.position_gain"])
             put("drum.position_gain", bandwidth * share)
@@ -252,7 +231,7 @@ class WinchLaw(DiagramLaw):
                 put(name, size * structure.pace ** (k - 1))
             if yu.size:
                 # With good sensors far larger gains do: as large as some crossover allows.
-                self._ask(values[::2], points[::2], omega, yu)
+                self._spread(values[::2], points[::2], omega, yu)
         elif structure.hears_payload:
             self._spread(values, points, omega, yu)
         return self.clipped(values)
@@ -260,35 +239,22 @@ class WinchLaw(DiagramLaw):
     def _spread(
         self, values: FloatArray, points: FloatArray, omega: FloatArray, yu: ComplexArray
     ) -> None:
-        """Set the gains for loop gains of any sign and size at a crossover behind the filters."""
-        signed = 2.0 * points[:, :3] - 1.0
-        loop_gain = np.sign(signed) * _TOP * 10.0 ** (3.0 * (np.abs(signed) - 1.0))
-        at = np.minimum((points[:, -1] * omega.size).astype(int), omega.size - 1)
-        for k, row in enumerate(values):
-            row[:3] = 1.0
-            own = self.response(list(row), 1j * omega[at[k] : at[k] + 1])[0]
-            for i, name in enumerate(PAYLOAD_MEASUREMENTS):
-                j = self._columns[name]
-                size = float(np.abs(own[j] * yu[at[k], j, 0]).max())
-                row[i] = loop_gain[k, i] / max(size, 1e-12)
-
-    def _ask(
-        self, values: FloatArray, points: FloatArray, omega: FloatArray, yu: ComplexArray
-    ) -> None:
-        """Set what the payload asks for by loop gains at a crossover, around the drum loop."""
-        at = np.minimum((points[:, -2] * omega.size).astype(int), omega.size - 1)
-        columns = [self.index(name) for name in ASKED]
+        """Set the payload's gains for loop gains at a crossover, behind filters and drum loop."""
+        drum = self._structure.drum
+        decades, chosen = (2.0, points[:, -2]) if drum else (3.0, points[:, -1])
+        at = np.minimum((chosen * omega.size).astype(int), omega.size - 1)
+        columns = [self.index(name) for name in (ASKED if drum else _GAINS)]
         heard = [self._columns[name] for name in PAYLOAD_MEASUREMENTS]
         for k, row in enumerate(values):
             row[columns] = 1.0
             own = self.response(list(row), 1j * omega[at[k] : at[k] + 1])[0]
             through = np.array([np.ravel(c)[0] for c in own]) * yu[at[k], :, 0]
             inner = 1.0 - (through.sum() - through[heard].sum())
-            for i, (column, j) in enumerate(zip(columns, heard, strict=True)):
+            for column, j in zip(columns, heard, strict=True):
                 signed = 2.0 * points[k, column] - 1.0
-                if i == 0 and points[k, column] < 0.4:
-                    signed = -signed
-                size = _TOP * 10.0 ** (2.0 * (abs(signed) - 1.0)) * abs(inner)
+                if drum and column == columns[0] and points[k, column] < 0.4:
+                    signed = -signed  # most with the sign that damps
+                size = _TOP * 10.0 ** (decades * (abs(signed) - 1.0)) * abs(inner)
                 row[column] = np.sign(signed) * size / max(abs(through[j]), 1e-12)
 
     def guesses(self, problem: GeneralisedPlant, omega: FloatArray) -> FloatArray:

@@ -119,7 +119,6 @@ def structure_named(name: str, case: Case) -> PayloadFeedback | WinchStructure |
     return WinchStructure(
         name=name,
         motor=SteadyMotion.of(data),
-        regulated=data.motor == "ac" and data.speed_gain > 0.0,
         amplifier=amplifier,
         pace=float(modes[0]),
         filters=sections["-rolloff" if feedback is None else feedback] if payload else (),
