@@ -2,21 +2,20 @@ r"""Linear feedback in the time domain: a design, sampled.
 
 ::
 
-    reference velocity ----> feed ---------------------------------+
-                                                                   v
-    measured --(+)--> fresh? --> [low-pass] --> C(z): A, B, C, D -(+)--> command, static included
-                ^- reference                      ^
-                                                  K_b
-                                                  +--- drive.applied - command asked for
+    reference velocity ----> feed --------------------+
+                                                       v
+    measured --(+)--> fresh? ----> C(z): A, B, C, D ---(+)--> command, static included
+                ^- reference         ^
+                                     K_b
+                                     +--- drive.applied - command asked for
 
 From gains, C is static: the 1975 thesis's u = -A (a P'' + a1 P' + a2 P) (its eq. 30), about the
 reference.  It has nothing that could wind up, so anti-windup changes nothing.
 
 A controller with states (from `synth.design.tuning`) is sampled by Tustin's rule, which keeps every
-stable pole stable, or as if its measurements were held (``zoh``).  Anti-windup is by
-back-calculation in the observer's form (K. J. Astrom and B. Wittenmark, Computer-Controlled
-Systems, 3rd ed., chapter 9): while the drive does not do what it is asked, the states follow
-what it does,
+stable pole stable.  Anti-windup is by back-calculation in the observer's form (K. J. Astrom and
+B. Wittenmark, Computer-Controlled Systems, 3rd ed., chapter 9): while the drive does not do what
+it is asked, the states follow what it does,
 
     x+ = A x + B e + K_b (u_applied - u_asked),
 
@@ -50,7 +49,6 @@ from ..structures import (
     Signals,
     SteadyMotion,
     checked_sample_time,
-    low_pass_matrices,
     sampled,
     tracking_gain,
 )
@@ -78,12 +76,6 @@ class LinearFeedback(RecursiveController):
         T [s].
     anti_windup
         Whether the states of a dynamic controller follow the drive where it has limits.
-    method
-        ``tustin`` or ``zoh``, for a dynamic controller.
-    prewarp
-        Frequency at which Tustin's rule is exact [rad/s]; by default zero.
-    filter_bandwidth
-        First-order low-pass on every measurement [rad/s]; by default none.
     hold_for
         Age up to which the payload's values count in full [s]; by default a second more than
         the telemetry's delay.
@@ -103,7 +95,6 @@ class LinearFeedback(RecursiveController):
     case: Case
     controller: LinearController
     anti_windup: bool
-    method: str
     hold_for: float
     motor: SteadyMotion
 
@@ -114,9 +105,6 @@ class LinearFeedback(RecursiveController):
         *,
         sample_time: float = 0.01,
         anti_windup: bool = True,
-        method: str = "tustin",
-        prewarp: float | None = None,
-        filter_bandwidth: float | None = None,
         hold_for: float | None = None,
         name: str = "feedback",
     ) -> None:
@@ -127,38 +115,32 @@ class LinearFeedback(RecursiveController):
         _check_signals(controller)
         hold = late + 1.0 if hold_for is None else hold_for
         check_range(_OWNER, "hold_for", hold, low=0.0, unit="s")
-        C = sampled(controller, sample_time, method=method, prewarp=prewarp)
+        C = sampled(controller, sample_time)
         self._set(
             case=case,
             controller=controller,
             anti_windup=anti_windup and len(C[0]) > 0,
-            method=method,
             hold_for=float(hold),
             motor=SteadyMotion.of(plant.data),
         )
-        ny = len(controller.measurements)
-        low_pass = low_pass_matrices(ny, filter_bandwidth, sample_time)
         back = tracking_gain(C, sample_time) if self.anti_windup else np.zeros((len(C[0]), 1))
         static = {"rope.tension": point.tension, "motor.torque": point.torque}
-        filtered, own = len(low_pass[0]), len(C[0])
+        own = len(C[0])
 
         def respond(xc: ca.SX, m: Signals) -> tuple[ca.SX, ca.SX]:
             # Not by slices: an empty slice of a column of two is a row in CasADi.
-            xf, x, asked = ca.vertsplit(xc, [0, filtered, filtered + own, xc.numel()])
-            error = self._deviations(m, static)
-            following, heard = _advance(low_pass, xf, error)
+            x, asked = ca.vertsplit(xc, [0, own, xc.numel()])
             if self.anti_windup:  # what the drive really did over the last sample
                 x = x + back @ (m["drive.applied"] - asked)
-            after, feedback = _advance(C, x, heard)
+            following, feedback = _advance(C, x, self._deviations(m, static))
             speed = self.motor.per_rope_speed * m["reference.velocity"]
             command = point.command + (self.motor.feed * speed + feedback)
-            following = ca.vertcat(following, after)
             if self.anti_windup:
                 following = ca.vertcat(following, command)
             return following, command
 
         last = [point.command] if self.anti_windup else []
-        self._adopt(name, sample_time, [*np.zeros(filtered + own), *last], respond)
+        self._adopt(name, sample_time, [*np.zeros(own), *last], respond)
 
     @classmethod
     def from_design(

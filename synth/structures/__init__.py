@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .low_order import LowOrder, LowOrderFeedback, LowOrderLaw
     from .lqg import LqgEstimator, LqgRegulator, estimator, reduced, regulator, shaped, weighing
     from .recursive import RecursiveController, Signals, checked_sample_time, make_recursion
-    from .sampled_controller import Matrices, low_pass_matrices, sampled, tracking_gain
+    from .sampled_controller import Matrices, sampled, tracking_gain
     from .sampling import SampledLoop, sampled_loop
     from .structure import (
         Parameter,

@@ -10,26 +10,20 @@ import math
 import numpy as np
 import scipy.linalg
 
-from models.basics import FloatArray, InputError, SynthesisError, check_range, pick
-from models.plant import zero_order_hold
+from models.basics import FloatArray, InputError, SynthesisError
 
 from ..loop import LinearController
 
 Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 _OWNER = "linear feedback"
-METHODS = ("tustin", "zoh")
 _SLOWEST = 0.5  # frequencies above which a controller's gains are compared [rad/s]
 
 
-def sampled(
-    controller: LinearController,
-    sample_time: float,
-    *,
-    method: str = "tustin",
-    prewarp: float | None = None,
-) -> Matrices:
+def sampled(controller: LinearController, sample_time: float) -> Matrices:
     """Return (A, B, C, D) of a controller sampled every `sample_time` [s].
+
+    By Tustin's rule, s = k (z - 1)/(z + 1) with k = 2/T.
 
     Parameters
     ----------
@@ -37,58 +31,23 @@ def sampled(
         x' = A x + B y, u = C x + D y.
     sample_time
         T [s].
-    method
-        ``tustin``: s = k (z - 1)/(z + 1), k = 2/T; ``zoh``: the measurements held over T.
-    prewarp
-        With Tustin's rule, the frequency omega at which it is exact, k = omega/tan(omega T/2)
-        [rad/s].
 
     Raises
     ------
     InputError
-        If the method is unknown, the frequency not below pi/T, or k an eigenvalue of A.
+        If k is an eigenvalue of A.
     """
-    pick(_OWNER, "method", METHODS, (method,))
     A, B, C, D = controller.A, controller.B, controller.C, controller.D
     n = len(A)
-    if method == "zoh":
-        if prewarp is not None:
-            raise InputError(f"{_OWNER}: prewarp is for the method 'tustin' only, got {prewarp!r}")
-        return *zero_order_hold(A, B, sample_time), C, D
     k = 2.0 / sample_time
-    if prewarp is not None:
-        check_range(
-            _OWNER,
-            "prewarp",
-            prewarp,
-            low=0.0,
-            high=math.pi / sample_time,
-            unit="rad/s",
-            open_low=True,
-            open_high=True,
-        )
-        k = prewarp / math.tan(0.5 * prewarp * sample_time)
     if n and np.abs(np.linalg.eigvals(A) - k).min() < 1e-9 * k:
         raise InputError(
-            f"{_OWNER}: sample_time must be another one, or the method 'zoh': the controller "
-            f"has a pole at {k:.6g} 1/s, which Tustin's rule maps to infinity"
+            f"{_OWNER}: sample_time must be another one: the controller has "
+            f"a pole at {k:.6g} 1/s, which Tustin's rule maps to infinity"
         )
     inverse = np.linalg.inv(np.eye(n) - A / k)
-    Bd = 2.0 / k * inverse @ B
+    Bd = sample_time * inverse @ B
     return inverse @ (np.eye(n) + A / k), Bd, C @ inverse, D + 0.5 * C @ Bd
-
-
-def low_pass_matrices(n: int, bandwidth: float | None, sample_time: float) -> Matrices:
-    """Return n first-order low-passes side by side, sampled; nothing but D = 1 without one."""
-    if bandwidth is None:
-        return np.zeros((0, 0)), np.zeros((0, n)), np.zeros((n, 0)), np.eye(n)
-    omega = check_range(_OWNER, "filter_bandwidth", bandwidth, low=0.0, unit="rad/s", open_low=True)
-    names = tuple(f"y{i}" for i in range(n))
-    one = np.eye(n)
-    low_pass = LinearController(
-        A=-omega * one, B=omega * one, C=one, D=0.0 * one, measurements=names, inputs=names
-    )
-    return sampled(low_pass, sample_time)
 
 
 def tracking_gain(matrices: Matrices, sample_time: float) -> FloatArray:

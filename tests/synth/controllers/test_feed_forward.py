@@ -129,46 +129,13 @@ def test_lead_is_that_of_a_line_through_a_filtered_slope() -> None:
     assert asked[1] / asked[0] == pytest.approx(1.0 + 0.3 * slope, rel=2e-3)
 
 
-@pytest.mark.parametrize("omega", [0.15, 0.5, 1.0])
-def test_restoring_puts_a_longer_heave_filter_in_place_of_the_mrus(omega: float) -> None:
-    # The drum standing still, the command is linear in heave and heave rate.
-    case, T = short_filter(), 0.02
-    asked = []
-    for restore in (1.0, 4.0):
-        controller = VelocityFeedForward(case, restore=restore, position_gain=0.3)
-        time, found, applied = T * np.arange(24000.0), [], controller.loop.static
-        for t in time:
-            m = {"mru.heave": np.sin(omega * t), "mru.heave_rate": omega * np.cos(omega * t)}
-            m |= {"mru.valid": 1.0, "drive.applied": applied}
-            applied = controller.step(Measurement.of(m), t)
-            found.append(applied)
-        late = slice(14000, None)
-        asked.append(sine_part(time[late], np.array(found[late]), omega))
-    s, old, new = 1j * omega, 2.0 * np.pi / 30.0, 2.0 * np.pi / 120.0
-    expected = (s**2 + np.sqrt(2.0) * old * s + old**2) / (s**2 + np.sqrt(2.0) * new * s + new**2)
-    assert asked[1] / asked[0] == pytest.approx(expected, rel=0.01)
-
-
-def test_a_heave_filter_turns_the_waves_and_restoring_turns_them_back() -> None:
+def test_a_heave_filter_turns_the_waves() -> None:
     case, omega = short_filter(), 0.77
-    left = {
-        restore: abs(residual(VelocityFeedForward(case, restore=restore), case, omega))
-        for restore in (1.0, 2.0, 8.0)
-    }
+    left = abs(residual(VelocityFeedForward(case), case, omega))
     corner, s = 2.0 * np.pi / 30.0, 1j * omega
     shown = s**2 / (s**2 + np.sqrt(2.0) * corner * s + corner**2)
-    assert left[1.0] == pytest.approx(abs(1.0 - 0.9 * shown), rel=0.1)
-    assert left[1.0] > 0.35
-    assert left[2.0] < 0.6 * left[1.0]
-    assert left[8.0] < 0.12
-
-
-def test_without_a_heave_filter_there_is_nothing_to_restore() -> None:
-    case = load_case("thesis-1975")
-    m = Measurement.of({"mru.heave": 1.0, "mru.heave_rate": 0.3, "mru.valid": 1.0})
-    plain, restored = (VelocityFeedForward(case, restore=restore) for restore in (1.0, 5.0))
-    for _ in range(50):
-        assert restored.step(m, 0.0) == plain.step(m, 0.0)
+    assert left == pytest.approx(abs(1.0 - 0.9 * shown), rel=0.1)
+    assert left > 0.35
 
 
 def test_the_first_heave_rate_makes_no_acceleration() -> None:
@@ -238,10 +205,8 @@ def test_numbers_out_of_range_are_told() -> None:
     for changes, text in (
         ({"share": 1.2}, r"feed-forward: share must be in \[0, 1\], got 1\.2"),
         ({"lead": -0.1}, r"lead must be in \[0, 10\] s, got -0\.1"),
-        ({"restore": 0.5}, r"restore must be in \[1, 20\], got 0\.5"),
         ({"position_gain": 2.0}, r"position_gain must be in \[0, 1\] 1/s, got 2"),
         ({"fade": -1.0}, r"fade must be in \[0, 60\] s"),
-        ({"lead_bandwidth": 0.0}, "lead_bandwidth must be above 0 rad/s"),
         ({"bandwidth": -3.0}, "drum-speed loop: bandwidth must be above 0 rad/s"),
     ):
         with pytest.raises(InputError, match=text):
