@@ -72,6 +72,10 @@ class Dual:
         value = other / self.value
         return Dual(value, -(value / self.value) * self.slope)
 
+    def __matmul__(self, other: Array) -> Dual:
+        """Return sums over the last axis, weighted by columns of plain numbers."""
+        return Dual(self.value @ other, self.slope @ other)
+
     def __getitem__(self, key: Any) -> Dual:
         """Return some of the numbers, chosen along the last axis."""
         if isinstance(key, tuple):  # [..., key], as arrays with leading axes have it

@@ -120,7 +120,7 @@ def _figures(limits: Sequence[Limit], member: Member, loops: SolvedRows, index: 
     if not loops.stable[index]:
         return _unstable(member)
     moments = {name: column[index, :, 0] for name, column in loops.moments.items()}
-    at_rest = {name: float(v[index % v.size]) for name, v in loops.numbers.at_rest.items()}
+    at_rest = {name: float(v[index % v.size]) for name, v in loops.at_rest.items()}
     assessment = _OneLoop(max_sensitivity=float(loops.peak[index]), moments=moments)
     use, name = 0.0, ""
     for limit in limits:

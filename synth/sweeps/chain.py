@@ -27,7 +27,7 @@ Nothing is divided by what may be zero: but for the controller's own poles, whic
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -36,8 +36,9 @@ from models.basics import ComplexArray, FloatArray, IndexArray, White
 from models.plant import RopeLumps
 from models.sensing import SAMPLE_TIME
 
+from ..loop import Dual, exp, squared, value_of, where
 from .law_rows import LawColumns
-from .numbers import PlantNumbers, at_rows
+from .numbers import Numbers, at_rows, part_of
 from .sweep_nodes import SweepNodes
 
 BLOCK = 12_000  # numbers of an array at once: the half dozen in use stay in the cache
@@ -71,13 +72,16 @@ class Shaken:
     noisy: bool
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ChainLoops:
     """Closed loops of a controller around a lumped rope, delays and low-passes exact.
 
-    Parameters
+    Attributes
     ----------
-    plants
-        The plants.
+    count
+        How many, n.
+    numbers
+        Their plants, as of `synth.sweeps.numbers.columns_of`.
     law
         The controller.
     drag
@@ -86,51 +90,39 @@ class ChainLoops:
         How the rope is lumped.
     """
 
-    def __init__(
-        self, plants: PlantNumbers, law: LawColumns, drag: FloatArray, *, lumps: RopeLumps
-    ) -> None:
-        n = self.numbers = plants
-        self.law, self.lumps, self.drag = law, lumps, drag
-        self._count = max(len(plants), drag.size, *(v.size for v in law.values))
-        h = n["drum_radius"] / n["gear_ratio"]
-        phi, beta, lag = n.drive
-        self.columns = {
-            **{name: n[name] for name in ("payload_mass", "inertia", "viscous_friction", "delay")},
-            **n.sensors,
-            "h": h,
-            "load": n.gear_factor * h,
-            "phi": phi,
-            "beta": beta,
-            "lag": lag,
-            "tau": n.damping_time,
-            "stiffness": n.stiffness,
-            "rope": n.rope_mass,
-            "tension": n.static_tension,
-            "per_ampere": n["torque_constant"],
-        }
-        self.low_passes = [
-            n[name]
-            for name in ("sensor_bandwidth", "telemetry_bandwidth")
-            if np.all(np.isfinite(n[name]))
-        ]
+    count: int
+    numbers: Numbers
+    law: LawColumns
+    drag: FloatArray
+    lumps: RopeLumps
 
     def __len__(self) -> int:
-        return self._count
+        return self.count
 
     @property
     def mode_spacing(self) -> FloatArray:
         """Distance of the rope's higher modes, pi c / L, (n,) or (1,) [rad/s]."""
-        rope = np.maximum(self.columns["rope"], 1e-12)
-        return np.asarray(np.pi * np.sqrt(self.columns["stiffness"] / rope))
+        rope = np.maximum(self.numbers["rope_mass"], 1e-12)
+        return np.asarray(np.pi * np.sqrt(self.numbers["stiffness"] / rope))
 
     @property
     def masses(self) -> int:
         """Masses along the rope."""
         return len(self.lumps.masses)
 
+    def part(self, index: IndexArray) -> ChainLoops:
+        """Return some of the loops."""
+        return replace(
+            self,
+            count=len(index),
+            numbers={name: part_of(column, index) for name, column in self.numbers.items()},
+            law=self.law.part(index),
+            drag=part_of(self.drag, index),
+        )
+
     def with_drag(self, drag: FloatArray) -> ChainLoops:
         """Return the loops with other drag [N s/m]."""
-        return ChainLoops(self.numbers, self.law, drag, lumps=self.lumps)
+        return replace(self, drag=drag)
 
     def responses(self, rows: IndexArray, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Return closed and open characteristic functions of some loops, (m, k) each.
@@ -180,7 +172,7 @@ class Chain:
     def __init__(self, loops: ChainLoops, rows: IndexArray, s: ComplexArray) -> None:
         self.loops, self.rows = loops, rows
         self.s = s = np.atleast_2d(s)
-        h, phi = self._own("h"), self._own("phi")
+        h, phi = self._own("haul"), self._own("phi")
         self._inertial = self._own("inertia") * (s * s) + self._own("viscous_friction") * s
         self._back = self._own("beta") * s
         e = 1.0 + s * self._own("lag")
@@ -196,7 +188,7 @@ class Chain:
         self._rope()
 
     def _own(self, name: str) -> Any:
-        return at_rows(self.loops.columns[name], self.rows)
+        return at_rows(self.loops.numbers[name], self.rows)
 
     def _rope(self) -> None:
         """Set y and f.
@@ -206,8 +198,8 @@ class Chain:
         sinh(n mu)/sinh(mu) and c, from q = 4 sinh^2(mu/2).
         """
         s, springs, masses = self.s, self.loops.lumps.springs, self.loops.lumps.masses
-        spring = self._own("stiffness") * (1.0 + s * self._own("tau"))
-        rope = self._own("rope")
+        spring = self._own("stiffness") * (1.0 + s * self._own("damping_time"))
+        rope = self._own("rope_mass")
         if masses.size == 1:  # the unit is F/spring
             one = np.ones((1, 1))
             self._y, self._f, unit = (one, springs[0] * one), (0.0 * one, spring), 1.0 / spring
@@ -215,12 +207,10 @@ class Chain:
             piece = springs[-1]
             z = rope * (s * s) / spring
             q = z * (piece * masses[0])
-            b, c, step = np.zeros_like(q), np.zeros_like(q), np.empty_like(q)
+            b = c = 0.0 * q
             for _ in range(masses.size - 2):
-                c += b
-                np.multiply(q, c, out=step)
-                step += 1.0
-                b += step
+                c = c + b
+                b = b + (1.0 + q * c)
             delta = q * b
             x = 1.0 + q * c + delta, 1.0 + q * c + delta + b
             inner = masses[0] * z
@@ -235,44 +225,52 @@ class Chain:
         s, gain = self.s, np.zeros((1, 1))
         for name in _PAYLOAD:
             gain = gain * s + self._heard.get(f"payload.{name}", 0.0)
-        for bandwidth in self.loops.low_passes:
-            b = s / at_rows(bandwidth, self.rows)
-            gain = gain / (1.0 + np.sqrt(2.0) * b + b * b)
+        for name in ("sensor_bandwidth", "telemetry_bandwidth"):
+            bandwidth = self._own(name)
+            if _there(bandwidth):
+                b = s / bandwidth
+                gain = gain / (1.0 + np.sqrt(2.0) * b + b * b)
         return gain * late(s, self._own("delay"))
 
     def _load_cell(self) -> Any:
         bandwidth = self._own("cell_bandwidth")
-        return bandwidth / (self.s + bandwidth) if np.all(np.isfinite(bandwidth)) else 1.0
+        return bandwidth / (self.s + bandwidth) if _there(bandwidth) else 1.0
 
     def _hook(self) -> Any:
         """Return what the hook's motion makes of the command."""
         gain, s, period = self._follows(), self.s, self._own("mru_period")
-        if np.all(np.isfinite(period)):
+        if _there(period):
             w = 2.0 * np.pi / period
             gain = gain * (s * s / (s * s + np.sqrt(2.0) * w * s + w * w))
-        return gain * late(s, np.nan_to_num(self._own("mru_delay")))
+        delay = self._own("mru_delay")
+        return gain * late(s, delay) if _there(delay) else gain
 
     def _follows(self) -> Any:
         """Return what the heave that is shown makes of the command, its rate with it."""
         heave, rate = (self._heard.get(f"mru.{name}", 0.0) for name in ("heave", "heave_rate"))
-        return heave + self.s * rate if np.any(rate) else np.zeros((1, 1))
+        follows = {"mru.heave", "mru.heave_rate"} & self._heard.keys()
+        return heave + self.s * rate if follows else np.zeros((1, 1))
 
-    def noise(self, heave_rms: FloatArray) -> FloatArray:
+    def noise(self, heave_rms: FloatArray) -> Any:
         """Return the density of what errors and noise of the sensors make of the command."""
         total: Any = np.zeros((1, 1))
         for name in _PAYLOAD:
             # An amplitude density a root hertz is white noise of half its square.
-            size = abs2(np.asarray(self._heard.get(f"payload.{name}", 0.0)))
-            total = total + size * (0.5 * _UNIT * self._own(f"{name}_noise") ** 2)
-        size = abs2(np.asarray(self._heard.get("rope.tension", 0.0)))
-        cell = np.nan_to_num(self._own("cell_noise")) * self._own("tension")
-        total = total + size * (SAMPLE_TIME * _UNIT * cell**2)
+            size = abs2(self._heard.get(f"payload.{name}", 0.0))
+            total = total + size * (0.5 * _UNIT * abs2(self._own(f"{name}_noise")))
+        share = self._own("cell_noise")
+        if _there(share):
+            size = abs2(self._heard.get("rope.tension", 0.0))
+            cell = share * self._own("static_tension")
+            total = total + size * (SAMPLE_TIME * _UNIT * (cell * cell))
         floor, w = self._own("mru_floor"), self._own("mru_bandwidth")
-        if np.all(np.isfinite(floor)):
-            error = np.maximum(floor, self._own("mru_fraction") * at_rows(heave_rms, self.rows))
-            shape = 2.0 * np.sqrt(2.0) / np.pi * w**3 / (self.s.imag**4 + w**4)
-            total = total + abs2(self._follows()) * (error**2 * shape)
-        return np.asarray(total)
+        if _there(floor):
+            error = self._own("mru_fraction") * at_rows(heave_rms, self.rows)
+            error = where(value_of(error) > value_of(floor), error, floor)
+            fourth = w * w * w * w
+            shape = 2.0 * np.sqrt(2.0) / np.pi * (fourth / w) / (self.s.imag**4 + fourth)
+            total = total + abs2(self._follows()) * (error * error * shape)
+        return total
 
     def ends(self, drag: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Return y and f with a drag, (1 or m, 1) [N s/m]."""
@@ -291,7 +289,7 @@ class Chain:
     def moments(
         self, outputs: Iterable[str], nodes: SweepNodes, shaken: Shaken, drag: FloatArray
     ) -> dict[str, FloatArray]:
-        """Return variances of outputs and of their rates by all rules, (m, 2, rules) each.
+        """Return variances of outputs, then of their rates, by all rules, (m, 2 rules) each.
 
         Parameters
         ----------
@@ -303,7 +301,7 @@ class Chain:
         y, f = self.ends(drag[:, None])
         inverse = 1.0 / abs2(self.closed(y, f))
         right = _both(nodes.sea if shaken.ratios is None else nodes.weights, nodes.omega)
-        heave = inverse if shaken.ratios is None else inverse * shaken.ratios[self.rows]
+        heave = inverse if shaken.ratios is None else inverse * part_of(shaken.ratios, self.rows)
         factors = at_rows(shaken.factors, self.rows)
         sources = [(heave, right, factors, self._of_heave())]
         if shaken.noisy:
@@ -312,11 +310,11 @@ class Chain:
             sources.append((white, right, np.ones((1, 1)), self._of_noise()))
         found = {}
         for name in outputs:
-            total = np.zeros((self.rows.size, right.shape[1]))
-            for density, weights, factor, numerators in sources:
-                size = abs2(_sum_of(numerators[name], y, f))
-                total += ((size * density) @ weights) * factor
-            found[name] = total.reshape(self.rows.size, 2, -1)
+            parts = [
+                ((abs2(_sum_of(numerators[name], y, f)) * density) @ weights) * factor
+                for density, weights, factor, numerators in sources
+            ]
+            found[name] = sum(parts[1:], start=parts[0])
         return found
 
     def velocity_of_drag(self, nodes: SweepNodes, shaken: Shaken) -> list[FloatArray]:
@@ -325,7 +323,7 @@ class Chain:
         cross = 2.0 * (fixed.real * slope.real + fixed.imag * slope.imag)
         heave: Any = nodes.sea[0]
         if shaken.ratios is not None:
-            heave = shaken.ratios[self.rows] * nodes.weights[0]
+            heave = part_of(shaken.ratios, self.rows) * nodes.weights[0]
         driven = abs2(self._of_heave()[VELOCITY][2])
         total = driven * (heave * at_rows(shaken.factors, self.rows))
         if shaken.noisy:
@@ -338,7 +336,7 @@ class Chain:
         """Return the numerators of outputs over `closed`, for the hook's heave."""
         phi, shaft, W, H = self._own("phi"), self._inertial, self.W, self.H
         load, asks = self._own("load"), self.D + self.H
-        turn = phi * H, -(phi * self.E + self.pull / self._own("h")), -phi * self.G
+        turn = phi * H, -(phi * self.E + self.pull / self._own("haul")), -phi * self.G
         pulls = load * (self._back + self.drive * asks) - phi * shaft * self.E
         return self._numerators(
             payload=W + self.drive * asks,
@@ -363,18 +361,20 @@ class Chain:
         return {
             "payload.displacement": (None, None, payload),
             VELOCITY: (None, None, self.s * payload),
-            "drum.haul": _times(self._own("h"), turn),
+            "drum.haul": _times(self._own("haul"), turn),
             "motor.speed": _times(self.s, turn),
             "motor.torque": torque,
-            "motor.current": _times(1.0 / self._own("per_ampere"), torque),
+            "motor.current": _times(1.0 / self._own("torque_constant"), torque),
             "drive.command": command,
             "motor.voltage": command,
             "rope.tension": (None, payload, None),
         }
 
 
-def late(s: ComplexArray, delay: FloatArray) -> Any:
+def late(s: ComplexArray, delay: Any) -> Any:
     """Return exp(-s delay); real arithmetic where s is on the imaginary axis."""
+    if isinstance(delay, Dual):
+        return exp(-s * delay)
     if not np.any(delay):
         return 1.0
     turn = s.imag * delay
@@ -384,9 +384,16 @@ def late(s: ComplexArray, delay: FloatArray) -> Any:
     return found * np.exp(-s.real * delay) if np.any(s.real) else found
 
 
-def abs2(values: ComplexArray) -> FloatArray:
+def abs2(values: Any) -> Any:
     """Return |values|^2."""
-    return np.asarray(values.real**2 + values.imag**2)
+    if isinstance(values, Dual):
+        return squared(values)
+    return values.real**2 + values.imag**2
+
+
+def _there(column: Any) -> bool:
+    """Return whether all plants have a number: a sensor, or a bandwidth that matters."""
+    return bool(np.all(np.isfinite(value_of(column))))
 
 
 def _times(factor: Any, terms: Numerator) -> Numerator:

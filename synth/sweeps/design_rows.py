@@ -11,7 +11,6 @@ begin again on finer nodes.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -31,8 +30,8 @@ from models.spread import Spread
 from ..question import DesignQuestion, SampledNoise
 from .chain import BLOCK, VELOCITY, Chain, ChainLoops, Shaken
 from .kernel import SpringLoops
-from .law_rows import DesignLaw, LawColumns
-from .numbers import NOISE_OF, PlantNumbers, numbers_of
+from .law_rows import DesignLaw
+from .numbers import NOISE_OF, at_rest, numbers_of
 from .sea_rows import SeaRows
 from .sweep_nodes import Panel, SweepNodes, halved, sweep_nodes, sweep_panels
 from .winding_count import calming_drag, light_poles, survey
@@ -54,30 +53,13 @@ _CLOSE = 1e-10  # ... and what will do
 _STEP = 1.5  # of it, at most
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Batch:
-    """Rows with all that their loops are made of."""
-
-    rows: FloatArray
-    numbers: PlantNumbers
-    law: LawColumns
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    def part(self, index: IndexArray) -> _Batch:
-        return _Batch(
-            rows=self.rows[index], numbers=self.numbers.part(index), law=self.law.part(index)
-        )
-
-
 class SolvedRows:
     """What is known of the loops of n rows.
 
     Attributes
     ----------
-    numbers
-        Their plants.
+    at_rest
+        What hauling the load at rest takes, by output, (n,) or (1,).
     drag
         Linear drag coefficient, (n,) [N s/m].
     stable
@@ -89,9 +71,8 @@ class SolvedRows:
         rules).
     """
 
-    def __init__(self, numbers: PlantNumbers, orders: Mapping[str, int], rules: int = 1) -> None:
-        count = len(numbers)
-        self.numbers = numbers
+    def __init__(self, loops: ChainLoops, orders: Mapping[str, int], rules: int = 1) -> None:
+        count, self.at_rest = len(loops), at_rest(loops.numbers)
         self.drag = np.full(count, np.nan)
         self.stable = np.zeros(count, dtype=bool)
         self.peak = np.full(count, np.nan)
@@ -168,7 +149,7 @@ class DesignRows:
         self.columns: bool | None = None  # whether column arithmetic suffices
         self.refined = 0  # rows that needed finer nodes
         self.unresolved = 0  # ... and those that none of them resolved
-        consistent = bool(np.isnan(self._pilots.numbers.fixed_drag).any())
+        consistent = bool(np.isnan(self._loops(self._pilots).drag).any())
         # The drag agrees with the velocity.
         wanted = [*outputs, *([VELOCITY] * consistent)]
         self._orders = {name: 2 if name in second else 1 for name in wanted}
@@ -191,8 +172,8 @@ class DesignRows:
         InputError
             If a row is no valid case.
         """
-        batch = self._batch(rows)
-        solved = SolvedRows(batch.numbers, self._orders)
+        loops = self._loops(rows)
+        solved = SolvedRows(loops, self._orders)
         # All rows on common nodes first; those whose two rules disagree begin again on panels half
         # as long, and so on: narrow resonances are few, and pay for themselves.
         at: IndexArray = np.arange(len(rows))
@@ -201,8 +182,8 @@ class DesignRows:
             step = _AT_ONCE if level or self.sea.varies else max(len(rows), 1)
             for k in range(0, at.size, step):
                 some = at[k : k + step]
-                own = batch.part(some) if some.size < len(rows) else batch
-                found = self._solved(own, self.level_nodes(level))
+                own = loops.part(some) if some.size < len(rows) else loops
+                found = self._solved(rows[some], own, self.level_nodes(level))
                 solved.put(some, found)
                 doubtful.append(some[self._doubt(found, level)])
             at = np.concatenate(doubtful) if doubtful else at[:0]
@@ -211,20 +192,21 @@ class DesignRows:
             self.refined += at.size if level == 0 else 0
         for k in at:  # at the very edge of stability: nodes that know the loop's own poles
             one = np.array([k])
-            own = batch.part(one)
-            found = self._solved(own, self._closely(own, solved.drag[one]))
+            own = loops.part(one)
+            nodes = self._closely(own.with_drag(_sound(solved.drag[one])))
+            found = self._solved(rows[one], own, nodes)
             solved.put(one, found)
             self.unresolved += self._doubt(found, _LEVELS).size
         if self._peaks and self.spring and solved.stable.any():
             chosen = np.flatnonzero(solved.stable)
-            solved.peak[chosen] = survey(self._chains(batch, solved.drag), chosen)[1]
+            solved.peak[chosen] = survey(loops, chosen)[1]
         return solved
 
     def loop_gain(self, rows: FloatArray, omega: FloatArray) -> ComplexArray:
         """Return L(i omega) of rows, (n, k), at frequencies above zero [rad/s]."""
-        batch = self._batch(rows)
-        drag = self._solved(batch, self.level_nodes()).drag
-        loops = self._chains(batch, drag)
+        loops = self._loops(rows)
+        drag = self._solved(rows, loops, self.level_nodes()).drag
+        loops = loops.with_drag(_sound(drag))
         s = np.asarray(1j * omega, dtype=np.complex128)
         closed, free = loops.responses(np.arange(len(rows)), s)
         return np.asarray(closed / free - 1.0)
@@ -241,26 +223,26 @@ class DesignRows:
         return self._nodes[level]
 
     @cached_property
-    def _pilots(self) -> _Batch:
+    def _pilots(self) -> FloatArray:
         """The design's own row and some others."""
         nominal = [self.spread.nominal[path] for path in self.spread.paths]
-        rows = np.vstack([nominal, self.spread.sample(_PILOTS - 1, "random", 1)])
-        return self._batch(rows)
+        return np.vstack([nominal, self.spread.sample(_PILOTS - 1, "random", 1)])
 
     @cached_property
     def _noisy(self) -> set[str]:
         """What the controller hears with errors or noise, if they count."""
-        sensors = self._pilots.numbers.sensors
+        numbers = self._loops(self._pilots).numbers
         heard = [name for name in self.law.measurements if name in NOISE_OF]
-        return {y for y in heard if np.any(sensors[NOISE_OF[y]] > 0.0)}
+        return {y for y in heard if np.any(numbers[NOISE_OF[y]] > 0.0)}
 
     @cached_property
     def _panels(self) -> list[Panel]:
         """The panels that the pilots ask for."""
         axis, splits = self._frame
+        rows, loops = self._pilots, self._loops(self._pilots)
         panels = sweep_panels(axis, splits if self.sea.varies else [])
         while len(panels) < _MOST_PANELS:
-            found = self._solved(self._pilots, self._nodes_on(panels, apart=True), alone=True)
+            found = self._solved(rows, loops, self._nodes_on(panels, apart=True), alone=True)
             error = np.zeros(len(panels))
             for column in found.moments.values():
                 with np.errstate(all="ignore"):
@@ -287,23 +269,16 @@ class DesignRows:
         noise = SampledNoise(spectrum=White().density).band
         return FrequencyAxis(min(low, noise[0]), max(high, noise[1]), half_line=False), splits
 
-    def _batch(self, rows: FloatArray) -> _Batch:
-        made = numbers_of(self.case, self.spread, rows, columns=self.columns)
-        numbers, self.columns = made
-        return _Batch(rows=rows, numbers=numbers, law=self.law.columns(self.spread, rows))
-
-    def _springs(self, batch: _Batch) -> SpringLoops:
-        return SpringLoops(
-            batch.numbers,
-            self.law.amplifier * np.stack(np.broadcast_arrays(*batch.law.values), axis=1),
-            batch.numbers.fixed_drag,
-            mass_share=float(self.lumps.masses[0]),
-            reference=_REFERENCE,
+    def _loops(self, rows: FloatArray) -> ChainLoops:
+        """Return the loops of rows with the drag that is given; NaN where it is to be found."""
+        numbers, self.columns = numbers_of(self.case, self.spread, rows, columns=self.columns)
+        return ChainLoops(
+            count=len(rows),
+            numbers=numbers,
+            law=self.law.columns(self.spread, rows),
+            drag=numbers["fixed_drag"],
+            lumps=self.lumps,
         )
-
-    def _chains(self, batch: _Batch, drag: FloatArray) -> ChainLoops:
-        sound = np.where(np.isfinite(drag), drag, 0.0)
-        return ChainLoops(batch.numbers, batch.law, sound, lumps=self.lumps)
 
     def _doubt(self, found: SolvedRows, level: int) -> IndexArray:
         """Return the stable rows whose two rules disagree."""
@@ -316,49 +291,51 @@ class DesignRows:
         limit = self.accuracy if level < _LEVELS else max(self.accuracy, _LAST)
         return np.flatnonzero(found.stable & ~(error <= limit))
 
-    def _closely(self, batch: _Batch, drag: FloatArray) -> SweepNodes:
-        """Return nodes for one row, its panels short near its own poles."""
-        poles = light_poles(self._chains(batch, drag), 0)
+    def _closely(self, loops: ChainLoops) -> SweepNodes:
+        """Return nodes for one loop, its panels short near its own poles."""
+        poles = light_poles(loops, 0)
         marks = [complex(p) for p in poles if p.real < 0.0 and p.imag >= 0.0]
         axis, splits = self._frame
         panels = sweep_panels(axis, splits, level=2, marks=marks, clearance=0.6)
         return sweep_nodes(axis, panels, self.sea.density)
 
-    def _solved(self, batch: _Batch, nodes: SweepNodes, *, alone: bool = False) -> SolvedRows:
-        """Return drag, stability and moments of rows; M_s too, but of springs.
+    def _solved(
+        self, rows: FloatArray, loops: ChainLoops, nodes: SweepNodes, *, alone: bool = False
+    ) -> SolvedRows:
+        """Return drag, stability and moments of the loops of rows; M_s too, but of springs.
 
         `alone` leaves stability and M_s out: all count as stable.
         """
-        found = SolvedRows(batch.numbers, self._orders, len(nodes.weights))
-        ratios = self.sea.ratios(batch.rows, nodes.omega)
+        found = SolvedRows(loops, self._orders, len(nodes.weights))
+        ratios = self.sea.ratios(rows, nodes.omega)
         shaken = Shaken(
-            factors=self.sea.factors(batch.rows),
+            factors=self.sea.factors(rows),
             ratios=ratios,
-            heave_rms=self.sea.heave_rms(batch.rows, ratios, nodes.weights[0]),
+            heave_rms=self.sea.heave_rms(rows, ratios, nodes.weights[0]),
             noisy=bool(self._noisy),
         )
-        found.drag[:] = batch.numbers.fixed_drag
+        found.drag[:] = loops.drag
         if self.spring:
-            springs = self._springs(batch)
+            springs = SpringLoops(loops, amplifier=self.law.amplifier, reference=_REFERENCE)
             found.stable[:] = springs.stable
             with np.errstate(all="ignore"):
                 found.moments |= springs.moments(self._orders, nodes, shaken)
             return found
-        loops = self._chains(batch, np.zeros(1))
-        at = np.arange(len(batch))
+        at = np.arange(len(loops))
         free = np.isnan(found.drag)
         self._settle(loops, at, nodes, shaken, np.zeros(at.size), found, free)
         if alone:
             return found
         # Whether a chain is stable costs more than its variance: it is asked at the answer first.
-        count, found.peak[:] = survey(self._chains(batch, found.drag), peaks=self._peaks)
+        settled = loops.with_drag(_sound(found.drag))
+        count, found.peak[:] = survey(settled, peaks=self._peaks)
         again = np.flatnonzero(free & (count != 0))
         if again.size:
             edge = np.zeros(at.size)
-            edge[again] = calming_drag(self._chains(batch.part(again), np.zeros(1)))
+            edge[again] = calming_drag(loops.part(again))
             self._settle(loops, again, nodes, shaken, edge, found, free)
-            calmed = survey(self._chains(batch, found.drag), again, peaks=self._peaks)
-            count[again], found.peak[again] = calmed
+            settled = loops.with_drag(_sound(found.drag))
+            count[again], found.peak[again] = survey(settled, again, peaks=self._peaks)
         found.stable[:] = np.isfinite(found.drag) & (count == 0)
         return found
 
@@ -386,10 +363,15 @@ class DesignRows:
                 agreed = np.where(agreed <= _EDGE * edge[rows], np.inf, agreed)
                 found.drag[rows] = np.where(free[rows], agreed, found.drag[rows])
             if self._orders:
-                drag = np.where(np.isfinite(found.drag[rows]), found.drag[rows], 0.0)
-                moments = chain.moments(self._orders, nodes, shaken, drag)
+                moments = chain.moments(self._orders, nodes, shaken, _sound(found.drag[rows]))
                 for name, column in moments.items():
-                    found.moments[name][rows] = column[:, : self._orders[name]]
+                    both = column.reshape(rows.size, 2, -1)
+                    found.moments[name][rows] = both[:, : self._orders[name]]
+
+
+def _sound(drag: FloatArray) -> FloatArray:
+    """Return drag coefficients, zero where none agrees or none has been found yet."""
+    return np.where(np.isfinite(drag), drag, 0.0)
 
 
 def _velocity_of(parts: Sequence[FloatArray], edge: FloatArray) -> Velocity:

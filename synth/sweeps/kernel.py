@@ -23,8 +23,7 @@ import numpy as np
 
 from models.basics import BoolArray, FloatArray
 
-from .chain import Shaken
-from .numbers import PlantNumbers
+from .chain import ChainLoops, Shaken
 from .sweep_nodes import SweepNodes
 
 Columns = list[FloatArray]  # coefficients of s^0, s^1, .., each (n,), or (1,) if all have the same
@@ -37,40 +36,26 @@ class SpringLoops:
 
     Parameters
     ----------
-    plants
-        The plants, their delays zero.
-    gains
-        A a, A a1, A a2 of each loop, (n, 3).
-    drag
-        Linear drag coefficient of each, (n,) [N s/m].
-    mass_share
-        Share of the rope's mass that moves with the payload: 1/3, or 1 as in the thesis.
+    loops
+        The loops, their delays zero, of a controller whose parameters are a, a1 and a2.
+    amplifier
+        What these are multiplied by, A.
     reference
         Frequency by which s is scaled [rad/s].
     """
 
-    def __init__(
-        self,
-        plants: PlantNumbers,
-        gains: FloatArray,
-        drag: FloatArray,
-        *,
-        mass_share: float,
-        reference: float,
-    ) -> None:
+    def __init__(self, loops: ChainLoops, *, amplifier: float, reference: float) -> None:
         self.reference = reference
-        n = plants
-        self._count = max(len(plants), len(gains), drag.size)
+        n = loops.numbers
+        self._count = len(loops)
         zero, one = np.zeros(1), np.ones(1)
-        h = n["drum_radius"] / n["gear_ratio"]
-        load = n.gear_factor * h
-        phi, beta, lag = n.drive
-        K, mass = n.stiffness, n["payload_mass"] + mass_share * n.rope_mass
-        kappa = _trimmed([K, K * n.damping_time])
-        D, e = [zero, drag, mass], _trimmed([one, lag])
+        h, load, phi, beta = n["haul"], n["load"], n["phi"], n["beta"]
+        K, mass = n["stiffness"], n["payload_mass"] + loops.lumps.masses[0] * n["rope_mass"]
+        kappa = _trimmed([K, K * n["damping_time"]])
+        D, e = [zero, loops.drag, mass], _trimmed([one, n["lag"]])
         shaft = [zero, n["viscous_friction"], n["inertia"]]
         W = total(product(shaft, e), [zero, beta])
-        q = [gains[:, 2], gains[:, 1], gains[:, 0]]
+        q = [amplifier * gain for gain in reversed(loops.law.values)]
         sensors: Columns = [one]
         for name in ("sensor_bandwidth", "telemetry_bandwidth"):
             if np.all(np.isfinite(n[name])):

@@ -34,7 +34,7 @@ class LawColumns:
     law, measurements
         The structure bound to its plant, and what it hears, in its plant's order.
     values
-        Column of each parameter, (n,) or (1,).
+        Column of each parameter, (n,) or (1,); `synth.loop.Dual` numbers of one loop too.
     poles
         The controller's own poles, (n, p) or (1, p) [1/s].
     """
@@ -56,8 +56,7 @@ class LawColumns:
 
     def response(self, rows: IndexArray, s: ComplexArray) -> dict[str, Any]:
         """Return C of each measurement of some rows at s, each (1 or m, 1 or k)."""
-        values = [at_rows(v, rows) if v.size > 1 else float(v[0]) for v in self.values]
-        found = self.law.response(values, s)[0]
+        found = self.law.response([at_rows(v, rows) for v in self.values], s)[0]
         return dict(zip(self.measurements, found, strict=True))
 
     def without_poles(self, rows: IndexArray, s: ComplexArray) -> Any:

@@ -105,7 +105,7 @@ def finished(
     exposure
         Time for which most probable extremes are taken [s].
     """
-    static = loops.numbers.at_rest
+    static = loops.at_rest
     alone = {
         "max_sensitivity": loops.peak,
         "drag": loops.drag,

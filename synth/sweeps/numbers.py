@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,14 +21,19 @@ from models.operation import PREFIX as FAULTS
 from models.plant import PlantData
 from models.spread import DRAG, GAINS, Spread, with_payload
 
+from ..loop import Dual
+
 Column = TypeVar("Column", FloatArray, ComplexArray)
+Numbers = Mapping[str, Any]
+"""Numbers of plants with their sensors by name, in SI: (n,), or (1,) where all have the same, so
+that arithmetic on what does not vary costs nothing.  `columns_of` says which."""
 
 _AGREE = 1e-12
 _NEWTON = 30
 
 # Paths that nothing of a case's plant depends on.
 _ELSEWHERE = ("sea.", "vessel.", "limits.", FAULTS, GAINS, DRAG)
-# What the other sensors are made of, by path; nothing of a case's plant depends on them.
+# What the other sensors are made of, by path.
 _SENSED = {
     "acceleration_noise": "sensors.payload.acceleration_noise",
     "velocity_noise": "sensors.payload.velocity_noise",
@@ -56,107 +61,71 @@ _PLAIN = tuple(
 )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PlantNumbers:
-    """Numbers of n plants of one kind, in SI, named as in `PlantData`.
+def columns_of(case: Case) -> dict[str, FloatArray]:
+    """Return what the loops of a case are made of, (1,) each; (n,) if its fields are columns.
 
-    Attributes
-    ----------
-    count
-        How many plants, n.
-    values
-        By name of a field of `PlantData`: (n,), or (1,) where all plants have the same, so that
-        arithmetic on what does not vary costs nothing.
-    like
-        The plant of the case itself: its kind of motor, how its rope is lumped.
-    fixed_drag
-        Linear drag coefficient [N s/m]; NaN where it agrees with the response.
-    sensors
-        Numbers of the sensors besides those of the payload's signals, likewise; NaN where there
-        is no such sensor.
+    The fields of `PlantData` and its plain properties by their names, and beside them
+
+    * ``haul``: h = r/n, rope hauled by a turn of the motor [m]; ``load``: h (1/eta + eta)/2 [m];
+    * ``phi``, ``beta``, ``lag``: torque per command, torque per speed, and the lag of the motor
+      with its drive [s];
+    * ``damping_time``: Kelvin-Voigt time of the rope, 2 zeta over the first exact mode [s];
+    * ``fixed_drag``: linear drag coefficient [N s/m]; NaN where it agrees with the response;
+    * the sensors' numbers; NaN where there is no such sensor.
     """
-
-    count: int
-    values: Mapping[str, FloatArray]
-    like: PlantData
-    fixed_drag: FloatArray
-    sensors: Mapping[str, FloatArray]
-
-    def __len__(self) -> int:
-        return self.count
-
-    def __getitem__(self, name: str) -> FloatArray:
-        return self.values[name]
-
-    def part(self, index: IndexArray) -> PlantNumbers:
-        """Return some of the plants."""
-        return replace(
-            self,
-            count=len(index),
-            values={name: part_of(column, index) for name, column in self.values.items()},
-            fixed_drag=part_of(self.fixed_drag, index),
-            sensors={name: part_of(column, index) for name, column in self.sensors.items()},
+    data, drag = PlantData.from_case(case), case.payload.fixed_drag
+    found = {name: getattr(data, name) for name in _PLAIN}
+    found |= {name: getattr(data, name) for name in ("stiffness", "rope_mass", "static_tension")}
+    haul = data.drum_radius / data.gear_ratio
+    phi: Any
+    found |= {"haul": haul, "load": data.mean_gear_factor * haul}
+    if data.motor == "dc":
+        phi = data.torque_constant / data.resistance
+        beta, lag = phi * data.back_emf_constant, data.inductance / data.resistance
+    else:
+        # Without a speed regulator the command is the torque itself.
+        phi, beta = (
+            np.where(np.asarray(data.speed_gain) > 0.0, data.speed_gain, 1.0),
+            data.speed_gain,
         )
+        lag = 1.0 / data.torque_bandwidth
+    found |= {"phi": phi, "beta": beta, "lag": lag}
+    found |= {"damping_time": _damping_time(data), "fixed_drag": math.nan if drag is None else drag}
+    for name, path in _SENSED.items():
+        value: Any = case
+        for key in path.split("."):
+            value = getattr(value, key, None)
+        found[name] = math.nan if value is None else value
+    found["mru_error"] = np.maximum(found["mru_floor"], found["mru_fraction"])
+    return {name: np.atleast_1d(np.asarray(v, dtype=np.float64)) for name, v in found.items()}
 
-    @property
-    def stiffness(self) -> FloatArray:
-        """K = EA/L [N/m]."""
-        return self["axial_stiffness"] / self["rope_length"]
 
-    @property
-    def rope_mass(self) -> FloatArray:
-        """Mass of the rope paid out [kg]."""
-        return self["mass_per_length"] * self["rope_length"]
+def _damping_time(data: PlantData) -> Any:
+    """Return `PlantData.damping_time` of data that may hold columns."""
+    zeta = data.damping_ratio
+    if not np.any(zeta):
+        return 0.0
+    wave = np.sqrt(data.axial_stiffness / np.maximum(data.mass_per_length, 1e-300))
+    nu = _first_root(np.asarray(data.rope_mass / data.payload_mass))
+    return 2.0 * zeta * data.rope_length / (nu * wave)
 
-    @property
-    def static_tension(self) -> FloatArray:
-        """Rope tension at the drum at rest [N]."""
-        return self["payload_weight"] + self["rope_weight"] * self["rope_length"]
 
-    @property
-    def at_rest(self) -> dict[str, FloatArray]:
-        """What hauling the load at rest takes, by output, (n,) or (1,)."""
-        tension = self.static_tension
-        torque = tension * self["drum_radius"] / (self["gear_ratio"] * self["gear_efficiency"])
-        current = torque / self["torque_constant"]
-        return {
-            "rope.tension": tension,
-            "motor.torque": torque,
-            "motor.current": current,
-            "motor.voltage": current * self["resistance"],
-        }
-
-    @property
-    def gear_factor(self) -> FloatArray:
-        """(1/eta + eta)/2, see `PlantData.mean_gear_factor` [-]."""
-        eta = self["gear_efficiency"]
-        return 0.5 * (1.0 / eta + eta)
-
-    @property
-    def drive(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Torque per command, torque per speed, and the lag of the motor with its drive [s]."""
-        if self.like.motor == "dc":
-            phi = self["torque_constant"] / self["resistance"]
-            return phi, phi * self["back_emf_constant"], self["inductance"] / self["resistance"]
-        lag = 1.0 / self["torque_bandwidth"]
-        if self.like.speed_gain > 0.0:
-            return self["speed_gain"], self["speed_gain"], lag
-        return np.ones(1), np.zeros(1), lag
-
-    @property
-    def damping_time(self) -> FloatArray:
-        """Kelvin-Voigt time of the rope, 2 zeta over the first exact mode [s]."""
-        zeta = self["damping_ratio"]
-        if not np.any(zeta):
-            return np.zeros(1)
-        wave = np.sqrt(self["axial_stiffness"] / np.maximum(self["mass_per_length"], 1e-300))
-        nu = _first_root(self.rope_mass / self["payload_mass"])
-        return 2.0 * zeta * self["rope_length"] / (nu * wave)
+def at_rest(numbers: Numbers) -> dict[str, FloatArray]:
+    """Return what hauling the load at rest takes, by output, (n,) or (1,)."""
+    tension = numbers["static_tension"]
+    torque = tension * numbers["haul"] / numbers["gear_efficiency"]
+    current = torque / numbers["torque_constant"]
+    return {
+        "rope.tension": tension,
+        "motor.torque": torque,
+        "motor.current": current,
+        "motor.voltage": current * numbers["resistance"],
+    }
 
 
 def numbers_of(
     case: Case, spread: Spread, rows: FloatArray, *, columns: bool | None = None
-) -> tuple[PlantNumbers, bool]:
+) -> tuple[Numbers, bool]:
     """Return the plants of a spread's rows, (n, d), and whether columns sufficed.
 
     `columns` tells whether they do; if left out all rows are compared with their checked cases.
@@ -166,18 +135,22 @@ def numbers_of(
     InputError
         If a row is no valid case; its values are named.
     """
-    drag = rows[:, spread.paths.index(DRAG)] if DRAG in spread.paths else None
-    like = PlantData.from_case(case)
-    if columns is None:
+    found: Numbers = {}
+    if columns is not False:
         try:
-            columns = _agree(_columns(like, spread, rows), spread, rows)
+            found = columns_of(_with_columns(case, spread, rows))
+            if columns is None:
+                columns = _agree(found, spread, rows)
         except (TypeError, ValueError):
             columns = False
-    made = _columns(like, spread, rows) if columns else _one_by_one(like, spread, rows)
-    return made if drag is None else replace(made, fixed_drag=drag), columns
+    if not columns:
+        found = _one_by_one(case, spread, rows)
+    if DRAG in spread.paths:
+        found = {**found, "fixed_drag": rows[:, spread.paths.index(DRAG)]}
+    return found, columns
 
 
-def _agree(quick: PlantNumbers, spread: Spread, rows: FloatArray) -> bool:
+def _agree(quick: Numbers, spread: Spread, rows: FloatArray) -> bool:
     """Return whether plants by column arithmetic are those of their checked cases."""
     for k, row in enumerate(rows):
         exact = PlantData.from_case(_case_at(spread, row))
@@ -197,52 +170,18 @@ def _case_at(spread: Spread, row: FloatArray) -> Case:
         raise InputError(f"sweep: no case at {named}: {error}") from None
 
 
-def _one_by_one(like: PlantData, spread: Spread, rows: FloatArray) -> PlantNumbers:
+def _one_by_one(like: Case, spread: Spread, rows: FloatArray) -> Numbers:
     """Return the plants of rows, each through its own checked case."""
-    data, fixed = [], []
-    for row in rows:
-        own = _case_at(spread, row)
-        data.append(PlantData.from_case(own))
-        drag = own.payload.fixed_drag
-        fixed.append(math.nan if drag is None else drag)
-    values = {name: np.array([getattr(d, name) for d in data]) for name in _PLAIN}
-    kinds = {(d.motor, d.lumping, d.masses) for d in data}
-    if kinds != {(like.motor, like.lumping, like.masses)}:
+    cases = [_case_at(spread, row) for row in rows]
+    kinds = {(c.winch.motor.type, c.rope.lumping, c.rope.masses) for c in [like, *cases]}
+    if len(kinds) > 1:
         raise InputError("sweep: the motor's kind and the rope's lumping cannot vary within one")
-    return PlantNumbers(
-        count=len(rows),
-        values=values,
-        like=like,
-        fixed_drag=np.array(fixed),
-        sensors=_sensors(spread, rows),
-    )
+    parts = [columns_of(own) for own in cases]
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _sensors(spread: Spread, rows: FloatArray) -> dict[str, FloatArray]:
-    """Return the sensors' numbers, NaN where the case has no such sensor."""
-
-    def of(path: str) -> FloatArray:
-        if path in spread.paths:
-            return rows[:, spread.paths.index(path)]
-        found: Any = spread.case
-        for key in path.split("."):
-            found = getattr(found, key, None)
-        return np.array([math.nan if found is None else float(found)])
-
-    found = {name: of(path) for name, path in _SENSED.items()}
-    return {**found, "mru_error": np.maximum(found["mru_floor"], found["mru_fraction"])}
-
-
-def _columns(like: PlantData, spread: Spread, rows: FloatArray) -> PlantNumbers:
-    """Return the plants of rows by column arithmetic.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If something on the way is no plain arithmetic.
-    """
-    case = spread.case
-    assert case is not None
+def _with_columns(case: Case, spread: Spread, rows: FloatArray) -> Any:
+    """Return the case with the columns of rows as its fields, and nothing checked."""
     pairs = zip(spread.paths, rows.T, strict=True)
     given = {path: column for path, column in pairs if not path.startswith(_ELSEWHERE)}
     if "rope.length" in given and case.winch.drum.radius is None:
@@ -250,14 +189,7 @@ def _columns(like: PlantData, spread: Spread, rows: FloatArray) -> PlantNumbers:
     changed: Any = case
     for path, column in with_payload(case, given).items():
         changed = _with(changed, path.split("."), column)
-    data, fixed = PlantData.from_case(changed), changed.payload.fixed_drag
-    return PlantNumbers(
-        count=len(rows),
-        values={name: np.atleast_1d(getattr(data, name)) for name in _PLAIN},
-        like=like,
-        fixed_drag=np.atleast_1d(math.nan if fixed is None else fixed),
-        sensors=_sensors(spread, rows),
-    )
+    return changed
 
 
 def _with(section: Any, keys: Sequence[str], value: Any) -> Any:
@@ -301,10 +233,13 @@ def _first_root(eps: FloatArray) -> FloatArray:
 
 
 def part_of(column: Column, rows: IndexArray) -> Column:
-    """Return a column's values of some rows; the one value where all rows have the same."""
-    return column[rows] if len(column) > 1 else column
+    """Return a column's values of some rows; the one value where all rows have the same.
+
+    A `Dual` number is of one loop, and stays what it is.
+    """
+    return column if isinstance(column, Dual) or len(column) == 1 else column[rows]
 
 
-def at_rows(column: FloatArray, rows: IndexArray) -> FloatArray:
+def at_rows(column: Any, rows: IndexArray) -> Any:
     """Return a column's values of some rows, (m, 1); (1, 1) where all rows have the same."""
     return part_of(column, rows)[:, None]

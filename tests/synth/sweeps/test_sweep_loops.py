@@ -70,7 +70,14 @@ def chains(masses: int, count: int, seed: int, delay: float) -> tuple[FrequencyE
     rows = engine.spread.sample(count, seed=seed)
     numbers, _ = numbers_of(case, engine.spread, rows)
     law = DesignLaw(design.question, design.parameters).columns(engine.spread, rows)
-    return engine, ChainLoops(numbers, law, numbers.fixed_drag, lumps=lump_rope(masses))
+    loops = ChainLoops(
+        count=count,
+        numbers=numbers,
+        law=law,
+        drag=numbers["fixed_drag"],
+        lumps=lump_rope(masses),
+    )
+    return engine, loops
 
 
 @pytest.mark.parametrize("degree", range(1, 10))
@@ -161,7 +168,13 @@ def test_spring_and_chain_agree_where_both_are_possible() -> None:
     found = engine.evaluate(rows)
     numbers, _ = numbers_of(engine.case, engine.spread, rows)
     law = engine.rows.law.columns(engine.spread, rows)
-    loops = ChainLoops(numbers, law, numbers.fixed_drag, lumps=lump_rope(1, "thesis"))
+    loops = ChainLoops(
+        count=len(rows),
+        numbers=numbers,
+        law=law,
+        drag=numbers["fixed_drag"],
+        lumps=lump_rope(1, "thesis"),
+    )
     stable = found["stable"].astype(bool)
     np.testing.assert_array_equal(count_unstable(loops) == 0, stable)
     chosen = np.flatnonzero(stable)
