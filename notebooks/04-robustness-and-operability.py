@@ -59,7 +59,7 @@ table(
 # ## 1. What matters most
 #
 # An elasticity is what one per cent more of a number does to a figure, in per cent. All of them
-# come from one gradient, by automatic differentiation and the adjoint of the spectral integral.
+# come from one evaluation of the closed loop, by automatic differentiation.
 
 # %%
 studies = {name: sh.sensitivity(d) for name, d in designs.items()}

@@ -1,6 +1,6 @@
 """Sensitivity of a design to the numbers of its case, locally and over whole ranges.
 
-A design comes in, with a spread where ranges are meant; elasticities by the adjoint method
+A design comes in, with a spread where ranges are meant; elasticities by dual numbers
 (`sensitivity`), Sobol's indices (`sobol_indices`) or Morris's effects (`morris_screening`) go out.
 """
 

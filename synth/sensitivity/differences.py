@@ -1,9 +1,8 @@
 """Derivatives of smooth functions by central differences with Richardson's extrapolation.
 
-Used for the algebra that stands before the plant: how the numbers of a case become those of the
-plant, the spectra and the law.  Those are short formulas without cancellation, for which two
-steps leave some ten digits; the plant's own equations are differentiated automatically, and the
-integral over the spectrum by its adjoint (`gradient`).
+Used for the algebra that stands before the loop: how the numbers of a case become those of the
+loop and the spectrum.  Those are short formulas without cancellation, for which two steps leave
+some ten digits; the loop itself is differentiated automatically (`slopes`).
 """
 
 from __future__ import annotations

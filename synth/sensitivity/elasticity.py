@@ -1,6 +1,6 @@
 r"""Elasticities of a design: by how many per cent its figures move for one per cent of a number.
 
-    design -> closed loop at its own drag -> gradients -> slopes along every number -> Sensitivity
+    design -> closed loop at its own drag -> slopes along every number -> Sensitivity
 
 The gains are fixed, the world moves: rope, payload, winch, sensors and sea, and the gains
 themselves.  Where the payload's drag is linearised with the response, C = q sqrt(8/pi) sigma_v, it
@@ -19,28 +19,22 @@ moves with every number too.  With theta the number and all slopes logarithmic,
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from models.basics import FloatArray, InputError
-from models.plant import PlantData
+from models.basics import InputError
 
 from ..design import Design
-from ..loop import Assessment, Disturbance
 from ..question import PAYLOAD
 from ..search import Progress
-from .differences import StepError, derivative
-from .fields import Number, numbers_of
+from .differences import StepError
+from .fields import numbers_of
 from .fixed_design import FixedDesign
-from .gradient import Gradient, sensitivity_gradient, variance_gradient
 from .results import Elasticity, Sensitivity
-from .slopes import PlantSlopes, changed
+from .slopes import LoopSlopes
 
 _OUTPUTS = {"payload_rms": PAYLOAD, "torque_rms": "motor.torque", "speed_rms": "motor.speed"}
-_PEAK = "peak of |S| "
-_SHAKING = ("sea.", "vessel.", "sensors.")  # sections that the disturbances' spectra depend on
 _TIE = 0.999  # peaks of this share of the largest count as tied
 _SECOND = 0.01  # share of a number for its second derivative
 
@@ -93,129 +87,50 @@ def _first(
     assessment = fixed.assessment()
     if assessment is None:
         raise InputError("sensitivity: the loop must be stable; an unstable one has no rms")
-    gradients = _gradients(assessment, fixed)
-    figures = {name: gradients[name].value for name in _OUTPUTS}
-    figures["max_sensitivity"] = assessment.max_sensitivity
-    design, drag_now = fixed.design, assessment.coefficient or fixed.fixed_drag
-    slopes = PlantSlopes(
-        fixed.case, masses=design.masses, drag=drag_now, measurements=design.measurements
-    )
-    drag = _DragMotion(fixed, assessment, gradients, slopes) if fixed.stochastic else None
-    numbers = [n for n in numbers_of(fixed.case) if only is None or n.path == only]
-    found: list[Elasticity] = []
-    idle: list[str] = []
+    drag = assessment.coefficient or fixed.fixed_drag
+    outputs = {**_OUTPUTS, "velocity": "payload.velocity"}
+    slopes = LoopSlopes(fixed, drag, assessment.quadrature(list(outputs.values())))
+    known: list[tuple[str, float, str]] = []  # paths, values, units
     steps: list[str] = []
+    numbers = [n for n in numbers_of(fixed.case) if only is None or n.path == only]
     for k, number in enumerate(numbers):
         if progress is not None:
             progress("numbers of the case", k, len(numbers))
         try:
-            matrices = slopes.of(number)
-            densities = _density_slopes(fixed, number, gradients["payload_rms"].omega)
+            slopes.add_number(number)
         except StepError:
             steps.append(number.path)
-            continue
-        own = {
-            name: gradient.along(matrices) + gradient.along_densities(densities)
-            for name, gradient in gradients.items()
-        }
-        moved = drag.along(number, own["velocity"]) if drag is not None else 0.0
-        if matrices.is_zero and not densities and moved == 0.0:
-            idle.append(number.path)
-            continue
-        whole = _shares(number.value, own, moved, drag)
-        found.append(Elasticity(path=number.path, value=number.value, unit=number.unit, **whole))
-    for name, value, slope in fixed.law_slopes(gradients["payload_rms"].s):
-        path = f"gains.{name}"
-        if only is not None and path != only:
-            continue
-        own = {
-            key: gradient.along_law(
-                fixed.law_slope(name, gradient.s) if key.startswith(_PEAK) else slope
-            )
-            for key, gradient in gradients.items()
-        }
-        moved = drag.shift(own["velocity"]) if drag is not None else 0.0
-        whole = _shares(value, own, moved, drag)
-        found.append(Elasticity(path=path, value=value, unit=design.units.get(name, ""), **whole))
+        else:
+            known.append((number.path, number.value, number.unit))
+    for k, (name, value) in enumerate(zip(fixed.names, fixed.values, strict=True)):
+        if value != 0.0 and only in (None, f"gains.{name}"):
+            slopes.add_gain(k)
+            known.append((f"gains.{name}", value, fixed.design.units.get(name, "")))
+    if not known:
+        return {}, [], [], steps
+    peaks = assessment.sensitivity_peaks(_TIE * assessment.max_sensitivity)
+    sigmas, heights = slopes.figures(list(outputs.values()), peaks)
+    figures = {name: float(np.exp(sigmas[output].value[0])) for name, output in _OUTPUTS.items()}
+    figures["max_sensitivity"] = assessment.max_sensitivity
+    # By every variable, and last by the drag; then with the drag that moves along.
+    own = {name: sigmas[output].slope[:, 0] for name, output in outputs.items()}
+    moved = np.zeros(len(known))
+    if fixed.stochastic:
+        velocity, of_drag = own["velocity"][:-1], own["velocity"][-1]
+        moved = drag * (velocity + slopes.quadratic_drag()) / (1.0 - drag * of_drag)
+    scale = np.array([value for _, value, _ in known])
+    whole = {name: scale * (own[name][:-1] + own[name][-1] * moved) for name in _OUTPUTS}
+    of_peaks = scale * (heights.slope[:-1, 0].T + heights.slope[-1, 0][:, None] * moved)
+    most = np.abs(of_peaks).argmax(axis=0)
+    whole["max_sensitivity"] = of_peaks[most, np.arange(len(known))]
+    found, idle = [], []
+    for k, (path, value, unit) in enumerate(known):
+        entry = {name: float(column[k]) for name, column in whole.items()}
+        if any(entry.values()):
+            found.append(Elasticity(path=path, value=value, unit=unit, **entry))
+        else:
+            idle.append(path)
     return figures, found, idle, steps
-
-
-def _shares(
-    value: float, own: Mapping[str, float], moved: float, drag: _DragMotion | None
-) -> dict[str, float]:
-    """Return the elasticities of all figures from their slopes at fixed drag and dC."""
-    whole = {
-        name: value * (slope + (moved * drag.of[name] if drag is not None else 0.0))
-        for name, slope in own.items()
-    }
-    peaks = [slope for name, slope in whole.items() if name.startswith(_PEAK)]
-    return {name: whole[name] for name in _OUTPUTS} | {"max_sensitivity": max(peaks, key=abs)}
-
-
-class _DragMotion:
-    """How the drag coefficient that agrees with the response moves."""
-
-    def __init__(
-        self,
-        fixed: FixedDesign,
-        assessment: Assessment,
-        gradients: Mapping[str, Gradient],
-        slopes: PlantSlopes,
-    ) -> None:
-        self._case, self.C = fixed.case, assessment.coefficient
-        self.of = {name: g.along(slopes.of_drag()) for name, g in gradients.items()}
-
-    def shift(self, velocity: float, quadratic: float = 0.0) -> float:
-        """Return dC for slopes of ln sigma_v and of ln q at fixed C."""
-        return self.C * (velocity + quadratic) / (1.0 - self.C * self.of["velocity"])
-
-    def along(self, number: Number, velocity: float) -> float:
-        """Return dC / d number."""
-
-        def quadratic(value: float) -> FloatArray:
-            q = PlantData.from_case(changed(self._case, number, value)).quadratic_drag
-            return np.array([np.log(q)])
-
-        own = 0.0
-        if number.path.startswith("payload."):
-            own = float(np.real(derivative(quadratic, number.value)[0]))
-        return self.shift(velocity, own)
-
-
-def _gradients(assessment: Assessment, fixed: FixedDesign) -> dict[str, Gradient]:
-    outputs = {**_OUTPUTS, "velocity": "payload.velocity"}
-    nodes = assessment.quadrature(list(outputs.values()))
-    arguments = assessment.plant, assessment.controller, fixed.disturbances
-    found = {
-        name: variance_gradient(*arguments, output, nodes.omega, nodes.weights)
-        for name, output in outputs.items()
-    }
-    for k, peak in enumerate(assessment.sensitivity_peaks(_TIE * assessment.max_sensitivity)):
-        found[f"{_PEAK}{k}"] = sensitivity_gradient(
-            assessment.plant, assessment.controller, float(peak)
-        )
-    return found
-
-
-def _density_slopes(fixed: FixedDesign, number: Number, omega: FloatArray) -> dict[str, FloatArray]:
-    """Return d S / d number at the nodes by disturbance, where the number shakes anything."""
-    if not number.path.startswith(_SHAKING):
-        return {}
-
-    def densities(value: float) -> FloatArray:
-        sources = fixed.disturbances_of(changed(fixed.case, number, value))
-        return np.array([_density(sources, d.name, omega) for d in fixed.disturbances])
-
-    slopes = np.asarray(derivative(densities, number.value, common=True), dtype=np.float64)
-    pairs = zip(fixed.disturbances, slopes, strict=True)
-    return {d.name: slope for d, slope in pairs if slope.any()}
-
-
-def _density(sources: Sequence[Disturbance], name: str, omega: FloatArray) -> FloatArray:
-    for source in sources:
-        if source.name == name:
-            return source.density(omega)
-    return np.zeros_like(omega)
 
 
 def _with_curvature(fixed: FixedDesign, entry: Elasticity) -> Elasticity:

@@ -8,13 +8,10 @@ differs from the one designed for.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-
-from models.basics import ComplexArray, InputError, SolverError
+from models.basics import InputError, SolverError
 from models.case import Case
 from models.hook import HookMotion
 from models.plant import PlantData
@@ -24,7 +21,6 @@ from ..design import Design
 from ..loop import Assessment, Disturbance, DragElement, disturbances
 from ..question import heard_spectra
 from ..structures import ParametrisedController
-from .differences import derivative
 from .fields import numbers_of
 
 
@@ -134,20 +130,3 @@ class FixedDesign:
         except InputError:
             return None
         return replace(self, case=case, drag=None)
-
-    def law_slopes(self, s: ComplexArray) -> Iterator[tuple[str, float, ComplexArray]]:
-        """Yield name, value and the slope of C(s) of every parameter that is not zero."""
-        for name, value in zip(self.names, self.values, strict=True):
-            if value != 0.0:
-                yield name, value, self.law_slope(name, s)
-
-    def law_slope(self, name: str, s: ComplexArray) -> ComplexArray:
-        """Return the slope of C(s) in a parameter, (k, nu, ny)."""
-        at = self.names.index(name)
-
-        def response(value: float) -> ComplexArray:
-            values = list(self.values)
-            values[at] = value
-            return self.law.controller(values).response_at(s)
-
-        return np.asarray(derivative(response, self.values[at], common=True), np.complex128)

@@ -1,128 +1,126 @@
-r"""How the linear plant's matrices move with a number of the case.
+r"""How the figures of a fixed design move with all that its loop is made of: `LoopSlopes`.
 
 ::
 
-    number -> PlantData -> p            short formulas: differences of fourth order
-                           p -> A, B .. automatic differentiation of the nonlinear plant
-    number -> sensors ->  filters       short formulas again
+    number of the case -> the loop's numbers, density of the sea    differences of fourth order
+    these, gains, drag -> figures                                   dual numbers, exact
 
-The payload's drag coefficient is a parameter p of the plant too.  Where it is linearised with the
-response it moves with every other number; that is `elasticity`'s matter, here its own slope is
-returned beside the others.
+What stands before the loop are short formulas; the loop itself, its rope's recursion and the
+integral over the spectrum are differentiated automatically (`synth.sweeps.dual_figures`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from models.basics import FloatArray
+from models.basics import FloatArray, Quadrature
 from models.case import Case
-from models.plant import MEAN_LOSSES, LinearPlant, Plant, PlantData, build_plant, parameter_values
-from models.sensing import with_sensors
+from models.hook import HookMotion
+from models.plant import lump_rope
 
+from ..loop import Dual
+from ..sweeps import columns_of, dual_figures
 from .differences import derivative
 from .fields import Number
+from .fixed_design import FixedDesign
 
-BLOCKS = ("A", "B", "E", "C", "D", "F", "Cz", "Dz", "Fz")
-"""The matrices of a linear plant, in the order of `Plant.jacobians`."""
-
-_DRAG = "payload.linear_drag"
+_SHAKING = ("sea.", "vessel.")  # sections that the hook's motion depends on
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class MatrixSlope:
-    """Derivatives of a linear plant with respect to one number.
-
-    Attributes
-    ----------
-    blocks
-        Derivative of each of `BLOCKS`, in its shape.
-    delays
-        Derivatives of the delays, (ny,) [s per unit].
-    """
-
-    blocks: dict[str, FloatArray]
-    delays: FloatArray
-
-    @property
-    def is_zero(self) -> bool:
-        """Whether nothing moves."""
-        return not (self.delays.any() or any(block.any() for block in self.blocks.values()))
-
-
-class PlantSlopes:
-    """Slopes of the plant of a case with its sensors.
+class LoopSlopes:
+    """Slopes of a loop's figures in variables that are added one by one, and in its drag.
 
     Parameters
     ----------
-    case
-        The case.
-    masses
-        Rope masses.
+    fixed
+        The design on its case.
     drag
-        Linear drag coefficient of the payload at which the slopes are taken [N s/m].
-    measurements
-        What the controller hears.
+        The linear drag coefficient in its loop [N s/m].
+    nodes
+        Nodes of all integrals.
     """
 
-    def __init__(
-        self, case: Case, *, masses: int, drag: float, measurements: Sequence[str]
-    ) -> None:
-        self.case = case
-        self._measurements = measurements
-        self._model = build_plant(case, masses)
-        self._drag = drag
-        self._bare = self._model.linearise(drag=drag)
-        self._by_parameter = _jacobian(self._model, drag)
-        self._nominal = _parameters(case, self._model)
+    def __init__(self, fixed: FixedDesign, drag: float, nodes: Quadrature) -> None:
+        self._fixed, self._drag, self._nodes = fixed, drag, nodes
+        self._numbers = columns_of(fixed.case)
+        self._there = [name for name, value in self._numbers.items() if np.isfinite(value[0])]
+        # One row for every variable.
+        self._of_numbers: list[FloatArray] = []
+        self._of_density: list[FloatArray] = []
+        self._of_gains: list[FloatArray] = []
 
-    @property
-    def plant(self) -> LinearPlant:
-        """The plant itself."""
-        return self._heard(self._bare, self.case)
+    def add_number(self, number: Number) -> None:
+        """Add a number of the case.
 
-    def of_drag(self) -> MatrixSlope:
-        """Return the slopes in the drag coefficient [per N s/m]."""
-        unit = np.zeros(len(self._nominal))
-        unit[list(self._model.parameters).index(_DRAG)] = 1.0
-        return self._slope(self.case, unit, np.zeros(len(self.plant.delays)))
+        Raises
+        ------
+        StepError
+            If something steps at its value.
+        """
+        case = self._fixed.case
 
-    def of(self, number: Number) -> MatrixSlope:
-        """Return the slopes in a number of the case [per its unit]."""
+        def numbers(value: float) -> FloatArray:
+            columns = columns_of(changed(case, number, value))
+            return np.concatenate([columns[name] for name in self._there])
 
-        def parameters(value: float) -> FloatArray:
-            other = changed(self.case, number, value)
-            return np.append(_parameters(other, self._model), _delays(other, self.plant))
+        def density(value: float) -> FloatArray:
+            return self._density(changed(case, number, value))
 
-        count = len(self._nominal)
-        both = np.asarray(derivative(parameters, number.value), dtype=np.float64)
-        slope = self._slope(self.case, both[:count], both[count:])
-        if not number.path.startswith("sensors."):
-            return slope
+        own = np.asarray(derivative(numbers, number.value), dtype=np.float64)
+        shaken = np.zeros(self._nodes.omega.size)
+        if number.path.startswith(_SHAKING):
+            shaken = np.asarray(derivative(density, number.value, common=True), dtype=np.float64)
+        self._add(own, shaken, np.zeros(len(self._fixed.values)))
 
-        def filters(value: float) -> FloatArray:
-            heard = self._heard(self._bare, changed(self.case, number, value))
-            return np.concatenate([getattr(heard, name).ravel() for name in BLOCKS])
+    def add_gain(self, index: int) -> None:
+        """Add a parameter of the controller."""
+        unit = np.zeros(len(self._fixed.values))
+        unit[index] = 1.0
+        self._add(np.zeros(len(self._there)), np.zeros(self._nodes.omega.size), unit)
 
-        own = np.asarray(derivative(filters, number.value, common=True), dtype=np.float64)
-        return MatrixSlope(blocks=_add(slope.blocks, own), delays=slope.delays)
+    def figures(self, outputs: Sequence[str], peaks: FloatArray) -> tuple[Mapping[str, Dual], Dual]:
+        """Return ln sigma of outputs, (1,), and ln |S| at frequencies [rad/s], (1, p).
 
-    def _slope(self, case: Case, direction: FloatArray, delays: FloatArray) -> MatrixSlope:
-        """Return the slopes for a direction of the plant's parameters; the sensors are affine."""
-        moved = {
-            name: getattr(self._bare, name) + jacobian @ direction
-            for name, jacobian in self._by_parameter.items()
+        Their slopes are by the variables added, in that order, and by the drag coefficient where
+        nothing else moves.
+        """
+        fixed = self._fixed
+        by_name = dict(zip(self._there, np.array(self._of_numbers).T, strict=True))
+        numbers = {
+            name: _dual(value, by_name[name]) if name in by_name else value
+            for name, value in self._numbers.items()
         }
-        here, there = self.plant, self._heard(replace(self._bare, **moved), case)
-        blocks = {name: getattr(there, name) - getattr(here, name) for name in BLOCKS}
-        return MatrixSlope(blocks=blocks, delays=delays)
+        drag_slope = by_name.get("fixed_drag", np.zeros(len(self._of_numbers)))
+        gains = np.array(self._of_gains).T
+        density = np.array([*self._of_density, np.zeros(self._nodes.omega.size)])
+        return dual_figures(
+            numbers,
+            fixed.law,
+            fixed.design.measurements,
+            [_dual(np.array([v]), own) for v, own in zip(fixed.values, gains, strict=True)],
+            Dual(np.array([self._drag]), np.append(drag_slope, 1.0)[:, None]),
+            lumps=lump_rope(fixed.design.masses, fixed.case.rope.lumping),
+            nodes=self._nodes,
+            density=Dual(self._density(fixed.case)[None], density[:, None]),
+            outputs=outputs,
+            peaks=peaks,
+        )
 
-    def _heard(self, bare: LinearPlant, case: Case) -> LinearPlant:
-        return with_sensors(bare, case.sensors).select(measurements=self._measurements)
+    def quadratic_drag(self) -> FloatArray:
+        """Return the slopes of ln q, q of the drag force q |v| v, by the variables added, (n,)."""
+        at = self._there.index("quadratic_drag")
+        return np.array([own[at] for own in self._of_numbers]) / self._numbers["quadratic_drag"]
+
+    def _add(self, numbers: FloatArray, density: FloatArray, gains: FloatArray) -> None:
+        self._of_numbers.append(numbers)
+        self._of_density.append(density)
+        self._of_gains.append(gains)
+
+    def _density(self, case: Case) -> FloatArray:
+        return np.asarray(HookMotion.from_case(case, warn=False).density(self._nodes.omega))
 
 
 def changed(case: Case, number: Number, value: float) -> Case:
@@ -130,46 +128,6 @@ def changed(case: Case, number: Number, value: float) -> Case:
     return case.variant(number.change(value))
 
 
-def _parameters(case: Case, model: Plant) -> FloatArray:
-    """Return the plant's p of a case on the given lumping, a given drag coefficient included."""
-    data = replace(PlantData.from_case(case), masses=model.masses)
-    values = parameter_values(data)
-    values[_DRAG] = case.payload.fixed_drag or 0.0
-    return np.array([values[name] for name in model.parameters])
-
-
-def _delays(case: Case, plant: LinearPlant) -> FloatArray:
-    unit = case.sensors.mru
-    late = {"mru.heave", "mru.heave_rate"}
-    return np.array(
-        [
-            (unit.delay if unit else 0.0)
-            if name in late
-            else case.sensors.telemetry.delay
-            if name.startswith("payload.")
-            else 0.0
-            for name in plant.measurements
-        ]
-    )
-
-
-def _jacobian(model: Plant, drag: float) -> dict[str, FloatArray]:
-    """Return d block / d p for every block at rest, (rows, columns, np), by CasADi."""
-    rest = model.operating_point({_DRAG: drag, **MEAN_LOSSES})
-    p = ca.SX.sym("p", rest.p.size)
-    blocks = model.jacobians(rest.x, rest.u, np.zeros(len(model.disturbances)), p)
-    found = {}
-    for name, block in zip(BLOCKS, blocks, strict=True):
-        slope = ca.Function("slope", [p], [ca.jacobian(ca.vec(ca.SX(block)), p)])
-        values = np.asarray(slope(rest.p).full(), dtype=np.float64)
-        # CasADi counts down the columns.
-        found[name] = values.reshape((*reversed(block.shape), rest.p.size)).transpose(1, 0, 2)
-    return found
-
-
-def _add(blocks: dict[str, FloatArray], flat: FloatArray) -> dict[str, FloatArray]:
-    result, start = {}, 0
-    for name, block in blocks.items():
-        result[name] = block + flat[start : start + block.size].reshape(block.shape)
-        start += block.size
-    return result
+def _dual(value: FloatArray, slopes: FloatArray) -> Any:
+    """Return a number, (1,), with its slopes by the variables and by the drag, if it has any."""
+    return Dual(value, np.append(slopes, 0.0)[:, None]) if slopes.any() else value

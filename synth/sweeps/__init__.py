@@ -11,7 +11,9 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .dataset import ATTRIBUTE, case_of, coordinates_of, law_of, spread_of
     from .design_rows import DesignRows, SolvedRows
+    from .dual_loop import dual_figures
     from .frequency import FrequencyEngine, frequency_sweep
     from .metrics import METRICS
+    from .numbers import columns_of
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -233,7 +233,7 @@ class DesignRows:
         """What the controller hears with errors or noise, if they count."""
         numbers = self._loops(self._pilots).numbers
         heard = [name for name in self.law.measurements if name in NOISE_OF]
-        return {y for y in heard if np.any(numbers[NOISE_OF[y]] > 0.0)}
+        return {y for y in heard if any(np.any(numbers[name] > 0.0) for name in NOISE_OF[y])}
 
     @cached_property
     def _panels(self) -> list[Panel]:

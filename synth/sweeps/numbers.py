@@ -47,13 +47,13 @@ _SENSED = {
     "cell_noise": "sensors.load_cell.noise_fraction",
 }
 NOISE_OF = {
-    "payload.acceleration": "acceleration_noise",
-    "payload.velocity": "velocity_noise",
-    "payload.displacement": "displacement_noise",
-    "mru.heave": "mru_error",
-    "rope.tension": "cell_noise",
+    "payload.acceleration": ("acceleration_noise",),
+    "payload.velocity": ("velocity_noise",),
+    "payload.displacement": ("displacement_noise",),
+    "mru.heave": ("mru_floor", "mru_fraction"),
+    "rope.tension": ("cell_noise",),
 }
-"""Number of the sensors by what is measured; zero or NaN where it is without noise."""
+"""Numbers of the sensors by what is measured; zero or NaN where it is without noise."""
 _PLAIN = tuple(
     f.name
     for f in fields(PlantData)
@@ -77,18 +77,15 @@ def columns_of(case: Case) -> dict[str, FloatArray]:
     found = {name: getattr(data, name) for name in _PLAIN}
     found |= {name: getattr(data, name) for name in ("stiffness", "rope_mass", "static_tension")}
     haul = data.drum_radius / data.gear_ratio
-    phi: Any
     found |= {"haul": haul, "load": data.mean_gear_factor * haul}
+    phi: Any
     if data.motor == "dc":
         phi = data.torque_constant / data.resistance
         beta, lag = phi * data.back_emf_constant, data.inductance / data.resistance
     else:
+        beta, lag = data.speed_gain, 1.0 / data.torque_bandwidth
         # Without a speed regulator the command is the torque itself.
-        phi, beta = (
-            np.where(np.asarray(data.speed_gain) > 0.0, data.speed_gain, 1.0),
-            data.speed_gain,
-        )
-        lag = 1.0 / data.torque_bandwidth
+        phi = np.where(np.asarray(beta) > 0.0, beta, 1.0)
     found |= {"phi": phi, "beta": beta, "lag": lag}
     found |= {"damping_time": _damping_time(data), "fixed_drag": math.nan if drag is None else drag}
     for name, path in _SENSED.items():
@@ -96,7 +93,6 @@ def columns_of(case: Case) -> dict[str, FloatArray]:
         for key in path.split("."):
             value = getattr(value, key, None)
         found[name] = math.nan if value is None else value
-    found["mru_error"] = np.maximum(found["mru_floor"], found["mru_fraction"])
     return {name: np.atleast_1d(np.asarray(v, dtype=np.float64)) for name, v in found.items()}
 
 

@@ -10,26 +10,12 @@ from hypothesis import strategies as st
 
 import stillhook as sh
 from models.basics import InputError
-from models.sensing import sensed_plant
 from synth.sensitivity import sensitivity
 from synth.sensitivity.differences import derivative
 from synth.sensitivity.fields import numbers_of
 from synth.sensitivity.results import FIGURES
-from synth.sensitivity.slopes import BLOCKS, PlantSlopes, changed
 
 STEP = 1e-3
-# One of each kind: the finite differences above are of all.
-SOME = (
-    "rope.axial_stiffness",
-    "rope.length",
-    "rope.damping_ratio",
-    "payload.mass",
-    "winch.drum.geometry.core_diameter",
-    "winch.gearbox.ratio",
-    "winch.gearbox.efficiency",
-    "winch.motor.speed_gain",
-    "sensors.payload.bandwidth",
-)
 CRANE_GAINS = {"A": 1.0, "a": 0.25, "a1": 0.6, "a2": 0.02}
 
 
@@ -138,29 +124,6 @@ def test_second_order_foretells_ten_per_cent_better_than_first():
         true = found.moved(0.1, [entry.path])[0].payload_rms / found.payload_rms
         first = np.exp(entry.payload_rms * np.log(1.1))
         assert abs(entry.predicted(0.1) - true) < 0.2 * abs(first - true), entry.path
-
-
-@pytest.mark.ci
-def test_slopes_of_the_matrices_are_those_of_another_linearisation():
-    case = crane().case
-    heard = ("payload.acceleration", "payload.velocity", "payload.displacement")
-    slopes = PlantSlopes(case, masses=1, drag=2e4, measurements=heard)
-    stepping = sensitivity(crane()).stepping
-    for number in numbers_of(case):
-        if number.path not in SOME or number.path in stepping:
-            continue
-        found = slopes.of(number)
-        for name in BLOCKS:
-
-            def block(value, number=number, name=name):
-                plant = sensed_plant(changed(case, number, value), masses=1, drag=2e4)
-                return getattr(plant.select(measurements=heard), name)
-
-            wanted = derivative(block, number.value, common=True)
-            # What differences leave of a constant block: its last digit over the step.
-            rest = 1e-12 * np.abs(block(number.value)).max() / number.value
-            room = 1e-6 * np.abs(wanted).max() + rest
-            assert np.abs(found.blocks[name] - wanted).max() <= room, number.path
 
 
 def test_an_unstable_loop_is_refused():
