@@ -1,8 +1,8 @@
 """Robust design: one set of gains for a family of plants and seas, and how far it may be off.
 
 A case and what varies come in (`Family`); gains for all of it (`optimise_robust`), gains over the
-rope's length (`schedule_gains`), the structured singular value of a design (`robustness`) and the
-exact radius of errors of its gains (`gain_radius`) go out.
+rope's length (`schedule_gains`), the nearest unstable values of what is uncertain (`robustness`)
+and the exact radius of errors of the gains (`gain_radius`) go out.
 """
 
 from typing import TYPE_CHECKING
@@ -11,11 +11,11 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .family import DiscreteValues, Family, SeaState, sea_states
-    from .mu import Robustness, robustness
     from .perturbation import GainRadius, gain_radius
     from .robust import optimise_robust
     from .robust_result import RobustDesign, ScenarioResult
     from .schedule import GainSchedule, schedule_gains
     from .tolerance import gain_tolerance
+    from .worst_parameters import Robustness, robustness
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from models.spread import GAINS
+
 from ...text import Report, ReportSection
 from ..declare import CASE, DESIGN, options, within
 from ..given import case_words, given_case, split_pairs
@@ -19,7 +21,7 @@ ARGUMENTS = (
         """
         --off PATH=SHARE ...  what may be off and how far either way, as in payload.mass=0.3,
             drag=0.5 or 'delay=20 ms' (default: payload.mass=0.3, stiffness=0.2, drag=0.5)
-        --draws N [1000]  random plants to check with
+        --draws N [2000]  random plants to check with
         """,
         draws=within(low=0, high=1_000_000),
     ),
@@ -36,9 +38,9 @@ def run(arguments: argparse.Namespace) -> int:
     with working(arguments) as step:
         found = robustness(design, off, draws=arguments.draws, progress=step)
     vary = " ".join(
-        f"--vary {d.path}={max(d.at(-1.0), 0.0):.5g}..{d.at(1.0):.5g}"
-        for d in found.doubts
-        if "." in d.path
+        f"--vary {path}={low:.5g}..{high:.5g}"
+        for path, (low, high) in found.ranges.items()
+        if "." in path and not path.startswith(GAINS)
     )
     again = (
         [("gains for the whole range", f"stillhook robust {case_words(arguments)} {vary}")]
