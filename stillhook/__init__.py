@@ -56,7 +56,6 @@ if TYPE_CHECKING:
     from synth.robust import (
         Family,
         Robustness,
-        gain_tolerance,
         optimise_robust,
         robustness,
         schedule_gains,

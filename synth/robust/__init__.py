@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from .robust import optimise_robust
     from .robust_result import RobustDesign, ScenarioResult
     from .schedule import GainSchedule, schedule_gains
-    from .tolerance import gain_tolerance
     from .worst_parameters import Robustness, robustness
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -151,7 +151,7 @@ def robustness(
     design: Design,
     uncertainty: Mapping[str, float | str],
     *,
-    draws: int = 2000,
+    draws: int = 1000,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Robustness:

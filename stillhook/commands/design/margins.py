@@ -21,7 +21,7 @@ ARGUMENTS = (
         """
         --off PATH=SHARE ...  what may be off and how far either way, as in payload.mass=0.3,
             drag=0.5 or 'delay=20 ms' (default: payload.mass=0.3, stiffness=0.2, drag=0.5)
-        --draws N [2000]  random plants to check with
+        --draws N [1000]  random plants to check with
         """,
         draws=within(low=0, high=1_000_000),
     ),

@@ -13,7 +13,7 @@ from models.basics import InputError
 from synth import PayloadFeedback, StaticGain, Structure
 from synth.loop import LinearController, closed_loop_poles
 from synth.question import pose
-from synth.robust import gain_radius, gain_tolerance
+from synth.robust import gain_radius, robustness
 from synth.structures import Parameter, ParametrisedController
 
 GAINS = (50.0, 100.0, 100.0)
@@ -154,15 +154,15 @@ def test_a_filtered_loop_has_the_gain_margin_of_its_characteristic_polynomial():
     assert radius.box == pytest.approx(min(up - 1.0, 1.0), rel=1e-6)
 
 
+@pytest.mark.ci
 def test_gains_within_the_exact_radius_are_stable_and_just_beyond_not() -> None:
-    inside = gain_tolerance(thesis_design(), 0.05)
+    inside = robustness(thesis_design(), {"gains": 0.05})
     assert inside.ok
-    assert inside.beyond is True
-    assert inside.stable.count == inside.stable.total == 2000
-    at_edge = gain_tolerance(thesis_design(), 0.999 * inside.radius.box, samples=4000)
+    assert inside.confirmed
+    assert inside.found == pytest.approx(inside.gain_radius.box / 0.05, rel=1e-6)
+    at_edge = robustness(thesis_design(), {"gains": 0.999 * inside.gain_radius.box}, draws=4000)
     assert at_edge.ok
     assert at_edge.stable.count == 4000
-    outside = gain_tolerance(thesis_design(), 1.15 * inside.radius.box, samples=4000)
+    outside = robustness(thesis_design(), {"gains": 1.15 * inside.gain_radius.box})
     assert not outside.ok
-    assert outside.stable.count < 4000
-    assert "NOT stable" in str(outside)
+    assert "unstable within the ranges" in str(outside)
