@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from .metrics import (
         THREE_HOURS,
         SpectrumStatistics,
+        fractile_factor,
         most_probable_maximum,
         peak_factor,
         spectrum_statistics,

@@ -109,6 +109,41 @@ def peak_factor(t_z: float, duration: float = THREE_HOURS) -> float:
     return math.sqrt(max(2.0 * math.log(time / period), 1.0))
 
 
+def fractile_factor(t_z: float, probability: float, duration: float = THREE_HOURS) -> float:
+    r"""Return what the largest maximum stays below with a probability, in units of sigma.
+
+    With Rayleigh maxima the largest of N = T/T_z stays below x sigma with the probability
+    exp(-N exp(-x^2/2)), so
+
+    .. math:: x_p = \sqrt{2 \ln N - 2 \ln \ln (1/p)},
+
+    which is the most probable maximum at p = 1/e = 0.37 (DNV-RP-C205 3.3.4).
+
+    Parameters
+    ----------
+    t_z
+        Mean zero-crossing period [s], above zero; infinite for a signal at rest.
+    probability
+        p, between 0 and 1.
+    duration
+        Exposure time [s].
+
+    Raises
+    ------
+    InputError
+        If a figure is out of range.
+
+    Examples
+    --------
+    >>> round(fractile_factor(8.0, 0.9), 3), round(fractile_factor(8.0, math.exp(-1.0)), 3)
+    (4.349, 3.797)
+    """
+    p = check_range(
+        "extremes", "fractile", probability, low=0.0, high=1.0, open_low=True, open_high=True
+    )
+    return math.sqrt(max(peak_factor(t_z, duration) ** 2 - 2.0 * math.log(-math.log(p)), 0.0))
+
+
 def most_probable_maximum(sigma: float, t_z: float, duration: float = THREE_HOURS) -> float:
     """Return the most probable maximum of a Gaussian signal [the unit of `sigma`].
 
@@ -134,17 +169,15 @@ class SpectrumStatistics:
     Attributes
     ----------
     m0, m1, m2, m4
-        Spectral moments over `band` [u^2 (rad/s)^n].  The m4 of a wave spectrum with an omega^-5
-        tail grows with the logarithm of the band's upper end, so it means nothing without it.
-    band
-        The band of the integrals [rad/s].
+        Spectral moments over the spectrum's band [u^2 (rad/s)^n].  The m4 of a wave spectrum with
+        an omega^-5 tail grows with the logarithm of the band's upper end, so it means nothing
+        without it.
     """
 
     m0: float
     m1: float
     m2: float
     m4: float
-    band: tuple[float, float]
 
     @property
     def rms(self) -> float:
@@ -171,15 +204,26 @@ class SpectrumStatistics:
         """Mean period T_1 = 2 pi m0 / m1 [s]."""
         return math.inf if self.m1 == 0.0 else 2.0 * math.pi * self.m0 / self.m1
 
+    @property
+    def width(self) -> float:
+        """Spectral width, sqrt(m0 m2 / m1^2 - 1) [-]; 0 is a sine (Longuet-Higgins 1975)."""
+        if self.m1 <= 0.0:
+            return 0.0
+        return math.sqrt(max(self.m0 * self.m2 / self.m1**2 - 1.0, 0.0))
+
     def most_probable_maximum(self, duration: float = THREE_HOURS) -> float:
         """Most probable maximum in `duration` [s], in three hours unless told otherwise [u]."""
         return most_probable_maximum(self.rms, self.zero_crossing_period, duration)
 
+    def fractile(self, probability: float, duration: float = THREE_HOURS) -> float:
+        """Return what the largest maximum stays below with this probability [u]."""
+        return self.rms * fractile_factor(self.zero_crossing_period, probability, duration)
+
 
 def spectrum_statistics(
-    quadrature: Quadrature, density: Density | npt.ArrayLike, band: tuple[float, float]
+    quadrature: Quadrature, density: Density | npt.ArrayLike
 ) -> SpectrumStatistics:
-    """Return the statistics of a spectrum over a band that `quadrature` covers.
+    """Return the statistics of a spectrum over the band that `quadrature` covers.
 
     Examples
     --------
@@ -187,9 +231,9 @@ def spectrum_statistics(
 
     >>> from models.basics.quadrature import spectral_nodes
     >>> q = spectral_nodes(1e-9, 2.0)
-    >>> s = spectrum_statistics(q, lambda omega: 3.0 + 0.0 * omega, (0.0, 2.0))
+    >>> s = spectrum_statistics(q, lambda omega: 3.0 + 0.0 * omega)
     >>> round(s.m0, 6), round(s.m2, 6), round(s.rms, 6)
     (6.0, 8.0, 2.44949)
     """
     m0, m1, m2, m4 = (float(m) for m in moments(quadrature, density))
-    return SpectrumStatistics(m0=m0, m1=m1, m2=m2, m4=m4, band=band)
+    return SpectrumStatistics(m0=m0, m1=m1, m2=m2, m4=m4)

@@ -32,14 +32,18 @@ from ..basics import (
     SpectrumStatistics,
     adaptive_nodes,
     check_range,
-    spectrum_statistics,
+    read_only,
 )
 from ..case import Case
 from ..sea import SeaSpectrum
 from ..vessel import HeaveRao, OutsideShare, hook_rao, speed_remark
 from .encounter import Encounter, MetSpectrum
 
-_MOTIONS = ("displacement", "velocity", "acceleration")
+MOTIONS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}
+"""The motions with their units: each is the derivative of the one before."""
+
+ORDERS = np.arange(9.0)[:, np.newaxis]
+"""Orders of the displacement's moments that the statistics of all three motions are made of."""
 
 # A Fourier transform whose length has a larger prime factor takes up to twenty times as long.
 _LARGEST_FACTOR = 300
@@ -145,16 +149,6 @@ class HookMotion:
         """Return :meth:`density`."""
         return self.density(omega)
 
-    def velocity_density(self, omega: npt.ArrayLike) -> FloatArray:
-        """Return the velocity's variance density [(m/s)^2 s/rad] at `omega` [rad/s]."""
-        frequency = np.asarray(omega, dtype=np.float64)
-        return frequency**2 * self.density(frequency)
-
-    def acceleration_density(self, omega: npt.ArrayLike) -> FloatArray:
-        """Return the acceleration's variance density [(m/s2)^2 s/rad] at `omega` [rad/s]."""
-        frequency = np.asarray(omega, dtype=np.float64)
-        return frequency**4 * self.density(frequency)
-
     @cached_property
     def met(self) -> MetSpectrum | None:
         """The displacement's spectrum over the frequency of encounter; None on a vessel at rest."""
@@ -189,30 +183,36 @@ class HookMotion:
         )
 
     @cached_property
+    def moments(self) -> FloatArray:
+        """Spectral moments of order 0 to 8 of the displacement (9,) [m^2 (rad/s)^n]."""
+        nodes = self.quadrature
+        return read_only(nodes.integrate(nodes.omega**ORDERS * self.density(nodes.omega)))
+
+    @property
     def displacement(self) -> SpectrumStatistics:
         """Statistics of the displacement [m]."""
-        return spectrum_statistics(self.quadrature, self.density, self.band)
+        return motion_statistics(self.moments)[0]
 
-    @cached_property
+    @property
     def velocity(self) -> SpectrumStatistics:
         """Statistics of the velocity [m/s]."""
-        return spectrum_statistics(self.quadrature, self.velocity_density, self.band)
+        return motion_statistics(self.moments)[1]
 
-    @cached_property
+    @property
     def acceleration(self) -> SpectrumStatistics:
         """Statistics of the acceleration [m/s2].
 
         Its periods are set by the band's upper end where the RAO does not fall off beyond its
         table: the omega^-5 tail of a sea leaves an acceleration spectrum that falls with 1/omega.
         """
-        return spectrum_statistics(self.quadrature, self.acceleration_density, self.band)
+        return motion_statistics(self.moments)[2]
 
     @cached_property
     def outside(self) -> dict[str, OutsideShare]:
         """Share of each variance from outside the RAO's table, by the motion's name."""
         return {
             name: self.rao.share_outside(self.sea, derivative=order)
-            for order, name in enumerate(_MOTIONS)
+            for order, name in enumerate(MOTIONS)
         }
 
     def warn_if_outside(self) -> None:
@@ -299,6 +299,21 @@ class HookMotion:
             acceleration=series(2),
             seed=seed,
         )
+
+
+def motion_statistics(moments: FloatArray) -> tuple[SpectrumStatistics, ...]:
+    """Return the statistics of displacement, velocity and acceleration.
+
+    Parameters
+    ----------
+    moments
+        Moments of order 0 to 8 of the displacement (9,) [m^2 (rad/s)^n]: those of a derivative
+        are two orders further on.
+    """
+    m = [float(moment) for moment in moments]
+    return tuple(
+        SpectrumStatistics(m0=m[n], m1=m[n + 1], m2=m[n + 2], m4=m[n + 4]) for n in (0, 2, 4)
+    )
 
 
 def _transformable(length: int) -> int:

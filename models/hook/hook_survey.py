@@ -24,6 +24,7 @@ from ..basics import (
     check_choice,
     check_finite,
     check_range,
+    fractile_factor,
     spectral_nodes,
 )
 from ..case import Case
@@ -39,12 +40,11 @@ from ..vessel import (
     vessel_raos,
 )
 from .encounter import Encounter, speed_along
-from .hook_demand import ORDERS, HookDemand, fractile_factor
+from .hook import MOTIONS, ORDERS
+from .hook_demand import HookDemand
 
 HEADINGS = tuple(float(b) for b in range(0, 360, 15))
 PEAK_PERIODS = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0)
-
-_MOTIONS = ("displacement", "velocity", "acceleration")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,7 +63,7 @@ class HookSurvey(ReadOnlyArrays):
     points
         The hook's place, and the same place across the ship (s, 3) [m]; empty with `heave_rao`.
     moments
-        Moments of order 0 to 6 of the displacement (s, h, t, 7); s = h = 1 with `heave_rao`.
+        Moments of order 0 to 8 of the displacement (s, h, t, 9); s = h = 1 with `heave_rao`.
     steep
         Whether a sea of this peak period would be steeper than breaking (t,).
     own
@@ -94,8 +94,8 @@ class HookSurvey(ReadOnlyArrays):
         motion
             `displacement`, `velocity` or `acceleration`.
         """
-        check_choice("hook", "motion", motion, _MOTIONS)
-        return np.sqrt(np.maximum(self.moments[..., 2 * _MOTIONS.index(motion)], 0.0))
+        check_choice("hook", "motion", motion, MOTIONS)
+        return np.sqrt(np.maximum(self.moments[..., 2 * list(MOTIONS).index(motion)], 0.0))
 
     def figures(self, side: int, heading: int, period: int) -> HookDemand:
         """Return all figures of one point, by its indices."""
@@ -123,7 +123,7 @@ class HookSurvey(ReadOnlyArrays):
         """Return every point as a row: place, sea, and the figures of the three motions in SI."""
         names = [
             f"{motion}_{what}"
-            for motion in _MOTIONS
+            for motion in MOTIONS
             for what in ("rms", "T_z", "width", "most_probable_max", "fractile_max")
         ]
         head = ["x", "y", "heading_deg", "peak_period", "significant_height", *names]
@@ -137,8 +137,9 @@ class HookSurvey(ReadOnlyArrays):
                     demand = self.figures(s, h, t)
                     row = [*place, heading, period, height]
                     for m in demand.motions:
-                        fractile = m.fractile(self.probability)
-                        row += [m.rms, m.zero_crossing_period, m.width, m.largest, fractile]
+                        row += [m.rms, m.zero_crossing_period, m.width]
+                        row.append(m.most_probable_maximum(demand.duration))
+                        row.append(m.fractile(self.probability, demand.duration))
                     row += [demand.peak_power, demand.mean_power]
                     lines.append(",".join("" if math.isnan(v) else f"{v:.6g}" for v in row))
         return "\n".join(lines) + "\n"
@@ -256,14 +257,14 @@ class _Waves:
         return cls(nodes.omega, energies, high)
 
     def moments(self, gain: FloatArray, met: FloatArray | None = None) -> FloatArray:
-        """Return moments of order 0 to 6 by sea (t, 7) of a motion with this amplitude (n,)."""
+        """Return moments of order 0 to 8 by sea (t, 9) of a motion with this amplitude (n,)."""
         frequency = self.omega if met is None else np.abs(met)
         kept = gain**2 * (frequency <= self.highest)
         return np.asarray((self.energies * kept) @ (frequency**ORDERS).T)
 
 
 def _point(case: Case, waves: _Waves, place: Point, heading: float) -> FloatArray:
-    """Return the moments (t, 7) of the hook at one place in waves of one mean heading."""
+    """Return the moments (t, 9) of the hook at one place in waves of one mean heading."""
     raos = vessel_raos(case.vessel, case.label)
     angles, weights = sea_directions(heading, case.sea.to_spectrum().spreading)
     operators = heave_operators(raos, place, angles)

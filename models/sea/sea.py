@@ -264,7 +264,7 @@ class SeaSpectrum:
         m4 of a spectrum with an omega^-5 tail grows with the logarithm of the band's upper end
         without limit, and so has no meaning of its own.
         """
-        return spectrum_statistics(self.quadrature(), self.density, self.band)
+        return spectrum_statistics(self.quadrature(), self.density)
 
     def scaled(self, significant_height: float) -> SeaSpectrum:
         """Return the sea with the same shape and another H_s [m].

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from models.basics import FloatArray
-from models.hook import HookDemand, HookMotion, HookSurvey
+from models.hook import HookMotion, HookSurvey
 from models.vessel import side_of
 
 from ..text import (
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 _MOTIONS = (
     ("displacement", "m", "m$^2$ s/rad"),
     ("velocity", "m/s", "(m/s)$^2$ s/rad"),
-    ("acceleration", "m/s$^2$", "(m/s$^2$)$^2$ s/rad"),
+    ("acceleration", "m/s2", "(m/s$^2$)$^2$ s/rad"),
 )
 _SIDES = (AFTER, BEFORE)
 _ROWS = 12  # of the table over headings
@@ -86,11 +86,10 @@ def spectra_figure(survey: HookSurvey) -> Figure:
     omega = np.linspace(low, top, 800)
     figure = new_figure(height=6.4)
     axes = figure.subplots(3, 1, sharex=True)
-    for order, (axis, (name, _, per)) in enumerate(zip(axes, _MOTIONS, strict=True)):
+    for order, (axis, (name, unit, per)) in enumerate(zip(axes, _MOTIONS, strict=True)):
         for k, (side, hook) in enumerate(hooks):
             values = omega ** (2 * order) * hook.density(omega)
-            found = HookDemand.from_motion(hook, tension=0.0).motions[order]
-            label = f"{side}, {quantity(found.rms, found.unit)} rms"
+            label = f"{side}, {quantity(getattr(hook, name).rms, unit)} rms"
             axis.plot(omega, values, color=_SIDES[k] if len(hooks) > 1 else HOOK, label=label)
         if order == 0:
             waves = hooks[0][1].sea.density(omega)
@@ -120,7 +119,7 @@ def _by_period(survey: HookSurvey) -> Figure:
             axis.plot(periods, row, style, color=colour, marker="o", markersize=3.5)
         axis.axvline(survey.case.sea.spectral_peak_period, color=REFERENCE, linewidth=0.8)
         axis.set_ylim(bottom=0.0)
-        axis.set_title(f"{name} [{unit}]", fontsize=10.0)
+        axis.set_title(f"{name} [{unit}]".replace("s2", "s$^2$"), fontsize=10.0)
         axis.set_xlabel(typeset("T_p") + " [s]")
     finding = "How the hook's motion, rms, hangs on the waves' period"
     return _headed(figure, finding, survey)
@@ -226,7 +225,7 @@ def goes_round(headings: FloatArray) -> bool:
 def _shown(hook: HookMotion) -> tuple[float, float]:
     """Return the frequencies between which there is something to see [rad/s]."""
     omega = np.geomspace(hook.band[0], min(hook.band[1], 6.0), 2000)
-    energy = np.cumsum(hook.velocity_density(omega) * omega)
+    energy = np.cumsum(omega**2 * hook.density(omega) * omega)
     low, high = np.interp([1e-4 * energy[-1], 0.997 * energy[-1]], energy, omega)
     return 0.8 * float(low), 1.15 * float(high)
 
@@ -254,15 +253,15 @@ def motion_report(survey: HookSurvey) -> Report:
     )
     rows = [
         (
-            {"velocity": "speed"}.get(m.name, m.name),
-            _in_unit(m.rms, m.unit),
-            _in_unit(m.significant_amplitude, m.unit),
+            {"velocity": "speed"}.get(name, name),
+            _in_unit(m.rms, unit),
+            _in_unit(m.significant_amplitude, unit),
             m.zero_crossing_period,
             m.width,
-            _in_unit(m.largest, m.unit),
-            _in_unit(m.fractile(own.probability), m.unit),
+            _in_unit(m.most_probable_maximum(own.duration), unit),
+            _in_unit(m.fractile(own.probability, own.duration), unit),
         )
-        for m in own.motions
+        for (name, unit, _), m in zip(_MOTIONS, own.motions, strict=True)
     ]
     note = f"width: 0 is a sine; {longest} max: most probable; {share}: that fractile of it"
     table = Table(columns=heads, rows=rows, notes=(note,))
@@ -298,13 +297,16 @@ def _demand(survey: HookSurvey) -> list[tuple[str, str]]:
     case, own = survey.case, survey.own
     winch = case.winch
     fastest = winch.speed_limit * case.drum_radius / winch.gearbox.ratio
-    speed, power = own.velocity, own.peak_power
-    can = f"; this winch can {quantity(fastest, 'm/s')}, {percent(speed.largest / fastest)} used"
+    power = own.peak_power
+    speed, acceleration = (
+        motion.most_probable_maximum(own.duration) for motion in (own.velocity, own.acceleration)
+    )
+    can = f"; this winch can {quantity(fastest, 'm/s')}, {percent(speed / fastest)} used"
     limit = winch.drive.power
     has = "" if limit is None else f"; the drive has {quantity(limit, 'W')}"
     return [
-        ("to follow the hook", f"rope speed {quantity(speed.largest, 'm/s')}{can}"),
-        ("", f"acceleration {quantity(own.acceleration.largest, 'm/s2')}"),
+        ("to follow the hook", f"rope speed {quantity(speed, 'm/s')}{can}"),
+        ("", f"acceleration {quantity(acceleration, 'm/s2')}"),
         ("power", f"{quantity(power, 'W')} at {quantity(own.tension, 'N')}, no losses{has}"),
         ("", f"{quantity(own.mean_power, 'W')} mean, to and fro"),
     ]
@@ -318,7 +320,8 @@ def _periods(survey: HookSurvey) -> ReportSection:
         demand = survey.figures(side, heading, t)
         rms = [motion.rms for motion in demand.motions]
         steep = "too steep" if survey.steep[t] else ""
-        rows.append((float(period), *rms, demand.velocity.largest, demand.peak_power, steep))
+        largest = demand.velocity.most_probable_maximum(demand.duration)
+        rows.append((float(period), *rms, largest, demand.peak_power, steep))
     notes = []
     if survey.steep.any():
         notes.append("too steep: such waves break, seas of this H_s and T_p are not observed")
@@ -343,8 +346,9 @@ def _headings(survey: HookSurvey) -> ReportSection:
             demand = survey.figures(s, h, t)
             mark = " *" if (s, h) == best else ""
             rms = demand.velocity.rms
+            fastest = demand.velocity.most_probable_maximum(demand.duration)
             row.append(Written(rms, quantity(rms, "m/s", size=size) + mark))
-            row += [demand.velocity.largest, demand.peak_power]
+            row += [fastest, demand.peak_power]
         rows.append(row)
     heads = [Column("heading", "towards", write=lambda degrees: f"{degrees:.4g} deg")]
     for side in sides:

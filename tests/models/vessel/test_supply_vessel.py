@@ -71,7 +71,7 @@ def test_the_table_is_met(row):
     sigmas = [m.rms for m in demand.motions]
     t_z = demand.displacement.zero_crossing_period
     largest = [sigma * peak_factor(t_z) for sigma in sigmas]
-    assert demand.displacement.largest == pytest.approx(largest[0])
+    assert demand.displacement.most_probable_maximum(demand.duration) == pytest.approx(largest[0])
     found = np.array([*sigmas, t_z, *largest])
     if (heading, period) == (180, 7):
         # In short head waves the table's chords cost it 2 to 4 %, see the module: ours is above.
