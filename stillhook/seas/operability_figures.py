@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from models.basics import GRAVITY, FloatArray
-from synth.operability import AtDepth, Criterion, Operability
+from synth.limits import Limit
+from synth.operability import AtDepth, Operability
 
 from ..designs import LIMITS
 from ..text import (
@@ -51,17 +52,13 @@ _SHADE = "#cfe3f1"
 _FAR = 3.0  # times what can be reached: beyond, a limit is not shown
 
 
-def limit_text(criterion: Criterion) -> str:
+def limit_text(limit: Limit) -> str:
     """Return a limit with its bound, as ``motor speed 2000 rpm``."""
-    if criterion.limit is None:
-        return criterion.name
-    bound = (
-        quantity(criterion.bound, "rpm")
-        if criterion.unit == "rad/s"
-        else quantity(criterion.bound, criterion.unit)
-    )
+    if math.isnan(limit.bound):
+        return limit.name
+    bound = quantity(limit.bound, "rpm" if limit.unit == "rad/s" else limit.unit)
     kind = {"payload.rms": " rms", "payload.significant": " sign.", "payload.max": " max."}
-    return f"{_label(criterion.name)} {bound}{kind.get(criterion.name, '')}"
+    return f"{_label(limit.name)} {bound}{kind.get(limit.name, '')}"
 
 
 def _label(name: str) -> str:

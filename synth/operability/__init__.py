@@ -10,7 +10,6 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .contour import Contour
-    from .criteria import Criterion
     from .depths import AtDepth
     from .recheck import ContourCheck
     from .result import Operability

@@ -24,8 +24,7 @@ import numpy.typing as npt
 
 from models.basics import FloatArray, Quadrature, ReadOnlyArrays
 
-from ..limits import Continuous, Peak, Power
-from .criteria import Criterion
+from ..limits import Continuous, Limit, Peak, Power
 from .systems import PerfectSystem
 
 
@@ -45,7 +44,7 @@ class Capability(ReadOnlyArrays):
     """
 
     periods: FloatArray
-    criteria: tuple[Criterion, ...]
+    criteria: tuple[Limit, ...]
     heights: FloatArray
 
     @property
@@ -55,7 +54,7 @@ class Capability(ReadOnlyArrays):
 
 
 def capability(
-    system: PerfectSystem, criteria: Sequence[Criterion], periods: npt.ArrayLike
+    system: PerfectSystem, criteria: Sequence[Limit], periods: npt.ArrayLike
 ) -> Capability:
     """Return the largest regular heave that a winch can follow at given periods [s] (p,).
 
@@ -72,19 +71,18 @@ def capability(
     order = np.argsort(-given)  # nodes ascend
     omega = 2.0 * math.pi / given[order]
     base = system.responses(Quadrature(omega=omega, weights=np.ones_like(omega)))
-    sizes = {name: np.abs(base.zw[k, 0]) for k, name in enumerate(base.outputs)}
+    sizes = {name: np.abs(base.table[k, 0]) for k, name in enumerate(base.outputs)}
     rows = []
-    for criterion in criteria:
-        amplitude = _amplitude(criterion, sizes)
+    for limit in criteria:
+        amplitude = _amplitude(limit, sizes)
         row = np.empty_like(given)
         row[order] = 2.0 * np.maximum(amplitude, 0.0)
         rows.append(row)
     return Capability(periods=given, criteria=tuple(criteria), heights=np.array(rows))
 
 
-def _amplitude(criterion: Criterion, sizes: dict[str, FloatArray]) -> FloatArray:
+def _amplitude(limit: Limit, sizes: dict[str, FloatArray]) -> FloatArray:
     """Return the amplitude of the heave at which a limit is reached (p,) [m]."""
-    limit = criterion.limit
     if isinstance(limit, Peak):
         return (limit.bound - abs(limit.static)) / sizes[limit.output]
     if isinstance(limit, Continuous):

@@ -14,7 +14,6 @@ import numpy as np
 from models.basics import (
     ComplexArray,
     FloatArray,
-    IndexArray,
     InputError,
     Quadrature,
     adaptive_nodes,
@@ -85,28 +84,6 @@ class SeaColumn:
         except InputError:
             return False
         return True
-
-    def heave(self, omega: FloatArray, heights: FloatArray, index: IndexArray) -> FloatArray:
-        """Return the hook's density (r, n) at heights (r,) [m] in headings `index` (r,)."""
-        if self.scalable:
-            unit = self._unit(omega)
-            return np.asarray(heights[:, None] ** 2 * unit[index])
-        rows = np.empty((heights.size, omega.size))
-        for k, (height, i) in enumerate(zip(heights, index, strict=True)):
-            defined = max(float(height), self.floor)
-            rows[k] = (height / defined) ** 2 * self.hook(int(i), defined).density(omega)
-        return rows
-
-    def _unit(self, omega: FloatArray) -> FloatArray:
-        """Return the densities at H_s = 1 m, (h, n); kept for the last nodes asked for."""
-        if self._kept.get("key") is not omega:
-            self._kept["key"] = omega
-            self._kept["unit"] = np.array([hook.scaled(1.0).density(omega) for hook in self.hooks])
-        return np.asarray(self._kept["unit"])
-
-    @cached_property
-    def _kept(self) -> dict[str, FloatArray]:
-        return {}
 
     @cached_property
     def sources(self) -> tuple[Disturbance, ...]:

@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from models.basics import FloatArray, InputError, read_only
 
+from ..limits import Limit
 from .columns import SeaColumn
-from .criteria import Criterion
-from .limiting import HIGHEST, ColumnLimits, SeaStates, limiting_heights
+from .limiting import HIGHEST, SeaStates, limiting_heights
 from .systems import System
 
 _FULL_CIRCLE_GAP = math.radians(90.0)  # between headings that still stand for a full circle
@@ -42,7 +42,7 @@ class Contour:
         Highest H_s that was looked at [m].
     """
 
-    criteria: tuple[Criterion, ...]
+    criteria: tuple[Limit, ...]
     periods: FloatArray
     headings: FloatArray | None
     heights: FloatArray
@@ -143,7 +143,7 @@ def heading_shares(axis: FloatArray | None, headings: npt.ArrayLike) -> FloatArr
 
 def contour_of(
     system: System,
-    criteria: Sequence[Criterion],
+    criteria: Sequence[Limit],
     columns: Sequence[SeaColumn],
     *,
     highest: float = HIGHEST,
@@ -164,25 +164,25 @@ def contour_of(
     """
     found = []
     for column in columns:
-        states = SeaStates.of(system, column)
+        states = SeaStates(system=system, column=column)
         found.append(limiting_heights(states, criteria, highest=highest))
         step()
     return assembled(criteria, columns, found, highest)
 
 
 def assembled(
-    criteria: Sequence[Criterion],
+    criteria: Sequence[Limit],
     columns: Sequence[SeaColumn],
-    found: Sequence[ColumnLimits],
+    found: Sequence[tuple[FloatArray, FloatArray]],
     highest: float,
 ) -> Contour:
-    """Return the contour of what was found in each column."""
+    """Return the contour of what `limiting_heights` found in each column."""
     headings = columns[0].headings
     return Contour(
         criteria=tuple(criteria),
         periods=np.array([column.period for column in columns]),
         headings=None if headings is None else np.array(headings),
-        heights=np.stack([limits.heights for limits in found], axis=2),
-        drag=np.stack([limits.drag for limits in found], axis=1),
+        heights=np.stack([heights for heights, _ in found], axis=2),
+        drag=np.stack([drag for _, drag in found], axis=1),
         highest=highest,
     )

@@ -10,16 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import elementwise
 
-from models.basics import FloatArray, IndexArray, ReadOnlyArrays, SolverError
+from models.basics import BoolArray, FloatArray, IndexArray, SolverError
 
+from ..limits import Limit
 from .columns import SeaColumn
-from .criteria import Criterion, SeaMoments
-from .responses import DragResponses
+from .responses import DragResponses, SeaMoments
 from .systems import System
 
 LOWEST, HIGHEST = 0.01, 30.0  # H_s that are looked at [m]
@@ -29,6 +30,7 @@ _STEPS = 25  # of the coarse grid
 _SPEEDS = (1e-9, 1e3)  # rms speeds of the payload between which the drag's is looked for [m/s]
 _DRAG_RTOL = 1e-13  # of the logarithm's step, so of the drag
 _HEIGHT_TOL = 1e-10  # of the logarithm of H_s
+_BROKEN = 10.0  # excess of what is broken beyond measure
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,30 +41,44 @@ class SeaStates:
     ----------
     system, column
         What is moved, and by which seas.
-    responses
-        The system's responses on nodes that suit both.
     """
 
     system: System
     column: SeaColumn
-    responses: DragResponses
 
-    @classmethod
-    def of(cls, system: System, column: SeaColumn) -> SeaStates:
-        """Return the states of a system in a column."""
-        responses = system.responses(column.nodes(system))
-        return cls(system=system, column=column, responses=responses)
+    @cached_property
+    def responses(self) -> DragResponses:
+        """The system's responses on nodes that suit both."""
+        return self.system.responses(self.column.nodes(self.system))
+
+    @cached_property
+    def _unit(self) -> FloatArray:
+        """The hook's densities at H_s = 1 m, (h, n)."""
+        omega = self.responses.nodes.omega
+        return np.array([hook.scaled(1.0).density(omega) for hook in self.column.hooks])
+
+    def heave(self, heights: FloatArray, index: IndexArray) -> FloatArray:
+        """Return the hook's density (r, n) at heights (r,) [m] in headings `index` (r,)."""
+        if self.column.scalable:
+            return np.asarray(heights[:, None] ** 2 * self._unit[index])
+        rows = np.empty((heights.size, self.responses.nodes.omega.size))
+        for k, (height, i) in enumerate(zip(heights, index, strict=True)):
+            defined = max(float(height), self.column.floor)
+            density = self.column.hook(int(i), defined).density(self.responses.nodes.omega)
+            rows[k] = (height / defined) ** 2 * density
+        return rows
 
     def densities(self, heights: FloatArray, index: IndexArray) -> list[FloatArray]:
         """Return the disturbances' densities at heights (r,) [m] in headings `index` (r,)."""
         omega = self.responses.nodes.omega
-        heave = self.column.heave(omega, heights, index)
+        heave = self.heave(heights, index)
         found = [heave]
         for noise in self.system.noises:
             density = noise.density(omega)[None]
             if noise.name == "mru.error":
                 rms = np.sqrt(heave @ self.responses.nodes.weights)
-                density = self.system.mru_growth(rms)[:, None] ** 2 * density
+                given = self.system.mru_error(np.array(self.system.mru_rms))
+                density = (self.system.mru_error(rms) / given)[:, None] ** 2 * density
             found.append(density)
         return found
 
@@ -118,37 +134,30 @@ class SeaStates:
         densities = self.densities(heights, index)
         C = self.coefficients(densities)
         known = np.where(np.isfinite(C), C, self.system.reference)
-        m0, m2 = self.responses.moments(densities, known)
-        names = self.responses.outputs
-        return (
-            SeaMoments(
-                m0={name: m0[:, k] for k, name in enumerate(names)},
-                m2={name: m2[:, k] for k, name in enumerate(names)},
-            ),
-            C,
-        )
+        return self.responses.moments(densities, known), C
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ColumnLimits(ReadOnlyArrays):
-    """Limiting significant heights of one peak period.
+def _excess(limit: Limit, moments: SeaMoments, stationary: BoolArray) -> FloatArray:
+    """Return by how much a limit is broken, relative; at most 0 where it is kept (r,).
 
-    Attributes
+    Parameters
     ----------
-    heights
-        By criterion and heading (c, h) [m]: 0 where the criterion is broken in a flat sea,
-        infinite where it is kept up to the highest H_s looked at.
-    drag
-        Drag coefficient at the lowest of them (h,) [N s/m]; NaN where that is 0 or infinite.
+    limit
+        What must be kept.
+    moments
+        Of the outputs.
+    stationary
+        Where there is a stationary motion at all (r,).
     """
-
-    heights: FloatArray
-    drag: FloatArray
+    # All that the limit asks of a programme's symbols is `moment` and `peak`.
+    raw = np.asarray(limit.rows(moments, limit.bound))  # type: ignore[arg-type]
+    # Finite, as a root finder takes differences of it.
+    return np.where(stationary & np.isfinite(raw), np.minimum(raw, _BROKEN), _BROKEN)
 
 
 def limiting_heights(
-    states: SeaStates, criteria: Sequence[Criterion], *, highest: float = HIGHEST
-) -> ColumnLimits:
+    states: SeaStates, criteria: Sequence[Limit], *, highest: float = HIGHEST
+) -> tuple[FloatArray, FloatArray]:
     """Return the lowest H_s at which each criterion breaks, in every heading of a column.
 
     Parameters
@@ -160,6 +169,13 @@ def limiting_heights(
     highest
         Highest H_s that is looked at [m].
 
+    Returns
+    -------
+    heights, drag
+        Limiting H_s by criterion and heading (c, h) [m], 0 where the criterion is broken in a flat
+        sea, infinite where it is kept up to the highest; and the drag coefficient at the lowest of
+        them (h,) [N s/m], NaN where that is 0 or infinite.
+
     Raises
     ------
     SolverError
@@ -170,7 +186,7 @@ def limiting_heights(
     grid = np.geomspace(LOWEST, highest, _STEPS)
     row_heading = np.repeat(np.arange(headings), grid.size)
     moments, C = states.moments_at(np.tile(grid, headings), row_heading)
-    excess = np.array([c.excess(moments, np.isfinite(C)) for c in criteria])
+    excess = np.array([_excess(limit, moments, np.isfinite(C)) for limit in criteria])
     excess = excess.reshape(count, headings, grid.size)
     broken = excess > 0.0
     first = np.where(broken.any(axis=2), broken.argmax(axis=2), grid.size)  # (c, h)
@@ -187,12 +203,12 @@ def limiting_heights(
     some = np.flatnonzero((lowest > 0.0) & np.isfinite(lowest))
     if some.size:
         drag[some] = states.moments_at(lowest[some], some)[1]
-    return ColumnLimits(heights=heights, drag=drag)
+    return heights, drag
 
 
 def _refined(
     states: SeaStates,
-    criteria: Sequence[Criterion],
+    criteria: Sequence[Limit],
     which: IndexArray,
     heading: IndexArray,
     low: FloatArray,
@@ -205,7 +221,7 @@ def _refined(
         found = np.zeros(size.size)
         for k in np.unique(w.astype(np.intp)):
             mine = w == k
-            found[mine] = criteria[k].excess(moments, stationary)[mine]
+            found[mine] = _excess(criteria[k], moments, stationary)[mine]
         return found
 
     solved = elementwise.find_root(

@@ -9,8 +9,9 @@ from models.basics import InputError
 from models.case import Case
 
 from ..design import Design
+from ..limits import Limit
 from ..question import HOOK, PAYLOAD, pose
-from .criteria import STABILITY, Criterion, case_criteria, outputs_of
+from .criteria import Stability, case_criteria, outputs_of
 from .systems import VELOCITY, HeldSystem, LoopSystem, PerfectSystem, System
 
 _HELD = {PAYLOAD, VELOCITY, "rope.tension"}
@@ -37,7 +38,7 @@ class OperabilityQuestion:
     held: HeldSystem
     perfect: PerfectSystem
     loop: LoopSystem | None
-    criteria: dict[str, tuple[Criterion, ...]]
+    criteria: dict[str, tuple[Limit, ...]]
 
     @property
     def systems(self) -> dict[str, System]:
@@ -47,7 +48,7 @@ class OperabilityQuestion:
 
 
 def pose_operability(
-    source: Case | Design, wanted: Sequence[Criterion], *, length: float | None = None
+    source: Case | Design, wanted: Sequence[Limit], *, length: float | None = None
 ) -> OperabilityQuestion:
     """Return what is asked of a design, or of a case alone.
 
@@ -79,7 +80,7 @@ def pose_operability(
     else:
         question = pose(reported, source.structure, source.masses if same else None)
     of_case = case_criteria(reported, question.plant)
-    every = (STABILITY, *wanted, *of_case)
+    every = (Stability(), *wanted, *of_case)
     held = tuple(c for c in every if set(c.outputs) <= _HELD)
     winch = tuple(c for c in of_case if set(c.outputs) <= set(_WINCH))
     drag = question.drag

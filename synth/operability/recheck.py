@@ -104,7 +104,6 @@ def recheck(
         h, p = known[place]
         k = int(contour.heights[:, h, p].argmin())
         criterion = contour.criteria[k]
-        assert criterion.limit is not None
         height = float(limit[h, p])
         case = columns[p].cases[h].replace({"sea.significant_height": height})
         drag = float(contour.drag[h, p])
@@ -118,7 +117,7 @@ def recheck(
                 heading=None if contour.headings is None else float(contour.headings[h]),
                 height=height,
                 criterion=criterion.name,
-                value=criterion.shown * criterion.limit.measure(assessment),
+                value=criterion.measure(assessment),
                 bound=criterion.bound,
                 drag=drag,
                 agreed=drag if fixed else slope * assessment.sigma("payload.velocity"),

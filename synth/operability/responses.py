@@ -17,7 +17,8 @@ cost no more than a handful of single evaluations, without an approximation.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -27,39 +28,62 @@ from models.basics import ComplexArray, FloatArray, Quadrature, read_only
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class SeaMoments:
+    """Variances m0 and second moments m2 of outputs in r sea states, each (r,).
+
+    The limits on signals make their rows of it (`synth.limits.Limit.rows`), one for each sea state.
+    """
+
+    m0: Mapping[str, FloatArray]
+    m2: Mapping[str, FloatArray]
+
+    def moment(self, output: str, order: int) -> FloatArray:
+        """Return the spectral moment of order 0 or 2 of an output (r,)."""
+        return (self.m2 if order else self.m0)[output]
+
+    def peak(self, output: str, duration: float) -> FloatArray:
+        """Return the most probable maximum in `duration` [s] without the mean (r,).
+
+        As `models.basics.metrics.peak_factor`, sigma sqrt(2 ln(T/T_z)), held at one sigma.
+        """
+        m0, m2 = self.m0[output], self.m2[output]
+        still = (m0 <= 0.0) | (m2 <= 0.0)
+        crossings = duration / (2.0 * math.pi) * np.sqrt(m2 / np.where(still, 1.0, m0))
+        k = np.sqrt(np.maximum(2.0 * np.log(np.where(still, 1.0, crossings)), 1.0))
+        return np.asarray(k * np.sqrt(m0), dtype=np.float64)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class DragResponses:
-    """Responses of a loop on n nodes, with the drag coefficient as a variable.
+    """Responses of a system on n nodes, with the drag coefficient as a variable.
 
     Attributes
     ----------
     nodes
         Frequencies and weights of the integrals (n,).
-    outputs, disturbances
-        Names of the o outputs and the w disturbances.
-    zw, zf
-        Responses of the outputs to the disturbances (o, w, n) and to a force on the payload
-        (o, n), at the coefficient `reference`.
-    vw, vf
-        Those of the payload's velocity, (w, n) and (n,).
+    outputs
+        Names of the o outputs.
+    table
+        Responses of the outputs and, last, of the payload's velocity, to the w disturbances and,
+        last, to a force on the payload, at the coefficient `reference` (o + 1, w + 1, n).
     reference
         Drag coefficient C_0 that the responses hold [N s/m].
     """
 
     nodes: Quadrature
     outputs: tuple[str, ...]
-    disturbances: tuple[str, ...]
-    zw: ComplexArray
-    zf: ComplexArray
-    vw: ComplexArray
-    vf: ComplexArray
+    table: ComplexArray
     reference: float
 
-    def __post_init__(self) -> None:
-        """Make the arrays read-only."""
-        for name in ("zw", "zf", "vw", "vf"):
-            array = np.array(getattr(self, name), dtype=np.complex128)
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+    @property
+    def _vf(self) -> ComplexArray:
+        return np.asarray(self.table[-1, -1])
+
+    @cached_property
+    def _update(self) -> ComplexArray:
+        """G of the outputs (o, w, n)."""
+        zf, vw = self.table[:-1, -1:], self.table[-1:, :-1]
+        return np.asarray(self.table[:-1, :-1] * self._vf - zf * vw)
 
     @cached_property
     def _tables(self) -> FloatArray:
@@ -67,26 +91,17 @@ class DragResponses:
 
         First those of the densities, then those times omega^2.
         """
-        update = self.zw * self.vf - self.zf[:, None, :] * self.vw[None]
+        zw = self.table[:-1, :-1]
         parts = np.stack(
             [
-                np.abs(self.zw) ** 2,
-                2.0 * np.real(np.conj(self.zw) * update),
-                np.abs(update) ** 2,
+                np.abs(zw) ** 2,
+                2.0 * np.real(np.conj(zw) * self._update),
+                np.abs(self._update) ** 2,
             ]
         )  # (3, o, w, n)
         both = np.stack([parts, parts * self.nodes.omega**2])
         moved = np.transpose(both, (3, 4, 0, 1, 2))
         return read_only(moved.reshape(*moved.shape[:2], -1))
-
-    @cached_property
-    def _speed(self) -> FloatArray:
-        """Squared modulus of the velocity's responses at the reference (w, n)."""
-        return read_only(np.abs(self.vw) ** 2)
-
-    @cached_property
-    def _vf_parts(self) -> tuple[FloatArray, FloatArray]:
-        return read_only(2.0 * self.vf.real), read_only(np.abs(self.vf) ** 2)
 
     def weighted_speed(self, densities: Sequence[FloatArray]) -> FloatArray:
         """Return what `speed_variance` sums up, at the reference, (r, n).
@@ -96,7 +111,8 @@ class DragResponses:
         densities
             One-sided densities of the disturbances at the nodes, each (r, n) or (1, n).
         """
-        total = sum(self._speed[k] * densities[k] for k in range(len(self.disturbances)))
+        squared = np.abs(self.table[-1, :-1]) ** 2
+        total = sum(row * density for row, density in zip(squared, densities, strict=True))
         return np.asarray(total * self.nodes.weights, dtype=np.float64)
 
     def speed_variance(self, weighted: FloatArray, coefficient: FloatArray) -> FloatArray:
@@ -111,10 +127,8 @@ class DragResponses:
         """
         return np.asarray((weighted / self._denominator(coefficient)).sum(axis=1))
 
-    def moments(
-        self, densities: Sequence[FloatArray], coefficient: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the variance m0 and the second moment m2 of every output, each (r, o).
+    def moments(self, densities: Sequence[FloatArray], coefficient: FloatArray) -> SeaMoments:
+        """Return the moments of every output.
 
         Parameters
         ----------
@@ -126,22 +140,24 @@ class DragResponses:
         rows = coefficient.size
         weights = self.nodes.weights / self._denominator(coefficient)  # (r, n)
         found = np.zeros((rows, self._tables.shape[-1]))
-        for k in range(len(self.disturbances)):
-            found += (weights * densities[k]) @ self._tables[k]
+        for table, density in zip(self._tables, densities, strict=True):
+            found += (weights * density) @ table
         parts = found.reshape(rows, 2, 3, len(self.outputs))
         D = (coefficient - self.reference)[:, None]
         both = parts[:, :, 0] + D[:, None] * (parts[:, :, 1] + D[:, None] * parts[:, :, 2])
         # Rounding may leave a trifle below zero where an output does not move at all.
-        both = np.maximum(both, 0.0)
-        return both[:, 0], both[:, 1]
+        m0, m2 = np.maximum(both, 0.0).transpose(1, 2, 0)
+        return SeaMoments(
+            m0=dict(zip(self.outputs, m0, strict=True)), m2=dict(zip(self.outputs, m2, strict=True))
+        )
 
     def gains(self, coefficient: float) -> FloatArray:
         """Return the squared moduli of the responses for one coefficient [N s/m], (o, w, n)."""
         D = coefficient - self.reference
-        update = self.zw * self.vf - self.zf[:, None, :] * self.vw[None]
-        return np.asarray(np.abs((self.zw + D * update) / (1.0 + D * self.vf)) ** 2)
+        changed = (self.table[:-1, :-1] + D * self._update) / (1.0 + D * self._vf)
+        return np.asarray(np.abs(changed) ** 2)
 
     def _denominator(self, coefficient: FloatArray) -> FloatArray:
         D = (coefficient - self.reference)[:, None]
-        twice_real, square = self._vf_parts
-        return np.asarray(1.0 + D * (twice_real + D * square), dtype=np.float64)
+        # The modulus without complex numbers: this is what the search for the drag spends.
+        return np.asarray(1.0 + D * (2.0 * self._vf.real + D * np.abs(self._vf) ** 2))

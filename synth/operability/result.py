@@ -20,8 +20,8 @@ from models.case import Case
 from models.sea import Scatter
 
 from ..design import Design
+from ..limits import Limit
 from .contour import Contour
-from .criteria import Criterion
 from .depths import STAGES, AtDepth
 from .recheck import ContourCheck, recheck
 from .workable import Rule, rule_shares
@@ -65,7 +65,7 @@ class Operability:
     design: Design | None
     depths: tuple[AtDepth, ...]
     scatter: Scatter | None
-    wanted: tuple[Criterion, ...]
+    wanted: tuple[Limit, ...]
 
     @property
     def periods(self) -> FloatArray:

@@ -43,7 +43,7 @@ from .columns import SeaColumn, has_headings, has_period, sea_column
 from .contour import Contour, assembled, contour_of
 from .criteria import payload_criteria
 from .depths import AtDepth, rope_state
-from .limiting import HIGHEST, ColumnLimits, SeaStates, limiting_heights
+from .limiting import HIGHEST, SeaStates, limiting_heights
 from .pose import OperabilityQuestion, pose_operability
 from .result import Operability
 from .workable import workable
@@ -350,7 +350,7 @@ def reoptimised_contour(
     """
     assert question.loop is not None
     criteria = question.criteria["loop"]
-    drive = tuple(c.limit for c in criteria if c.limit is not None)
+    drive = tuple(limit for limit in criteria if limit.outputs)
     found = []
     for column in columns:
         heights = np.zeros((len(criteria), len(column.hooks)))
@@ -365,9 +365,9 @@ def reoptimised_contour(
                 question.loop,
                 controller=pose(case, design.structure, design.masses).controller(gains),
             )
-            limits = limiting_heights(SeaStates.of(loop, one), criteria, highest=highest)
-            heights[:, h], drag[h] = limits.heights[:, 0], limits.drag[0]
-        found.append(ColumnLimits(heights=heights, drag=drag))
+            states = SeaStates(system=loop, column=one)
+            heights[:, [h]], drag[[h]] = limiting_heights(states, criteria, highest=highest)
+        found.append((heights, drag))
     return assembled(criteria, columns, found, highest)
 
 

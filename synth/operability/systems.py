@@ -65,31 +65,26 @@ class System(ABC):
     mru: MRU | None = None
     mru_rms: float = 0.0
 
-    @property
-    def disturbances(self) -> tuple[str, ...]:
-        """Names of the disturbances: the hook first."""
-        return (HOOK, *(noise.name for noise in self.noises))
+    def mru_error(self, rms: FloatArray) -> FloatArray:
+        """Return the rms of the reference unit's error in seas of an rms heave (r,) [m].
 
-    def mru_growth(self, rms: FloatArray) -> FloatArray:
-        """Return the error of the reference unit over that in `noises`, (r,).
-
-        Parameters
-        ----------
-        rms
-            Standard deviations of the hook's heave (r,) [m]; the error is a floor or a share of
-            it, whichever is greater (`models.sensing.mru.MruModel.error_rms`).
+        A floor or a share of the heave, whichever is greater, as `MruModel.error_rms`.
         """
-        if self.mru is None:
-            return np.ones_like(rms)
-        floor, share = self.mru.noise_floor, self.mru.noise_fraction
-        given = max(floor, share * self.mru_rms)
-        return np.asarray(
-            np.maximum(floor, share * rms) / given if given > 0.0 else 1.0 + 0.0 * rms
-        )
+        assert self.mru is not None
+        return np.maximum(self.mru.noise_floor, self.mru.noise_fraction * rms)
 
     @abstractmethod
+    def transfers(self, omega: FloatArray) -> ComplexArray:
+        """Return the responses at frequencies (n,) [rad/s], as `DragResponses.table` has them."""
+
     def responses(self, nodes: Quadrature) -> DragResponses:
-        """Return the responses on nodes."""
+        """Return the responses on nodes, with the drag as a variable."""
+        return DragResponses(
+            nodes=nodes,
+            outputs=self.outputs,
+            table=self.transfers(nodes.omega),
+            reference=self.reference,
+        )
 
     @abstractmethod
     def poles(self, coefficient: float) -> ComplexArray:
@@ -155,21 +150,10 @@ class LoopSystem(System):
     drag: DragElement | None
 
     @override
-    def responses(self, nodes: Quadrature) -> DragResponses:
-        names = [*self.disturbances, FORCE]
-        outputs = [*self.outputs, VELOCITY]
-        found = LoopResponses.of(self.plant.response(nodes.omega), self.controller)
-        table = np.array([[found.response(z, w) for w in names] for z in outputs])
-        return DragResponses(
-            nodes=nodes,
-            outputs=self.outputs,
-            disturbances=self.disturbances,
-            zw=table[:-1, :-1],
-            zf=table[:-1, -1],
-            vw=table[-1, :-1],
-            vf=table[-1, -1],
-            reference=self.reference,
-        )
+    def transfers(self, omega: FloatArray) -> ComplexArray:
+        causes = [HOOK, *(noise.name for noise in self.noises), FORCE]
+        found = LoopResponses.of(self.plant.response(omega), self.controller)
+        return np.array([[found.response(z, w) for w in causes] for z in (*self.outputs, VELOCITY)])
 
     @override
     def poles(self, coefficient: float) -> ComplexArray:
@@ -185,21 +169,11 @@ class HeldSystem(System):
     data: PlantData
 
     @override
-    def responses(self, nodes: Quadrature) -> DragResponses:
-        s = 1j * nodes.omega
-        P_Y, P_F, T_Y, T_F = held_transfers(self.data, s.astype(np.complex128), self.reference)
-        to_heave = {PAYLOAD: P_Y, VELOCITY: s * P_Y, "rope.tension": T_Y}
-        to_force = {PAYLOAD: P_F, VELOCITY: s * P_F, "rope.tension": T_F}
-        return DragResponses(
-            nodes=nodes,
-            outputs=self.outputs,
-            disturbances=self.disturbances,
-            zw=np.array([[to_heave[z]] for z in self.outputs]),
-            zf=np.array([to_force[z] for z in self.outputs]),
-            vw=to_heave[VELOCITY][None],
-            vf=to_force[VELOCITY],
-            reference=self.reference,
-        )
+    def transfers(self, omega: FloatArray) -> ComplexArray:
+        s = 1j * omega.astype(np.complex128)
+        P_Y, P_F, T_Y, T_F = held_transfers(self.data, s, self.reference)
+        rows = {PAYLOAD: (P_Y, P_F), VELOCITY: (s * P_Y, s * P_F), "rope.tension": (T_Y, T_F)}
+        return np.array([rows[z] for z in (*self.outputs, VELOCITY)])
 
     @override
     def poles(self, coefficient: float) -> ComplexArray:
@@ -223,8 +197,8 @@ class PerfectSystem(System):
     data: PlantData
 
     @override
-    def responses(self, nodes: Quadrature) -> DragResponses:
-        data, s = self.data, 1j * nodes.omega
+    def transfers(self, omega: FloatArray) -> ComplexArray:
+        data, s = self.data, 1j * omega
         angle = -data.gear_ratio / data.drum_radius + 0.0 * s
         torque = (data.inertia * s**2 + data.viscous_friction * s) * angle
         current = torque / data.torque_constant
@@ -232,17 +206,10 @@ class PerfectSystem(System):
         if data.motor == "dc":
             coil = data.resistance + data.inductance * s
             moved["motor.voltage"] = coil * current + data.back_emf_constant * s * angle
+        # The payload, which stands still, and what no force on it moves.
         nothing = np.zeros_like(s)
-        return DragResponses(
-            nodes=nodes,
-            outputs=self.outputs,
-            disturbances=self.disturbances,
-            zw=np.array([[moved[z]] for z in self.outputs]),
-            zf=np.array([nothing for _ in self.outputs]),
-            vw=nothing[None],
-            vf=nothing,
-            reference=self.reference,
-        )
+        rows = [(moved[z], nothing) for z in self.outputs]
+        return np.array([*rows, (nothing, nothing)])
 
     @override
     def poles(self, coefficient: float) -> ComplexArray:

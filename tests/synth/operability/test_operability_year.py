@@ -29,7 +29,7 @@ from stillhook.seas import (
 from stillhook.seas.operability import netcdf
 from synth.operability import Contour, Operability, operability
 from synth.operability.contour import heading_shares
-from synth.operability.criteria import STABILITY
+from synth.operability.criteria import Stability
 from synth.operability.study import example_scatter
 from synth.operability.workable import RULES, class_width, rule_shares, workable
 
@@ -42,7 +42,7 @@ def contour(limits: list[list[float]], headings: list[float] | None = None) -> C
     """A contour with one criterion, at 6 and 10 s."""
     heights = np.array([limits])
     return Contour(
-        criteria=(STABILITY,),
+        criteria=(Stability(),),
         periods=np.array([6.0, 10.0]),
         headings=None if headings is None else np.radians(headings),
         heights=heights,
