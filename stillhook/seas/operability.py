@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from synth.operability import AtDepth, Contour, ContourCheck, Operability
+from synth.operability import AtDepth, Contour, ContourCheck, Operability, rule_shares
 
 from ..text import (
     Column,
@@ -167,5 +167,5 @@ def _shares(study: Operability) -> list[Item]:
         note = f"% of each month with {first.rope.length:g} m of rope"
         items.append(Table(columns=(Column("system", ""), *each), rows=shares, notes=(note,)))
     heads = columns("operation=rules of thumb, 1975 thesis, Table 2; safe [%]; or marginal [%]")
-    rules = [(rule.operation, safe, marginal) for rule, safe, marginal in study.rules()]
-    return [*items, Table(columns=heads, rows=rules)]
+    assert study.scatter is not None
+    return [*items, Table(columns=heads, rows=rule_shares(study.scatter))]

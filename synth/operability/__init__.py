@@ -14,5 +14,6 @@ if TYPE_CHECKING:
     from .recheck import ContourCheck
     from .result import Operability
     from .study import operability
+    from .workable import rule_shares
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

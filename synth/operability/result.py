@@ -24,7 +24,6 @@ from ..limits import Limit
 from .contour import Contour
 from .depths import STAGES, AtDepth
 from .recheck import ContourCheck, recheck
-from .workable import Rule, rule_shares
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
 _CHECKS = 3
 _PRESSES = 1e-4  # of a limit: a design that was made to press against it is within
 
-_SUFFIX = {"loop": "", "held": "_held", "perfect": "_perfect", "reoptimised": "_reoptimised"}
 # Of a rope: variable, attribute of `RopeState`, unit, words.
 _ROPE = (
     ("rope_length", "length", "m", "rope paid out"),
@@ -109,8 +107,51 @@ class Operability:
 
     @cached_property
     def dataset(self) -> xr.Dataset:
-        """Everything as an xarray Dataset, with units and long names; `to_netcdf` writes it."""
-        return dataset_of(self.case, self.depths, self.status)
+        """Everything as an xarray Dataset, with units and long names; `to_netcdf` writes it.
+
+        Dimensions are ``rope_length`` (where lengths were asked for), ``limit``, ``heading`` (where
+        the vessel has headings) and ``peak_period``.  A limit that a system does not have is NaN;
+        one that is kept up to the highest H_s looked at is infinite.
+        """
+        import xarray as xr
+
+        names, main = _names(self.depths), self.depths[0].main
+        parts = []
+        for at in self.depths:
+            rope = {
+                name: ((), getattr(at.rope, field), {"units": unit, "long_name": text})
+                for name, field, unit, text in _ROPE
+            }
+            parts.append(xr.Dataset(_variables(at, names), coords=rope))
+        found = parts[0]
+        if len(parts) > 1:
+            own = [name for name, *_ in _ROPE if name != "rope_length"]
+            found = xr.concat(parts, "rope_length", data_vars="all", coords=own, join="exact")
+        first = {c.name: c for n in self.depths[0].contours.values() for c in n.criteria}
+        coordinates: dict[str, Any] = {
+            "limit": ("limit", names, {"long_name": "limit"}),
+            "bound": ("limit", [first[n].bound for n in names], {"long_name": "bound, in `unit`"}),
+            "unit": ("limit", [first[n].unit for n in names], {"long_name": "unit of the bound"}),
+        }
+        about = {"units": "s", "long_name": "peak period T_p"}
+        coordinates["peak_period"] = ("peak_period", main.periods, about)
+        attributes = {
+            "title": f"Operability of {self.case.name}",
+            "case": self.case.to_yaml(),
+            "sea": self.case.sea.spectrum,
+            "exposure_time": self.case.limits.exposure_time,
+            "highest_height": main.highest,
+            "status": self.status,
+        }
+        if main.headings is None:
+            attributes["headings"] = "none: the vessel is given by the heave of its hook alone"
+        else:
+            about = {
+                "units": "degree",
+                "long_name": "heading: where the waves travel to, counter-clockwise from the bow",
+            }
+            coordinates["heading"] = ("heading", np.degrees(main.headings), about)
+        return found.assign_coords(coordinates).assign_attrs(attributes)
 
     def own_heading(self, contour: Contour) -> int:
         """Return the row of the case's own heading, or of the nearest."""
@@ -126,18 +167,6 @@ class Operability:
             return "the loop is unstable with this rope, at least in small motion"
         over = at.max_sensitivity > bound * (1.0 + 1e-3)
         return f"M_s {at.max_sensitivity:.3g}, {'above' if over else 'within'} its limit {bound:g}"
-
-    def rules(self) -> list[tuple[Rule, float, float]]:
-        """Return the operations of the thesis's Table 2, with the shares safe and marginal.
-
-        Raises
-        ------
-        InputError
-            If there is no scatter diagram.
-        """
-        if self.scatter is None:
-            raise InputError("operability: the shares of the rules need a scatter diagram")
-        return rule_shares(self.scatter)
 
     def verify(self, count: int = _CHECKS) -> tuple[ContourCheck, ...]:
         """Evaluate the design at points of its contour once more, by single evaluations.
@@ -160,35 +189,49 @@ class Operability:
         return tuple(found)
 
     def to_csv(self) -> str:
-        """Return the contours as a table, a line for each sea: what binds and every limit."""
-        return table_text(self.depths)
+        """Return the contours as CSV: a line for each length of rope, system, heading and period.
+
+        It has the limiting H_s, what binds, and the limiting H_s by every limit.
+        """
+        names = _names(self.depths)
+        out = io.StringIO()
+        writer = csv.writer(out, lineterminator="\n")
+        head = "rope_length_m drum_layer system heading_deg peak_period_s height_m binding"
+        writer.writerow([*head.split(), *(f"{name}_height_m" for name in names)])
+        headings = [""]
+        if self.headings is not None:
+            headings = [f"{degrees:.6g}" for degrees in np.degrees(self.headings)]
+        for at in self.depths:
+            for system, contour in at.contours.items():
+                every = _by_limit(contour, names)
+                for h, heading in enumerate(headings):
+                    for p, period in enumerate(contour.periods):
+                        row = [f"{at.rope.length:g}", at.rope.layer or "", system, heading]
+                        row += [f"{period:.6g}", _figure(contour.limit[h, p])]
+                        row += [str(contour.binding[h, p])]
+                        writer.writerow([*row, *(_figure(v) for v in every[:, h, p])])
+        return out.getvalue()
 
     def __str__(self) -> str:
         """Return a small tree."""
-        what = "the drum held" if self.design is None else type(self.design).__name__
+        what = "with the drum held" if self.design is None else "with a design"
         lines = [f"Operability of {self.case.name}, {what}: {self.status}"]
         if self.headings is None:
-            lines.append("├ no headings: the vessel is given by the heave of its hook alone")
+            lines.append("no headings: the vessel is given by the heave of its hook alone")
         for at in self.depths:
-            lines.append(f"├ rope {at.rope}")
-            inner = [f"{STAGES[n]}: {_range_text(c)}" for n, c in at.contours.items()]
+            lines.append(f"rope {at.rope}")
+            lines += [f"  {STAGES[n]}: {_range_text(c)}" for n, c in at.contours.items()]
             if self.design is not None:
-                inner.append(self.margin_text(at))
+                lines.append(f"  {self.margin_text(at)}")
             for name, share in at.workable.items():
                 turned = (
                     f", {100.0 * share.best_heading:.1f} % in the best heading"
                     if share.best_heading is not None
                     else ""
                 )
-                inner.append(f"workable {STAGES[name]}: {100.0 * share.share:.1f} %{turned}")
-            last = at is self.depths[-1]
-            if last:
-                lines[-1] = "└" + lines[-1][1:]
-            bar = " " if last else "│"
-            lines += [
-                f"{bar} {'└' if k == len(inner) - 1 else '├'} {t}" for k, t in enumerate(inner)
-            ]
-        return "\n".join(lines)
+                lines.append(f"  workable {STAGES[name]}: {100.0 * share.share:.1f} %{turned}")
+        marks = ["", *["├ "] * (len(lines) - 2), "└ "]
+        return "\n".join(mark + line for mark, line in zip(marks, lines, strict=True))
 
     def _own_limit(self, contour: Contour) -> float:
         """Return the limit in the case's own sea and heading [m]; NaN off the contour."""
@@ -217,79 +260,6 @@ def _range_text(contour: Contour) -> str:
     return f"H_s {finite.min():.3g} m to {high}, set by {by}"
 
 
-def dataset_of(case: Case, depths: Sequence[AtDepth], status: str) -> xr.Dataset:
-    """Return the contours of a case, at each length of rope asked for, as a Dataset.
-
-    Dimensions are ``rope_length`` (where lengths were asked for), ``limit``, ``heading`` (where the
-    vessel has headings) and ``peak_period``.  A limit that a system does not have is NaN; one that
-    is kept up to the highest H_s looked at is infinite.
-    """
-    import xarray as xr
-
-    names, main = _names(depths), depths[0].main
-    ropes = [
-        {
-            name: ((), getattr(at.rope, field), {"units": unit, "long_name": text})
-            for name, field, unit, text in _ROPE
-        }
-        for at in depths
-    ]
-    parts = [
-        xr.Dataset(_variables(at, names), coords=rope)
-        for at, rope in zip(depths, ropes, strict=True)
-    ]
-    found = parts[0]
-    if len(parts) > 1:
-        own = [name for name, *_ in _ROPE if name != "rope_length"]
-        found = xr.concat(parts, "rope_length", data_vars="all", coords=own, join="exact")
-    first = {c.name: c for n in depths[0].contours.values() for c in n.criteria}
-    coordinates: dict[str, Any] = {
-        "limit": ("limit", names, {"long_name": "limit"}),
-        "bound": ("limit", [first[n].bound for n in names], {"long_name": "bound, in `unit`"}),
-        "unit": ("limit", [first[n].unit for n in names], {"long_name": "unit of the bound"}),
-    }
-    about = {"units": "s", "long_name": "peak period T_p"}
-    coordinates["peak_period"] = ("peak_period", main.periods, about)
-    if main.headings is not None:
-        about = {
-            "units": "degree",
-            "long_name": "heading: where the waves travel to, counter-clockwise from the bow",
-        }
-        coordinates["heading"] = ("heading", np.degrees(main.headings), about)
-    attributes = {
-        "title": f"Operability of {case.name}",
-        "case": case.to_yaml(),
-        "sea": case.sea.spectrum,
-        "exposure_time": case.limits.exposure_time,
-        "highest_height": main.highest,
-        "status": status,
-    }
-    if main.headings is None:
-        attributes["headings"] = "none: the vessel is given by the heave of its hook alone"
-    return found.assign_coords(coordinates).assign_attrs(attributes)
-
-
-def table_text(depths: Sequence[AtDepth]) -> str:
-    """Return contours as CSV: a line for each length of rope, system, heading and period."""
-    names = _names(depths)
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    head = "rope_length_m drum_layer system heading_deg peak_period_s height_m binding"
-    writer.writerow([*head.split(), *(f"{name}_height_m" for name in names)])
-    for at in depths:
-        for system, contour in at.contours.items():
-            every = _by_limit(contour, names)
-            headings = np.degrees([] if contour.headings is None else contour.headings)
-            for h in range(contour.limit.shape[0]):
-                heading = f"{headings[h]:.6g}" if headings.size else ""
-                for p, period in enumerate(contour.periods):
-                    row = [f"{at.rope.length:g}", at.rope.layer or "", system, heading]
-                    row += [f"{period:.6g}", _figure(contour.limit[h, p])]
-                    row += [str(contour.binding[h, p])]
-                    writer.writerow([*row, *(_figure(v) for v in every[:, h, p])])
-    return out.getvalue()
-
-
 def _figure(value: float) -> str:
     return "" if np.isnan(value) else f"{value:.6g}"
 
@@ -307,6 +277,11 @@ def _names(depths: Sequence[AtDepth]) -> list[str]:
     return list(dict.fromkeys(found))
 
 
+def _suffix(system: str) -> str:
+    """Return what stands behind the names of a system's variables; nothing for the design's."""
+    return "" if system == "loop" else f"_{system}"
+
+
 def _variables(at: AtDepth, names: list[str]) -> dict[str, Any]:
     """Return the contours and the workable shares with one length of rope as variables."""
     found: dict[str, Any] = {}
@@ -317,7 +292,7 @@ def _variables(at: AtDepth, names: list[str]) -> dict[str, Any]:
     turns = at.main.headings is not None
     plane = (*(("heading",) if turns else ()), "peak_period")
     for system in (name for name in STAGES if name in at.contours):
-        contour, end, words = at.contours[system], _SUFFIX[system], STAGES[system]
+        contour, end, words = at.contours[system], _suffix(system), STAGES[system]
         text = f"limiting significant wave height {words}"
 
         def over(values: Any) -> Any:
@@ -334,7 +309,7 @@ def _variables(at: AtDepth, names: list[str]) -> dict[str, Any]:
         text = "sensitivity peak M_s of the design's loop"
         put("max_sensitivity", (), at.max_sensitivity, "1", text)
     for system in (name for name in STAGES if name in at.workable):
-        share, end = at.workable[system], _SUFFIX[system]
+        share, end = at.workable[system], _suffix(system)
         text = f"share of the time workable {STAGES[system]}"
         put(f"workable{end}", (), share.share, "1", text)
         if share.best_heading is not None:

@@ -23,7 +23,6 @@ import numpy as np
 from scipy.special import ndtr
 
 from models.basics import (
-    FloatArray,
     InputError,
     SolverError,
     check_ascending,
@@ -47,9 +46,6 @@ from .limiting import HIGHEST, SeaStates, limiting_heights
 from .pose import OperabilityQuestion, pose_operability
 from .result import Operability
 from .workable import workable
-
-EXAMPLE = "example"
-"""The name by which the command line knows the diagram."""
 
 _SCALES = (3.0, 2.8, 2.5, 2.0, 1.6, 1.4, 1.3, 1.4, 1.8, 2.3, 2.6, 2.9)  # of H_s by month [m]
 _DAYS = (31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
@@ -179,9 +175,7 @@ def operability(
             for name, system in stage.systems.items()
         }
         if reoptimise and not isinstance(design, Case):
-            contours["reoptimised"] = reoptimised_contour(
-                design, stage, seas, highest=highest, seed=seed, step=step
-            )
+            contours["reoptimised"] = _reoptimised(design, stage, seas, highest, seed, step)
         found.append(_at_depth(stage, contours, seas, diagram))
     return Operability(
         case=case,
@@ -192,21 +186,10 @@ def operability(
     )
 
 
-def default_periods(scatter: Scatter | None = None) -> FloatArray:
-    """Return the peak periods of a contour where none are asked for [s]: whole seconds."""
-    if scatter is None:
-        return np.linspace(*_PERIODS[:2], int(_PERIODS[2]))
-    low = np.floor(float(scatter.peak_period.min()))
-    high = np.ceil(float(scatter.peak_period.max()))
-    if low == high:
-        return np.array([max(low, 1.0)])
-    return np.linspace(max(low, 1.0), high, int(min(high - max(low, 1.0), 40.0)) + 1)
-
-
 def _diagram(given: Scatter | str | Path | None) -> Scatter | None:
     if given is None or isinstance(given, Scatter):
         return given
-    return example_scatter() if str(given) == EXAMPLE else read_scatter(given)
+    return example_scatter() if str(given) == "example" else read_scatter(given)
 
 
 def _headings(case: Case, given: Sequence[float] | None) -> Sequence[float] | None:
@@ -221,7 +204,14 @@ def _periods(
     if given is None:
         if not has_period(case):
             return [None]
-        return [float(t) for t in default_periods(scatter)]
+        if scatter is None:
+            return list(map(float, np.linspace(*_PERIODS[:2], int(_PERIODS[2]))))
+        # Whole seconds about those of the diagram.
+        low = max(np.floor(float(scatter.peak_period.min())), 1.0)
+        high = np.ceil(float(scatter.peak_period.max()))
+        if low >= high:
+            return [low]
+        return list(map(float, np.linspace(low, high, int(min(high - low, 40.0)) + 1)))
     return _axis("periods", given, _MOST_PERIODS, "s", 60.0, open_low=True)
 
 
@@ -295,59 +285,34 @@ def example_scatter() -> Scatter:
     joint environmental model of DNV-RP-C205 (3.6.3), with round numbers that make a northern
     open-sea site with rough winters.  Real work needs the diagram of the real site.
     """
-    heights, periods, shares, months = [], [], [], []
-    centres = 0.5 * (_CLASS_HEIGHTS[:-1] + _CLASS_HEIGHTS[1:])
-    for month, (scale, days) in enumerate(zip(_SCALES, _DAYS, strict=True), start=1):
-        below = 1.0 - np.exp(-((_CLASS_HEIGHTS / scale) ** _WEIBULL_SHAPE))
-        for height, share in zip(centres, np.diff(below), strict=True):
-            # Mean of the logarithm of T_p, and its spread, which narrows as the sea grows.
-            mean = math.log(6.0 + 1.3 * float(height) ** 0.8)
-            spread = 0.12 + 0.14 * math.exp(-0.35 * float(height))
-            within = np.diff(ndtr((np.log(_CLASS_PERIODS) - mean) / spread))
-            for period, part in zip(
-                0.5 * (_CLASS_PERIODS[:-1] + _CLASS_PERIODS[1:]), within, strict=True
-            ):
-                if share * part > _LEAST_SHARE:
-                    heights.append(float(height))
-                    periods.append(float(period))
-                    shares.append(float(share * part * days))
-                    months.append(month)
+    heights = 0.5 * (_CLASS_HEIGHTS[:-1] + _CLASS_HEIGHTS[1:])
+    periods = 0.5 * (_CLASS_PERIODS[:-1] + _CLASS_PERIODS[1:])
+    scales = np.array(_SCALES)[:, None]
+    by_height = np.diff(1.0 - np.exp(-((_CLASS_HEIGHTS / scales) ** _WEIBULL_SHAPE)))  # (12, h)
+    # Mean of the logarithm of T_p, and its spread, which narrows as the sea grows.
+    mean = np.log(6.0 + 1.3 * heights**0.8)[:, None]
+    spread = 0.12 + 0.14 * np.exp(-0.35 * heights)[:, None]
+    by_period = np.diff(ndtr((np.log(_CLASS_PERIODS) - mean) / spread))  # (h, p)
+    shares = by_height[:, :, None] * by_period
+    month, height, period = np.nonzero(shares > _LEAST_SHARE)
     return Scatter(
-        significant_height=np.array(heights),
-        peak_period=np.array(periods),
-        occurrence=np.array(shares),
-        month=np.array(months),
+        significant_height=heights[height],
+        peak_period=periods[period],
+        occurrence=shares[month, height, period] * np.array(_DAYS)[month],
+        month=month + 1,
         source="made-up example site",
     )
 
 
-@one_thread()
-def reoptimised_contour(
+def _reoptimised(
     design: Design,
     question: OperabilityQuestion,
     columns: Sequence[SeaColumn],
-    *,
-    highest: float = HIGHEST,
-    seed: int = 0,
-    step: Callable[[], None] = lambda: None,
+    highest: float,
+    seed: int,
+    step: Callable[[], None],
 ) -> Contour:
-    """Return the contour of gains that are optimised for each sea.
-
-    Parameters
-    ----------
-    design
-        Where the searches start from, and the rope masses.
-    question
-        What is asked of the design: its loop and criteria.
-    columns
-        The seas.
-    highest
-        Highest H_s that is looked at [m].
-    seed
-        Of the searches.
-    step
-        Called after each sea.
-    """
+    """Return the contour of gains that are optimised for each sea, beginning at the design's."""
     assert question.loop is not None
     criteria = question.criteria["loop"]
     drive = tuple(limit for limit in criteria if limit.outputs)

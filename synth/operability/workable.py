@@ -30,33 +30,16 @@ HIGHEST_TENTH = 1.27
 _MOST_CLASSES = 80  # of H_s: more are measured heights
 
 
-@dataclass(frozen=True, kw_only=True)
-class Rule:
-    """One operation of the table.
-
-    Attributes
-    ----------
-    operation
-        What is done.
-    safe, marginal
-        Wave heights up to which it is safe, and up to which it is marginal [m].
-    """
-
-    operation: str
-    safe: float
-    marginal: float
-
-
-RULES = (
-    Rule(operation="crew boat 20-30 m, crew transfer at a platform", safe=0.9, marginal=1.5),
-    Rule(operation="supervisor's boat 10-16 m, personnel transfer", safe=0.6, marginal=1.2),
-    Rule(operation="cargo vessel at a platform", safe=0.9, marginal=1.2),
-    Rule(operation="cargo vessel at floating equipment", safe=1.2, marginal=1.5),
-    Rule(operation="buoy laying, small derrick barge", safe=0.6, marginal=0.9),
-    Rule(operation="platform building, ship-mounted derrick", safe=1.2, marginal=1.8),
-    Rule(operation="platform building, large derrick barge", safe=0.9, marginal=1.5),
-)
-"""The operations of the table."""
+RULES: Mapping[str, tuple[float, float]] = {
+    "crew boat 20-30 m, crew transfer at a platform": (0.9, 1.5),
+    "supervisor's boat 10-16 m, personnel transfer": (0.6, 1.2),
+    "cargo vessel at a platform": (0.9, 1.2),
+    "cargo vessel at floating equipment": (1.2, 1.5),
+    "buoy laying, small derrick barge": (0.6, 0.9),
+    "platform building, ship-mounted derrick": (1.2, 1.8),
+    "platform building, large derrick barge": (0.9, 1.5),
+}
+"""Wave heights [m] up to which an operation of the table is safe, and up to which marginal."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -149,7 +132,7 @@ def _relative(contour: Contour, scatter: Scatter, turned: float | None) -> Float
     return np.full(scatter.peak_period.size, turned or 0.0)
 
 
-def rule_shares(scatter: Scatter) -> list[tuple[Rule, float, float]]:
+def rule_shares(scatter: Scatter) -> list[tuple[str, float, float]]:
     """Return the operations of the thesis's Table 2 with the shares safe, and safe or marginal."""
     height, width = scatter.significant_height, class_width(scatter)
 
@@ -157,7 +140,7 @@ def rule_shares(scatter: Scatter) -> list[tuple[Rule, float, float]]:
         limit = highest_tenth / HIGHEST_TENTH
         return float(scatter.occurrence @ _part_below(height, width, np.full(height.size, limit)))
 
-    return [(r, share(r.safe), share(r.marginal)) for r in RULES]
+    return [(name, share(safe), share(marginal)) for name, (safe, marginal) in RULES.items()]
 
 
 def class_width(scatter: Scatter) -> float:

@@ -183,17 +183,17 @@ def test_the_rules_of_thumb_are_the_thesiss_table() -> None:
         pytest.skip("the thesis's tables are not here")
     with open(table, encoding="utf-8") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    for rule, row in zip(RULES, rows, strict=True):
-        assert rule.safe == float(row["safe_max_m"]) == float(row["marginal_min_m"])
-        assert rule.marginal == float(row["marginal_max_m"]) == float(row["dangerous_above_m"])
+    for (safe, marginal), row in zip(RULES.values(), rows, strict=True):
+        assert safe == float(row["safe_max_m"]) == float(row["marginal_min_m"])
+        assert marginal == float(row["marginal_max_m"]) == float(row["dangerous_above_m"])
 
 
 def test_shares_of_the_rules_are_those_of_the_distribution() -> None:
     # The example's H_s is Weibull in each month: the exact share below a height is known.
     scales = (3.0, 2.8, 2.5, 2.0, 1.6, 1.4, 1.3, 1.4, 1.8, 2.3, 2.6, 2.9)
     days = (31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
-    for rule, safe, marginal in rule_shares(example_scatter()):
-        for limit, share in ((rule.safe / 1.27, safe), (rule.marginal / 1.27, marginal)):
+    for name, *shares in rule_shares(example_scatter()):
+        for limit, share in zip(np.array(RULES[name]) / 1.27, shares, strict=True):
             exact = sum(
                 d / 365.0 * (1.0 - math.exp(-((limit / s) ** 1.5)))
                 for d, s in zip(days, scales, strict=True)
