@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .scatter_files import read_scatter, write_scatter
     from .sea import SeaSpectrum
     from .sea_section import Sea
+    from .shapes import breaking_steepness
     from .spreading import Spreading
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

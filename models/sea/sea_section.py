@@ -26,7 +26,7 @@ from pydantic import (
 from ..basics import GRAVITY, InputError, file_stamp, range_text
 from ..casefile import DataFile, Quantity, Section, problems
 from .sea import FIELDS, SeaSpectrum, takes
-from .shapes import fully_arisen, gaussian_widths, jonswap_gamma
+from .shapes import breaking_steepness, fully_arisen, gaussian_widths, jonswap_gamma
 from .spreading import Spreading
 from .table import SpectrumTable, row_faults
 
@@ -169,12 +169,8 @@ class SeaSection(Section):
 
     @property
     def breaking_steepness(self) -> float:
-        """Significant steepness above which seas are not observed [-] (DNV-RP-C205).
-
-        1/15 for peak periods up to 8 s, 1/25 from 15 s, linear in between.
-        """
-        share = min(max((self.spectral_peak_period - 8.0) / 7.0, 0.0), 1.0)
-        return 1.0 / 15.0 + share * (1.0 / 25.0 - 1.0 / 15.0)
+        """Significant steepness above which seas are not observed [-]."""
+        return float(breaking_steepness(self.spectral_peak_period))
 
     def to_spectrum(self) -> SeaSpectrum:
         """Return the spectrum.

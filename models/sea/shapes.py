@@ -59,6 +59,19 @@ def jonswap_gamma(peak_period: float, significant_height: float) -> float:
     return math.exp(5.75 - 1.15 * ratio) if ratio < 5.0 else 1.0
 
 
+def breaking_steepness(peak_period: float | FloatArray) -> FloatArray:
+    """Return the significant steepness above which seas are not observed [-].
+
+    1/15 for peak periods up to 8 s, 1/25 from 15 s, linear in between (DNV-RP-C205, 3.5.4).
+
+    Parameters
+    ----------
+    peak_period
+        T_p, any shape [s].
+    """
+    return np.asarray(np.interp(peak_period, (8.0, 15.0), (1.0 / 15.0, 1.0 / 25.0)))
+
+
 def fully_developed_period(significant_height: float) -> float:
     r"""Return the peak period of a fully developed sea, by Pierson and Moskowitz [s].
 

@@ -135,8 +135,7 @@ def _by_heading(survey: HookSurvey) -> Figure:
     figure = new_figure(width=7.6, height=7.4)
     grid = figure.add_gridspec(2, 2, height_ratios=(1.1, 1.0))
     rose = cast("PolarAxes", figure.add_subplot(grid[0, :], projection="polar"))
-    # Bow up and waves drawn where they come from, as seen from the bridge.
-    rose.set_theta_zero_location("N")
+    bow_up(rose)
     order = np.argsort(survey.headings)
     angle = survey.headings[order] - math.pi
     whole = goes_round(survey.headings)
@@ -151,10 +150,6 @@ def _by_heading(survey: HookSurvey) -> Figure:
         rose.plot(
             [own - math.pi], [survey.own.velocity.rms], "o", color=_SIDES[0], label="this case"
         )
-    rose.set_thetagrids(
-        range(0, 360, 45),
-        ["head", "", "from\nport", "", "following", "", "from\nstarboard", ""],
-    )
     rose.tick_params(axis="x", pad=16.0)
     rose.tick_params(axis="y", labelsize=8.0, labelcolor="#666666")
     rose.set_rlabel_position(22.5)
@@ -214,6 +209,13 @@ def _map(axis: Axes, survey: HookSurvey, side: int, top: float) -> QuadContourSe
 def _where(side: str) -> str:
     """Return the hook's side in words."""
     return f"hook on the {side}" if side == "centre line" else f"hook to {side}"
+
+
+def bow_up(rose: PolarAxes) -> None:
+    """Set polar axes over where the waves come from, as seen from the bridge, the bow up."""
+    rose.set_theta_zero_location("N")
+    names = ("head 180", "225", "from\nport\n270", "315", "following 0", "45")
+    rose.set_thetagrids(range(0, 360, 45), [*names, "from\nstarboard\n90", "135"])
 
 
 def goes_round(headings: FloatArray) -> bool:

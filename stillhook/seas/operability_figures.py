@@ -10,9 +10,9 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from models.basics import GRAVITY, FloatArray
+from models.sea import breaking_steepness
 from synth.limits import Limit
 from synth.operability import AtDepth, Operability
 
@@ -31,7 +31,7 @@ from ..text import (
     panel,
     quantity,
 )
-from .hook import goes_round
+from .hook import bow_up, goes_round
 
 # Colour and dashes of each limit: the same in every figure.
 _LINES: dict[str, tuple[str, Any]] = {
@@ -85,10 +85,8 @@ def pale(name: str) -> tuple[float, float, float]:
 
 
 def steepest(periods: FloatArray) -> FloatArray:
-    """Return the H_s above which seas of a period are not observed [m] (DNV-RP-C205, 3.5.4)."""
-    share = np.clip((periods - 8.0) / 7.0, 0.0, 1.0)
-    slope = 1.0 / 15.0 + share * (1.0 / 25.0 - 1.0 / 15.0)
-    return np.asarray(slope * GRAVITY * periods**2 / (2.0 * math.pi))
+    """Return the H_s above which seas of a peak period are not observed [m]."""
+    return np.asarray(breaking_steepness(periods) * GRAVITY * periods**2 / (2.0 * math.pi))
 
 
 def top_of(
@@ -298,18 +296,18 @@ def heading_figure(study: Operability) -> Figure:
     """
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.patches import Patch
+    from matplotlib.ticker import MaxNLocator
 
     contour = study.depths[0].main
     assert contour.headings is not None
     # Where the waves come from, seen from the deck: head seas at the top.
-    edges, rows = _around(contour.headings)
-    rings = _edges(contour.periods)
+    edges, rings = _around(contour.headings), _edges(contour.periods, 0.5)
     figure = new_figure(9.6, 5.6)
     left = figure.add_subplot(1, 2, 1, projection="polar")
     right = figure.add_subplot(1, 2, 2, projection="polar")
     # Above the steepest seas of a period there is nothing to be limited.
-    limit = np.minimum(contour.limit[rows], steepest(contour.periods))
-    levels = _levels(float(limit.max()))
+    limit = np.minimum(contour.limit, steepest(contour.periods))
+    levels = MaxNLocator(10, steps=[1, 2, 5, 10]).tick_values(0.0, max(float(limit.max()), 0.1))
     bands = BoundaryNorm(levels, 256, extend="neither")
     mesh = left.pcolormesh(edges, rings, limit.T, cmap="viridis", norm=bands)
     bar = figure.colorbar(mesh, ax=left, shrink=0.8, pad=0.08, location="bottom")
@@ -317,7 +315,7 @@ def heading_figure(study: Operability) -> Figure:
     real = contour.limit < steepest(contour.periods)
     binding = np.where(real, contour.binding, "")
     names = [str(n) for n in np.unique(binding)]
-    number = np.searchsorted(names, binding[rows])
+    number = np.searchsorted(names, binding)
     colours = [pale(name) for name in names]
     right.pcolormesh(
         edges, rings, number.T, cmap=ListedColormap(colours), vmin=-0.5, vmax=len(names) - 0.5
@@ -412,55 +410,30 @@ def _months(axes: Axes, at: AtDepth) -> None:
     axes.grid(axis="x", visible=False)
 
 
-def _around(headings: FloatArray) -> tuple[FloatArray, npt.NDArray[np.intp]]:
-    """Return the edges of sectors [rad], waves coming from there, and the rows in their order."""
-    rows = np.arange(headings.size)
-    if headings.size == 1:
-        half = math.radians(15.0)
-        return np.array([headings[0] - half, headings[0] + half]) + math.pi, rows
-    middle = 0.5 * (headings[:-1] + headings[1:])
+def _around(headings: FloatArray) -> FloatArray:
+    """Return the edges of sectors [rad], waves coming from there."""
+    edges = _edges(headings, math.radians(15.0))
     if goes_round(headings):
         seam = 0.5 * (headings[-1] + headings[0] + 2.0 * math.pi)
-        return np.concatenate([[seam - 2.0 * math.pi], middle, [seam]]) + math.pi, rows
-    first = headings[0] - 0.5 * (headings[1] - headings[0])
-    last = headings[-1] + 0.5 * (headings[-1] - headings[-2])
-    return np.concatenate([[first], middle, [last]]) + math.pi, rows
+        edges[[0, -1]] = seam - 2.0 * math.pi, seam
+    return edges + math.pi
 
 
-def _edges(periods: FloatArray) -> FloatArray:
-    if periods.size == 1:
-        return np.array([periods[0] - 0.5, periods[0] + 0.5])
-    middle = 0.5 * (periods[:-1] + periods[1:])
-    first, last = 1.5 * periods[0] - 0.5 * periods[1], 1.5 * periods[-1] - 0.5 * periods[-2]
+def _edges(centres: FloatArray, half: float) -> FloatArray:
+    """Return the edges of cells about ascending centres; `half` is half the width of one alone."""
+    if centres.size == 1:
+        return np.array([centres[0] - half, centres[0] + half])
+    middle = 0.5 * (centres[:-1] + centres[1:])
+    first, last = 1.5 * centres[0] - 0.5 * centres[1], 1.5 * centres[-1] - 0.5 * centres[-2]
     return np.concatenate([[first], middle, [last]])
 
 
-def _levels(high: float) -> FloatArray:
-    """Return round bounds of bands of H_s from zero to above a value, five to ten."""
-    steps = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-    step = next((s for s in steps if high / s <= 10.0), steps[-1])
-    return np.asarray(step * np.arange(max(math.ceil(high / step - 1e-9), 1) + 1.0))
-
-
 def _rose(axes: Any, periods: FloatArray) -> None:
-    """Set a polar axis: bow up, angles counter-clockwise, radius the peak period."""
-    axes.set_theta_zero_location("N")
-    axes.set_theta_direction(1)
-    turns = np.radians(np.arange(0.0, 360.0, 45.0))
-    names = {
-        180.0: "head 180",
-        0.0: "following 0",
-        90.0: "from\nstarboard 90",
-        270.0: "from\nport 270",
-    }
-    labels = []
-    for turn in turns:
-        heading = (math.degrees(turn) + 180.0) % 360.0
-        labels.append(names.get(round(heading, 6), f"{heading:.0f}"))
-    axes.set_xticks(turns, labels, fontsize=8.0)
-    axes.set_ylim(0.0, _edges(periods)[-1])
+    """Set a polar axis: bow up, radius the peak period."""
+    bow_up(axes)
+    axes.set_ylim(0.0, _edges(periods, 0.5)[-1])
     rings = [t for t in (5.0, 10.0, 15.0, 20.0) if t < periods[-1]]
     axes.set_yticks(rings, [f"{t:g} s" for t in rings], fontsize=7.5, color="white")
     axes.set_axisbelow(False)
     axes.grid(color="white", linewidth=0.5, alpha=0.7)
-    axes.tick_params(axis="x", pad=9.0)
+    axes.tick_params(axis="x", pad=9.0, labelsize=8.0)
