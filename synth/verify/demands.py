@@ -159,7 +159,7 @@ class Demand:
             return math.hypot(self.static, sizes[0])
         peaks = [
             size * peak_factor(zero_crossing_period(*moments[name]), self.duration)
-            if math.isfinite(size)
+            if all(map(math.isfinite, moments[name]))
             else math.inf
             for size, name in zip(sizes, self.outputs, strict=True)
         ]

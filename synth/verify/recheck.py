@@ -13,7 +13,7 @@ import numpy.typing as npt
 from models.basics import ComplexArray, SolverError, StillhookError
 from models.plant import LinearPlant, PlantResponse
 
-from .claims import ControllerMatrices, LimitClaim, SpectralSource
+from .claims import ControllerMatrices, LoopClaims, SpectralSource
 from .demands import Demand
 from .nyquist import CurveMargins, curve_margins
 from .recompute import LawMatrices, Loop, closed_matrices, moments
@@ -113,9 +113,21 @@ def closed_loop_marks(plant: LinearPlant, law: LawMatrices) -> ComplexArray:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CheckedLoop(Loop):
-    """A loop put together again, and what shakes it, the `sources`."""
+    """A loop put together again, what shakes it, and what is asked of it.
+
+    Attributes
+    ----------
+    sources
+        What shakes it.
+    demands
+        What is demanded of it, by name.
+    own
+        Outputs whose variances are wanted besides.
+    """
 
     sources: Sequence[SpectralSource]
+    demands: Mapping[str, Demand]
+    own: Iterable[str]
 
     @classmethod
     def of(
@@ -123,12 +135,22 @@ class CheckedLoop(Loop):
         plant: LinearPlant,
         controller: ControllerMatrices,
         sources: Sequence[SpectralSource],
+        demands: Mapping[str, Demand],
+        own: Iterable[str],
         exact: Callable[[ComplexArray], PlantResponse] | None = None,
     ) -> CheckedLoop:
         """Return the loop of a controller around a plant."""
         law = LawMatrices.of(controller, plant)
         marks = closed_loop_marks(plant, law)
-        return cls(plant=plant, law=law, marks=marks, exact=exact, sources=sources)
+        return cls(
+            plant=plant,
+            law=law,
+            marks=marks,
+            exact=exact,
+            sources=sources,
+            demands=demands,
+            own=own,
+        )
 
     @cached_property
     def region(self) -> tuple[ComplexArray, ComplexArray]:
@@ -146,112 +168,84 @@ class CheckedLoop(Loop):
         pieces = (curve_margins(self.broken(i), self.marks) for i in range(count))
         return reduce(CurveMargins.worse, pieces)
 
-    def moments(
-        self, outputs: Sequence[str], orders: tuple[int, ...] = (0, 2)
-    ) -> dict[str, tuple[float, ...]]:
-        """Return spectral moments of outputs, by name."""
-        delay = max(self.plant.delays, default=0.0)
-        if all(source.band is not None for source in self.sources):
-            return moments(self, outputs, self.sources, orders=orders, delay=delay)
-        found: dict[str, tuple[float, ...]] = {}
-        for name in outputs:  # to infinity, where one output may have no variance
-            try:
-                found |= moments(self, [name], self.sources, orders=orders, delay=delay)
-            except SolverError:
-                found[name] = (math.inf,) * len(orders)
-        return found
+    @cached_property
+    def moments(self) -> dict[str, tuple[float, ...]]:
+        """Spectral moments of all that is asked for, by output; none of higher order than needed.
 
-    def demanded(
-        self, demands: Iterable[Demand], variances: Iterable[str] = ()
-    ) -> dict[str, tuple[float, ...]]:
-        """Return the moments that demands ask for, and variances of further outputs.
-
-        None is of higher order than is needed: it might be infinite.
+        Integrals to infinity may be infinite, each on its own.
         """
-        orders: dict[str, tuple[int, ...]] = dict.fromkeys(variances, (0,))
-        for demand in demands:
+        orders: dict[str, tuple[int, ...]] = dict.fromkeys(self.own, (0,))
+        for demand in self.demands.values():
             for name, own in demand.orders.items():
                 orders[name] = max(orders.get(name, ()), own, key=len)
+        if any(source.band is None for source in self.sources):
+            return {n: tuple(self._endless(n, order) for order in own) for n, own in orders.items()}
         found: dict[str, tuple[float, ...]] = {}
         for wanted in sorted(set(orders.values())):
-            found |= self.moments(sorted(n for n, o in orders.items() if o == wanted), wanted)
+            names = sorted(name for name, own in orders.items() if own == wanted)
+            found |= moments(self, names, self.sources, orders=wanted)
         return found
 
-    def measured(self, demand: Demand, moments: Mapping[str, tuple[float, ...]]) -> float:
-        """Return what the loop makes of a limit, its spectral moments given by output."""
-        return demand.measured(self, self.margins, self.region, moments)
+    def _endless(self, output: str, order: int) -> float:
+        delay = max(self.plant.delays, default=0.0)
+        try:
+            return moments(self, [output], self.sources, orders=(order,), delay=delay)[output][0]
+        except SolverError:
+            return math.inf
 
-    def limit_checks(
-        self,
-        demands: Mapping[str, Demand],
-        claims: Mapping[str, LimitClaim],
-        moments: Mapping[str, tuple[float, ...]],
-        *,
-        ok: bool,
-        by: str,
-        on: str,
-    ) -> list[Check]:
+    def rms(self, output: str) -> float:
+        """Return the standard deviation of an output."""
+        return math.sqrt(self.moments[output][0])
+
+    def measured(self, demand: Demand) -> float:
+        """Return what the loop makes of a demand."""
+        return demand.measured(self, self.margins, self.region, self.moments)
+
+    def margin_checks(self, claimed: object | None) -> list[Check]:
+        """Return the checks of a `synth.loop.margins.Margins` against those found root by root."""
+        if claimed is None:
+            return [failure("margins", "the loop is stable but no margins are claimed")]
+
+        def of(name: str) -> tuple[float, float]:
+            return float(getattr(claimed, name)), float(getattr(self.margins, name))
+
+        return [
+            agreement("margins.max_sensitivity", *of("max_sensitivity"), TIGHT),
+            inverse_agreement("margins.gain", *of("gain")),
+            agreement("margins.gain_down", *of("gain_down"), TIGHT, scale=1.0),
+            agreement("margins.phase", *of("phase"), TIGHT, "[rad]", scale=0.1),
+            agreement("margins.delay", *of("delay"), TIGHT, "[s]", scale=1e-3),
+            agreement("margins.disk", *of("disk"), TIGHT),
+        ]
+
+    def limit_checks(self, answer: LoopClaims, by: str, on: str) -> list[Check]:
         """Return a check of each limit that is stated, and of strangers.
 
-        Parameters
-        ----------
-        demands
-            What is stated, by name.
-        claims
-            What the answer says of it.
-        moments
-            What `demanded` makes of the demands.
-        ok
-            Whether the answer counts as good.
-        by, on
-            What the limits are stated by, and what the answer is called.
+        `by` is what states the limits, and `on` what the answer is called.
         """
-        checks = []
-        for name, demand in demands.items():
+        checks, claims = [], answer.limits
+        for name, demand in self.demands.items():
             use = claims.get(name)
             if use is None:
                 note = f"the {by} states it, the {on} does not"
                 checks.append(failure(f"limits.{name}", note))
                 continue
-            value = self.measured(demand, moments)
-            check = limit_check(demand, use.value, value)
+            value = self.measured(demand)
+            if demand.kind == "gain":
+                check = inverse_agreement(f"limits.{name}", use.value, value)
+            else:
+                check = agreement(f"limits.{name}", use.value, value, TIGHT)
             note = ""
             if not math.isclose(use.bound, demand.bound, rel_tol=1e-9):
                 note = f"the bound is {use.bound:.6g} but the {by} says {demand.bound:.6g}"
             elif use.enforced != demand.enforced:
                 note = f"the {by} says otherwise whether it is enforced"
-            elif ok and demand.enforced and not demand.kept(value, TIGHT):
+            elif answer.ok and demand.enforced and not demand.kept(value, TIGHT):
                 note = f"the {on} counts as good but breaks the bound {demand.bound:.6g}"
             checks.append(replace(check, ok=False, note=note) if note else check)
-        for name in sorted(set(claims) - set(demands)):
+        for name in sorted(set(claims) - set(self.demands)):
             checks.append(failure(f"limits.{name}", f"the {by} has no such limit"))
         return checks
-
-
-def margin_checks(claimed: object | None, found: CurveMargins) -> list[Check]:
-    """Return the checks of a `synth.loop.margins.Margins` against figures found by root finding."""
-    if claimed is None:
-        return [failure("margins", "the loop is stable but no margins are claimed")]
-
-    def of(name: str) -> tuple[float, float]:
-        return float(getattr(claimed, name)), float(getattr(found, name))
-
-    return [
-        agreement("margins.max_sensitivity", *of("max_sensitivity"), TIGHT),
-        inverse_agreement("margins.gain", *of("gain")),
-        agreement("margins.gain_down", *of("gain_down"), TIGHT, scale=1.0),
-        agreement("margins.phase", *of("phase"), TIGHT, "[rad]", scale=0.1),
-        agreement("margins.delay", *of("delay"), TIGHT, "[s]", scale=1e-3),
-        agreement("margins.disk", *of("disk"), TIGHT),
-    ]
-
-
-def limit_check(demand: Demand, claimed: float, found: float) -> Check:
-    """Return the check that two figures of a limit agree."""
-    name = f"limits.{demand.name}"
-    if demand.kind == "gain":
-        return inverse_agreement(name, claimed, found)
-    return agreement(name, claimed, found, TIGHT)
 
 
 def inverse_agreement(name: str, claimed: float, found: float) -> Check:

@@ -24,7 +24,6 @@ from .recheck import (
     TIGHT,
     CheckedLoop,
     looked_at,
-    margin_checks,
     pole_check,
     winding_check,
     winding_of_plant,
@@ -58,10 +57,10 @@ def verify_tuning(tuning: TuningClaims) -> Verification:
     steps = {
         "stability": loop.stability,
         "parameters": loop.parameters,
-        "margins": loop.margins,
+        "margins": lambda: loop.checked.margin_checks(tuning.margins),
         "cost": loop.cost,
         "coefficient": loop.drag,
-        "limits": loop.limits,
+        "limits": lambda: loop.checked.limit_checks(tuning, by="problem", on="answer"),
     }
     return looked_at(steps, ": stable with the exact delays")
 
@@ -92,7 +91,10 @@ class _TunedLoop:
 
     @cached_property
     def checked(self) -> CheckedLoop:
-        return CheckedLoop.of(self.plant, self.controller, self.tuning.problem.disturbances)
+        asked = self.tuning.problem
+        demands = {limit.name: limit_demand(limit) for limit in asked.limits}
+        own = [*asked.minimise, *([] if asked.drag is None else [asked.drag.velocity])]
+        return CheckedLoop.of(self.plant, self.controller, asked.disturbances, demands, own)
 
     @cached_property
     def intensities(self) -> dict[str, float] | None:
@@ -133,27 +135,17 @@ class _TunedLoop:
             )
         ]
 
-    def margins(self) -> list[Check]:
-        return margin_checks(self.tuning.margins, self.checked.margins)
-
     def cost(self) -> list[Check]:
         weights = self.tuning.problem.minimise
-        found = self.checked.moments(list(weights), (0,))
-        checks = [
-            agreement(
-                "cost",
-                self.tuning.cost,
-                _cost(weights, found),
-                _COST,
-                "by other quadrature, exact delays",
-            )
-        ]
+        found = _cost(weights, {name: self.checked.moments[name][0] for name in weights})
+        note = "by other quadrature, exact delays"
+        checks = [agreement("cost", self.tuning.cost, found, _COST, note)]
         if self.intensities is None:
             return checks
         late = any(self.plant.delays)
         rational = self.plant.without_delays(PADE, at="measurements")
         variances = lyapunov_variances(rational, self.checked.law, self.intensities)
-        by_time = _cost(weights, {name: (variances[name],) for name in weights})
+        by_time = _cost(weights, variances)
         note = "by a Lyapunov equation" + (" with Pade delays" if late else "")
         tolerance = _PADE_COST if late else _COST
         return [*checks, agreement("cost.time", self.tuning.cost, by_time, tolerance, note)]
@@ -164,19 +156,9 @@ class _TunedLoop:
             return []
         if claimed is None:
             return [failure("coefficient", "there is drag but no coefficient is claimed")]
-        sigma = math.sqrt(self.checked.moments([element.velocity], (0,))[element.velocity][0])
-        needed = element.quadratic * math.sqrt(8.0 / math.pi) * sigma
+        needed = element.quadratic * math.sqrt(8.0 / math.pi) * self.checked.rms(element.velocity)
         return [agreement("coefficient", claimed, needed, TIGHT, "q sqrt(8/pi) sigma")]
 
-    def limits(self) -> list[Check]:
-        stated = self.tuning.problem.limits
-        demands = {limit.name: limit_demand(limit) for limit in stated}
-        found = self.checked.demanded(demands.values())
-        own = {name: use for name, use in self.tuning.limits.items() if name in demands}
-        return self.checked.limit_checks(
-            demands, own, found, ok=self.tuning.ok, by="problem", on="answer"
-        )
 
-
-def _cost(weights: Mapping[str, float], found: Mapping[str, tuple[float, ...]]) -> float:
-    return math.sqrt(sum(weight * found[name][0] for name, weight in weights.items()))
+def _cost(weights: Mapping[str, float], variances: Mapping[str, float]) -> float:
+    return math.sqrt(sum(weight * variances[name] for name, weight in weights.items()))

@@ -37,7 +37,6 @@ from .recheck import (
     TIGHT,
     CheckedLoop,
     looked_at,
-    margin_checks,
     pade_order,
     pole_check,
     winding_check,
@@ -79,8 +78,8 @@ def verify_design(design: DesignClaims) -> Verification:
     steps = {
         "stability": winch.stability,
         "parameters": winch.parameters,
-        "margins": winch.margins,
-        "limits": winch.limits,
+        "margins": lambda: winch.coarse.margin_checks(design.margins),
+        "limits": lambda: winch.coarse.limit_checks(design, by="case", on="design"),
         "payload_rms": winch.spectral,
         "shares": winch.shares,
         "payload_rms.time": winch.time_domain,
@@ -153,22 +152,29 @@ class _Winch:
         return line.select(measurements=self.design.controller.measurements)
 
     @cached_property
+    def coarse_plant(self) -> LinearPlant:
+        """The design's plant."""
+        return self._plant(self.design.masses)
+
+    @cached_property
     def coarse(self) -> CheckedLoop:
         """The loop on the design's plant."""
-        plant = self._plant(self.design.masses)
-        return CheckedLoop.of(plant, self.design.controller, self.sources)
+        own = {PAYLOAD, VELOCITY, *self.design.shares}
+        controller = self.design.controller
+        return CheckedLoop.of(self.coarse_plant, controller, self.sources, self.demands, own)
 
     @cached_property
     def fine(self) -> CheckedLoop:
         """The loop on the distributed rope, or on the best there is in its place."""
         exact = self._line if self.distributed else None
         plant = self._plant(self.more_masses)
-        return CheckedLoop.of(plant, self.design.controller, self.sources, exact)
+        controller = self.design.controller
+        return CheckedLoop.of(plant, controller, self.sources, self.demands, [PAYLOAD], exact)
 
     @cached_property
     def demands(self) -> dict[str, Demand]:
         design = self.design
-        found = case_demands(design.case, self.data, self.coarse.plant, design.masses)
+        found = case_demands(design.case, self.data, self.coarse_plant, design.masses)
         # Who does not hear the payload cannot keep it from drifting with the ship.
         deaf = not any(name.startswith("payload.") for name in design.controller.measurements)
         return {
@@ -177,12 +183,6 @@ class _Winch:
             else demand
             for name, demand in found.items()
         }
-
-    @cached_property
-    def coarse_moments(self) -> dict[str, tuple[float, ...]]:
-        """Moments on the design's plant of everything that a claim is about."""
-        own = {PAYLOAD, VELOCITY, *self.design.shares}
-        return self.coarse.demanded(self.demands.values(), own)
 
     def stability(self) -> list[Check]:
         plant, law = self.fine.plant, self.fine.law
@@ -221,28 +221,12 @@ class _Winch:
         note = "largest entry of the feedback, and by how much it is another"
         return [agreement("parameters", size, size + apart, TIGHT, note)]
 
-    def margins(self) -> list[Check]:
-        return margin_checks(self.design.margins, self.coarse.margins)
-
-    def limits(self) -> list[Check]:
-        """Return a check of each limit that the case states, and of strangers."""
-        design = self.design
-        return self.coarse.limit_checks(
-            self.demands,
-            design.limits,
-            self.coarse_moments,
-            ok=design.ok,
-            by="case",
-            on="design",
-        )
-
     def spectral(self) -> list[Check]:
-        rms = math.sqrt(self.coarse_moments[PAYLOAD][0])
+        rms = self.coarse.rms(PAYLOAD)
         fixed = self.design.case.payload.fixed_drag
         drag, note = fixed, "[N s/m], given"
         if drag is None:
-            sigma = math.sqrt(self.coarse_moments[VELOCITY][0])
-            drag = self.data.quadratic_drag * math.sqrt(8.0 / math.pi) * sigma
+            drag = self.data.quadratic_drag * math.sqrt(8.0 / math.pi) * self.coarse.rms(VELOCITY)
             note = "[N s/m], q sqrt(8/pi) sigma of the payload's velocity"
         return [
             agreement("payload_rms", self.design.payload_rms, rms, _RMS, "[m] by other quadrature"),
@@ -254,7 +238,7 @@ class _Winch:
         checks = []
         for signal, parts in self.design.shares.items():
             claimed = math.sqrt(sum(rms**2 for rms in parts.values()))
-            found = math.sqrt(self.coarse_moments[signal][0])
+            found = self.coarse.rms(signal)
             note = f"root of the sum of squares of {', '.join(parts)}"
             checks.append(agreement(f"shares.{signal}", claimed, found, TIGHT, note))
         return checks
@@ -287,15 +271,14 @@ class _Winch:
         """Return the checks of rms and enforced limits on the rope as it is."""
         if self.data.lumping == "thesis":
             return []  # the one spring is all the rope there is
-        found = self.fine.demanded(self.demands.values(), [PAYLOAD])
         on, near = f"on {self.yardstick_name}", _ROPE if self.design.ok else _BROKEN_ROPE
-        rms = math.sqrt(found[PAYLOAD][0])
+        rms = self.fine.rms(PAYLOAD)
         checks = [agreement("payload_rms.rope", self.design.payload_rms, rms, near, f"[m] {on}")]
         for name, demand in self.demands.items():
             use = self.design.limits.get(name)
             if use is None or not demand.enforced:
                 continue
-            value = self.fine.measured(demand, found)
+            value = self.fine.measured(demand)
             # What the lumped rope keeps may not be broken here; what it breaks, not much more.
             bound = (min if demand.at_least else max)(demand.bound, use.value)
             checks.append(bounded(f"rope.{name}", bound, value, near, on, at_least=demand.at_least))
