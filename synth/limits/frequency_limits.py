@@ -35,17 +35,20 @@ class _AtEveryFrequency(Limit):
         """Return the weight at frequencies [rad/s]; where it is zero nothing is asked for."""
         return np.ones_like(omega)
 
+    def size(self, omega: FloatArray, value: Any) -> FloatArray:
+        """Return what is to be small at frequencies [rad/s], of 1 + L or of the response."""
+        return np.asarray(np.sqrt(self.squared_size(value)) * self.weights(omega))
+
+    @override
+    def measure(self, loop: Assessment) -> float:
+        return loop.largest(self.size, self.weights, self.edges, self.channel)
+
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
         # The logarithm keeps |L| of 1e6 at low frequency from dwarfing what matters.
         most, level = (1.0 / self.bound, bound) if self.at_least else (self.bound, 1.0 / bound)
-
-        def size(omega: FloatArray, value: Any) -> FloatArray:
-            sizes = np.sqrt(self.squared_size(value)) * self.weights(omega)
-            return np.asarray(sizes, dtype=np.float64)
-
         rows = []
-        for omega, value in symbols.curves(size, most / _FOLLOWED, self.channel):
+        for omega, value in symbols.curves(self.size, most / _FOLLOWED, self.channel):
             weights = self.weights(omega)
             at = np.flatnonzero(weights > 0.0)
             weighted = self.squared_size(value[..., at]) * weights[at] ** 2
@@ -117,10 +120,6 @@ class RollOff(_AtEveryFrequency):
     def squared_size(self, value: Any) -> Any:
         return squared(value - 1.0)
 
-    @override
-    def measure(self, loop: Assessment) -> float:
-        return loop.largest_loop_gain(self.above)
-
 
 @dataclass(frozen=True, kw_only=True)
 class _OfOneChannel(_AtEveryFrequency):
@@ -137,10 +136,6 @@ class _OfOneChannel(_AtEveryFrequency):
     @override
     def squared_size(self, value: Any) -> Any:
         return squared(value)
-
-    @override
-    def measure(self, loop: Assessment) -> float:
-        return loop.largest_response(self.output, self.disturbance, self.weights, self.edges)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -83,10 +83,10 @@ class Peak(_OfOneSignal):
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
-        return (abs(self.static) + symbols.peak(self.output, self.duration)) / bound - 1.0
+        return self.measure(symbols) / bound - 1.0
 
     @override
-    def measure(self, loop: Assessment) -> float:
+    def measure(self, loop: Assessment | Symbols) -> Any:
         return abs(self.static) + loop.peak(self.output, self.duration)
 
 
@@ -101,10 +101,10 @@ class Minimum(_OfOneSignal):
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
-        return (bound - self.static + symbols.peak(self.output, self.duration)) / abs(self.static)
+        return (bound - self.measure(symbols)) / abs(self.static)
 
     @override
-    def measure(self, loop: Assessment) -> float:
+    def measure(self, loop: Assessment | Symbols) -> Any:
         return self.static - loop.peak(self.output, self.duration)
 
     @override
@@ -137,10 +137,9 @@ class Power(Limit):
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
-        torque = abs(self.static) + symbols.peak(self.torque, self.duration)
-        return torque * symbols.peak(self.speed, self.duration) / bound - 1.0
+        return self.measure(symbols) / bound - 1.0
 
     @override
-    def measure(self, loop: Assessment) -> float:
+    def measure(self, loop: Assessment | Symbols) -> Any:
         torque = abs(self.static) + loop.peak(self.torque, self.duration)
         return torque * loop.peak(self.speed, self.duration)

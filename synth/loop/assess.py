@@ -188,35 +188,42 @@ class Assessment:
         found = [at[least < 1.0 / above] for (at, least), _ in self._minima]
         return np.unique(np.concatenate(found))
 
-    def largest_loop_gain(self, above: float) -> float:
-        """Return the largest |L| from frequency `above` [rad/s] on."""
-        grid = np.append(self.grid[self.grid > above], [above, 10.0 * self.grid[-1]])
-        return self._largest(lambda w: np.max(np.abs(self._gains(w)), 0), grid)
-
-    def largest_response(
+    def largest(
         self,
-        output: str,
-        disturbance: str,
+        size: Callable[[FloatArray, ComplexArray], FloatArray],
         weight: Callable[[FloatArray], FloatArray],
         edges: Sequence[float] = (),
+        channel: tuple[str, str] | None = None,
     ) -> float:
-        """Return the largest |response| times a weight on it.
+        """Return the largest size of 1 + L of any loop, or of a response.
 
         Parameters
         ----------
-        output, disturbance
-            The ends of the channel.
+        size
+            From frequencies [rad/s] and what the curve is there to its size, (k,) each.
         weight
-            From frequencies [rad/s] to the weight there, zero where it does not matter.
+            From frequencies [rad/s] to the weight there, zero where the size does not matter.
         edges
             Frequencies [rad/s] at which the weight has a kink or an end.
+        channel
+            Output and disturbance of the closed-loop response that is looked at, if one is.
         """
-        ends = [share * edge for edge in edges for share in (1e-4, 1.0)]
-        places = np.append(self.grid, ends)
-        return self._largest(
-            lambda w: np.abs(self.response(output, disturbance, w)) * weight(w),
-            places[weight(places) > 0.0],
-        )
+
+        def sizes(omega: FloatArray) -> FloatArray:
+            curves: Sequence[ComplexArray]
+            if channel is None:
+                curves = [np.asarray(1.0 + gain) for gain in self._gains(omega)]
+            else:
+                curves = [self.response(*channel, omega)]
+            return np.asarray(np.max([size(omega, curve) for curve in curves], axis=0))
+
+        places = np.append(self.grid, [share * edge for edge in edges for share in (1e-4, 1.0)])
+        grid = np.unique(places[weight(places) > 0.0])
+        if not grid.size:
+            return 0.0
+        found = sizes(grid)
+        high = found > _LOW * found.max()
+        return float(-refine_minima(lambda w: -sizes(w), grid, -found, high)[1].min())
 
     def spectrum(self, output: str, omega: FloatArray) -> FloatArray:
         """Return the one-sided density of `output` at `omega` [rad/s], (k,)."""
@@ -299,15 +306,6 @@ class Assessment:
         """Return L of each loop, (k,) each."""
         loop = self._closed((), (), omega)  # no loop gain needs an output
         return [np.asarray(loop.difference(i) - 1.0) for i in range(len(self.plant.inputs))]
-
-    @staticmethod
-    def _largest(function: Callable[[FloatArray], FloatArray], places: FloatArray) -> float:
-        if not places.size:
-            return 0.0
-        grid = np.unique(places)
-        sizes = function(grid)
-        high = sizes > _LOW * sizes.max()
-        return float(-refine_minima(lambda w: -function(w), grid, -sizes, high)[1].min())
 
 
 def frequency_grid(poles: ComplexArray) -> FloatArray:
