@@ -84,7 +84,7 @@ def loop_margins(
         return np.array([np.abs(at) - 1.0, at.imag])
 
     among = np.array([np.ones_like(felt), felt])
-    crossovers, axis = _all_crossings(lambda w: heights(loop(w)), grid, heights(gain), among)
+    crossovers, axis = _crossings(lambda w: heights(loop(w)), grid, heights(gain), among)
     turn = np.angle(-loop(crossovers))  # angle beyond -180 deg
     axis = np.append(axis, grid[[0, -1]][level_ends(gain)])
     on_axis = loop(axis).real
@@ -206,25 +206,16 @@ def _all_minima(
     return found
 
 
-def crossings(
-    function: Callable[[FloatArray], FloatArray],
-    grid: FloatArray,
-    values: FloatArray,
-    among: BoolArray | None = None,
-) -> FloatArray:
-    """Return where `function` changes its sign between grid points, all of them at once."""
-    felt = np.ones_like(values, np.bool_) if among is None else among
-    return _all_crossings(lambda w: function(w)[None], grid, values[None], felt[None])[0]
-
-
-def _all_crossings(
+def _crossings(
     function: Callable[[FloatArray], FloatArray],
     grid: FloatArray,
     values: FloatArray,
     among: BoolArray,
 ) -> list[FloatArray]:
-    """Return `crossings` of each of several functions, (f, k), that are evaluated together.
+    """Return where several functions, (f, k), change their sign between grid points, of each.
 
+    They are evaluated together, and all places are looked for at once; those count that have an
+    end among the points where `among`, (f, k), is true.
     By Chandrupatla's method (Adv. Eng. Software 28, 1997): inverse quadratic interpolation
     where it is safe, bisection elsewhere.
     """

@@ -1,13 +1,13 @@
 r"""A free controller of low order, for any number of inputs and measurements.
 
-Its parameters are those of `BlockForm`: n (nu + ny) numbers for order n, plus nu
-ny for a direct term.  Random controllers of this kind are seldom stable in a loop, so the
-candidates are LQG designs (`synth.structures.lqg`) for weights and noises of many sizes, reduced to
-the order; and, as these may all lie about one optimum of several, controllers whose poles are
-drawn, with the zeros that bring them closest to a state feedback.
+Its parameters are n (nu + ny) numbers for order n, plus nu ny for a direct term.  Random
+controllers of this kind are seldom stable in a loop, so the candidates are LQG designs
+(`synth.structures.lqg`) for weights and noises of many sizes, reduced to the order; and, as these
+may all lie about one optimum of several, controllers whose poles are drawn, with the zeros that
+bring them closest to a state feedback.
 
-`BlockForm` is a controller of given order in as few numbers as there can be: parallel canonical
-blocks.  Second-order blocks (and one of first order if the order is odd), each in observable
+A controller of given order in as few numbers as there can be is one of parallel canonical blocks:
+second-order blocks (and one of first order if the order is odd), each in observable
 canonical form as seen from one of the inputs, which leaves no redundant scale:
 
 .. math::
@@ -109,8 +109,19 @@ class LowOrder(Structure):
         return LowOrderLaw(plant, self)
 
 
+@dataclass(frozen=True, kw_only=True)
+class CanonicalBlock:
+    """Where the numbers of one block stand among the parameters, and which row of C is fixed."""
+
+    size: int
+    row: int
+    alpha: slice  #: alpha1, alpha0; alpha0 alone for a block of first order
+    B: slice  #: `size` rows of ny
+    C: slice  #: nu - 1 rows of `size`
+
+
 class LowOrderLaw(ParametrisedController):
-    """The law of `LowOrder`: parameters of `BlockForm` and of the direct term."""
+    """The law of `LowOrder`: parameters of canonical blocks and of the direct term."""
 
     def __init__(self, plant: LinearPlant, structure: LowOrder) -> None:
         nu, ny = len(plant.inputs), len(plant.measurements)
@@ -118,20 +129,28 @@ class LowOrderLaw(ParametrisedController):
             raise InputError("LowOrder: the plant must have an input and a measurement")
         self._plant = plant
         self._structure = structure
-        self._form = BlockForm(structure.order, nu, ny)
-        self._direct = slice(self._form.count, None) if structure.proper else slice(0, 0)
+        self._nu, self._ny = nu, ny
+        self._blocks: list[CanonicalBlock] = []
+        at = 0
+        for k in range((structure.order + 1) // 2):
+            size = min(2, structure.order - 2 * k)
+            ends = np.cumsum([at, size, size * ny, (nu - 1) * size]).tolist()
+            alpha, B, C = (slice(a, b) for a, b in itertools.pairwise(ends))
+            self._blocks.append(CanonicalBlock(size=size, row=k % nu, alpha=alpha, B=B, C=C))
+            at = ends[-1]
+        self._direct = slice(at, None) if structure.proper else slice(0, 0)
         self.parameters = tuple(self._named_parameters())
         check_bounds("LowOrder", structure.bounds, [p.name for p in self.parameters])
         self.dimensions = 4 + len(self.parameters)
 
     def _named_parameters(self) -> Iterable[Parameter]:
-        plant, form = self._plant, self._form
+        plant = self._plant
         middle = pace(plant)
-        entries = [(i, j) for i in range(form.nu) for j in range(form.ny)]
-        gains = np.reshape(gain_scales(plant, entries), (form.nu, form.ny))
+        entries = [(i, j) for i in range(self._nu) for j in range(self._ny)]
+        gains = np.reshape(gain_scales(plant, entries), (self._nu, self._ny))
         # The share of each input in a loop gain of one; an input's size against another's.
         inputs = np.exp(np.log(gains).mean(axis=1))
-        for k, block in enumerate(form.blocks, start=1):
+        for k, block in enumerate(self._blocks, start=1):
             powers = [middle ** (i + 1) for i in range(block.size)]
             alphas = ["alpha1", "alpha0"] if block.size == 2 else ["alpha0"]
             for name, scale in zip(alphas, powers, strict=True):
@@ -156,31 +175,84 @@ class LowOrderLaw(ParametrisedController):
 
     @override
     def response(self, values: Sequence[Any], s: Any) -> list[list[Any]]:
-        result = self._form.response(values, s)
+        measured = range(self._ny)
+        result: list[list[Any]] = [[0.0] * self._ny for _ in range(self._nu)]
+        for block in self._blocks:
+            alpha, B = values[block.alpha], values[block.B]
+            free = iter(values[block.C])
+            # The block's states, each as a response to every measurement.
+            if block.size == 2:
+                below = s * (s + alpha[0]) + alpha[1]
+                # x1' = x2 - alpha1 x1 + B1 y gives the second from the first.
+                first = [(s * B[j] + B[self._ny + j]) / below for j in measured]
+                second = [(s + alpha[0]) * first[j] - B[j] for j in measured] * (self._nu > 1)
+                states = [first, second]
+            else:
+                states = [[B[j] / (s + alpha[0]) for j in measured]]
+            for i in range(self._nu):
+                weights = [1.0] if i == block.row else [next(free) for _ in range(block.size)]
+                for weight, state in zip(weights, states, strict=False):
+                    for j in measured:
+                        result[i][j] = state[j] * weight + result[i][j]
         for k, gain in enumerate(values[self._direct]):
-            i, j = divmod(k, self._form.ny)
+            i, j = divmod(k, self._ny)
             result[i][j] = result[i][j] + gain
         return result
 
     @override
     def controller(self, values: Sequence[float]) -> LinearController:
-        numbers = np.asarray(values, dtype=np.float64)
-        A, B, C = self._form.matrices(numbers)
-        D = np.zeros((self._form.nu, self._form.ny))
+        numbers, order = np.asarray(values, dtype=np.float64), self._structure.order
+        A, B = np.zeros((order, order)), np.empty((order, self._ny))
+        C, D = np.zeros((self._nu, order)), np.zeros((self._nu, self._ny))
+        at = 0
+        for block in self._blocks:
+            states = slice(at, at + block.size)
+            A[states, states] = np.eye(block.size, k=1)
+            A[states, at] = -numbers[block.alpha]
+            B[states] = numbers[block.B].reshape(block.size, self._ny)
+            C[block.row, at] = 1.0
+            others = [i for i in range(self._nu) if i != block.row]
+            C[others, states] = numbers[block.C].reshape(self._nu - 1, block.size)
+            at += block.size
         D.flat[: numbers[self._direct].size] = numbers[self._direct]
         names = self._plant.measurements, self._plant.inputs
         return LinearController(A=A, B=B, C=C, D=D, measurements=names[0], inputs=names[1])
 
     def values(self, controller: LinearController) -> FloatArray:
-        """Return the parameters of a controller, whose order may be lower than the law's."""
+        """Return the parameters of a controller, whose order may be lower than the law's.
+
+        Poles that repeat are pulled apart a little, and a mode that its block's fixed row does
+        not hear is lent a whisper of it.
+        """
         missing = self._structure.order - len(controller.A)
         A, B, C = controller.A, controller.B, controller.C
         if missing > 0:
             A = block_diag(A, -np.diag(pace(self._plant) * (1.0 + 0.3 * np.arange(missing))))
-            B = np.vstack([B, np.zeros((missing, self._form.ny))])
-            C = np.hstack([C, np.ones((self._form.nu, missing))])
-        direct = controller.D.ravel() if self._structure.proper else np.zeros(0)
-        return np.concatenate([self._form.values(A, B, C), direct])
+            B = np.vstack([B, np.zeros((missing, self._ny))])
+            C = np.hstack([C, np.ones((self._nu, missing))])
+        poles, into, out = _modes(A, B, C)
+        result = np.empty(len(self.parameters))
+        for block, at in zip(self._blocks, self._assigned(poles, out), strict=True):
+            _fill(result, block, poles[at], into[at], out[:, at])
+        if self._structure.proper:
+            result[self._direct] = controller.D.ravel()
+        return result
+
+    def _assigned(self, poles: ComplexArray, C: ComplexArray) -> list[list[int]]:
+        """Return the modes of each block, such that each is well heard through its fixed row."""
+        groups = [[int(i), int(i) + 1] for i in np.flatnonzero(poles.imag > 0.0)]
+        real = [int(i) for i in np.flatnonzero(poles.imag == 0.0)]
+        real.sort(key=lambda i: poles[i].real)
+        single = [[real.pop(0)]] if len(real) % 2 else []  # the fastest one
+        groups += [real[i : i + 2] for i in range(0, len(real), 2)]
+        heard = np.abs(C) / np.maximum(np.linalg.norm(C, axis=0), 1e-300)
+        rows = [block.row for block in self._blocks[: len(groups)]]
+        price = [[-np.log(heard[row, g].min() + 1e-12) for row in rows] for g in groups]
+        result = groups + single
+        if groups:
+            for g, b in zip(*linear_sum_assignment(price), strict=True):
+                result[b] = groups[g]
+        return result
 
     @override
     def guesses(self, problem: GeneralisedPlant, omega: FloatArray) -> FloatArray:
@@ -192,7 +264,7 @@ class LowOrderLaw(ParametrisedController):
         """
         plant = whitened(self._plant.without_delays(_PADE), problem.disturbances)
         regulators, filters = designs(plant, problem.minimise, omega)
-        full = np.ones((self._form.nu, self._form.ny), dtype=np.bool_)
+        full = np.ones((self._nu, self._ny), dtype=np.bool_)
         gains = [projected(plant, design, full) for design in regulators]
         fast = [
             self.values(self._swift(gain, share * float(omega[-1])))
@@ -215,14 +287,14 @@ class LowOrderLaw(ParametrisedController):
         """
         plant = whitened(self._plant.without_delays(_PADE), problem.disturbances)
         regulators, _ = designs(plant, problem.minimise, omega)
-        points = qmc.Sobol(2 * len(self._form.blocks), seed=seed).random(_DRAWN)
+        points = qmc.Sobol(2 * len(self._blocks), seed=seed).random(_DRAWN)
         sizes = omega[0] * (omega[-1] / omega[0]) ** points[:, ::2]
         dampings = _LIGHTEST * (_HEAVIEST / _LIGHTEST) ** points[:, 1::2]
         found = np.zeros((_DRAWN * bool(regulators), len(self.parameters)))
         for k, row in enumerate(found):
             regulator = regulators[k % len(regulators)]
             with contextlib.suppress(np.linalg.LinAlgError):
-                self._form.fill(row, plant, regulator, sizes[k], dampings[k])
+                self._fit(row, plant, regulator, sizes[k], dampings[k])
         return self.clipped(found)
 
     @override
@@ -232,7 +304,7 @@ class LowOrderLaw(ParametrisedController):
         sizes += 1e-12 * sizes.max(axis=0) + 1e-60 * sizes.max()
         at = np.minimum((points[:, :2] * omega.size).astype(int), omega.size - 1)
         tilt = 10.0 ** (2.0 * points[:, 2:4] - 1.0)
-        uneven = np.linspace(-1.0, 1.0, self._form.ny)
+        uneven = np.linspace(-1.0, 1.0, self._ny)
         regulators, filters = [], []
         for k in range(min(_SIDE, len(points)) if np.any(yu) else 0):
             # Bandwidths are drawn: with such weights the loop crosses over near that frequency.
@@ -270,6 +342,59 @@ class LowOrderLaw(ParametrisedController):
             measurements=self._plant.measurements,
             inputs=self._plant.inputs,
         )
+
+    def _fit(
+        self,
+        values: FloatArray,
+        plant: LinearPlant,
+        feedback: LqgRegulator,
+        sizes: FloatArray,
+        dampings: FloatArray,
+    ) -> None:
+        """Write the numbers of a controller with given poles that comes closest to a feedback.
+
+        Parameters
+        ----------
+        values
+            What is written to.
+        plant, feedback
+            Shaken by white noises of intensity 1, and u = K x.
+        sizes, dampings
+            Of the poles of each block [rad/s], [-].
+        """
+        # Every measurement through 1 and s over each block's denominator, beside the plant.
+        filters = []
+        for block, size, damping in zip(self._blocks, sizes, dampings, strict=True):
+            alpha = [2.0 * damping * size, size**2] if block.size == 2 else [size]
+            values[block.alpha] = alpha
+            companion = np.eye(block.size, k=1)
+            companion[-1] = -np.array(alpha[::-1])
+            filters += [companion] * self._ny
+        heard, noise = plant.C + plant.D @ feedback.gain, plant.F
+        entries = [np.eye(len(f))[:, -1:] for f in filters]
+        rows = [np.tile(x, (len(self._blocks), 1)) for x in (heard, noise)]
+        into, shaken = (
+            np.vstack([e @ row[None] for e, row in zip(entries, of, strict=True)]) for of in rows
+        )
+        n = len(plant.A)
+        A = block_diag(plant.A + plant.B @ feedback.gain, *filters)
+        A[n:, :n] = into
+        E = np.vstack([plant.E, shaken])
+        covariance = solve_continuous_lyapunov(A, -E @ E.T)
+        owner = np.repeat([b.row for b in self._blocks], [b.size * self._ny for b in self._blocks])
+        command = np.zeros(len(owner))
+        for i, gain in enumerate(feedback.gain):
+            at = n + np.flatnonzero(owner == i)
+            size = np.sqrt(np.maximum(np.diag(covariance)[at], 1e-300))
+            share = covariance[np.ix_(at, at)] / np.outer(size, size)
+            wanted = covariance[at, :n] @ gain / size
+            command[at - n] = np.linalg.lstsq(share, wanted, rcond=1e-12)[0] / size
+        start = 0
+        for block in self._blocks:
+            end = start + block.size * self._ny
+            # B1 goes with s, B2 with 1.
+            values[block.B] = command[start:end].reshape(self._ny, block.size).T[::-1].ravel()
+            start = end
 
     def _family(
         self,
@@ -352,154 +477,6 @@ class LowOrderFeedback(Structure):
         return [float(v) for v in law.values(controller)]
 
 
-@dataclass(frozen=True, kw_only=True)
-class CanonicalBlock:
-    """Where the numbers of one block stand among the parameters, and which row of C is fixed."""
-
-    size: int
-    row: int
-    alpha: slice  #: alpha1, alpha0; alpha0 alone for a block of first order
-    B: slice  #: `size` rows of ny
-    C: slice  #: nu - 1 rows of `size`
-
-
-class BlockForm:
-    """The form for an order, nu inputs and ny measurements, without a direct term."""
-
-    def __init__(self, order: int, nu: int, ny: int) -> None:
-        self.order, self.nu, self.ny = order, nu, ny
-        self.blocks: list[CanonicalBlock] = []
-        at = 0
-        for k in range((order + 1) // 2):
-            size = min(2, order - 2 * k)
-            ends = np.cumsum([at, size, size * ny, (nu - 1) * size]).tolist()
-            alpha, B, C = (slice(a, b) for a, b in itertools.pairwise(ends))
-            self.blocks.append(CanonicalBlock(size=size, row=k % nu, alpha=alpha, B=B, C=C))
-            at = ends[-1]
-        self.count = at  #: of the numbers
-
-    def matrices(self, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return A, B, C."""
-        A, B = np.zeros((self.order, self.order)), np.empty((self.order, self.ny))
-        C = np.zeros((self.nu, self.order))
-        at = 0
-        for block in self.blocks:
-            states = slice(at, at + block.size)
-            A[states, at] = -values[block.alpha]
-            if block.size == 2:
-                A[at, at + 1] = 1.0
-            B[states] = values[block.B].reshape(block.size, self.ny)
-            C[block.row, at] = 1.0
-            if self.nu > 1:
-                others = [i for i in range(self.nu) if i != block.row]
-                C[others, states] = values[block.C].reshape(self.nu - 1, block.size)
-            at += block.size
-        return A, B, C
-
-    def response(self, values: Sequence[Any], s: Any) -> list[list[Any]]:
-        """Return C (s - A)^-1 B, nu lists of ny entries, for numbers or `synth.loop.Dual`."""
-        measured = range(self.ny)
-        result: list[list[Any]] = [[0.0] * self.ny for _ in range(self.nu)]
-        for block in self.blocks:
-            alpha, B = values[block.alpha], values[block.B]
-            free = iter(values[block.C])
-            # The block's states, each as a response to every measurement.
-            if block.size == 2:
-                below = s * (s + alpha[0]) + alpha[1]
-                # x1' = x2 - alpha1 x1 + B1 y gives the second from the first.
-                first = [(s * B[j] + B[self.ny + j]) / below for j in measured]
-                second = [(s + alpha[0]) * first[j] - B[j] for j in measured] * (self.nu > 1)
-                states = [first, second]
-            else:
-                states = [[B[j] / (s + alpha[0]) for j in measured]]
-            for i in range(self.nu):
-                weights = [1.0] if i == block.row else [next(free) for _ in range(block.size)]
-                for weight, state in zip(weights, states, strict=False):
-                    for j in measured:
-                        result[i][j] = state[j] * weight + result[i][j]
-        return result
-
-    def fill(
-        self,
-        values: FloatArray,
-        plant: LinearPlant,
-        feedback: LqgRegulator,
-        sizes: FloatArray,
-        dampings: FloatArray,
-    ) -> None:
-        """Write the numbers of a controller with given poles that comes closest to a feedback.
-
-        Parameters
-        ----------
-        values
-            What is written to.
-        plant, feedback
-            Shaken by white noises of intensity 1, and u = K x.
-        sizes, dampings
-            Of the poles of each block [rad/s], [-].
-        """
-        # Every measurement through 1 and s over each block's denominator, beside the plant.
-        filters = []
-        for block, size, damping in zip(self.blocks, sizes, dampings, strict=True):
-            pair = block.size == 2
-            values[block.alpha] = [2.0 * damping * size, size**2] if pair else [size]
-            companion = [[0.0, 1.0], [-(size**2), -2.0 * damping * size]] if pair else [[-size]]
-            filters += [np.array(companion)] * self.ny
-        heard, noise = plant.C + plant.D @ feedback.gain, plant.F
-        entries = [np.eye(len(f))[:, -1:] for f in filters]
-        rows = [np.tile(x, (len(self.blocks), 1)) for x in (heard, noise)]
-        into, shaken = (
-            np.vstack([e @ row[None] for e, row in zip(entries, of, strict=True)]) for of in rows
-        )
-        n = len(plant.A)
-        A = block_diag(plant.A + plant.B @ feedback.gain, *filters)
-        A[n:, :n] = into
-        E = np.vstack([plant.E, shaken])
-        covariance = solve_continuous_lyapunov(A, -E @ E.T)
-        owner = np.repeat([b.row for b in self.blocks], [b.size * self.ny for b in self.blocks])
-        command = np.zeros(len(owner))
-        for i, gain in enumerate(feedback.gain):
-            at = n + np.flatnonzero(owner == i)
-            size = np.sqrt(np.maximum(np.diag(covariance)[at], 1e-300))
-            share = covariance[np.ix_(at, at)] / np.outer(size, size)
-            wanted = covariance[at, :n] @ gain / size
-            command[at - n] = np.linalg.lstsq(share, wanted, rcond=1e-12)[0] / size
-        start = 0
-        for block in self.blocks:
-            end = start + block.size * self.ny
-            # B1 goes with s, B2 with 1.
-            values[block.B] = command[start:end].reshape(self.ny, block.size).T[::-1].ravel()
-            start = end
-
-    def values(self, A: FloatArray, B: FloatArray, C: FloatArray) -> FloatArray:
-        """Return the numbers of a controller of this order.
-
-        Poles that repeat are pulled apart a little, and a mode that its block's fixed row does
-        not hear is lent a whisper of it.
-        """
-        poles, into, out = _modes(A, B, C)
-        result = np.empty(self.count)
-        for block, at in zip(self.blocks, self._assigned(poles, out), strict=True):
-            _fill(result, block, poles[at], into[at], out[:, at])
-        return result
-
-    def _assigned(self, poles: ComplexArray, C: ComplexArray) -> list[list[int]]:
-        """Return the modes of each block, such that each is well heard through its fixed row."""
-        groups = [[int(i), int(i) + 1] for i in np.flatnonzero(poles.imag > 0.0)]
-        real = [int(i) for i in np.flatnonzero(poles.imag == 0.0)]
-        real.sort(key=lambda i: poles[i].real)
-        single = [[real.pop(0)]] if len(real) % 2 else []  # the fastest one
-        groups += [real[i : i + 2] for i in range(0, len(real), 2)]
-        heard = np.abs(C) / np.maximum(np.linalg.norm(C, axis=0), 1e-300)
-        rows = [block.row for block in self.blocks[: len(groups)]]
-        price = [[-np.log(heard[row, g].min() + 1e-12) for row in rows] for g in groups]
-        result = groups + single
-        if groups:
-            for g, b in zip(*linear_sum_assignment(price), strict=True):
-                result[b] = groups[g]
-        return result
-
-
 def _fill(
     result: FloatArray, block: CanonicalBlock, poles: ComplexArray, B: ComplexArray, C: ComplexArray
 ) -> None:
@@ -507,11 +484,8 @@ def _fill(
     fixed, size = C[block.row].copy(), np.linalg.norm(C, axis=0)
     faint = np.abs(fixed) < _FAINT * size
     fixed[faint] = _FAINT * size[faint] + 1e-300
-    if block.size == 2:
-        alpha = np.array([-(poles[0] + poles[1]), poles[0] * poles[1]])
-        to_canonical = np.array([fixed, fixed * poles]) + np.outer([0.0, alpha[0]], fixed)
-    else:
-        alpha, to_canonical = -poles, np.diag(fixed)
+    alpha = np.poly(poles)[1:]
+    to_canonical = np.array([fixed, fixed * (poles + alpha[0])])[: block.size]
     others = np.delete(C, block.row, axis=0)
     result[block.alpha] = alpha.real
     result[block.B] = (to_canonical @ B).real.ravel()
