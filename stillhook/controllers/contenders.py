@@ -14,7 +14,7 @@ from models.basics import InputError, pick
 from synth.design import Design, Tuning
 
 from .named import CONTROLLER_TEXTS
-from .recipe import Make, Recipe, feedback, gains_in_use, recipe_of
+from .recipe import Make, Recipe, feedback, recipe_of, thesis
 from .stored_design import EAGER, HALF
 
 GROUPS = ("brake", "linear", "predictive", "own", "reference", "floor")
@@ -72,7 +72,7 @@ def _linear(name: str, needs: str, what: str, knows: str, make: Make | None = No
     own = Recipe(
         name=name,
         kind="law",
-        make=make or functools.partial(feedback, name, not name.endswith("-no-antiwindup")),
+        make=make or functools.partial(feedback, name),
         needs=needs,
         identity=name,
     )
@@ -98,9 +98,7 @@ _ALL = (
     _named("none", "nothing", "brake"),
     _named("constant-tension", "load cell and motor", "linear"),
     _named("feed-forward", "motion reference unit", "linear"),
-    _linear(
-        "thesis", "", "the gains that the case has in use", "payload by telemetry", gains_in_use
-    ),
+    _linear("thesis", "", "the gains that the case has in use", "payload by telemetry", thesis),
     *(
         _linear(
             f"{name}{ending}",

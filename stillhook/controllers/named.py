@@ -8,16 +8,18 @@ imported when one is made, as they bring a solver along.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from models.basics import InputError, pick
 from models.case import Case
 from models.sensing import Controller
 
 if TYPE_CHECKING:
+    from synth.controllers import LinearFeedback
     from synth.design import Design, Tuning
+    from synth.loop import LinearController
 
 PROTOCOL = ("name", "sample_time", "reset", "step")
 """What a controller has."""
@@ -70,10 +72,21 @@ def controller_by_name(
         If it cannot be made for the case.
     """
     pick("controllers", "controller", tuple(CONTROLLER_TEXTS), (name,))
+    if name.startswith("feedback"):
+        given = gains if gains is not None else design
+        law = gains_in_use(case) if given is None else given
+        T = _FEEDBACK_SAMPLE if sample_time is None else sample_time
+        return feedback_of(name, case, law, sample_time=T)
     if "mpc" not in name:
-        from synth.controllers import controller_named
+        from synth.controllers import BrakeOn, ConstantTension, VelocityFeedForward
 
-        return controller_named(name, case, design=design, gains=gains, sample_time=sample_time)
+        makers: Mapping[str, Callable[..., Controller]] = {
+            "feed-forward": VelocityFeedForward,
+            "feed-forward-lead": VelocityFeedForward.with_lead,
+            "constant-tension": ConstantTension,
+            "none": BrakeOn,
+        }
+        return makers[name](case, **({} if sample_time is None else {"sample_time": sample_time}))
     if gains is not None:
         raise InputError(f"{name}: gains are for feedback; predictive control has none")
     T = 0.05 if sample_time is None else sample_time
@@ -86,6 +99,50 @@ def controller_by_name(
     if name == "mpc":
         return LinearMPC(case, sample_time=T)
     return LinearMPC(case, sample_time=T, predictor="ar" if name == "mpc-ar" else "preview")
+
+
+def feedback_of(
+    name: str,
+    case: Case,
+    law: Mapping[str, float] | LinearController | Design | Tuning,
+    *,
+    sample_time: float = _FEEDBACK_SAMPLE,
+) -> LinearFeedback:
+    """Return linear feedback of gains, a controller or a design, by its name without anti-windup.
+
+    Raises
+    ------
+    InputError
+        If it is to be without, but has no states; or as `synth.controllers.LinearFeedback`.
+    """
+    from synth.controllers import LinearFeedback
+    from synth.loop import LinearController
+
+    anti_windup = not name.endswith("-no-antiwindup")
+    options: dict[str, Any] = {"sample_time": sample_time, "anti_windup": anti_windup, "name": name}
+    if isinstance(law, Mapping | LinearController):
+        made = LinearFeedback(case, law, **options)
+    else:
+        made = LinearFeedback.from_design(law, case=case, **options)
+    if not anti_windup and not made.dynamic:
+        raise InputError(
+            f"{name}: static gains have no state that could wind up, so that this is the same as "
+            "with anti-windup; it is for a design with a dynamic controller"
+        )
+    return made
+
+
+def gains_in_use(case: Case) -> dict[str, float]:
+    """Return the gains that a case has in use, by name.
+
+    Raises
+    ------
+    InputError
+        If it has none.
+    """
+    if case.gains is None:
+        raise InputError(f"the case {case.name} has no gains in use: optimise them, or give them")
+    return {name: getattr(case.gains, name) for name in ("A", "a", "a1", "a2")}
 
 
 def controller_of(
@@ -103,7 +160,6 @@ def controller_of(
     InputError
         If it is none of these, or what is given with it does not belong to it.
     """
-    from synth.controllers import LinearFeedback
     from synth.design import Design, Tuning
 
     if isinstance(controller, str):
@@ -114,7 +170,7 @@ def controller_of(
         raise InputError("simulate: design and gains are for a controller by its name")
     if isinstance(controller, Design | Tuning):
         own = _FEEDBACK_SAMPLE if sample_time is None else sample_time
-        return LinearFeedback.from_design(controller, case=case, sample_time=own)
+        return feedback_of("feedback", case, controller, sample_time=own)
     lacking = [name for name in PROTOCOL if not hasattr(controller, name)]
     if lacking:
         raise InputError(

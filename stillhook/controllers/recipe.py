@@ -21,11 +21,10 @@ from typing import Any
 from models.basics import InputError, pick
 from models.case import Case
 from models.sensing import Controller
-from synth.controllers import LinearFeedback
 from synth.design import Design, Tuning
 
-from .named import CONTROLLER_TEXTS, PROTOCOL, controller_by_name
-from .stored_design import EAGER, StoredDesign, design_law
+from .named import CONTROLLER_TEXTS, PROTOCOL, controller_by_name, feedback_of, gains_in_use
+from .stored_design import StoredDesign, design_law
 
 Make = Callable[[Case, StoredDesign | None], Controller]
 
@@ -180,28 +179,21 @@ def recipe_from(about: Mapping[str, Any]) -> Recipe:
     )
 
 
-def feedback(name: str, anti_windup: bool, case: Case, design: StoredDesign | None) -> Controller:
+def feedback(name: str, case: Case, design: StoredDesign | None) -> Controller:
     """Return the linear feedback of a design."""
     if design is None or not design.found:
         raise InputError("no design was found" if design is None else design.status)
-    made = LinearFeedback(case, design.law, anti_windup=anti_windup, name=name)
-    if not anti_windup and not made.dynamic:
-        plain = f"{name.removesuffix('-no-antiwindup')}{EAGER}"
-        raise InputError(f"static gains have no state that could wind up: the same as {plain}")
-    return made
+    return feedback_of(name, case, design.law)
 
 
-def gains_in_use(case: Case, design: StoredDesign | None) -> Controller:
+def thesis(case: Case, design: StoredDesign | None) -> Controller:
     """Return the feedback with the gains that the case has in use."""
     del design
-    if case.gains is None:
-        raise InputError(f"the case {case.name} has no gains in use")
-    gains = {name: getattr(case.gains, name) for name in ("A", "a", "a1", "a2")}
-    return LinearFeedback(case, gains, name="thesis")
+    return feedback_of("thesis", case, gains_in_use(case))
 
 
 def _of_design(name: str, design: StoredDesign, needs: str) -> Recipe:
-    make = functools.partial(feedback, name, True)
+    make = functools.partial(feedback, name)
     own = design.digest
     return Recipe(name=name, kind="law", make=make, design=design, needs=needs, identity=own)
 

@@ -1,7 +1,7 @@
 """Controllers in time: designs, sampled, and the laws that the industry uses.
 
 A case comes in, with gains or a design where there is feedback; a controller that steps with the
-simulation goes out (`controller_named`, or its class).
+simulation goes out.
 """
 
 from typing import TYPE_CHECKING
@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
+    from .brake import BrakeOn
     from .constant_tension import ConstantTension
-    from .controllers import CONTROLLERS, BrakeOn, controller_named
     from .feed_forward import VelocityFeedForward
     from .linear_feedback import LinearFeedback
 else:

@@ -292,7 +292,9 @@ def test_a_contender_that_cannot_take_part_is_a_row_with_its_reason():
         case, ["none", "thesis", ("unmade", unmade), ("clumsy", clumsy)], jobs=1, **FAST
     )
     height = case.sea.significant_height
-    assert found.refused["thesis", height] == "the case subsea-crane has no gains in use"
+    assert found.refused["thesis", height] == (
+        "the case subsea-crane has no gains in use: optimise them, or give them"
+    )
     assert found.refused["unmade", height] == "KeyError: 'torque'"
     notes = found.table.set_index("contender")["note"]
     assert notes["clumsy"] == "RuntimeError: stepped on the cable"

@@ -15,12 +15,11 @@ from models.basics import InputError
 from models.sensing import HEARD, Measurement
 from stillhook.controllers import (
     CONTENDERS,
-    CONTROLLER_TEXTS,
     contenders_of,
     recipe_from,
     recipe_of,
 )
-from synth.controllers import CONTROLLERS, LinearFeedback
+from synth.controllers import LinearFeedback
 
 CASE = sh.load_case("thesis-1975")
 
@@ -102,8 +101,3 @@ def test_a_design_is_wanted_by_laws_that_are_designed_for_every_sea_alone():
     assert CONTENDERS["none"].needs == CONTENDERS["clairvoyant"].needs == ""
     (given,) = contenders_of([thesis_design()])
     assert (given.name, given.needs, given.group) == ("design", "", "linear")
-
-
-def test_every_controller_is_told_in_a_line():
-    own = [name for name in CONTROLLER_TEXTS if "mpc" not in name]
-    assert own == list(CONTROLLERS)

@@ -19,12 +19,10 @@ from models.plant import MEAN_LOSSES, build_plant
 from models.sensing import HEARD, Controller, Measurement, Recursion, holds_brake, recursion_of
 from models.simulation import Kernel
 from synth.controllers import (
-    CONTROLLERS,
     BrakeOn,
     ConstantTension,
     LinearFeedback,
     VelocityFeedForward,
-    controller_named,
 )
 from synth.loop import LinearController as StateSpace
 from synth.structures import RecursiveController
@@ -40,20 +38,25 @@ DYNAMIC = StateSpace(
     measurements=("payload.acceleration", "payload.velocity", "payload.displacement"),
     inputs=("drive.command",),
 )
-KINDS = (*CONTROLLERS, "feedback with states")
+MAKERS = {
+    "feedback": lambda case: LinearFeedback(case, {"a": 1.0, "a1": 5.0, "a2": 3.0}),
+    "feedback with states": lambda case: LinearFeedback(case, DYNAMIC),
+    "feedback-no-antiwindup": lambda case: LinearFeedback(
+        case, DYNAMIC, anti_windup=False, name="feedback-no-antiwindup"
+    ),
+    "feed-forward": VelocityFeedForward,
+    "feed-forward-lead": VelocityFeedForward.with_lead,
+    "constant-tension": ConstantTension,
+    "none": BrakeOn,
+}
+KINDS = tuple(MAKERS)
 EVERY = [(name, kind) for name in CASES for kind in KINDS]
 every = pytest.mark.parametrize(("name", "kind"), EVERY)
 
 
 @cache
 def made(name: str, kind: str) -> RecursiveController:
-    case = load_case(name)
-    if kind == "feedback with states":
-        return LinearFeedback(case, DYNAMIC)
-    if kind == "feedback-no-antiwindup":
-        return LinearFeedback(case, DYNAMIC, anti_windup=False, name=kind)
-    gains = {"a": 1.0, "a1": 5.0, "a2": 3.0} if kind == "feedback" else None
-    return controller_named(kind, case, gains=gains)
+    return MAKERS[kind](load_case(name))
 
 
 @cache
@@ -210,51 +213,6 @@ def test_it_cannot_be_changed(name: str, kind: str) -> None:
 def test_a_sample_time_out_of_range_is_told(make: object, wrong: float) -> None:
     with pytest.raises(InputError, match=r"sample_time must be in \[0\.0001, 10\] s, got"):
         make(load_case("thesis-1975"), wrong)
-
-
-def test_sample_time_is_the_controllers_own_unless_asked_for() -> None:
-    case = load_case("thesis-1975")
-    for kind in set(CONTROLLERS) - {"feedback-no-antiwindup"}:
-        own = controller_named(kind, case).sample_time
-        assert own == (0.01 if kind == "feedback" else 0.02)
-        assert controller_named(kind, case, sample_time=0.05).sample_time == 0.05
-
-
-def test_feedback_takes_gains_before_a_design_before_those_of_the_case() -> None:
-    case = load_case("thesis-1975")  # A = 200, a2 = 100
-    m = rest("thesis-1975").values.copy()
-    m[HEARD.index("payload.displacement")] = 0.01
-    static = build_plant(case).operating_point(MEAN_LOSSES).command
-
-    class Design:  # all that is asked of a Tuning
-        controller, status = DYNAMIC, "found"
-
-    def asked(**given: object) -> float:
-        return controller_named("feedback", case, **given).step(Measurement(m), 0.0) - static
-
-    assert asked() == pytest.approx(-200.0 * 100.0 * 0.01)
-    # Tustin at 10 ms: D, and half a sample of the integrator.
-    assert asked(design=Design()) == pytest.approx((-2.0 - 0.1 * 0.005) * 0.01)
-    gains = {"A": 2.0, "a": 0.0, "a1": 0.0, "a2": 3.0}
-    assert asked(design=Design(), gains=gains) == pytest.approx(-6.0 * 0.01)
-    without = controller_named("feedback-no-antiwindup", case, design=Design())
-    assert without.name == "feedback-no-antiwindup"
-
-
-def test_feedback_without_gains_says_what_to_do() -> None:
-    with pytest.raises(InputError, match="subsea-crane has no gains in use: optimise them, or"):
-        controller_named("feedback", load_case("subsea-crane"))
-
-
-def test_static_gains_have_no_version_without_anti_windup() -> None:
-    with pytest.raises(InputError, match="static gains have no state that could wind up"):
-        controller_named("feedback-no-antiwindup", load_case("thesis-1975"))
-
-
-def test_unknown_controllers_are_told_with_those_that_there_are() -> None:
-    text = r"no controller 'pid'; there are: feedback, .*constant-tension, none"
-    with pytest.raises(InputError, match=text):
-        controller_named("pid", load_case("thesis-1975"))
 
 
 def test_measurements_go_by_their_names() -> None:
