@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -41,7 +40,7 @@ from ..text import (
 from .data import runs_data
 from .figures import comparison, exceedance
 from .runs import Runs, headline_of, speed_of
-from .strip import animation, strip
+from .strip import strip
 from .table import tables_of
 from .trace_figure import traces
 
@@ -54,7 +53,6 @@ FORMATS: Mapping[str, tuple[str, Callable[[Run, Path], Path]]] = {
 """Suffix and writer of each format of time traces; "none" writes none."""
 
 _FIGURES = ("traces", "strip", "comparison", "exceedance")
-_MOVIE = "animation.gif"
 _READ = "`summary.json` holds all of this for programs, `case.yaml` the case."
 _EVENTS = 8  # told of a run
 _RUNS = 4  # whose events are told
@@ -132,7 +130,6 @@ def write_summary(
     *,
     case: Case | None = None,
     question: Mapping[str, object] | None = None,
-    animate: bool = False,
     progress: Callable[[str, float], None] | None = None,
 ) -> None:
     """Write the summary of runs, their events and their figures.
@@ -147,8 +144,6 @@ def write_summary(
         The case as it was given; by default that of the runs, as it is in the scenario.
     question
         What was asked, to be kept beside the answer; plain data.
-    animate
-        Whether to draw a moving picture.
     progress
         Called with what is being done, and the share of it that is.
 
@@ -164,17 +159,12 @@ def write_summary(
     folder.write("events.csv", csv_text(_event_table(compared)))
     drawn = folder.draw(report.drawings, progress=lambda what, done, of: tell("drawing", done / of))
     own = [_own(runs.controller, len(compared) > 1) for runs in compared]
-    for place, runs in zip(own, compared, strict=True):
-        if animate and runs.worst.time.size >= 2:
-            what = f"animating {runs.controller}"
-            film = animation(runs.worst, runs.scenario, progress=partial(tell, what))
-            folder.write(place + _MOVIE, film)
     names = [p.relative_to(folder.path).with_suffix("").as_posix() for p in drawn]
     text = markdown(_with_each(report, compared), names)
     folder.write("summary.md", f"{text}\n{_READ}\n")
     # What an earlier simulation has left here and this one does not have.
     traces = [f"runs/seed-[0-9]*.{suffix}" for suffix, _ in FORMATS.values()]
-    stale = [*pictures(*_FIGURES), _MOVIE, *traces]
+    stale = [*pictures(*_FIGURES), *traces]
     folder.discard(*(place + name for place in ("", *own) for name in stale))
 
 
@@ -189,7 +179,6 @@ def write_runs(
     *,
     format: TraceFormat = "csv",
     figures: bool = True,
-    animate: bool = False,
     question: Mapping[str, object] | None = None,
 ) -> list[Path]:
     """Write everything there is to say about runs into a folder.
@@ -202,8 +191,8 @@ def write_runs(
         Runs of one controller, or of several on the same case and scenario.
     format
         Of the files with the time traces: csv, parquet, netcdf or none.
-    figures, animate
-        Whether to draw figures, and a moving picture of the worst run.
+    figures
+        Whether to draw figures.
     question
         What was asked, to be kept in the summary; plain data.
 
@@ -212,8 +201,8 @@ def write_runs(
     list of Path
         The files written: ``case.yaml``, ``summary.json``, ``summary.md``, ``events.csv``, the
         figures ``exceedance``, ``comparison``, ``traces`` and ``strip`` as ``.svg`` and
-        ``.png``, ``animation.gif``, and the traces in ``runs/``; with several controllers what
-        belongs to one is in a folder of its name.
+        ``.png``, and the traces in ``runs/``; with several controllers what belongs to one is
+        in a folder of its name.
 
     Raises
     ------
@@ -233,7 +222,7 @@ def write_runs(
     for runs in compared:
         for run in runs:
             write_traces(target, run, format, several=len(compared) > 1)
-    write_summary(target, compared, question=question, animate=animate)
+    write_summary(target, compared, question=question)
     return target.written
 
 

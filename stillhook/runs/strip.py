@@ -1,16 +1,13 @@
-"""A run in pictures, still and moving: hook, drum, rope and payload, against the earth.
+"""A run in pictures: hook, drum, rope and payload at some moments, against the earth.
 
 Time runs to the right, height is drawn to one scale: a hook that heaves by a metre above a payload
 that stays within millimetres looks like just that.  The rope is too long to be drawn; its middle
-is left out.  What is drawn at one moment by `draw_station` is also a frame of the animation, an
-animated GIF of a megabyte or so: it plays in every browser and every talk.
+is left out.
 """
 
 from __future__ import annotations
 
-import io
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
@@ -32,10 +29,8 @@ from ..text import (
     Figure,
     drawn,
     headline,
-    number,
     panel,
     quantity,
-    styled,
 )
 from .window import Window, moves, whole_of, window_of
 
@@ -179,7 +174,7 @@ def strip(run: Run, scenario: Scenario | None = None) -> Figure:
     # Half a picture of room at both ends: the ship is to the left of its rope.
     shots = np.linspace(time[0] + 0.09 * span, time[-1] - 0.02 * span, _SHOTS)
     for at in np.searchsorted(time, shots):
-        draw_station(axes, float(time[at]), scene, int(at))
+        _station(axes, float(time[at]), scene, int(at))
         label = quantity(float(scene.tension[at]), "N")
         # Clear of the box, of the ship, and of the place where the rope is broken.
         middle = 0.4 * float(scene.hook[at]) + 0.6 * float(scene.payload[at])
@@ -195,14 +190,14 @@ def strip(run: Run, scenario: Scenario | None = None) -> Figure:
             zorder=6,
         )
     axes.set_xlim(float(time[0]), float(time[-1]) + 0.03 * span)
-    height_axis(axes, scene)
+    _height_axis(axes, scene)
     axes.set_xlabel("time [s]")
     about = f"{run.case.name}, {run.scenario}, {run.controller}, seed {run.seed}"
     return headline(figure, _finding(scene), f"{about}: {window.why}")
 
 
-def draw_station(axes: Axes, x: float, scene: Scene, at: int) -> list[Artist]:
-    """Draw ship, drum, rope and payload at a moment, the rope at `x`; return what was drawn."""
+def _station(axes: Axes, x: float, scene: Scene, at: int) -> None:
+    """Draw ship, drum, rope and payload at a moment, the rope at `x`."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Circle, Polygon, Rectangle
     from matplotlib.transforms import Affine2D, ScaledTranslation
@@ -263,10 +258,9 @@ def draw_station(axes: Axes, x: float, scene: Scene, at: int) -> list[Artist]:
     for artist in artists:
         axes.add_artist(artist)
         artist.set_clip_on(False)
-    return artists
 
 
-def height_axis(axes: Axes, scene: Scene) -> None:
+def _height_axis(axes: Axes, scene: Scene) -> None:
     """Set the limits of a drawing's height, and mark those of the payload and of the hook."""
     from matplotlib.ticker import MaxNLocator
 
@@ -307,102 +301,3 @@ def _finding(scene: Scene) -> str:
     if np.ptp(scene.asked) > 0.0:
         return f"{text} {quantity(payload, 'm')} about what is asked"
     return f"{text} {quantity(payload, 'm')}"
-
-
-_FEWEST, _MOST = 120, 300  # frames
-_RATE = 12.0  # frames per second
-_FASTER = 4.0  # than it is, if that many frames will do
-_LATELY = 0.4  # part of the picture's time that is shown behind the present
-_COLOURS = 48
-_DOTS = 84.0  # per inch
-
-
-def animation(
-    run: Run,
-    scenario: Scenario | None = None,
-    progress: Callable[[float], None] | None = None,
-) -> bytes:
-    """Return a run as the contents of an animated GIF: a minute, or all of an operation.
-
-    Parameters
-    ----------
-    run
-        The run, with its traces.
-    scenario
-        What was asked of it: says where the water's surface is.
-    progress
-        Called with the share that is done.
-
-    Raises
-    ------
-    InputError
-        If the run has no stored samples.
-    """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from PIL import Image
-
-    window = whole_of(run) if moves(run) else window_of(run)
-    scene = Scene.of(run, window, scenario)
-    span = window.end - window.start
-    frames = round(min(max(span * _RATE / _FASTER, _FEWEST), _MOST))
-    pictures: list[Any] = []
-    with styled():
-        figure = Figure(figsize=(7.2, 4.2), dpi=_DOTS)
-        canvas: Any = FigureCanvasAgg(figure)  # whose methods have no types
-        left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.0, 2.2))
-        figure.subplots_adjust(left=0.095, right=0.985, top=0.88, bottom=0.125, wspace=0.04)
-        for axes in (left, right):
-            axes.grid(visible=False)
-            for height in (0.0, scene.offset):
-                axes.axhline(height, color=REFERENCE, linewidth=0.8, alpha=0.6)
-        left.set_xlim(-0.75, 0.45)
-        left.set_xticks([])
-        height_axis(left, scene)
-        right.tick_params(axis="y", length=0)
-        right.set_xlim(-_LATELY * span, 0.02 * span)
-        right.set_xlabel("time before now [s]")
-        faster = span * _RATE / frames
-        about = f"{run.case.name}, {run.scenario}, {run.controller}"
-        left.set_title(f"{about}, {number(faster, 2)} times as fast as it is", fontsize=9.5)
-        clock = right.set_title("", loc="right", fontsize=9.5)
-        moments = np.linspace(float(scene.time[0]), float(scene.time[-1]), frames)
-        before: list[Artist] = []
-        for done, moment in enumerate(moments):
-            at = int(np.searchsorted(scene.time, moment))
-            for artist in before:
-                artist.remove()
-            before = draw_station(left, 0.0, scene, at)
-            first = int(np.searchsorted(scene.time, moment - _LATELY * span))
-            part = slice(first, at + 1)
-            ago = scene.time[part] - scene.time[at]
-            curves = [(scene.hook, HOOK, 1.5), (scene.payload, AFTER, 1.8)]
-            if np.ptp(scene.asked) > 0.0:
-                curves.append((scene.asked, REFERENCE, 0.9))
-            for values, colour, width in curves:
-                before += right.plot(ago, values[part], color=colour, linewidth=width)
-            for surface, colour in ((scene.ground, _GROUND), (scene.water, _SEA)):
-                if surface is None:
-                    continue
-                level = float(surface[at])
-                before.append(left.axhspan(scene.bottom, level, color=colour, alpha=0.35, zorder=0))
-                before += right.plot(ago, surface[part], color=colour, linewidth=1.5)
-            clock.set_text(f"{moment:.1f} s")
-            canvas.draw()
-            picture = Image.frombuffer("RGBA", canvas.get_width_height(), canvas.buffer_rgba())
-            picture = picture.convert("RGB")
-            # One palette for all: a colour that changed from frame to frame would flicker.
-            palette = pictures[0] if pictures else picture.quantize(_COLOURS)
-            pictures.append(picture.quantize(palette=palette, dither=Image.Dither.NONE))
-            if progress is not None:
-                progress((done + 1) / frames)
-    target = io.BytesIO()
-    pictures[0].save(
-        target,
-        format="GIF",
-        save_all=True,
-        append_images=pictures[1:],
-        duration=round(1000.0 / _RATE),
-        loop=0,
-    )
-    return target.getvalue()

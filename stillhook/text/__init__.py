@@ -29,7 +29,6 @@ if TYPE_CHECKING:
         new_figure,
         panel,
         picture,
-        styled,
         typeset,
     )
     from .table import (

@@ -96,7 +96,6 @@ ARGUMENTS = (
         --out DIR  folder for the results (default: out/<case>-<scenario>)
         --traces {csv,parquet,netcdf,none} [csv]  format of the time traces (default: csv)
         --store-step TIME  time between two rows of them (default: so that there are at most 40 000)
-        --animate  make a moving picture (GIF) of the worst run
         """,
         seeds=within(low=1, high=_MANY),
         first_seed=within(low=0),
@@ -143,7 +142,6 @@ def run(arguments: argparse.Namespace) -> int:
                         [*found.compared.values()],
                         case=asked.case,
                         question=_question(asked, arguments),
-                        animate=arguments.animate,
                         progress=lambda what, share: tell(what, share * total, total),
                     )
         except KeyboardInterrupt:
@@ -275,7 +273,7 @@ def _written(folder: OutputFolder) -> str:
     suffixes = {path.suffix for path in folder.written}
     text = f"Written to {folder.path}: summary.md, summary.json, events.csv"
     text += ", design.yaml" * any(path.name == "design.yaml" for path in folder.written)
-    text += ", figures" * (".svg" in suffixes) + ", animation.gif" * (".gif" in suffixes)
+    text += ", figures" * (".svg" in suffixes)
     if traces:
         size = sum(path.stat().st_size for path in traces) / _MEGABYTE
         text += f", {count(len(traces), 'time trace')} of {size:.1f} MB"
@@ -297,15 +295,13 @@ def _next(
         )
     if len(asked.seeds) < 10 and not asked.duration > 1e5:
         rows.append(("ten seas", _again(arguments, words, seeds=10, **own)))
-    if not arguments.animate:
-        rows.append(("a moving picture", _again(arguments, words, animate=True, **own)))
     rows.append(("other operations and controllers", "stillhook scenarios"))
     return rows
 
 
 def _again(arguments: argparse.Namespace, case: str, **changes: object) -> str:
     """Return the command that does the same again, with changes."""
-    fresh: dict[str, object] = {"set": [], "out": None, "traces": "csv", "animate": False}
+    fresh: dict[str, object] = {"set": [], "out": None, "traces": "csv"}
     words = changed_words(arguments, ARGUMENTS, **(fresh | changes))
     return " ".join(["stillhook simulate", case, *map(shlex.quote, words)])
 

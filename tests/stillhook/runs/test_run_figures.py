@@ -18,9 +18,8 @@ from PIL import Image
 import stillhook as sh
 from models.run import Event, NamedQuantity
 from stillhook.runs import runs_report
-from stillhook.runs import strip as strip_module
 from stillhook.runs.figures import comparison, exceedance
-from stillhook.runs.strip import Scene, animation, strip
+from stillhook.runs.strip import Scene, strip
 from stillhook.runs.trace_figure import traces
 from stillhook.runs.window import Window, envelope, runs_of_true, window_of
 from stillhook.text import picture
@@ -210,7 +209,7 @@ def test_states_are_bars_over_their_periods():
 
 def test_a_run_without_traces_has_no_figures():
     bare = replace(calm()[0], time=np.zeros(0), values=np.zeros((0, len(calm()[0].signals))))
-    for make in (traces, strip, animation):
+    for make in (traces, strip):
         with pytest.raises(sh.InputError, match="the run with seed 0 has no time traces to draw"):
             make(bare)
     assert figures_of(replace(calm(), runs=(bare,))) == {"exceedance"}
@@ -299,7 +298,7 @@ def test_periods_cover_what_is_true(flags):
     assert not (covered & ~flag)[:-1].any()
 
 
-# strip and animation
+# strip
 
 
 def test_the_strip_is_drawn_to_one_scale():
@@ -329,22 +328,6 @@ def test_slack_rope_is_told_in_the_strip():
     texts = [text.get_text() for text in figure_of("strip of a landing").axes[0].texts]
     assert "slack" in texts
     assert any(text.endswith(" kN") for text in texts)
-
-
-def test_an_animation_moves_and_is_small(monkeypatch):
-    monkeypatch.setattr(strip_module, "_FEWEST", 8)
-    monkeypatch.setattr(strip_module, "_MOST", 8)
-    told: list[float] = []
-    film = animation(landing()[0], landing().scenario, progress=told.append)
-    assert told[-1] == 1.0
-    assert len(film) < 8 * 20_000  # at most 6 MB with all of its frames
-    image = Image.open(io.BytesIO(film))
-    assert (image.format, image.n_frames, image.info["loop"]) == ("GIF", 8, 0)
-    frames = []
-    for frame in range(image.n_frames):
-        image.seek(frame)
-        frames.append(np.asarray(image.convert("L"), dtype=np.int16))
-    assert all((np.abs(a - b) > 60).any() for a, b in itertools.pairwise(frames))
 
 
 # over seeds
