@@ -40,7 +40,7 @@ from models.spread import Spread
 from stillhook.controllers import recipe_of
 from stillhook.sweeps import sweep, usual_spread
 from stillhook.sweeps.store import Draw
-from stillhook.sweeps.time_cases import CaseResult, CaseTask, TimeBench, TimeQuestion
+from stillhook.sweeps.time_cases import CaseResult, CaseTask, TimeQuestion
 from stillhook.sweeps.time_metrics import METRICS
 from stillhook.sweeps.time_sweep import run_sweep
 
@@ -69,21 +69,11 @@ class Idle(TimeQuestion):
 
     sleep: float = 0.0
 
-    def bench(self) -> TimeBench:
-        """Return what sleeps."""
-        return IdleBench(self)
-
-
-class IdleBench(TimeBench):
-    """Sleeps instead of running a case."""
-
     def do(self, task: CaseTask, progress: Any = None) -> CaseResult:
         """Return numbers that stand for those of a case."""
-        question = self._question
-        assert isinstance(question, Idle)
-        clock.sleep(question.sleep)
-        values = dict.fromkeys(question.metrics, float(task.index))
-        return CaseResult(index=task.index, status="completed", values=values, wall=question.sleep)
+        clock.sleep(self.sleep)
+        values = dict.fromkeys(self.metrics, float(task.index))
+        return CaseResult(index=task.index, status="completed", values=values, wall=self.sleep)
 
 
 def case() -> Case:
@@ -113,13 +103,13 @@ def costs(count: int) -> list[Row]:
         question = TimeQuestion(
             case=own, recipe=recipe_of(wanted, "sweep"), metrics=tuple(METRICS), duration=duration
         )
-        bench, table = question.bench(), spread.sample(cases)
+        table = spread.sample(cases)
         for repeat in range(2):  # the first compiles what is not in the cache yet
             walls = []
             for index, row in enumerate(table):
                 task = CaseTask(index=index, seed=index, changes=spread.changes(row))
                 began = clock.process_time()
-                bench.do(task)
+                question.do(task)
                 walls.append(clock.process_time() - began)
             each = statistics.median(walls)
             what = f"{name}{', compiling' if repeat == 0 else ''}"

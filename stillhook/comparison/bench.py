@@ -1,12 +1,12 @@
 """Tasks of a comparison, designs and runs, and the bench that does them in any process.
 
-CellSetup --(to any process)--> CellBench.do(CellTask) --> StoredDesign, Cell, Trace or Refused
+CellBench --(to any process)--> do(CellTask) --> StoredDesign, Cell, Trace or Refused
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -57,23 +57,18 @@ class Refused:
     always: bool = False
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class CellSetup:
-    """What all are asked, and who is asked, by name."""
-
-    question: ComparisonQuestion
-    contenders: Mapping[str, Contender]
-
-    def bench(self) -> CellBench:
-        """Return what does the tasks."""
-        return CellBench(self)
-
-
 class CellBench:
-    """Does tasks, one after the other, and keeps what it prepared for the one before."""
+    """Does tasks, one after the other, and keeps what it prepared for the one before.
 
-    def __init__(self, setup: CellSetup) -> None:
-        self._question, self._contenders = setup.question, setup.contenders
+    Parameters
+    ----------
+    question, contenders
+        What all are asked, and who is asked.
+    """
+
+    def __init__(self, question: ComparisonQuestion, contenders: Sequence[Contender]) -> None:
+        self._question = question
+        self._contenders = {each.name: each for each in contenders}
         self._at: tuple[str, float] | None = None
         self._prepared: Any = None
 

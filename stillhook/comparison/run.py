@@ -8,7 +8,7 @@ says why it did not take part.
 
 `Campaign` says which task comes next, and what becomes of its answer.
 
-    question, contenders --> Campaign.share (in processes), Campaign.alone (here) --> Comparison
+    question, contenders --> Campaign.work (in processes, and here) --> Comparison
 
 Designs come first, since runs wait for them.  A process is given what it has prepared already, as
 long as there is any.
@@ -29,10 +29,10 @@ from models.case import Case
 from models.simulation import EASE
 
 from ..controllers import Contender, StoredDesign, contenders_of
-from ..keeper import POLL, Died, Processes, usable_cores
+from ..keeper import POLL, Alone, Died, Pool, Processes, usable_cores
 from ..runs import seconds_of, seeds_of
 from ..text import Progress
-from .bench import CellBench, CellSetup, CellTask, Refused
+from .bench import CellBench, CellTask, Refused
 from .cell import Cell, ComparisonQuestion, Trace
 from .comparison import Comparison
 from .mismatch import Mismatch
@@ -165,12 +165,12 @@ def compare(
         complete = True
         try:
             if workers > 1 and sys.executable:
-                names = {each.name: each for each in contenders if each.portable}
-                setup = CellSetup(question=question, contenders=names)
-                campaign.share(stack.enter_context(Processes(workers).begin(setup, workers)))
-            campaign.alone()
+                bench = CellBench(question, [each for each in contenders if each.portable])
+                campaign.work(stack.enter_context(Processes(workers).begin(bench, workers)))
+            bench = CellBench(question, contenders)
+            campaign.work(Alone(campaign.tell).begin(bench, 1))
             if traces:
-                campaign.look_closely()
+                campaign.look_closely(bench)
         except KeyboardInterrupt:
             complete = False
         return campaign.comparison(complete=complete, seconds=clock.perf_counter() - began)
@@ -214,7 +214,6 @@ class Campaign:
     traces: tuple[Trace, ...] = ()
     no_design: dict[tuple[str, float], str] = field(default_factory=dict)
     under_way: set[CellTask] = field(default_factory=set)
-    _bench: CellBench | None = None
     _names: dict[str, Contender] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -232,39 +231,31 @@ class Campaign:
             if cell is not None:
                 self.cells[task.name, task.height, task.seed] = cell
 
-    def share(self, pool: Processes) -> None:
-        """Do everything that can be sent to other processes."""
-        self._tell("starting")
+    def work(self, pool: Pool) -> None:
+        """Do everything that a pool can: in other processes not what cannot be sent there."""
+        here = isinstance(pool, Alone)
         while True:
             todo = [
                 task
                 for task in self._todo()
                 if task not in self.under_way
-                and (task.kind == "design" or self._names[task.name].portable)
+                and (here or task.kind == "design" or self._names[task.name].portable)
             ]
             while pool.idle and todo:
                 task = self._next(pool, todo)
                 todo.remove(task)
                 self.under_way.add(task)
                 pool.submit(self._full(task))
+            self.tell()
             if not pool.busy:
                 return
             answered = pool.wait(POLL)
-            self._tell()
-            if answered is None:
-                continue
-            task, answer = answered
-            self.under_way.discard(task)
-            self._take(task, answer)
+            if answered is not None:
+                task, answer = answered
+                self.under_way.discard(task)
+                self._take(task, answer)
 
-    def alone(self) -> None:
-        """Do the rest in this process."""
-        while todo := self._todo():
-            task = todo[0]
-            self._take(task, self._do(task))
-            self._tell()
-
-    def look_closely(self) -> None:
+    def look_closely(self, bench: CellBench) -> None:
         """Run the worst moment of the best linear law once more, for everybody."""
         found = self.comparison(complete=True, seconds=0.0).worst_moment
         if found is None:
@@ -275,10 +266,10 @@ class Campaign:
             cell = self.cells.get((contender.name, height, seed))
             if cell is None or cell.status in ("failed", "died"):
                 continue
-            self._tell(f"traces of {contender.name}")
             name = contender.name
             task = CellTask(kind="trace", name=name, height=height, seed=seed, moment=moment)
-            trace = self._do(task)
+            self.under_way = {task}
+            trace = bench.do(self._full(task), self.tell)
             if isinstance(trace, Trace):
                 traces.append(trace)
         self.traces = tuple(traces)
@@ -338,11 +329,11 @@ class Campaign:
         ]
         return designs + runs
 
-    def _next(self, pool: Processes, todo: list[CellTask]) -> CellTask:
+    def _next(self, pool: Pool, todo: list[CellTask]) -> CellTask:
         """Return what fits best: what an idle process has prepared, then what nobody has."""
         if todo[0].kind == "design":
             return todo[0]
-        prepared = [last for last in pool.lasts if last is not None]
+        prepared = pool.lasts
         known = next((task for task in todo if task.group in prepared), None)
         if known is not None:
             return known
@@ -364,16 +355,6 @@ class Campaign:
 
     def _law_of(self, contender: Contender, height: float) -> StoredDesign | None:
         return self.laws.get((contender.needs, self.question.design_height(height)))
-
-    def _do(self, task: CellTask) -> Any:
-        """Do a task in this process."""
-        if self._bench is None:
-            self._bench = CellSetup(question=self.question, contenders=self._names).bench()
-        full = self._full(task)
-        self._tell(_words(task))
-        if task.kind == "design":
-            return self._bench.do(full, lambda stage, done, total: self._tell(_words(task)))
-        return self._bench.do(full, lambda share: self._tell(_words(task)))
 
     def _full(self, task: CellTask) -> CellTask:
         """Return a task with the law that it takes."""
@@ -405,10 +386,11 @@ class Campaign:
             if self.store is not None:
                 self.store.add_cell(self._names[task.name], self._law(task), answer)
 
-    def _tell(self, what: str = "") -> None:
+    def tell(self, *part: object) -> None:
+        """Say what is under way, and how many runs there are; not how far each of them is."""
+        del part
         total = (len(self.contenders) * len(self.heights) - len(self.refused)) * len(self.seeds)
-        if not what:
-            what = _words(next(iter(self.under_way))) if self.under_way else ""
+        what = _words(next(iter(self.under_way))) if self.under_way else ""
         self.progress(what, len(self.cells), max(total, len(self.cells)))
 
 

@@ -1,6 +1,6 @@
 """A dask cluster as a pool: workers on other machines, or several processes on this one.
 
-    setup (pickled once, kept by the scheduler) + task --> worker --> answer
+    bench (pickled once, kept by the scheduler) + task --> worker --> answer
 
 A worker that is killed loses nothing: the scheduler gives its tasks to others, and starts anew
 what they need.  At most a few tasks for each thread are under way at once, so that a million of
@@ -24,7 +24,7 @@ from typing_extensions import override
 from models.basics import InputError, SolverError, check_range
 
 from .digest import code_digest
-from .pool import POLL, Bench, Died, Pool, Setup, Task
+from .pool import POLL, Bench, Died, Pool, Task
 
 _AHEAD = 3  # tasks under way for each thread of the cluster
 _PATIENCE = 60.0  # for a scheduler to answer and to have a worker [s]
@@ -80,7 +80,7 @@ class Cluster(Pool):
     def submit(self, task: Task) -> None:
         self._count += 1  # a task that is done again must not be taken for the one before
         future = self._running.submit(
-            _do, self._setup, task, self._code, key=f"{self._mark}-{self._count}", pure=False
+            _do, self._bench, task, self._code, key=f"{self._mark}-{self._count}", pure=False
         )
         self._under_way[future] = task
         future.add_done_callback(self._done.put)
@@ -88,22 +88,22 @@ class Cluster(Pool):
     @override
     def end(self) -> None:
         with contextlib.suppress(Exception):  # the scheduler may be what is gone
-            self._running.cancel([*self._under_way, self._setup], force=True)
+            self._running.cancel([*self._under_way, self._bench], force=True)
         self._stack.close()
 
     @override
-    def _start(self, setup: Setup, count: int) -> None:
+    def _start(self, bench: Bench, count: int) -> None:
         self._done: queue.Queue[Any] = queue.Queue()
         self._under_way: dict[Any, Task] = {}
         self._count, self._mark = 0, f"stillhook-{uuid.uuid4().hex[:12]}"
         self._stack = contextlib.ExitStack()
         self._running = self._stack.enter_context(self._connected())
-        self._code = code_digest(type(setup))
+        self._code = code_digest(type(bench))
         self._count_threads()
         # A task of its own and no scattered data: should all its copies be lost with a worker,
         # the scheduler makes it again.
-        self._setup = self._running.submit(
-            bytes, pickle.dumps(setup), key=f"{self._mark}-setup", pure=False
+        self._bench = self._running.submit(
+            bytes, pickle.dumps(bench), key=f"{self._mark}-bench", pure=False
         )
 
     @override
@@ -179,9 +179,9 @@ class Cluster(Pool):
             yield client
 
 
-def _do(setup: bytes, task: Task, code: str) -> Any:
+def _do(pickled: bytes, task: Task, code: str) -> Any:
     """Do a task on a worker, whose code must be the driver's: numbers of others do not belong."""
-    bench, own, alone = _bench(setup)
+    bench, own, alone = _bench(pickled)
     if code != own:
         raise InputError(
             "cluster: a worker has another version of Stillhook than this process; install the "
@@ -192,9 +192,9 @@ def _do(setup: bytes, task: Task, code: str) -> Any:
 
 
 @functools.lru_cache(maxsize=2)
-def _bench(setup: bytes) -> tuple[Bench, str, threading.Lock]:
-    found: Setup = pickle.loads(setup)
-    return found.bench(), code_digest(type(found)), threading.Lock()
+def _bench(pickled: bytes) -> tuple[Bench, str, threading.Lock]:
+    found: Bench = pickle.loads(pickled)
+    return found, code_digest(type(found)), threading.Lock()
 
 
 def _distributed() -> Any:

@@ -2,9 +2,9 @@
 
     tasks --> Pool.submit --> a worker's bench --> Pool.wait --> answers
 
-A pool is begun with a *setup*, which goes to every worker once; `setup.bench()` makes there what
-does the tasks (`Bench.do`).  A task whose worker was killed is done once more, by another worker;
-one that kills two is answered with `Died`.
+A pool is begun with a *bench* that does tasks (`Bench.do`), of which every worker gets a copy.  A
+task whose worker was killed is done once more, by another worker; one that kills two is answered
+with `Died`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 from abc import ABC, abstractmethod
 from collections import Counter, deque
-from collections.abc import Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol, Self, TypeVar
 
@@ -33,17 +33,10 @@ class Task(Protocol):
 
 
 class Bench(Protocol):
-    """Does tasks, one after the other, in whatever process."""
+    """Does tasks, one after the other; before the first one it can be pickled."""
 
-    def do(self, task: Any, /) -> Any:
-        """Return the answer to a task."""
-
-
-class Setup(Protocol):
-    """What a worker needs before its first task; it can be pickled."""
-
-    def bench(self) -> Bench:
-        """Return what does the tasks."""
+    def do(self, task: Any, progress: Any = None, /) -> Any:
+        """Return the answer to a task; `progress` is called with how far it is."""
 
 
 T = TypeVar("T", bound=Task)
@@ -70,10 +63,10 @@ class Pool(ABC):
     name: str
     jobs: int
 
-    def begin(self, setup: Setup, count: int) -> Self:
+    def begin(self, bench: Bench, count: int) -> Self:
         """Start the workers for as many tasks as there are; return the pool."""
         self._deaths = Counter[Hashable]()
-        self._start(setup, count)
+        self._start(bench, count)
         return self
 
     @property
@@ -85,6 +78,11 @@ class Pool(ABC):
     @abstractmethod
     def busy(self) -> int:
         """How many tasks are under way."""
+
+    @property
+    def lasts(self) -> list[Hashable]:
+        """The group of tasks that each idle worker has prepared, where it can be chosen."""
+        return []
 
     @abstractmethod
     def submit(self, task: Task) -> None:
@@ -115,7 +113,7 @@ class Pool(ABC):
             yield self.wait(POLL)
 
     @abstractmethod
-    def _start(self, setup: Setup, count: int) -> None:
+    def _start(self, bench: Bench, count: int) -> None:
         """Start the workers."""
 
     @abstractmethod
@@ -136,9 +134,18 @@ class Pool(ABC):
 
 
 class Alone(Pool):
-    """One task after the other in this process: for what cannot leave it."""
+    """One task after the other in this process: for what cannot leave it.
+
+    Parameters
+    ----------
+    progress
+        Called with whatever a task says of how far it is; it may raise KeyboardInterrupt.
+    """
 
     name, jobs = "serial", 1
+
+    def __init__(self, progress: Callable[..., None] | None = None) -> None:
+        self._progress = progress
 
     @property
     @override
@@ -159,13 +166,13 @@ class Alone(Pool):
         self._tasks.clear()
 
     @override
-    def _start(self, setup: Setup, count: int) -> None:
-        self._bench, self._tasks = setup.bench(), deque[Task]()
+    def _start(self, bench: Bench, count: int) -> None:
+        self._bench, self._tasks = bench, deque[Task]()
 
     @override
     def _answer(self, timeout: float) -> tuple[Any, Any] | None:
         task = self._tasks.popleft()
-        return task, self._bench.do(task)
+        return task, self._bench.do(task, self._progress)
 
 
 def usable_cores() -> int:

@@ -27,7 +27,7 @@ from typing import IO, Any
 
 from typing_extensions import override
 
-from .pool import Died, Pool, Setup, Task, usable_cores
+from .pool import Bench, Died, Pool, Task, usable_cores
 
 _START = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
@@ -40,7 +40,7 @@ _LENGTH = struct.Struct(">Q")
 class _Process:
     """A process and the thread that talks to it."""
 
-    def __init__(self, setup: Setup, answers: queue.Queue[tuple[_Process, Task, Any]]) -> None:
+    def __init__(self, bench: Bench, answers: queue.Queue[tuple[_Process, Task, Any]]) -> None:
         self.last: Hashable = None
         self._answers = answers
         self._tasks: queue.Queue[Task | None] = queue.Queue()
@@ -53,7 +53,7 @@ class _Process:
             env={**os.environ, **dict.fromkeys(_THREADS, "1")},
             start_new_session=True,
         )
-        self._setup = setup
+        self._bench = bench
         self._thread = threading.Thread(target=self._talk, daemon=True)
         self._thread.start()
 
@@ -85,7 +85,7 @@ class _Process:
         while (task := self._tasks.get()) is not None:
             try:
                 if fresh:
-                    _send(into, self._setup)
+                    _send(into, self._bench)
                     fresh = False
                 _send(into, task)
                 answer = _receive(out)
@@ -135,9 +135,9 @@ class Processes(Pool):
         return len(self._busy)
 
     @property
+    @override
     def lasts(self) -> list[Hashable]:
-        """The group of tasks that each idle process has prepared; None where there is none."""
-        return [process.last for process in self._idle]
+        return [process.last for process in self._idle if process.last is not None]
 
     @property
     def pids(self) -> list[int]:
@@ -160,9 +160,9 @@ class Processes(Pool):
         self._idle, self._busy = [], set()
 
     @override
-    def _start(self, setup: Setup, count: int) -> None:
-        self._setup, self._answers = setup, queue.Queue()
-        self._idle = [_Process(setup, self._answers) for _ in range(min(self.jobs, count))]
+    def _start(self, bench: Bench, count: int) -> None:
+        self._bench, self._answers = bench, queue.Queue()
+        self._idle = [_Process(bench, self._answers) for _ in range(min(self.jobs, count))]
 
     @override
     def _answer(self, timeout: float) -> tuple[Any, Any] | None:
@@ -173,19 +173,19 @@ class Processes(Pool):
         self._busy.discard(process)
         if isinstance(answer, Died):
             process.end()
-            process = _Process(self._setup, self._answers)
+            process = _Process(self._bench, self._answers)
         self._idle.append(process)
         return task, answer
 
 
 def serve() -> None:
-    """Answer tasks until there are no more; the first message is the setup."""
+    """Answer tasks until there are no more; the first message is the bench."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever a controller prints must not come among the answers
     tasks = sys.stdin.buffer
     with contextlib.suppress(EOFError, BrokenPipeError):
-        bench = _receive(tasks).bench()
+        bench = _receive(tasks)
         while True:
             _send(answers, bench.do(_receive(tasks)))
 

@@ -1,6 +1,6 @@
 """One case of a sweep in time: changed plant, controller, seed, and the numbers of its run.
 
-    TimeQuestion --(to any process)--> bench() --> do(CaseTask) --> CaseResult (plain data)
+    TimeQuestion --(to any process)--> do(CaseTask) --> CaseResult (plain data)
 
 The same function does a case in this process, in a pool and on a cluster, on one BLAS thread, from
 the case, its changes and its seed alone: so the numbers are the same to the last bit wherever and
@@ -14,6 +14,7 @@ import time as clock
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -89,7 +90,7 @@ class CaseResult:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TimeQuestion:
-    """What every case of a sweep is asked.
+    """What every case of a sweep is asked; it does the cases, one after the other.
 
     Attributes
     ----------
@@ -126,25 +127,6 @@ class TimeQuestion:
     weighed: bool = True
     starts: int = 8
 
-    def bench(self) -> TimeBench:
-        """Return what does the cases, in whatever process."""
-        return TimeBench(self)
-
-
-class TimeBench:
-    """Does cases, one after the other.
-
-    Parameters
-    ----------
-    question
-        What every case is asked.
-    """
-
-    def __init__(self, question: TimeQuestion) -> None:
-        self._question = question
-        self._own: Controller | None = None
-        self._static: Shift | None = None
-
     def do(self, task: CaseTask, progress: Progress | None = None) -> CaseResult:
         """Return what comes of a case; what is wrong with it is part of the answer.
 
@@ -154,17 +136,16 @@ class TimeBench:
             If the run was interrupted: half a run is worth nothing.
         """
         began = clock.perf_counter()
-        names = self._question.metrics
         with warnings.catch_warnings(), one_thread():
             warnings.simplefilter("ignore", PhysicsWarning)  # told once, of the nominal case
             try:
                 run = self.run(task, progress)
                 status, message = status_of(run), run.message
-                values = numbers_of(run, names)
+                values = numbers_of(run, self.metrics)
             except Exception as error:  # what a controller of the user's own may do
                 known = isinstance(error, StillhookError)
                 message = str(error) if known else f"{type(error).__name__}: {error}"
-                status, values = "failed", dict.fromkeys(names, math.nan)
+                status, values = "failed", dict.fromkeys(self.metrics, math.nan)
         wall = clock.perf_counter() - began
         return CaseResult(
             index=task.index, status=status, message=message, values=values, wall=wall
@@ -180,19 +161,18 @@ class TimeBench:
         KeyboardInterrupt
             If it was interrupted.
         """
-        question = self._question
-        case = question.case.replace(task.changes) if task.changes else question.case
+        case = self.case.replace(task.changes) if task.changes else self.case
         controller = self.controller(case, task)
-        scenario = scenario_named(question.scenario, question.case, **question.options)
+        scenario = scenario_named(self.scenario, self.case, **self.options)
         series = Series.prepare(
             case,
             controller,
-            with_faults(scenario, task.faults, case, question.duration),
+            with_faults(scenario, task.faults, case, self.duration),
             SimulationOptions(
-                duration=question.duration,
-                settle=question.settle,
-                masses=question.masses,
-                compiled=question.compiled,
+                duration=self.duration,
+                settle=self.settle,
+                masses=self.masses,
+                compiled=self.compiled,
             ),
         )
         run = series.run(task.seed, progress)
@@ -202,20 +182,24 @@ class TimeBench:
 
     def controller(self, case: Case, task: CaseTask) -> Controller:
         """Return the controller of a case: made for the nominal one, or for this one."""
-        question, recipe = self._question, self._question.recipe
-        if question.design_follows:
-            return recipe.follow(case, question.starts)
+        if self.design_follows:
+            return self.recipe.follow(case, self.starts)
+        own = self._own
         if task.gains:
-            own = recipe.with_gains(question.case, task.gains).controller(question.case)
-        else:
-            if self._own is None:
-                self._own = recipe.controller(question.case)
-            own = self._own
-        if not (question.weighed and task.changes):
+            own = self.recipe.with_gains(self.case, task.gains).controller(self.case)
+        if not (self.weighed and task.changes):
             return own
-        if self._static is None:
-            self._static = static_of(question.case)
         return trimmed(own, shift_between(self._static, static_of(case)))
+
+    @cached_property
+    def _own(self) -> Controller:
+        """The controller of the nominal case."""
+        return self.recipe.controller(self.case)
+
+    @cached_property
+    def _static(self) -> Shift:
+        """The static state of the nominal case."""
+        return static_of(self.case)
 
 
 def seed_of(seed: int, index: int, *, common: bool = False) -> int:

@@ -225,7 +225,7 @@ def test_the_controller_is_made_for_the_nominal_case_unless_it_follows():
             duration=5.0,
             design_follows=follows,
         )
-        made = question.bench().controller(case, task)
+        made = question.controller(case, task)
         assert made.name == f"made for {mass:.6g} kg"
 
 
