@@ -160,12 +160,11 @@ def idle(
         duration=DURATION,
         sleep=sleep,
     )
-    draw = Draw(samples=cases, sampling="sobol", seed=0, common_seed=False)
+    draw = Draw(spread=spread, samples=cases, sampling="sobol", seed=0, common_seed=False)
     with tempfile.TemporaryDirectory() as folder:
         watch = Watch()
         found = run_sweep(
             question,
-            spread,
             draw,
             engine=engine,
             jobs=jobs,

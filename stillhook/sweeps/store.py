@@ -1,6 +1,6 @@
 """Results of a sweep in memory and in a journal (`Results`), and the question they answer.
 
-    TimeQuestion, Spread, Draw --> header_of --> journal and attributes --> stored_question
+    TimeQuestion, Draw --> header_of --> journal and attributes --> stored_question
     CaseResult --> Results.put --> journal.jsonl --> Results --> what is there already --> result.nc
 
 The header holds everything that the numbers hang on: case, controller with its gains, spread,
@@ -12,9 +12,8 @@ from the journal at the end.
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +27,7 @@ from synth.sweeps import ATTRIBUTE
 from ..controllers import recipe_from
 from ..keeper import Journal, question_in, versions
 from .export import ENDINGS, check_writable
-from .time_cases import TimeQuestion
+from .time_cases import TimeQuestion, seed_of
 from .time_metrics import STATUS
 
 if TYPE_CHECKING:
@@ -38,8 +37,6 @@ JOURNAL, RESULT = "journal.jsonl", "result.nc"
 """Names of the files in the folder of a sweep."""
 
 _WHAT = "sweep"
-# What a question holds as plain data: all but the case and how the controller is made.
-_PLAIN = tuple(each.name for each in fields(TimeQuestion) if each.name not in ("case", "recipe"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +45,8 @@ class Draw:
 
     Attributes
     ----------
+    spread
+        What varies, on the nominal case.
     samples
         Number of cases.
     sampling
@@ -60,22 +59,34 @@ class Draw:
         Number of the first case: a part of a longer sweep.
     """
 
+    spread: Spread
     samples: int
     sampling: str
     seed: int
     common_seed: bool
     first: int = 0
 
+    def seeds(self, indices: Iterable[int]) -> list[int]:
+        """Return the seeds of the runs of cases, which depend on nothing but these."""
+        return [seed_of(self.seed, index, common=self.common_seed) for index in indices]
 
-def header_of(question: TimeQuestion, spread: Spread, draw: Draw) -> dict[str, Any]:
+
+# What a question and its draw hold as plain data: all but these.
+_RICH = ("case", "recipe", "spread")
+_QUESTION, _DRAW = (
+    [each.name for each in fields(kind) if each.name not in _RICH] for kind in (TimeQuestion, Draw)
+)
+
+
+def header_of(question: TimeQuestion, draw: Draw) -> dict[str, Any]:
     """Return what a store says about itself, as plain data."""
     found: dict[str, Any] = {
         "mode": "time",
         "case": question.case.to_dict(),
         "controller": question.recipe.to_dict(),
-        "spread": spread.to_dict(),
-        **asdict(draw),
-        **{name: getattr(question, name) for name in _PLAIN},
+        "spread": draw.spread.to_dict(),
+        **{name: getattr(draw, name) for name in _DRAW},
+        **{name: getattr(question, name) for name in _QUESTION},
         "versions": versions(TimeQuestion),
     }
     plain: dict[str, Any] = json.loads(text_of(found))
@@ -83,8 +94,8 @@ def header_of(question: TimeQuestion, spread: Spread, draw: Draw) -> dict[str, A
 
 
 def text_of(header: Mapping[str, Any]) -> str:
-    """Return a header as JSON; infinities are written as JavaScript has them."""
-    return json.dumps(_plain(header), ensure_ascii=True)
+    """Return a header as JSON, what JSON does not know as text."""
+    return json.dumps(header, default=str)
 
 
 def places_of(store: str | Path) -> tuple[Path, Path]:
@@ -109,41 +120,28 @@ def places_of(store: str | Path) -> tuple[Path, Path]:
     return journal, place
 
 
-def stored_question(store: str | Path) -> tuple[TimeQuestion, Spread, Draw]:
-    """Return the question of a stored sweep, its spread and how the cases are drawn.
+def stored_question(store: str | Path) -> tuple[TimeQuestion, Draw]:
+    """Return the question of a stored sweep, and how its cases are drawn.
 
     Raises
     ------
     InputError
-        If there is none, or it cannot be asked again: its controller was Python code.
+        If there is none, or it cannot be asked again: its controller was Python code, or
+        something is missing.
     """
     path, _ = places_of(store)
-    return question_from(question_in(path, _WHAT), str(path))
-
-
-def question_from(header: Mapping[str, Any], source: str) -> tuple[TimeQuestion, Spread, Draw]:
-    """Return the question that a header tells of, its spread and how the cases are drawn.
-
-    Raises
-    ------
-    InputError
-        If it cannot be asked again: its controller was Python code, or something is missing.
-    """
+    header, source = question_in(path, _WHAT), str(path)
     try:
         case = Case.from_dict(header["case"], source=source)
         recipe = recipe_from(header["controller"])
-        question = TimeQuestion(
-            case=case,
-            recipe=recipe,
-            **{name: header[name] for name in _PLAIN},
-        )
+        asked = {name: header[name] for name in _QUESTION}
         spread = Spread.from_dict(header["spread"], source=source).on(case, recipe.gains)
-        draw = Draw(**{each.name: header[each.name] for each in fields(Draw)})
+        draw = Draw(spread=spread, **{name: header[name] for name in _DRAW})
+        return TimeQuestion(case=case, recipe=recipe, **asked), draw
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"{source}: its question is spoilt ({error!r})") from error
-    return question, spread, draw
 
 
 class Results:
@@ -196,14 +194,3 @@ class Results:
             raise IndexError(f"there is no case {index}")
         for name, values in self._values.items():
             values[place] = row[name]
-
-
-def _plain(value: Any) -> Any:
-    """Return plain data, what is no JSON as text."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    if isinstance(value, float) and math.isnan(value):
-        return None
-    return value if value is None or isinstance(value, str | int | float | bool) else str(value)

@@ -172,12 +172,11 @@ def sweep(
 
     del accessor
     recipe = recipe_of(design, "sweep")
-    lasting = seconds_of("sweep: duration", duration, high=_LONGEST)
     question = TimeQuestion(
         case=nominal,
         recipe=recipe,
         metrics=names_of(metrics),
-        duration=lasting,
+        duration=seconds_of("sweep: duration", duration, high=_LONGEST),
         settle=None
         if settle is None
         else seconds_of("sweep: settle", settle, high=_LONGEST, positive=False),
@@ -190,14 +189,18 @@ def sweep(
         starts=int(check_range("sweep", "starts", starts, low=1, high=4096)),
     )
     own = given.on(nominal, recipe.gains or None)
-    count = own.count(None if sampling == "given" else int(wanted), sampling)
     check_range("sweep", "first", first, low=0, high=1e12)
     if first and sampling not in ("sobol", "random"):
         raise InputError(f"sweep: a part of a sweep is of sobol or random, got {sampling!r}")
     draw = Draw(
-        samples=count, sampling=sampling, seed=int(seed), common_seed=common_seed, first=int(first)
+        spread=own,
+        samples=own.count(None if sampling == "given" else int(wanted), sampling),
+        sampling=sampling,
+        seed=int(seed),
+        common_seed=common_seed,
+        first=int(first),
     )
-    return run_sweep(question, own, draw, engine=engine, jobs=jobs, store=store, progress=progress)
+    return run_sweep(question, draw, engine=engine, jobs=jobs, store=store, progress=progress)
 
 
 def resume_sweep(
@@ -227,10 +230,8 @@ def resume_sweep(
     from .time_sweep import run_sweep
 
     del accessor
-    question, spread, draw = stored_question(store)
-    return run_sweep(
-        question, spread, draw, engine=engine, jobs=jobs, store=store, progress=progress
-    )
+    question, draw = stored_question(store)
+    return run_sweep(question, draw, engine=engine, jobs=jobs, store=store, progress=progress)
 
 
 def case_of(design: object, case: Case | None) -> Case:

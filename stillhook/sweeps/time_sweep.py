@@ -1,6 +1,6 @@
 """A sweep in time from its question to its result (`run_sweep`): draws, tasks, pool, journal.
 
-    TimeQuestion, Spread, Draw --> tasks --> engine --> store (or memory) --> xarray.Dataset
+    TimeQuestion, Draw --> tasks --> engine --> store (or memory) --> xarray.Dataset
 
 The driver knows which cases are done and hands out the others; it never looks into a run.
 """
@@ -27,7 +27,7 @@ from ..keeper import Alone, Cluster, Died, Pool, Processes
 from ..text import OutputFolder, Progress
 from .export import write_result
 from .store import Draw, Results, header_of, places_of, text_of
-from .time_cases import CaseResult, CaseTask, TimeQuestion, seed_of
+from .time_cases import CaseResult, CaseTask, TimeQuestion
 from .time_metrics import METRICS, STATUS
 
 if TYPE_CHECKING:
@@ -38,7 +38,6 @@ _TOLD = 20  # reasons of failed cases that a result tells
 
 def run_sweep(
     question: TimeQuestion,
-    spread: Spread,
     draw: Draw,
     *,
     engine: str | Pool | None = None,
@@ -50,8 +49,8 @@ def run_sweep(
 
     Parameters
     ----------
-    question, spread, draw
-        What every case is asked, what varies (already on the case), and how it is drawn.
+    question, draw
+        What every case is asked, and how the cases are drawn.
     engine, jobs
         As for `engine_of`.
     store
@@ -74,12 +73,12 @@ def run_sweep(
         If the cluster is gone.
     """
     last = draw.first + draw.samples
-    rows = spread.sample(last, draw.sampling, draw.seed, start=draw.first, stop=last)
+    rows = draw.spread.sample(last, draw.sampling, draw.seed, start=draw.first, stop=last)
     if len(rows) != draw.samples:
         raise InputError(f"sweep: the spread gives {len(rows)} cases, not {draw.samples}")
-    _check(question, spread)
+    _check(question, draw.spread)
     tell = progress or (lambda what, done, total: None)
-    template = template_of(question, spread, draw, rows)
+    template = template_of(question, draw, rows)
     used = engine_of(engine, question, jobs)
     messages: dict[int, str] = {}
     began, wall = clock.perf_counter(), 0.0
@@ -92,7 +91,7 @@ def run_sweep(
         done, total = len(rows) - len(missing), len(rows)
         if missing.size and not question.design_follows:
             question.recipe.controller(question.case)  # one that cannot be made is told at once
-        tasks = tasks_of(spread, draw, rows, missing)
+        tasks = tasks_of(draw, rows, missing)
         with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as stack:
             tell("starting", done, total)
             # Entered at once: processes must not outlive the sweep when something raises.
@@ -128,34 +127,33 @@ def run_sweep(
     )
 
 
-def tasks_of(
-    spread: Spread, draw: Draw, rows: FloatArray, wanted: npt.NDArray[np.intp]
-) -> Iterator[CaseTask]:
+def tasks_of(draw: Draw, rows: FloatArray, wanted: npt.NDArray[np.intp]) -> Iterator[CaseTask]:
     """Yield the cases of a sweep whose places among the rows are wanted, in their order.
 
     One at a time: a million of them would need more memory than their results.
     """
+    spread = draw.spread
     faulty = [(j, path) for j, path in enumerate(spread.paths) if path.startswith(PREFIX)]
     for place in wanted:
         row, index = rows[place], draw.first + int(place)
         yield CaseTask(
             index=index,
-            seed=seed_of(draw.seed, index, common=draw.common_seed),
+            seed=draw.seeds([index])[0],
             changes=spread.changes(row),
             gains=spread.gains(row),
             faults={path: float(row[j]) for j, path in faulty},
         )
 
 
-def template_of(question: TimeQuestion, spread: Spread, draw: Draw, rows: FloatArray) -> xr.Dataset:
+def template_of(question: TimeQuestion, draw: Draw, rows: FloatArray) -> xr.Dataset:
     """Return the result with nothing in it yet: coordinates, variables, units, attributes."""
     import xarray as xr
 
     n = len(rows)
-    seeds = [seed_of(draw.seed, draw.first + k, common=draw.common_seed) for k in range(n)]
+    seeds = draw.seeds(range(draw.first, draw.first + n))
     coordinates = {
         "seed": ("case", np.array(seeds, np.int64), {"long_name": "seed of the run"}),
-        **coordinates_of(spread, rows, draw.first),
+        **coordinates_of(draw.spread, rows, draw.first),
     }
     flags = {
         "long_name": "what became of the case",
@@ -174,7 +172,7 @@ def template_of(question: TimeQuestion, spread: Spread, draw: Draw, rows: FloatA
         metric = METRICS[name]
         told = {"long_name": metric.text, "units": metric.unit}
         variables[name] = ("case", np.full(n, np.nan), told)
-    header = header_of(question, spread, draw)
+    header = header_of(question, draw)
     attributes = {
         "title": f"{question.recipe.name} on {n} cases about {question.case.name}, in time",
         "case_name": question.case.name,

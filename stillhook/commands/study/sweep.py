@@ -182,7 +182,7 @@ def _resumed(arguments: argparse.Namespace) -> Swept:
             f"sweep: --resume takes case and all else from {arguments.resume}; give no CASE"
         )
     warnings.simplefilter("ignore", PhysicsWarning)  # told when it was begun
-    question, _, _ = stored_question(arguments.resume)
+    question, _ = stored_question(arguments.resume)
     with counting(arguments) as step:
         result = resume_sweep(
             arguments.resume, engine=arguments.cluster, jobs=arguments.jobs, progress=step
