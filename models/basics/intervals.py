@@ -1,9 +1,9 @@
 """Confidence intervals of a mean, a probability or a rate from a few repetitions.
 
 The mean of independent values has Student's interval; a share the exact one of Clopper and Pearson
-(1934); the time until something happens, with some runs ended before it did, the product-limit
-curve of Kaplan and Meier (1958), and at a constant rate the chi-square interval of Epstein and
-Sobel (1953).  `models/run/metrics.py` applies them to runs that differ in their seed.
+(1934); the rate at which something happens, with some runs ended before it did, the chi-square
+interval of Epstein and Sobel (1953).  `models/run/metrics.py` applies them to runs that differ in
+their seed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .arrays import FloatArray
-from .checks import InputError, ReadOnlyArrays, check_finite, check_range
+from .checks import InputError, check_finite, check_range
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,8 +58,8 @@ class Share:
         return self.count / self.total
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class FallTime(ReadOnlyArrays):
+@dataclass(frozen=True, kw_only=True)
+class FallTime:
     """How long runs keep lock.
 
     Attributes
@@ -70,9 +70,6 @@ class FallTime(ReadOnlyArrays):
         Time that all runs together kept it [s].
     rate, rate_low, rate_high
         Falls per second if they come at a constant rate, and its interval [1/s].
-    times, kept, kept_low, kept_high
-        Kaplan-Meier: at each time of a fall [s], the share of runs that still keep lock, and its
-        pointwise interval; NaN where it does not exist, as when all runs have fallen.
     """
 
     falls: int
@@ -80,10 +77,6 @@ class FallTime(ReadOnlyArrays):
     rate: float
     rate_low: float
     rate_high: float
-    times: FloatArray
-    kept: FloatArray
-    kept_low: FloatArray
-    kept_high: FloatArray
 
     @property
     def mean(self) -> tuple[float, float, float]:
@@ -168,10 +161,8 @@ def fall_time(times: npt.ArrayLike, fell: npt.ArrayLike, *, confidence: float = 
     >>> found = fall_time([300.0, 1200.0, 900.0, 1200.0], [True, False, True, False])
     >>> print(f"{found.rate:.2e} per second, {found.rate_low:.2e} to {found.rate_high:.2e}")
     5.56e-04 per second, 6.73e-05 to 2.01e-03
-    >>> found.times.tolist(), found.kept.tolist()
-    ([300.0, 900.0], [0.75, 0.5])
     """
-    from scipy.special import chdtri, ndtri
+    from scipy.special import chdtri
 
     kept = check_finite("fall time", "times", times)
     falls = np.asarray(fell, dtype=np.bool_)
@@ -188,24 +179,4 @@ def fall_time(times: npt.ArrayLike, fell: npt.ArrayLike, *, confidence: float = 
         high = float(chdtri(2 * r + 2, tail)) / (2.0 * exposure)
     else:
         rate, low, high = (math.inf, 0.0, math.inf) if r else (0.0, 0.0, math.inf)
-    at = np.unique(kept[falls])
-    there = (kept >= at[:, np.newaxis]).sum(axis=1)  # still running just before
-    fallen = ((kept == at[:, np.newaxis]) & falls).sum(axis=1)
-    remain = np.cumprod(1.0 - fallen / there)
-    # Greenwood's variance of ln(-ln S); where none remain it does not exist, and the ends are NaN.
-    with np.errstate(divide="ignore", invalid="ignore"):
-        variance = np.cumsum(fallen / (there * (there - fallen)))
-        half = float(ndtri(1.0 - tail)) * np.sqrt(variance) / np.abs(np.log(remain))
-        kept_low, kept_high = remain ** np.exp(half), remain ** np.exp(-half)
-    nothing = remain == 0.0
-    return FallTime(
-        falls=r,
-        exposure=exposure,
-        rate=rate,
-        rate_low=low,
-        rate_high=high,
-        times=at,
-        kept=remain,
-        kept_low=np.where(nothing, math.nan, kept_low),
-        kept_high=np.where(nothing, math.nan, kept_high),
-    )
+    return FallTime(falls=r, exposure=exposure, rate=rate, rate_low=low, rate_high=high)
