@@ -13,7 +13,6 @@ import math
 from collections.abc import Callable
 
 from scipy.optimize import brentq
-from scipy.special import erf
 
 from ..basics import SolverError
 
@@ -21,31 +20,11 @@ _ROUNDS = 12  # of finding nodes for a drag; two are the rule
 _SETTLED = 1e-3  # relative change of a drag for which adapted nodes need not change
 
 
-def gaussian_gain(sigma: float, current: float = 0.0) -> float:
-    """Return E[d/dv |v + U|(v + U)], v Gaussian: the equivalent gain of v|v| [m/s].
+def stochastic_equivalent(quadratic: float, sigma: float) -> float:
+    """Return the C of stochastic linearisation, q sqrt(8/pi) sigma [N s/m].
 
-    2 (sigma sqrt(2/pi) exp(-U^2 / 2 sigma^2) + U erf(U / (sqrt(2) sigma))), which is
-    sqrt(8/pi) sigma without a current and 2|U| without motion.  For a Gaussian v it is also
-    E[f v]/sigma^2, the least-mean-square gain (Price's theorem).
-
-    Parameters
-    ----------
-    sigma
-        Standard deviation of the velocity [m/s].
-    current
-        Steady velocity U of the payload relative to the water [m/s].
-    """
-    if sigma == 0.0:
-        return 2.0 * abs(current)
-    ratio = current / sigma
-    bell = math.sqrt(2.0 / math.pi) * math.exp(-0.5 * ratio * ratio)
-    return 2.0 * (sigma * bell + current * float(erf(ratio / math.sqrt(2.0))))
-
-
-def stochastic_equivalent(quadratic: float, sigma: float, current: float = 0.0) -> float:
-    """Return the C of stochastic linearisation, q times `gaussian_gain` [N s/m].
-
-    Without a current C = q sqrt(8/pi) sigma (Borgman, J. Waterways Harbors 93, 1967).
+    The mean slope of q v|v|, v Gaussian, which is also its least-mean-square gain (Price's
+    theorem; Borgman, J. Waterways Harbors 93, 1967).
 
     Parameters
     ----------
@@ -53,24 +32,21 @@ def stochastic_equivalent(quadratic: float, sigma: float, current: float = 0.0) 
         q [N s2/m2].
     sigma
         Standard deviation of the payload's velocity [m/s].
-    current
-        Steady velocity of the payload relative to the water [m/s].
     """
-    return quadratic * gaussian_gain(sigma, current)
+    return quadratic * math.sqrt(8.0 / math.pi) * sigma
 
 
 def consistent_drag(
     quadratic: float,
     velocity_rms: Callable[[float], float],
     *,
-    current: float = 0.0,
     tolerance: float = 1e-10,
 ) -> float:
     """Return the C that agrees with the motion it leads to [N s/m].
 
-    Solves C = q gain(sigma_v(C)).  More drag means less motion, so that the difference of
+    Solves C = q sqrt(8/pi) sigma_v(C).  More drag means less motion, so that the difference of
     both sides changes sign once: a bracketing root finder cannot settle on the wrong root,
-    as the usual substitution C <- q gain(sigma_v(C)) can swing about it.
+    as the usual substitution of C into its own equation can swing about it.
 
     Parameters
     ----------
@@ -79,8 +55,6 @@ def consistent_drag(
     velocity_rms
         Function of C [N s/m] that returns the rms of the payload's velocity [m/s]; infinite
         where there is no stationary motion.
-    current
-        Steady velocity of the payload relative to the water [m/s].
     tolerance
         Relative tolerance of C [-].
 
@@ -93,8 +67,7 @@ def consistent_drag(
         return 0.0
 
     def target(C: float) -> float:
-        sigma = velocity_rms(C)
-        return math.inf if math.isinf(sigma) else stochastic_equivalent(quadratic, sigma, current)
+        return stochastic_equivalent(quadratic, velocity_rms(C))
 
     # A loop may be unstable at low drag (infinite motion) and calm at high: go up until it is.
     low, high = 0.0, quadratic  # the drag of about 0.6 m/s rms

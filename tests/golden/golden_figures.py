@@ -454,7 +454,6 @@ def plant(found: Figures) -> None:
         found.put(f"plant.rope_mode.{number}", mode)
     found.put("plant.drag.energy", energy_equivalent(10_500.0, 0.7, 1.1))
     found.put("plant.drag.stochastic", stochastic_equivalent(10_500.0, 0.4))
-    found.put("plant.drag.current", stochastic_equivalent(10_500.0, 0.4, 0.3))
     consistent = consistent_drag(10_500.0, lambda C: 2000.0 / (C + 1000.0))
     found.put("plant.drag.consistent", consistent)
 
