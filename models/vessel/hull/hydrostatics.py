@@ -241,36 +241,20 @@ def centre_of_mass(mass: FloatArray, point: Point = (0.0, 0.0, 0.0)) -> Point:
     return point[0] + float(arm[0]), point[1] + float(arm[1]), point[2] + float(arm[2])
 
 
-def stiffness_matrix(
-    waterplane: Waterplane,
-    loading: Loading,
-    point: Point = (0.0, 0.0, 0.0),
-    *,
-    density: float = SEA_WATER_DENSITY,
-) -> FloatArray:
-    """Return the hydrostatic stiffness of a freely floating body about a point (6, 6).
+def stiffness_matrix(waterplane: Waterplane, loading: Loading) -> FloatArray:
+    """Return the hydrostatic stiffness of a freely floating body about the origin (6, 6).
 
     Newman, Marine Hydrodynamics (1977), section 6.16, with weight equal to buoyancy.  Heave, roll
     and pitch only; [N/m, N, N m].
     """
-    x, y, z = point
     area = waterplane.area
-    sx, sy = waterplane.first
+    x, y = waterplane.first
     xx, yy, xy = waterplane.second
-    # Second moments of the waterplane about the point; the moment of volume and mass is the same
-    # about any height, as weight and buoyancy are equal.
-    moment = waterplane.volume * waterplane.centre_of_buoyancy[2]
-    moment -= loading.mass / density * loading.centre[2]
-    surplus = waterplane.volume - loading.mass / density
-    moment -= surplus * z
+    # Weight and buoyancy are equal: their moment is the same about any height.
+    below = waterplane.volume * (waterplane.centre_of_buoyancy[2] - loading.centre[2])
     found = np.zeros((6, 6))
-    found[2, 2] = area
-    found[2, 3] = found[3, 2] = sy - y * area
-    found[2, 4] = found[4, 2] = -(sx - x * area)
-    found[3, 3] = yy - 2.0 * y * sy + y**2 * area + moment
-    found[4, 4] = xx - 2.0 * x * sx + x**2 * area + moment
-    found[3, 4] = found[4, 3] = -(xy - x * sy - y * sx + x * y * area)
-    return density * GRAVITY * found
+    found[2:5, 2:5] = [[area, y, -x], [y, yy + below, -xy], [-x, -xy, xx + below]]
+    return loading.mass / waterplane.volume * GRAVITY * found
 
 
 def undamped_period(inertia: float, stiffness: float) -> float:

@@ -169,7 +169,7 @@ def vessel_from_hull(
     body = FloatingBody(
         hydrodynamics=water,
         mass=mass_matrix(loading),
-        stiffness=stiffness_matrix(waterplane, loading, density=density),
+        stiffness=stiffness_matrix(waterplane, loading),
         centre=loading.centre,
         roll_damping=roll_damping,
     )
@@ -181,7 +181,7 @@ def vessel_from_hull(
         values=body.motions(rows),
         depth=depth,
         source=f"Capytaine {versions()['capytaine']}",
-        notes=_provenance(hull, loading, body, frequencies, density, lid, command),
+        notes=_provenance(hull, loading, body, lid, command),
     )
     return HullVessel(
         hull=hull,
@@ -189,7 +189,7 @@ def vessel_from_hull(
         loading=loading,
         body=body,
         raos=raos,
-        warnings=_warnings(hull, loading, body, waterplane, radii),
+        warnings=_warnings(hull, body, loading.metacentric_heights(waterplane)[0], radii),
         kept=kept,
     )
 
@@ -249,8 +249,6 @@ def _provenance(
     hull: Hull,
     loading: Loading,
     body: FloatingBody,
-    frequencies: FloatArray,
-    density: float,
     lid: bool,
     command: str,
 ) -> tuple[str, ...]:
@@ -258,16 +256,18 @@ def _provenance(
     inputs = ", ".join(f"{key} {_told(value)}" for key, value in hull.inputs.items())
     x, y, z = (round(v, 3) + 0.0 for v in loading.centre)
     roll, pitch, yaw = loading.radii
+    water = body.hydrodynamics
+    omega = water.omega
     packages = ", ".join(f"{name} {version}" for name, version in versions().items())
     found = [
         f"hull: {inputs}; {hull.count} panels, digest {hull.digest[:16]}",
         f"loading: {loading.mass:.6g} kg, centre of gravity at ({x:g}, {y:g}, {z:g}) m from the "
         f"origin in the waterline, radii of gyration {roll:.4g}, {pitch:.4g}, {yaw:.4g} m",
         f"roll: {100.0 * body.roll_damping:g} % of critical damping added to that of the waves",
-        f"water: {density:g} kg/m3, "
-        + ("deep" if math.isinf(body.hydrodynamics.depth) else f"{body.hydrodynamics.depth:g} m")
-        + f"; coefficients at {frequencies.size} frequencies, {frequencies[0]:g} to "
-        f"{frequencies[-1]:g} rad/s, {'with' if lid else 'without'} a lid against irregular ones",
+        f"water: {water.density:g} kg/m3, "
+        + ("deep" if math.isinf(water.depth) else f"{water.depth:g} m")
+        + f"; coefficients at {omega.size} frequencies, {omega[0]:g} to {omega[-1]:g} rad/s, "
+        f"{'with' if lid else 'without'} a lid against irregular ones",
         f"by linear potential theory at zero speed: {packages}",
     ]
     if command:
@@ -281,22 +281,22 @@ def _told(value: object) -> str:
 
 def _warnings(
     hull: Hull,
-    loading: Loading,
     body: FloatingBody,
-    waterplane: Waterplane,
+    metacentric_height: float,
     radii: Sequence[float | None],
 ) -> tuple[str, ...]:
     """Return what the figures should be taken with care for."""
     found = []
-    omega = body.hydrodynamics.omega
+    water = body.hydrodynamics
+    omega = water.omega
     last = float(omega[-1])
-    reach = shortest_wave(hull, body.hydrodynamics.depth)
+    reach = shortest_wave(hull, water.depth)
     if reach < last:
         found.append(
             f"above {reach:.3g} rad/s a wave is shorter than four panels ({hull.panel_size:.3g} "
             "m): take more panels, or those figures for rough ones"
         )
-    turn = float(np.diff(body.hydrodynamics.omega**2).max()) / GRAVITY * hull.length / 2.0
+    turn = float(np.diff(omega**2).max()) / GRAVITY * hull.length / 2.0
     if turn > _TURN:
         found.append(
             f"from one frequency to the next the wave turns by {turn:.2g} rad at the ends of the "
@@ -309,17 +309,17 @@ def _warnings(
             "several times as far as a real one; 0.03 to 0.10 of critical is usual"
         )
     period = body.natural_periods().roll
-    if not 2.0 * math.pi / period >= float(body.hydrodynamics.omega[0]):
+    if not 2.0 * math.pi / period >= float(omega[0]):
         found.append(
             f"roll has its natural period, {period:.3g} s, beyond the table's lowest frequency: "
             "its resonance is not in the table"
         )
-    if loading.metacentric_heights(waterplane)[0] < 0.15:
+    if metacentric_height < 0.15:
         found.append(
-            f"a metacentric height of {loading.metacentric_heights(waterplane)[0]:.3g} m is less "
-            "than the 0.15 m that any seagoing vessel must have"
+            f"a metacentric height of {metacentric_height:.3g} m is less than the 0.15 m that any "
+            "seagoing vessel must have"
         )
-    error = body.hydrodynamics.energy_error(body.roll_damping * body.critical_roll_damping)
+    error = water.energy_error(body.roll_damping * body.critical_roll_damping)
     if error > _ENERGY:
         found.append(
             f"waves made and waves felt disagree by {100.0 * error:.0f} %: take more panels"

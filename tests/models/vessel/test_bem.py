@@ -23,7 +23,13 @@ from models.vessel.hull import (
     vessel_from_hull,
 )
 from models.vessel.hull.bem import froude_krylov, waterplane_lid
-from models.vessel.hull.hydrostatics import Loading, Waterplane, mass_matrix, stiffness_matrix
+from models.vessel.hull.hydrostatics import (
+    Loading,
+    Waterplane,
+    mass_matrix,
+    moved,
+    stiffness_matrix,
+)
 from models.vessel.hull.vessel import well_spaced
 
 pytestmark = pytest.mark.ci  # whole optimisations in fixtures
@@ -37,7 +43,7 @@ def body_of(water: Hydrodynamics, roll_damping: float = 0.05) -> FloatingBody:
     return FloatingBody(
         hydrodynamics=water,
         mass=mass_matrix(LOADING, water.point),
-        stiffness=stiffness_matrix(PLANE, LOADING, water.point),
+        stiffness=moved(stiffness_matrix(PLANE, LOADING), (0.0, 0.0, 0.0), water.point),
         centre=LOADING.centre,
         roll_damping=roll_damping,
     )
@@ -379,7 +385,7 @@ def test_capytaines_hydrostatics_tend_to_ours(water: Hydrodynamics) -> None:
 
     # One point a panel: their error falls with the panels' size squared.
     point = (3.0, 0.0, 1.0)
-    ours = stiffness_matrix(PLANE, LOADING, point)[2:5, 2:5]
+    ours = moved(stiffness_matrix(PLANE, LOADING), (0.0, 0.0, 0.0), point)[2:5, 2:5]
     theirs = []
     for panels in (380, 1500):
         hull = box_hull(60.0, 14.0, 4.0, panels=panels)
