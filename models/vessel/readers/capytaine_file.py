@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -70,14 +71,13 @@ def parse_capytaine(
         omega, heading, values = _computed(
             file, body, roll_damping, inertia, stiffness, point, notes
         )
-    order = np.argsort(heading)
     water = file.number("water_depth")
     return finished(
         VesselRaos(
             name=Path(owner).stem,
             omega=omega,
-            heading=heading[order],
-            values=values[:, order],
+            heading=heading,
+            values=values,
             origin=point,
             phase_origin=(0.0, 0.0),
             depth=math.inf if water is None else water,
@@ -92,16 +92,12 @@ def _stored(
     data: CapytaineData, name: str, body: str | None, notes: list[str]
 ) -> tuple[FloatArray, FloatArray, ComplexArray]:
     """Return frequencies, headings and motions as they stand in the file."""
-    place = _places(data, body)
+    place = _places(data, body, notes)
     values = data.table(name, ("frequency", "wave_direction", "dof"))
     order = _kept_rows(data, values)
-    found = np.zeros((order.size, values.shape[1], 6), dtype=np.complex128)
-    for mode, column in place.items():
-        found[:, :, MODES.index(mode)] = values[order][:, :, column]
-    _tell_missing(place, notes)
     notes.append(f"the RAO as the file has it ({name})")
     heading, first = _turned_headings(data)
-    return data.omega[order], heading, np.conj(found[:, first])
+    return data.omega[order], heading, _six(np.conj(values[order][:, first]), place, 1)
 
 
 def _computed(
@@ -115,7 +111,7 @@ def _computed(
 ) -> tuple[FloatArray, FloatArray, ComplexArray]:
     """Return frequencies, headings and motions, from the coefficients."""
     _need(data, ("added_mass", "radiation_damping"))
-    place = _places(data, body)
+    place = _places(data, body, notes)
     added, damping = (
         data.table(name, ("frequency", "influenced_dof", "radiating_dof"))
         for name in ("added_mass", "radiation_damping")
@@ -127,23 +123,33 @@ def _computed(
     added, damping = added[order].real, damping[order].real
     mass = _square_matrix(data, "inertia_matrix", inertia, "inertia", place)
     spring = _square_matrix(data, "hydrostatic_stiffness", stiffness, "stiffness", place)
-    columns = [place.get(mode) for mode in MODES]
     share = 0.0 if roll_damping is None else roll_damping
-    six = _six(mass, spring, added, damping, columns, omega, heading, share, point, force)
+    # A motion that the file lacks has a mass of one: it is zero, and the matrix not singular.
+    held = np.diag([float(mode not in place) for mode in MODES])
+    alone = FloatingBody(
+        hydrodynamics=Hydrodynamics(
+            omega=omega,
+            heading=heading,
+            added_mass=_six(added, place, 2),
+            damping=_six(damping, place, 2),
+            excitation=_six(force, place, 1),
+            point=point,
+        ),
+        mass=_six(mass, place, 2) + held,
+        stiffness=_six(spring, place, 2),
+        centre=centre_of_mass(_six(mass, place, 2) + held, point),
+        roll_damping=share,
+    )
     if share:
         column = place.get("roll")
         if column is None:
             raise InputError(f"{data.owner}: roll_damping is given, but nothing rolls")
         damping = damping.copy()
-        damping[:, column, column] += share * six.critical_roll_damping
+        damping[:, column, column] += share * alone.critical_roll_damping
     # Other bodies, and modes that bend, are in the equation too.
     solved = solved_motions(omega, mass + added, damping, spring, force, owner=data.owner)
-    values = np.zeros((omega.size, heading.size, 6), dtype=np.complex128)
-    for mode, column in place.items():
-        values[:, :, MODES.index(mode)] = solved[:, :, column]
-    _tell_missing(place, notes)
     if len(data.dofs) == len(place) == len(MODES):
-        notes.extend(_missed(six))
+        notes.extend(_missed(alone))
     notes.append(
         "computed from the file's coefficients"
         + ("" if inertia is None else ", with the mass that was given")
@@ -153,44 +159,17 @@ def _computed(
         notes.append(f"{100.0 * share:g} % of critical damping added to roll")
     elif "roll" in place:
         notes.append("no damping of roll but that of the waves: its resonance is far too high")
-    return omega, heading, values
+    return omega, heading, _six(solved, place, 1)
 
 
-def _six(
-    mass: FloatArray,
-    spring: FloatArray,
-    added: FloatArray,
-    damping: FloatArray,
-    columns: list[int | None],
-    omega: FloatArray,
-    heading: FloatArray,
-    share: float,
-    point: Point,
-    force: ComplexArray,
-) -> FloatingBody:
-    """Return one body with six motions; one that the file lacks has mass alone."""
-    there = [i for i, c in enumerate(columns) if c is not None]
-    picked = [c for c in columns if c is not None]
-    # Mass one where the file has none: the motion is then zero, and the matrix not singular.
-    M, C = np.eye(6), np.zeros((6, 6))
-    A, B = np.zeros((omega.size, 6, 6)), np.zeros((omega.size, 6, 6))
-    F = np.zeros((omega.size, heading.size, 6), dtype=np.complex128)
-    at, own = np.ix_(there, there), np.ix_(picked, picked)
-    M[at], C[at] = mass[own], spring[own]
-    A[:, at[0], at[1]] = added[:, own[0], own[1]]
-    B[:, at[0], at[1]] = damping[:, own[0], own[1]]
-    F[:, :, there] = force[:, :, picked]
-    order = np.argsort(heading)
-    water = Hydrodynamics(
-        omega=omega,
-        heading=heading[order],
-        added_mass=A,
-        damping=B,
-        excitation=F[:, order],
-        point=point,
-    )
-    centre = centre_of_mass(M, point)
-    return FloatingBody(hydrodynamics=water, mass=M, stiffness=C, centre=centre, roll_damping=share)
+def _six(table: npt.NDArray[Any], place: dict[str, int], axes: int) -> npt.NDArray[Any]:
+    """Return a table of the body's six motions along its last axes; one that it lacks is zero."""
+    lacking = table.shape[-1]
+    columns = [place.get(mode, lacking) for mode in MODES]
+    for axis in range(-axes, 0):
+        nothing = np.zeros_like(np.take(table, [0], axis))
+        table = np.take(np.concatenate([table, nothing], axis), columns, axis)
+    return table
 
 
 def _missed(body: FloatingBody) -> list[str]:
@@ -225,14 +204,8 @@ def _origin(data: CapytaineData, given: Point | None, notes: list[str]) -> Point
     return 0.0, 0.0, 0.0
 
 
-def _tell_missing(place: dict[str, int], notes: list[str]) -> None:
-    missing = [mode for mode in MODES if mode not in place]
-    if missing:
-        notes.append(f"the file has no {', '.join(missing)}: taken as held")
-
-
-def _places(data: CapytaineData, body: str | None) -> dict[str, int]:
-    """Return where each motion of the body stands."""
+def _places(data: CapytaineData, body: str | None, notes: list[str]) -> dict[str, int]:
+    """Return where each motion of the body stands, with a note of those that do not."""
     bodies: dict[str, dict[str, int]] = {}
     for column, dof in enumerate(data.dofs):
         # The name of its body may stand before it, as in barge__Roll.
@@ -251,10 +224,14 @@ def _places(data: CapytaineData, body: str | None) -> dict[str, int]:
     if body is None:
         if len(bodies) > 1:
             raise InputError(f"{data.owner}: say which body: {', '.join(bodies)}")
-        return next(iter(bodies.values()))
+        body = next(iter(bodies))
     if body not in bodies and not (len(bodies) == 1 and "" in bodies):
         raise InputError(f"{data.owner}: body must be one of {', '.join(bodies)}, got {body!r}")
-    return bodies.get(body, bodies.get("", {}))
+    place = bodies.get(body, bodies.get("", {}))
+    missing = [mode for mode in MODES if mode not in place]
+    if missing:
+        notes.append(f"the file has no {', '.join(missing)}: taken as held")
+    return place
 
 
 def _kept_rows(data: CapytaineData, *tables: npt.NDArray[np.generic]) -> npt.NDArray[np.intp]:
