@@ -32,6 +32,7 @@ from ..basics import (
     read_only,
     wave_number,
 )
+from .crane import transport
 
 MODES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 """The six motions, in the order of the last axis of every table."""
@@ -228,21 +229,9 @@ class VesselRaos:
         target = check_finite(self.name, "point", list(point))
         if target.shape != (3,):
             raise InputError(f"{self.name}: point must be 3 numbers [m], got {target.tolist()}")
-        x, y, z = target - np.asarray(self.origin)
-        surge, sway, heave, roll, pitch, yaw = np.moveaxis(self.values, -1, 0)
-        moved = np.stack(
-            [
-                surge - y * yaw + z * pitch,
-                sway + x * yaw - z * roll,
-                heave - x * pitch + y * roll,
-                roll,
-                pitch,
-                yaw,
-            ],
-            axis=-1,
-        )
+        x, y, z = (np.asarray(self.origin) - target).tolist()
         place = (float(target[0]), float(target[1]), float(target[2]))
-        return replace(self, values=moved, origin=place)
+        return replace(self, values=self.values @ transport((x, y, z)).T, origin=place)
 
     def heave_at(self, point: Sequence[float], heading: float) -> ComplexArray:
         """Return the heave of a point at the table's frequencies (k,) [m/m].

@@ -47,12 +47,12 @@ def completed(raos: VesselRaos, symmetry: str) -> VesselRaos:
         return _circular(raos)
     if symmetry not in SYMMETRIES:
         raise InputError(f"{raos.source}: symmetry must be one of {SYMMETRIES}, got {symmetry!r}")
-    found = raos
+    heading, values = raos.heading, raos.values
     if "xz" in symmetry:
-        found = _joined(found, -found.heading, found.values * MIRRORED)
+        heading, values = joined(heading, values, -heading, values * MIRRORED)
     if "yz" in symmetry:
-        found = _joined(found, math.pi - found.heading, found.values * FORE_AFT)
-    return found
+        heading, values = joined(heading, values, math.pi - heading, values * FORE_AFT)
+    return replace(raos, heading=heading, values=values)
 
 
 def looks_symmetric(raos: VesselRaos) -> bool:
@@ -71,18 +71,27 @@ def looks_symmetric(raos: VesselRaos) -> bool:
     return bool(np.all(size[:, along].max(axis=(0, 1)) <= _SMALL * largest))
 
 
-def _joined(raos: VesselRaos, heading: FloatArray, values: ComplexArray) -> VesselRaos:
-    """Return the table with those of the new headings that it does not have."""
+def joined(
+    heading: FloatArray, values: ComplexArray, turned: FloatArray, others: ComplexArray
+) -> tuple[FloatArray, ComplexArray]:
+    """Return a table with those of other headings that it does not have.
+
+    Parameters
+    ----------
+    heading, values
+        The table's headings in [0, 2 pi) (h,) [rad], and what it has there (k, h, 6).
+    turned, others
+        The other headings, of any turn (n,) [rad], and what is there (k, n, 6).
+    """
     turn = 2.0 * math.pi
-    new = np.mod(heading, turn)
+    new = np.mod(turned, turn)
     # Rounding leaves a heading just short of the full circle, which is the heading zero.
     new = np.where(turn - new < _SAME, 0.0, new)
-    away = np.abs(new[:, None] - raos.heading)
+    away = np.abs(new[:, None] - heading)
     fresh = np.flatnonzero(np.all(np.minimum(away, turn - away) > _SAME, axis=1))
-    every = np.concatenate([raos.heading, new[fresh]])
+    every = np.concatenate([heading, new[fresh]])
     order = np.argsort(every)
-    table = np.concatenate([raos.values, values[:, fresh]], axis=1)
-    return replace(raos, heading=every[order], values=table[:, order])
+    return every[order], np.concatenate([values, others[:, fresh]], axis=1)[:, order]
 
 
 def _circular(raos: VesselRaos) -> VesselRaos:

@@ -36,10 +36,11 @@ from ...basics import (
 )
 from ..crane import Point
 from ..raos import MIRRORED, MODES
+from ..symmetry import joined
 from .hydrostatics import moved, undamped_period
 
 _ROLL = MODES.index("roll")
-_SAME = 1e-6  # rad: two headings that are one
+_SAME = 1e-6  # rad from ahead or astern
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,27 +178,19 @@ class Hydrodynamics:
         return worst
 
     def mirrored(self) -> Hydrodynamics:
-        """Return the table with the headings of the other side, of a hull that has two like sides.
-
-        Two headings closer than 1e-6 rad are the same.
-        """
-        other = np.mod(-self.heading, 2.0 * math.pi)
-        apart = np.abs(np.exp(1j * other)[:, None] - np.exp(1j * self.heading)[None, :])
-        new = apart.min(axis=1) > _SAME
+        """Return the table with the headings of the other side, of a hull with two like sides."""
         # Seas from ahead and astern are their own mirror image, but for the last digits.
-        own = np.diagonal(apart) <= _SAME
+        own = np.abs(np.sin(self.heading)) <= _SAME
         force = np.where(own[:, None] & (MIRRORED < 0.0), 0.0, self.excitation)
-        force = np.concatenate([force, MIRRORED * self.excitation[:, new]], axis=1)
-        heading = np.concatenate([self.heading, other[new]])
-        order = np.argsort(heading)
+        heading, force = joined(self.heading, force, -self.heading, MIRRORED * force)
         # Two like sides never couple a motion that the mirror keeps with one that it turns round.
         coupled = np.where(np.outer(MIRRORED, MIRRORED) > 0.0, 1.0, 0.0)
         return replace(
             self,
-            heading=heading[order],
+            heading=heading,
             added_mass=self.added_mass * coupled,
             damping=self.damping * coupled,
-            excitation=force[:, order],
+            excitation=force,
         )
 
 

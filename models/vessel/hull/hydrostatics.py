@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...basics import GRAVITY, SEA_WATER_DENSITY, FloatArray, InputError, check_range
-from ..crane import Point
+from ..crane import Point, transport
 from .hull import Hull, quadrature_rule
 
 
@@ -182,24 +182,6 @@ class Loading:
         above = self.centre[2] - waterplane.centre_of_buoyancy[2]
         roll, pitch = waterplane.metacentric_radii
         return roll - above, pitch - above
-
-
-def transport(point: Point) -> FloatArray:
-    """Return T (6, 6): motions at the origin of small motions about `point` are T times those.
-
-    With the motions x_P at P = `point`, those at the origin O are x_O = T x_P: the translation
-    loses the rotation's cross product with the arm from O to P.
-
-    Examples
-    --------
-    >>> [float(v) for v in transport((0.0, 0.0, 2.0)) @ [0, 0, 0, 0, 0.1, 0]]
-    [-0.2, 0.0, 0.0, 0.0, 0.1, 0.0]
-    """
-    x, y, z = point
-    found = np.eye(6)
-    # u_O = u_P - theta x (P - O)
-    found[:3, 3:] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
-    return found
 
 
 def moved(matrix: FloatArray, origin: Point, point: Point) -> FloatArray:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from models.basics import GRAVITY, InputError
 from models.vessel import VesselRaos
+from models.vessel.crane import transport
 from models.vessel.hull import Hull, ShipLines, box_hull, centre_of_mass, read_hull
 from models.vessel.hull.hull import volumes
 from models.vessel.hull.hydrostatics import (
@@ -20,7 +21,6 @@ from models.vessel.hull.hydrostatics import (
     mass_matrix,
     moved,
     stiffness_matrix,
-    transport,
 )
 from models.vessel.hull.lines import section_coefficient, section_exponent
 
