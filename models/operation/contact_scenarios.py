@@ -57,7 +57,7 @@ def _landing(_: Case, values: Values) -> dict[str, Any]:
         # A payload that stands can no longer be lowered: a feedback from it would pay out rope
         # for ever.
         "disengage_at": touch.end,
-        "surroundings": Surroundings(seabed=seabed),
+        "surroundings": Surroundings(ground=seabed),
     }
 
 
@@ -86,7 +86,7 @@ def _on_deck(case: Case, values: Values, below: float) -> dict[str, Any]:
         source = values["deck"]
     deck = Deck(below=below, stiffness=values["stiffness"], moving=source is not None)
     return {
-        "surroundings": Surroundings(deck=deck),
+        "surroundings": Surroundings(ground=deck),
         "motions": {} if source is None else {"deck": source},
         "case_changes": {
             "rope.length": values["rope"],

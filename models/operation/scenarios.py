@@ -199,7 +199,7 @@ def scenario_named(name: str, case: Case, **options: object) -> Scenario:
     --------
     >>> from models import load_case
     >>> landing = scenario_named("landing", load_case("subsea-crane"), height="6 m")
-    >>> landing.surroundings.seabed.below, landing.profile.moves[0].distance
+    >>> landing.surroundings.ground.below, landing.profile.moves[0].distance
     (6.0, -1.0)
     """
     recipe = _recipe(name)

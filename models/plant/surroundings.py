@@ -30,10 +30,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import ClassVar
 
 import casadi as ca
 
-from ..basics import GRAVITY, SEA_WATER_DENSITY, InputError, check_range
+from ..basics import GRAVITY, SEA_WATER_DENSITY, check_range
 
 MotionSymbols = tuple[ca.SX, ca.SX, ca.SX]
 """Displacement, velocity and acceleration of a second body or of the surface."""
@@ -61,21 +62,22 @@ class Ground:
         k [N/m] and b [N s/m^1.5] of the contact force.
     """
 
+    name: ClassVar[str]
     below: float
     stiffness: float
     damping: float
 
     def __post_init__(self) -> None:
-        owner = type(self).__name__.lower()
-        check_range(owner, "below", self.below, unit="m")
-        check_range(owner, "stiffness", self.stiffness, low=0.0, unit="N/m", open_low=True)
-        check_range(owner, "damping", self.damping, low=0.0, unit="N s/m^1.5")
+        check_range(self.name, "below", self.below, unit="m")
+        check_range(self.name, "stiffness", self.stiffness, low=0.0, unit="N/m", open_low=True)
+        check_range(self.name, "damping", self.damping, low=0.0, unit="N s/m^1.5")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Seabed(Ground):
     """The seabed under the payload, which does not begin below it."""
 
+    name = "seabed"
     stiffness: float = 1.8e6
     damping: float = 6.5e5
 
@@ -91,6 +93,7 @@ class Deck(Ground):
     A payload that stands on it at the start has a negative `below`, the deck pressed in by that.
     """
 
+    name = "deck"
     stiffness: float = 5e6
     damping: float = 2e6
     moving: bool = True
@@ -119,6 +122,7 @@ class SplashZone:
         k of the decay with depth [1/m]; 0: the water at depth moves like the surface.
     """
 
+    name: ClassVar[str] = "water"
     below: float
     height: float
     buoyancy: float
@@ -170,35 +174,23 @@ class SurroundingForces:
 
 @dataclass(frozen=True, kw_only=True)
 class Surroundings:
-    """Seabed or deck, and the water's surface; every part may be missing.
+    """Seabed or deck, and the water's surface; every part may be missing."""
 
-    Raises
-    ------
-    InputError
-        If there is both a seabed and a deck: `contact.force` could not say which one it means.
-    """
-
-    seabed: Seabed | None = None
-    deck: Deck | None = None
+    ground: Seabed | Deck | None = None
     water: SplashZone | None = None
-
-    def __post_init__(self) -> None:
-        if self.seabed is not None and self.deck is not None:
-            raise InputError("surroundings: give a seabed or a deck, got both")
 
     @property
     def motions(self) -> tuple[str, ...]:
         """Names of the motions that `build` needs: ``deck``, ``surface``."""
-        deck = ("deck",) if self.deck is not None and self.deck.moving else ()
+        deck = ("deck",) if isinstance(self.ground, Deck) and self.ground.moving else ()
         return (*deck, *(("surface",) if self.water is not None else ()))
 
     @property
     def parameters(self) -> Mapping[str, float]:
         """Numbers by dotted name, such as ``deck.stiffness``; `build` takes symbols for them."""
-        parts = (("seabed", self.seabed), ("deck", self.deck), ("water", self.water))
         return {
-            f"{name}.{field.name}": float(getattr(part, field.name))
-            for name, part in parts
+            f"{part.name}.{field.name}": float(getattr(part, field.name))
+            for part in (self.ground, self.water)
             if part is not None
             for field in fields(part)
             if field.name != "moving"
@@ -214,9 +206,9 @@ class Surroundings:
         for drag and the added mass's resistance to the payload's own acceleration.
         """
         units: dict[str, str] = {}
-        if self.seabed is not None or self.deck is not None:
+        if self.ground is not None:
             units |= {"contact.force": "N", "contact.gap": "m", "contact.closing_speed": "m/s"}
-        if self.deck is not None:
+        if isinstance(self.ground, Deck):
             units |= {"deck.displacement": "m", "deck.velocity": "m/s"}
         if self.water is not None:
             units |= {"water.force": "N", "water.surface": "m", "water.submergence": "-"}
@@ -240,7 +232,7 @@ class Surroundings:
         b sqrt(d)/m with d the penetration of a landing at 2 m/s onto the spring alone.  A rope
         that pulls from above is not in them.
         """
-        contact = self.seabed or self.deck
+        contact = self.ground
         if contact is None:
             return ()
         rate = math.sqrt(contact.stiffness / payload_mass)
@@ -270,12 +262,9 @@ class Surroundings:
         p |= parameters or {}
         force, outputs = ca.SX(0.0), dict[str, ca.SX]()
         mass_change, drag_factor, relative = ca.SX(0.0), ca.SX(1.0), velocity
-        zero = ca.SX(0.0)
-        ground, ground_rate = zero, zero
-        if self.deck is not None and self.deck.moving:
-            ground, ground_rate, _ = motions["deck"]
-        if self.seabed is not None or self.deck is not None:
-            name = "deck" if self.seabed is None else "seabed"
+        if self.ground is not None:
+            name, still = self.ground.name, ca.SX(0.0)
+            ground, ground_rate, _ = motions.get(name, (still, still, still))
             gap = displacement + p[f"{name}.below"] - ground
             closing = ground_rate - velocity
             contact = _contact_force(-gap, closing, p[f"{name}.stiffness"], p[f"{name}.damping"])
@@ -285,8 +274,8 @@ class Surroundings:
                 "contact.gap": gap,
                 "contact.closing_speed": closing,
             }
-        if self.deck is not None:
-            outputs |= {"deck.displacement": ground, "deck.velocity": ground_rate}
+            if isinstance(self.ground, Deck):
+                outputs |= {"deck.displacement": ground, "deck.velocity": ground_rate}
         if self.water is not None:
             surface, surface_rate, surface_acceleration = motions["surface"]
             height = p["water.height"]

@@ -210,8 +210,8 @@ class Simulation:
             name: (float(z[0]), float(v[0]))
             for name, (z, v, _) in zip(self.loop.motions, ends, strict=True)
         }
-        deck = self.scenario.surroundings.deck if self.scenario.surroundings else None
-        standing = deck is not None and deck.below < 0.0
+        around = self.scenario.surroundings
+        standing = around is not None and around.ground is not None and around.ground.below < 0.0
         for at, name in enumerate(states):
             part, _, signal = name.partition(".")
             if part not in ("plant", "sensor") or signal.startswith("motor"):

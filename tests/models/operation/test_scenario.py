@@ -246,7 +246,7 @@ class TestScenario:
                 "scenario mine: a at 1 s must be a finite number, got nan",
             ),
             (
-                {"surroundings": Surroundings(deck=Deck(below=1.0))},
+                {"surroundings": Surroundings(ground=Deck(below=1.0))},
                 "scenario mine: its surroundings need the motions deck, got none",
             ),
             (
@@ -325,7 +325,7 @@ class TestLibrary:
 
     def test_landing_is_the_assignments(self, crane):
         found = scenario_named("landing", crane, wait="30 s", speed="500 mm/s", slack=0.5)
-        assert found.surroundings == Surroundings(seabed=Seabed(below=7.5))
+        assert found.surroundings == Surroundings(ground=Seabed(below=7.5))
         down, touch = found.profile.moves
         assert (down.start, down.distance) == (32.0, -2.5)
         assert (touch.start, touch.distance) == (down.end + 30.0, -5.5)
@@ -334,10 +334,10 @@ class TestLibrary:
 
     def test_a_deck_can_be_a_boat_a_platform_or_a_motion(self, crane):
         boat = scenario_named("set-down", crane)
-        assert boat.surroundings.deck.moving
+        assert boat.surroundings.ground.moving
         assert boat.motions["deck"].description == "jonswap sea, H_s 2 m, T_p 9 s"
         platform = scenario_named("set-down", crane, deck="platform")
-        assert not platform.surroundings.deck.moving
+        assert not platform.surroundings.ground.moving
         assert not platform.motions
         sine = SineMotion(amplitude=1.0, period=8.0)
         assert scenario_named("set-down", crane, deck=sine).motions["deck"] is sine
