@@ -164,7 +164,7 @@ def _computed(
 
 def _six(table: npt.NDArray[Any], place: dict[str, int], axes: int) -> npt.NDArray[Any]:
     """Return a table of the body's six motions along its last axes; one that it lacks is zero."""
-    lacking = table.shape[-1]
+    lacking: int = table.shape[-1]
     columns = [place.get(mode, lacking) for mode in MODES]
     for axis in range(-axes, 0):
         nothing = np.zeros_like(np.take(table, [0], axis))

@@ -28,14 +28,13 @@ from ..symmetry import SYMMETRIES
 
 Entry = dict[str, Any]
 
-_KINDS = {"displacement": "DisplacementRAOs", "load": "LoadRAOs"}
-_LOAD_UNIT = 1e3  # kN to N: the units of OrcaFlex's SI system
+_SECTION = "DisplacementRAOs"
 _UNITS = re.compile(r"^[ ]*UnitsSystem:[ ]*(\S+)", re.MULTILINE)
 _PERIODS = (1e-6, 1e6)
 _TABLE_KEYS = ("RAOPeriodOrFrequency", "RAOPeriodOrFreq")
 """How the heading of a RAO table begins, in newer and in older versions."""
 
-_KEPT = {"VesselTypes", "Draughts", "DisplacementRAOs", "LoadRAOs", "RAOs"}
+_KEPT = {"VesselTypes", "Draughts", _SECTION, "RAOs"}
 _COLUMNS = 13
 _KEY = re.compile(r"^(?P<indent>[ ]*(?:- +)*)(?P<key>[A-Za-z][^:#\[\]{}]*?):(?P<rest>\s.*|)$")
 _ROW = re.compile(r"\[([^\[\]]*)\]")
@@ -54,16 +53,14 @@ def looks_like_orcaflex(text: str) -> bool:
 def parse_orcaflex(
     owner: str,
     text: str,
-    kind: str = "displacement",
     *,
     vessel_type: str | None = None,
     draught: str | None = None,
     depth: float = math.inf,
 ) -> VesselRaos:
-    """Return the RAOs of one draught of one vessel type.
+    """Return the motions at one draught of one vessel type.
 
-    Arguments are those of `read_raos`; by default the first that has RAOs.  Those of the `kind`
-    `load` are the wave loads, whose `values` are then N/m and N m/m.
+    Arguments are those of `read_raos`; by default the first that has RAOs.
 
     Raises
     ------
@@ -76,18 +73,17 @@ def parse_orcaflex(
         raise InputError(
             f"{owner}: UnitsSystem must be SI, got {units[1]!r}: set it in OrcaFlex and save again"
         )
-    section = _KINDS[one_of(owner, "kind", kind, tuple(_KINDS))]
     types, tables = _vessel_types(owner, text)
-    found = _candidates(owner, types, section, vessel_type, draught)
+    found = _candidates(owner, types, vessel_type, draught)
     vessel, state, block = found[0]
-    convention = _convention(owner, vessel, load=kind == "load")
-    omega, heading, values = _table(owner, block, tables, convention, load=kind == "load")
-    origin = _point(owner, f"{section}.RAOOrigin", block.get("RAOOrigin"), (0.0, 0.0, 0.0))
-    zero = _point(owner, f"{section}.PhaseOrigin", block.get("PhaseOrigin"), origin)
+    convention = _convention(owner, vessel)
+    omega, heading, values = _table(owner, block, tables, convention)
+    origin = _point(owner, f"{_SECTION}.RAOOrigin", block.get("RAOOrigin"), (0.0, 0.0, 0.0))
+    zero = _point(owner, f"{_SECTION}.PhaseOrigin", block.get("PhaseOrigin"), origin)
     symmetry = one_of(owner, "Symmetry", vessel.get("Symmetry", "None"), SYMMETRIES)
     title = str(vessel.get("Name", "vessel"))
     notes = [
-        f"OrcaFlex vessel type {title!r}, draught {state.get('Name', '1')!r}, {section}",
+        f"OrcaFlex vessel type {title!r}, draught {state.get('Name', '1')!r}",
         f"conventions of the file: {convention.words()}",
     ]
     if len(found) > 1:
@@ -101,7 +97,7 @@ def parse_orcaflex(
 
 
 def _candidates(
-    owner: str, types: list[Entry], section: str, vessel_type: str | None, draught: str | None
+    owner: str, types: list[Entry], vessel_type: str | None, draught: str | None
 ) -> list[tuple[Entry, Entry, Entry]]:
     """Return what has RAOs and the names asked for: vessel type, draught, the RAOs' block."""
     found = []
@@ -114,15 +110,15 @@ def _candidates(
             names.append(f"{vessel.get('Name')!r} {state.get('Name')!r}")
             asked = vessel_type in {None, str(vessel.get("Name"))}
             asked = asked and draught in {None, str(state.get("Name"))}
-            block = state.get(section)
+            block = state.get(_SECTION)
             if asked and isinstance(block, dict) and _has_table(block):
                 found.append((vessel, state, block))
     if not found:
         wanted = " ".join(repr(x) for x in (vessel_type, draught) if x is not None)
         raise InputError(
-            f"{owner}: there are no {section} for {wanted or 'any vessel type'} in this file, "
+            f"{owner}: there are no {_SECTION} for {wanted or 'any vessel type'} in this file, "
             f"which has {', '.join(names[:6]) or 'no draught'}"
-            + ("; it may have load RAOs only" if section == "DisplacementRAOs" else "")
+            "; it may have load RAOs only"
         )
     return found
 
@@ -140,7 +136,7 @@ def _entry(row: Entry) -> Any:
     return None
 
 
-def _convention(owner: str, vessel: Entry, *, load: bool) -> Convention:
+def _convention(owner: str, vessel: Entry) -> Convention:
     """Return what the vessel type says its numbers mean."""
 
     def told(key: str, choices: tuple[str, ...]) -> str:
@@ -163,7 +159,7 @@ def _convention(owner: str, vessel: Entry, *, load: bool) -> Convention:
             "RAOPhaseRelativeToConvention",
             ("crest", "trough", "zero up-crossing", "zero down-crossing"),
         ),
-        rotations="rad/m" if load else rotations,
+        rotations=rotations,
         surge=told("SurgePositive", ("forward", "aft")),
         sway=told("SwayPositive", ("port", "starboard")),
         heave=told("HeavePositive", ("up", "down")),
@@ -174,7 +170,7 @@ def _convention(owner: str, vessel: Entry, *, load: bool) -> Convention:
 
 
 def _table(
-    owner: str, block: Entry, tables: list[FloatArray], convention: Convention, *, load: bool
+    owner: str, block: Entry, tables: list[FloatArray], convention: Convention
 ) -> tuple[FloatArray, FloatArray, ComplexArray]:
     """Return frequencies, headings and operators of a block of RAOs."""
     omega, heading, values = [], [], []
@@ -195,7 +191,7 @@ def _table(
         heading.append(np.full(frequency.size, float(convention.directions(direction))))
         slope = wave_number(frequency)
         values.append(convention.values(table[real, 1::2], table[real, 2::2], slope))
-    rows = np.concatenate(values) * (_LOAD_UNIT if load else 1.0)
+    rows = np.concatenate(values)
     if not np.any(rows):
         raise InputError(
             f"{owner}: all RAOs of this vessel type are zero: they were never filled in"
