@@ -263,19 +263,6 @@ class VesselRaos:
         turn = np.exp(1j * self.wave_number(self.omega)[:, None] * along)
         return replace(self, values=self.values * turn[..., None], phase_origin=new)
 
-    def mirrored(self) -> VesselRaos:
-        """Return the mirror image of the vessel: port and starboard swapped."""
-        heading = np.mod(-self.heading, 2.0 * math.pi)
-        order = np.argsort(heading)
-        x, y, z = self.origin
-        return replace(
-            self,
-            heading=heading[order],
-            values=(self.values * MIRRORED)[:, order],
-            origin=(x, -y, z),
-            phase_origin=(self.phase_origin[0], -self.phase_origin[1]),
-        )
-
     def to_waveresponse(self) -> dict[str, RAO]:
         """Return the six motions as :class:`waveresponse.RAO` objects, named by :data:`MODES`."""
         from waveresponse import RAO

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import cmath
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from models.vessel import VesselRaos
+from models.vessel.raos import MIRRORED
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 
@@ -184,3 +186,17 @@ def orcaflex_text(
                 lines.append(f"                - [{', '.join(cells)}]")
     lines += ["        LoadRAOs:", "          RAOs: []", "Lines:", "  - Name: Line1", "..."]
     return "\n".join(lines) + "\n"
+
+
+def mirrored(raos: VesselRaos) -> VesselRaos:
+    """Return the mirror image of a vessel: port and starboard swapped."""
+    heading = np.mod(-raos.heading, 2.0 * math.pi)
+    order = np.argsort(heading)
+    x, y, z = raos.origin
+    return replace(
+        raos,
+        heading=heading[order],
+        values=(raos.values * MIRRORED)[:, order],
+        origin=(x, -y, z),
+        phase_origin=(raos.phase_origin[0], -raos.phase_origin[1]),
+    )

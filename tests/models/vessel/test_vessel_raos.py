@@ -10,7 +10,7 @@ import pytest
 import waveresponse as wr
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from vessel_tables import swinging
+from vessel_tables import mirrored, swinging
 
 from models.basics import InputError, wave_number
 from models.vessel import MODES, VesselRaos
@@ -110,14 +110,14 @@ def test_moving_away_and_back_is_the_identity(x: float, y: float) -> None:
 
 
 def test_a_mirror_twice_is_the_vessel_and_a_symmetric_one_is_its_own_mirror() -> None:
-    again = RAOS.mirrored().mirrored()
+    again = mirrored(mirrored(RAOS))
     assert np.allclose(again.heading, RAOS.heading)
     assert np.array_equal(again.values, RAOS.values)
     ship = swinging(symmetric=True)
-    assert np.allclose(ship.mirrored().values, ship.values, atol=1e-15)
+    assert np.allclose(mirrored(ship).values, ship.values, atol=1e-15)
     # A hook to port in waves from starboard is a hook to starboard in waves from port.
     port = RAOS.heave_at((-20.0, 12.0, 0.0), RAOS.heading[2])
-    starboard = RAOS.mirrored().heave_at((-20.0, -12.0, 0.0), -RAOS.heading[2])
+    starboard = mirrored(RAOS).heave_at((-20.0, -12.0, 0.0), -RAOS.heading[2])
     assert np.allclose(port, starboard)
 
 
