@@ -44,7 +44,7 @@ def operability_report(study: Operability, checks: Sequence[ContourCheck] = ()) 
     sections = []
     for at in study.depths:
         margin = [study.margin_text(at)] if study.design is not None else []
-        sections.append(ReportSection(f"rope {at.rope}", [*margin, _contours(at)]))
+        sections.append(ReportSection(f"rope {at}", [*margin, _contours(at)]))
     if study.headings is None:
         note = "no headings: the vessel is given by the heave of its hook alone"
         sections.insert(0, ReportSection("", [note]))
@@ -75,7 +75,7 @@ def workable_table(study: Operability) -> Table:
     head = ["rope_length_m", "system", "workable", "best_heading", "outside_the_contour"]
     rows = [
         (
-            *(at.rope.length, name, share.share, share.best_heading, share.outside),
+            *(at.length, name, share.share, share.best_heading, share.outside),
             *(share.by_month.get(month) for month in range(1, 13)),
         )
         for at in study.depths
@@ -142,7 +142,7 @@ def _shares(study: Operability) -> list[Item]:
     for at in study.depths:
         lost = at.workable["loop" if "loop" in names else "held"].binding
         most = ", ".join(f"{_plain(n)} {percent(v)}" for n, v in list(lost.items())[:2])
-        rows.append((at.rope.length, *(at.workable[n].share for n in names), most))
+        rows.append((at.length, *(at.workable[n].share for n in names), most))
         if study.headings is not None:
             best = [at.workable[n].best_heading or 0.0 for n in names]
             rows.append(("  best heading", *best, ""))
@@ -164,7 +164,7 @@ def _shares(study: Operability) -> list[Item]:
             if n in months
         ]
         each = [Column(_MONTHS[m - 1], write=lambda v: f"{100.0 * v:.0f}") for m in known]
-        note = f"% of each month with {first.rope.length:g} m of rope"
+        note = f"% of each month with {first.length:g} m of rope"
         items.append(Table(columns=(Column("system", ""), *each), rows=shares, notes=(note,)))
     heads = columns("operation=rules of thumb, 1975 thesis, Table 2; safe [%]; or marginal [%]")
     assert study.scatter is not None

@@ -142,7 +142,7 @@ def titled(figure: Figure, study: Operability, at: AtDepth | None, finding: str)
     gamma = f", gamma {study.case.sea.gamma}" if study.case.sea.spectrum == "jonswap" else ""
     about = f"{study.case.name}: {study.case.sea.spectrum}{gamma}"
     if at is not None:
-        about += f", {at.rope.length:g} m of rope"
+        about += f", {at.length:g} m of rope"
     if study.headings is not None:
         h = study.own_heading(study.depths[0].main)
         about += f", heading {math.degrees(study.headings[h]):.0f} deg"
@@ -252,9 +252,9 @@ def depth_figure(study: Operability) -> Figure:
     helds = [at.contours["held"].limit[h] for at in study.depths]
     top = top_of(study.periods, limits)
     for at, limit, held, colour in zip(study.depths, limits, helds, colours, strict=True):
-        layer = f", layer {at.rope.layer}" if at.rope.layer else ""
+        layer = f", layer {at.layer}" if at.layer else ""
         layer += ": works in no sea" if limit.max() == 0.0 else ""
-        text = f"{at.rope.length:g} m{layer}"
+        text = f"{at.length:g} m{layer}"
         limit_line(axes, study.periods, limit, top, colour, label=text)
         if "loop" in at.contours:
             limit_line(axes, study.periods, held, top, colour, linestyle=_HELD, linewidth=1.2)
@@ -262,7 +262,7 @@ def depth_figure(study: Operability) -> Figure:
         axes.plot([], [], color=REFERENCE, linestyle=_HELD, label="drum held")
     _frame(axes, study.periods, top, r"limiting $H_s$ [m]")
     figure.legend(loc="outside right center", fontsize=8.5)
-    lengths = [at.rope.length for at in study.depths]
+    lengths = [at.length for at in study.depths]
     finding = f"Rope from {min(lengths):g} to {max(lengths):g} m"
     return titled(figure, study, None, finding)
 

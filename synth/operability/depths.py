@@ -1,4 +1,4 @@
-"""State and contours of one length of rope paid out: `RopeState`, `AtDepth`."""
+"""State and contours of one length of rope paid out: `AtDepth`."""
 
 from __future__ import annotations
 
@@ -22,44 +22,10 @@ STAGES: Mapping[str, str] = {
 """The systems that have contours, in words."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class RopeState:
-    """Rope and drum with a length paid out.
+def drum_layer(case: Case) -> tuple[int, int]:
+    """Return the layer of the drum from which the rope leaves, and how many the full drum has.
 
-    Attributes
-    ----------
-    length
-        Rope paid out [m].
-    layer, layers
-        Layer of the drum from which the rope leaves, 1 the bare drum, and how many the full drum
-        has; 0 where the case gives a radius instead of layers.
-    radius
-        Pitch radius of the drum [m].
-    tension, torque
-        Rope tension at the winch [N] and motor torque with the gear's losses [N m], at rest.
-    stiffness
-        EA/L [N/m].
-    """
-
-    length: float
-    layer: int
-    layers: int
-    radius: float
-    tension: float
-    torque: float
-    stiffness: float
-
-    def __str__(self) -> str:
-        """Return the state in a line."""
-        layer = f"layer {self.layer} of {self.layers}, " if self.layers else ""
-        return (
-            f"{self.length:g} m: {layer}drum radius {self.radius:.4g} m, torque at rest "
-            f"{1e-3 * self.torque:.3g} kN m, stiffness {1e-3 * self.stiffness:.3g} kN/m"
-        )
-
-
-def rope_state(case: Case) -> RopeState:
-    """Return the state of rope and drum in a case.
+    The bare drum is 1; both are 0 where the case gives a radius instead of layers.
 
     Raises
     ------
@@ -67,22 +33,14 @@ def rope_state(case: Case) -> RopeState:
         If the drum does not hold so much rope.
     """
     drum, length = case.winch.drum, case.rope.length
-    radius = case.drum_radius
-    layer = layers = 0
-    if drum.radius is None:
-        lays = drum.lays(case.rope.diameter)  # the bare drum first
-        # Layers that never hold rope, because the drum is not full, do not count.
-        layers = sum(1 for k in range(len(lays)) if k == 0 or lays[k - 1][0] > 0.0)
-        layer = 1 + next((k for k, (start, _) in enumerate(lays) if length >= start), len(lays) - 1)
-    return RopeState(
-        length=length,
-        layer=layer,
-        layers=layers,
-        radius=radius,
-        tension=case.static_tension,
-        torque=case.static_torque_budget,
-        stiffness=case.rope.stiffness,
-    )
+    if drum.radius is not None:
+        return 0, 0
+    lays = drum.lays(case.rope.diameter)  # the bare drum first
+    # Layers that never hold rope, because the drum is not full, do not count.
+    layers = sum(1 for k in range(len(lays)) if k == 0 or lays[k - 1][0] > 0.0)
+    return 1 + next(
+        (k for k, (start, _) in enumerate(lays) if length >= start), len(lays) - 1
+    ), layers
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,8 +49,10 @@ class AtDepth:
 
     Attributes
     ----------
-    rope
-        Length, layer of the drum, torque at rest, stiffness.
+    case
+        The case with this length of rope paid out, its limits reported rather than enforced.
+    layer, layers
+        Of the drum, see `drum_layer`.
     contours
         By name of the system, see `STAGES`: ``loop`` where there is a design, ``held``,
         ``perfect``, and ``reoptimised`` where it was asked for.
@@ -107,12 +67,28 @@ class AtDepth:
         sea; infinite where it is unstable, NaN without a design.
     """
 
-    rope: RopeState
+    case: Case
+    layer: int
+    layers: int
     contours: Mapping[str, Contour]
     columns: tuple[SeaColumn, ...]
     capability: Capability
     workable: Mapping[str, Workable]
     max_sensitivity: float = math.nan
+
+    def __str__(self) -> str:
+        """Return the state of rope and drum in a line."""
+        layer = f"layer {self.layer} of {self.layers}, " if self.layers else ""
+        torque, stiffness = self.case.static_torque_budget, self.case.rope.stiffness
+        return (
+            f"{self.length:g} m: {layer}drum radius {self.case.drum_radius:.4g} m, torque at rest "
+            f"{1e-3 * torque:.3g} kN m, stiffness {1e-3 * stiffness:.3g} kN/m"
+        )
+
+    @property
+    def length(self) -> float:
+        """Rope paid out [m]."""
+        return self.case.rope.length
 
     @property
     def main(self) -> Contour:

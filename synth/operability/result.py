@@ -31,16 +31,6 @@ if TYPE_CHECKING:
 _CHECKS = 3
 _PRESSES = 1e-4  # of a limit: a design that was made to press against it is within
 
-# Of a rope: variable, attribute of `RopeState`, unit, words.
-_ROPE = (
-    ("rope_length", "length", "m", "rope paid out"),
-    ("drum_layer", "layer", "1", "layer of the drum, 1 the bare drum; 0 not known"),
-    ("drum_radius", "radius", "m", "pitch radius of the drum"),
-    ("static_torque", "torque", "N m", "motor torque at rest, with losses"),
-    ("static_tension", "tension", "N", "rope tension at the winch at rest"),
-    ("stiffness", "stiffness", "N/m", "stiffness of the rope"),
-)
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Operability:
@@ -78,7 +68,7 @@ class Operability:
     @property
     def own_depth(self) -> AtDepth:
         """The contours at the length of rope nearest the case's own."""
-        return min(self.depths, key=lambda d: abs(d.rope.length - self.case.rope.length))
+        return min(self.depths, key=lambda d: abs(d.length - self.case.rope.length))
 
     @property
     def ok(self) -> bool:
@@ -118,14 +108,10 @@ class Operability:
         names, main = _names(self.depths), self.depths[0].main
         parts = []
         for at in self.depths:
-            rope = {
-                name: ((), getattr(at.rope, field), {"units": unit, "long_name": text})
-                for name, field, unit, text in _ROPE
-            }
-            parts.append(xr.Dataset(_variables(at, names), coords=rope))
+            parts.append(xr.Dataset(_variables(at, names), coords=_rope(at)))
         found = parts[0]
         if len(parts) > 1:
-            own = [name for name, *_ in _ROPE if name != "rope_length"]
+            own = [name for name in _rope(self.depths[0]) if name != "rope_length"]
             found = xr.concat(parts, "rope_length", data_vars="all", coords=own, join="exact")
         first = {c.name: c for n in self.depths[0].contours.values() for c in n.criteria}
         coordinates: dict[str, Any] = {
@@ -206,7 +192,7 @@ class Operability:
                 every = _by_limit(contour, names)
                 for h, heading in enumerate(headings):
                     for p, period in enumerate(contour.periods):
-                        row = [f"{at.rope.length:g}", at.rope.layer or "", system, heading]
+                        row = [f"{at.length:g}", at.layer or "", system, heading]
                         row += [f"{period:.6g}", _figure(contour.limit[h, p])]
                         row += [str(contour.binding[h, p])]
                         writer.writerow([*row, *(_figure(v) for v in every[:, h, p])])
@@ -219,7 +205,7 @@ class Operability:
         if self.headings is None:
             lines.append("no headings: the vessel is given by the heave of its hook alone")
         for at in self.depths:
-            lines.append(f"rope {at.rope}")
+            lines.append(f"rope {at}")
             lines += [f"  {STAGES[n]}: {_range_text(c)}" for n, c in at.contours.items()]
             if self.design is not None:
                 lines.append(f"  {self.margin_text(at)}")
@@ -275,6 +261,22 @@ def _names(depths: Sequence[AtDepth]) -> list[str]:
     """Return the names of all criteria, each once."""
     found = (c.name for at in depths for n in at.contours.values() for c in n.criteria)
     return list(dict.fromkeys(found))
+
+
+def _rope(at: AtDepth) -> dict[str, Any]:
+    """Return the state of rope and drum as coordinates."""
+    case = at.case
+    rows: tuple[tuple[str, float, str, str], ...] = (
+        ("rope_length", at.length, "m", "rope paid out"),
+        ("drum_layer", at.layer, "1", "layer of the drum, 1 the bare drum; 0 not known"),
+        ("drum_radius", case.drum_radius, "m", "pitch radius of the drum"),
+        ("static_torque", case.static_torque_budget, "N m", "motor torque at rest, with losses"),
+        ("static_tension", case.static_tension, "N", "rope tension at the winch at rest"),
+        ("stiffness", case.rope.stiffness, "N/m", "stiffness of the rope"),
+    )
+    return {
+        name: ((), value, {"units": unit, "long_name": text}) for name, value, unit, text in rows
+    }
 
 
 def _suffix(system: str) -> str:

@@ -41,7 +41,7 @@ from .capability import capability
 from .columns import SeaColumn, has_headings, has_period, sea_column
 from .contour import Contour, assembled, contour_of
 from .criteria import payload_criteria
-from .depths import AtDepth, rope_state
+from .depths import AtDepth, drum_layer
 from .limiting import HIGHEST, SeaStates, limiting_heights
 from .pose import OperabilityQuestion, pose_operability
 from .result import Operability
@@ -251,10 +251,13 @@ def _at_depth(
         if scatter is None
         else {name: workable(contour, scatter, turned) for name, contour in contours.items()}
     )
+    layer, layers = drum_layer(question.case)
     low, high = contours["perfect"].periods[[0, -1]]
     lines = np.linspace(0.75 * low, 1.1 * high, 60)
     return AtDepth(
-        rope=rope_state(question.case),
+        case=question.case,
+        layer=layer,
+        layers=layers,
         contours=contours,
         columns=tuple(columns),
         capability=capability(question.perfect, question.criteria["perfect"], lines),

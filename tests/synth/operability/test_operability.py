@@ -23,7 +23,7 @@ from synth.operability import operability
 from synth.operability.capability import capability
 from synth.operability.columns import SeaColumn, sea_column
 from synth.operability.criteria import case_criteria, payload_criteria
-from synth.operability.depths import rope_state
+from synth.operability.depths import drum_layer
 from synth.operability.limiting import SeaStates, limiting_heights
 from synth.operability.pose import pose_operability
 from synth.operability.recheck import evaluate_in
@@ -333,11 +333,11 @@ def test_a_hook_on_the_centre_line_knows_no_port_or_starboard() -> None:
 def test_a_rope_length_takes_its_layer_with_it() -> None:
     case = one_heading()
     study = operability(case, periods=[9.0], payload_rms=0.3, depths=[200.0, 1000.0, 1400.0])
-    layers = [at.rope.layer for at in study.depths]
+    layers = [at.layer for at in study.depths]
     assert layers == [5, 2, 1]
-    assert [at.rope.layers for at in study.depths] == [5, 5, 5]
+    assert [at.layers for at in study.depths] == [5, 5, 5]
     lays = case.winch.drum.lays(case.rope.diameter)
-    assert [at.rope.radius for at in study.depths] == [lays[k - 1][1] for k in layers]
+    assert [at.case.drum_radius for at in study.depths] == [lays[k - 1][1] for k in layers]
     data = study.dataset
     assert data.height_held.dims == ("rope_length", "peak_period")
     alone = operability(case.replace({"rope.length": 1400.0}), periods=[9.0], payload_rms=0.3)
@@ -346,7 +346,7 @@ def test_a_rope_length_takes_its_layer_with_it() -> None:
         case.replace({"rope.length": 1400.0}).static_torque_budget
     )
     # A radius that is given knows no layers.
-    assert rope_state(load_case("thesis-1975")).layer == 0
+    assert drum_layer(load_case("thesis-1975")) == (0, 0)
 
 
 @pytest.mark.ci
@@ -357,7 +357,7 @@ def test_gains_stay_when_the_rope_gets_longer() -> None:
         height = float(at.contours["loop"].heights[1, 0, 0])
         case = dragged().case.replace(
             {
-                "rope.length": at.rope.length,
+                "rope.length": at.length,
                 "sea.significant_height": height,
                 "sea.significant_period": 9.0 * T_S,
             }
