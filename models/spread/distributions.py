@@ -53,29 +53,29 @@ class Distribution(ABC):
         place, width
             Read a value, and a distance from the case's own value, in SI.
         """
-        given = {f.name: getattr(self, f.name) for f in fields(self)}
-        return replace(
-            self,
-            **{
-                name: (width if name in self.widths else place)(value)
-                for name, value in given.items()
-                if value is not None
-            },
-        )
+        read = {
+            name: (width if name in self.widths else place)(value)
+            for name, value in self._given().items()
+        }
+        return replace(self, **read)
 
     @abstractmethod
     def quantile(self, share: FloatArray) -> FloatArray:
         """Return the values that shares in (0, 1) of all draws stay below, of the same shape."""
 
     @property
-    @abstractmethod
     def support(self) -> tuple[float, float]:
         """Smallest and largest value; infinite where there is none."""
+        low, high = getattr(self, "low", None), getattr(self, "high", None)
+        return (
+            -math.inf if low is None else _number(low),
+            math.inf if high is None else _number(high),
+        )
 
     @property
     def numeric(self) -> bool:
         """Whether all its values are numbers already."""
-        return not any(isinstance(getattr(self, f.name), str) for f in fields(self))
+        return not any(isinstance(value, str) for value in self._given().values())
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -89,8 +89,12 @@ class Distribution(ABC):
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as in a file, ``{name: {field: value}}``, without empty fields."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        return {self.name: {k: v for k, v in values.items() if v is not None}}
+        return {self.name: self._given()}
+
+    def _given(self) -> dict[str, Any]:
+        """Return the values that are there by their fields."""
+        values = ((f.name, getattr(self, f.name)) for f in fields(self))
+        return {name: value for name, value in values if value is not None}
 
     @abstractmethod
     def _check(self) -> None:
@@ -99,17 +103,6 @@ class Distribution(ABC):
 
 class Bell(Distribution):
     """A distribution with tails, which a field's own range cuts."""
-
-    low: Value | None
-    high: Value | None
-
-    @property
-    @override
-    def support(self) -> tuple[float, float]:
-        return (
-            -math.inf if self.low is None else _number(self.low),
-            math.inf if self.high is None else _number(self.high),
-        )
 
     @property
     @override
@@ -167,18 +160,12 @@ class Uniform(Distribution):
 
     @property
     @override
-    def support(self) -> tuple[float, float]:
-        return _number(self.low), _number(self.high)
-
-    @property
-    @override
     def numeric(self) -> bool:
-        return not isinstance(self.low, str) and isinstance(self.high, int | float)
+        return self.high is not None and super().numeric
 
     @override
     def _check(self) -> None:
-        low, high = self.support
-        check_finite("uniform", "low and high", [low, high])
+        low, high = check_finite("uniform", "low and high", self.support)
         if low > high:
             raise InputError(f"uniform: low must be at most high, got {low:g} and {high:g}")
 
@@ -306,11 +293,6 @@ class Triangular(Distribution):
         rising = low + np.sqrt(share * width * (mode - low))
         falling = high - np.sqrt((1.0 - share) * width * (high - mode))
         return np.asarray(np.where(share < turn, rising, falling))
-
-    @property
-    @override
-    def support(self) -> tuple[float, float]:
-        return _number(self.low), _number(self.high)
 
     @override
     def _check(self) -> None:

@@ -28,6 +28,7 @@ import numpy.typing as npt
 
 from ..basics import FloatArray, InputError, check_range, read_text
 from ..case import Case
+from ..casefile import Path as Place
 from ..casefile import line_of, message_line, read_yaml, suggestion, yaml_text
 from ..operation import PREFIX as FAULTS
 from .distributions import KINDS, Distribution, Samples, Uniform, at_ends
@@ -109,15 +110,48 @@ class Spread:
         object.__setattr__(self, "_factor", copula_factor(self.paths, pairs))
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], *, source: str = "spread") -> Spread:
+    def from_dict(
+        cls, data: Any, *, source: str = "spread", lines: Mapping[Place, int] | None = None
+    ) -> Spread:
         """Make a spread from the contents of a spread file.
+
+        Parameters
+        ----------
+        data
+            What the file holds: `vary` and, if wanted, `correlations`.
+        source, lines
+            Name and lines of the file, for the messages.
 
         Raises
         ------
         InputError
             If it is not one; the message names the path.
         """
-        return cls(*read_spread(data, source))
+
+        def refused(path: Place, text: object) -> InputError:
+            return InputError(message_line(source, line_of(path, lines), path, str(text)))
+
+        if not isinstance(data, Mapping) or not isinstance(data.get("vary"), Mapping):
+            raise InputError(
+                f"{source}: must hold a section `vary:` with what varies, by path of the case"
+            )
+        for key in data:
+            if key not in ("vary", "correlations"):
+                hint = suggestion(key, ["vary", "correlations"])
+                raise refused((str(key),), f"is unknown; {hint}")
+        found = {}
+        for name, value in data["vary"].items():
+            try:
+                found[str(name)] = _distribution(value)
+            except InputError as error:
+                raise refused(("vary", str(name)), error) from None
+        pairs: dict[tuple[str, str], float] = {}
+        for k, entry in enumerate(data.get("correlations") or ()):
+            if not isinstance(entry, list | tuple) or len(entry) != 3:
+                text = f"must be [path, path, rank correlation], got {entry!r}"
+                raise refused(("correlations", k), text)
+            pairs[str(entry[0]), str(entry[1])] = entry[2]
+        return cls(found, pairs)
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Spread:
@@ -128,7 +162,8 @@ class Spread:
         InputError
             If there is no such file or it is no spread; file and line are named.
         """
-        return cls(*read_spread(Path(path), str(path)))
+        data, lines = read_yaml(read_text(path), str(path))
+        return cls.from_dict(data, source=str(path), lines=lines)
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -144,11 +179,6 @@ class Spread:
     def nominal(self) -> dict[str, float]:
         """The case's own value of each path."""
         return {field.path: field.nominal for field in self._known()}
-
-    @property
-    def ready(self) -> bool:
-        """Whether every value is a number, so that rows can be drawn."""
-        return all(d.numeric for d in self.distributions.values())
 
     def on(
         self, case: Case, gains: Mapping[str, float] | None = None, drag: float | None = None
@@ -225,7 +255,7 @@ class Spread:
         if method == "given":
             columns = [d.numbers[first:last] for d in self._lists()]
             return np.stack(columns, axis=1)
-        if not self.ready:
+        if not all(d.numeric for d in self.distributions.values()):
             raise InputError("spread: it has units or percentages; call Spread.on(case) first")
         dimensions = len(self.paths)
         total = wanted if samples is None else samples
@@ -390,43 +420,6 @@ def _short(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, int | float) else str(value)
 
 
-def read_spread(
-    given: Mapping[str, Any] | Path, source: str
-) -> tuple[dict[str, Distribution], Pairs]:
-    """Return distributions and correlations of a spread file or its contents.
-
-    Raises
-    ------
-    InputError
-        If it is no spread; the message names file, line and path.
-    """
-    lines: dict[tuple[str | int, ...], int] = {}
-    data: Any = given
-    if isinstance(given, Path):
-        data, lines = read_yaml(read_text(given), source)
-    if not isinstance(data, Mapping) or not isinstance(data.get("vary"), Mapping):
-        raise InputError(
-            f"{source}: must hold a section `vary:` with what varies, by path of the case"
-        )
-    for key in data:
-        if key not in ("vary", "correlations"):
-            text = f"is unknown; {suggestion(key, ['vary', 'correlations'])}"
-            raise InputError(_at(source, lines, (str(key),), text))
-    found = {}
-    for name, value in data["vary"].items():
-        try:
-            found[str(name)] = _distribution(value)
-        except InputError as error:
-            raise InputError(_at(source, lines, ("vary", str(name)), str(error))) from None
-    pairs: dict[tuple[str, str], float] = {}
-    for k, entry in enumerate(data.get("correlations") or ()):
-        if not isinstance(entry, list | tuple) or len(entry) != 3:
-            text = f"must be [path, path, rank correlation], got {entry!r}"
-            raise InputError(_at(source, lines, ("correlations", k), text))
-        pairs[str(entry[0]), str(entry[1])] = entry[2]
-    return found, pairs
-
-
 def _distribution(value: Any) -> Distribution:
     """Return the distribution that an entry of `vary:` stands for."""
     if isinstance(value, Distribution):
@@ -473,9 +466,3 @@ def _made(kind: Any, name: str, values: dict[str, Any]) -> Distribution:
 def _width(kind: Any) -> str:
     """Return the field that a single value stands for."""
     return {"normal": "sd", "lognormal": "sigma"}.get(kind.name, fields(kind)[0].name)
-
-
-def _at(
-    source: str, lines: dict[tuple[str | int, ...], int], path: tuple[str | int, ...], text: str
-) -> str:
-    return message_line(source, line_of(path, lines), path, text)

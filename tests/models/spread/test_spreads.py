@@ -277,7 +277,6 @@ def test_what_does_not_fit_the_case_is_told(
 
 def test_units_before_a_case_is_met_are_refused() -> None:
     spread = Spread({"payload.mass": "10 %"})
-    assert not spread.ready
     with pytest.raises(InputError, match=r"call Spread\.on\(case\) first"):
         spread.sample(3)
     with pytest.raises(InputError, match="has met no case"):
