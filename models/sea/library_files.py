@@ -11,7 +11,7 @@ import contextlib
 import importlib
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -44,27 +44,25 @@ FORMATS: dict[str, str] = {
 """Formats by the names that `read_seas` and `stillhook sea --read-as` take."""
 
 _READERS: dict[str, tuple[str, dict[str, Any]]] = {
-    "spotter": ("spotter", {"dd": None}),  # its own directions are moments, not a second axis
-    "swan": ("swan", {"as_site": True}),
-    "ww3-station": ("ww3_station", {}),
-    "wavespectra-json": ("json", {}),
-    "triaxys": ("triaxys", {}),
-    "datawell": ("datawell", {"dd": None}),
-    "octopus": ("octopus", {}),
-    "obscape": ("obscape", {}),
-    "awac": ("awac", {}),
-    "funwave": ("funwave", {}),
-    "xwaves": ("xwaves", {}),
+    "spotter": ("read_spotter", {"dd": None}),  # its own directions are moments, not an axis
+    "swan": ("read_swan", {"as_site": True}),
+    "ww3-station": ("read_ww3_station", {}),
+    "wavespectra-json": ("read_json", {}),
+    "triaxys": ("read_triaxys", {}),
+    "datawell": ("read_datawell", {"dd": None}),
+    "octopus": ("read_octopus", {}),
+    "obscape": ("read_obscape", {}),
+    "awac": ("read_awac", {}),
+    "funwave": ("read_funwave", {}),
+    "xwaves": ("read_xwaves", {}),
+    "ndbc-netcdf": ("from_ndbc", {"directional": False}),
+    "era5": ("from_era5", {}),
+    "ww3": ("from_ww3", {}),
+    "swan-netcdf": ("from_ncswan", {}),
+    "wwm": ("from_wwm", {}),
 }
-"""Module of the library and options, by our name of the format."""
-
-_NETCDF: dict[str, tuple[str, str, dict[str, Any]]] = {
-    "ndbc-netcdf": ("ndbc", "from_ndbc", {"directional": False}),
-    "era5": ("era5", "from_era5", {}),
-    "ww3": ("ww3", "from_ww3", {}),
-    "swan-netcdf": ("ncswan", "from_ncswan", {}),
-    "wwm": ("wwm", "from_wwm", {}),
-}
+"""The library's function and its options by our name of the format: `read_` takes a path, `from_` a
+data set."""
 
 _MOST_VALUES = 3e8  # densities of one file: 2.4 GB
 
@@ -95,9 +93,8 @@ def read_with_library(path: str, name: str) -> RawRecords:
         warnings.simplefilter("ignore")  # of what is read, the quality control tells
         try:
             with _unpacked(path) as plain:
-                if name in _READERS:
-                    module, options = _READERS[name]
-                    return _raw(_function(module, f"read_{module}")(plain, **options), name)
+                if _READERS.get(name, ("", {}))[0].startswith("read_"):
+                    return _raw(_read(name, plain), name)
                 return _netcdf(plain, name)
         except InputError as error:
             words = str(error).removeprefix(f"{path}: ")
@@ -125,11 +122,12 @@ def _unpacked(path: str) -> Iterator[str]:
         yield str(copy)
 
 
-def _function(module: str, name: str) -> Callable[..., Any]:
-    found: Callable[..., Any] = getattr(
-        importlib.import_module(f"wavespectra.input.{module}"), name
-    )
-    return found
+def _read(name: str, source: Any) -> Any:
+    """Return what the library makes of a path or a data set."""
+    function, options = _READERS[name]
+    module = function.partition("_")[2]
+    found = getattr(importlib.import_module(f"wavespectra.input.{module}"), function)
+    return found(source, **options)
 
 
 def _netcdf(path: str, name: str) -> RawRecords:
@@ -145,9 +143,8 @@ def _netcdf(path: str, name: str) -> RawRecords:
                 "the place or the years that matter"
             )
         loaded = dataset.load()
-        if name in _NETCDF:
-            module, function, options = _NETCDF[name]
-            found = _function(module, function)(loaded, **options)
+        if name in _READERS:
+            found = _read(name, loaded)
             if name == "ndbc-netcdf" and "mean_wave_dir" in loaded:
                 bearing = loaded["mean_wave_dir"]
                 ours = {"frequency": "freq", "latitude": "lat", "longitude": "lon"}

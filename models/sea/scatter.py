@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, InputError, check_finite, check_range, read_only
+from ..basics import FloatArray, InputError, check_finite, check_range
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -87,19 +87,17 @@ class Scatter:
         for name, high, unit in (("significant_height", 30.0, "m"), ("peak_period", 60.0, "s")):
             limits = {"low": 0.0, "high": high, "open_low": True}
             _check_all(self.source, name, columns[name], unit=unit, **limits)
+        month = columns.get("month", np.ones(1))
+        if np.any(month != np.round(month)) or np.any(month < 1) or np.any(month > 12):
+            raise InputError(f"{self.source}: month must be whole numbers in [1, 12]")
         total = float(columns["occurrence"].sum())
         if not math.isfinite(total):
             raise InputError(f"{self.source}: the occurrences must have a finite sum, got {total}")
         columns["occurrence"] = columns["occurrence"] / total
         for name, column in columns.items():
-            object.__setattr__(self, name, read_only(column))
-        if self.month is not None:
-            month = np.asarray(self.month)
-            if np.any(month != np.round(month)) or np.any(month < 1) or np.any(month > 12):
-                raise InputError(f"{self.source}: month must be whole numbers in [1, 12]")
-            whole = month.astype(np.int64)
+            whole = column.astype(np.int64) if name == "month" else column
             whole.setflags(write=False)
-            object.__setattr__(self, "month", whole)
+            object.__setattr__(self, name, whole)
         if math.isnan(self.total):
             object.__setattr__(self, "total", total)
 
