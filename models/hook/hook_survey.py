@@ -219,21 +219,14 @@ def _seas(
     case: Case, wanted: Sequence[float] | None
 ) -> tuple[FloatArray, list[SeaSpectrum], BoolArray]:
     """Return peak periods (t,) [s], the seas, and which of them are steeper than breaking (t,)."""
-    given = case.to_dict()["sea"]  # without what follows from a file, a wind, the parts of a sum
-    field = next((n for n in ("peak_period", "significant_period") if n in given), None)
-    if field is None:
-        if wanted is not None:
-            raise InputError(
-                f"{case.label}: sea: the {case.sea.spectrum} sea has no peak_period to vary"
-            )
+    if wanted is None and not case.sea.period_field:
         sea = case.sea.to_spectrum()
         return np.array([2.0 * math.pi / sea.peak_frequency]), [sea], np.array([False])
     periods = np.atleast_1d(check_finite("hook", "peak periods", wanted or PEAK_PERIODS))
-    ratio = getattr(case.sea, field) / case.sea.spectral_peak_period
     seas, steep = [], []
     for period in map(float, periods):
         check_range("hook", "peak period", period, low=0.0, high=60.0, unit="s", open_low=True)
-        there = case.variant({f"sea.{field}": ratio * period})
+        there = case.variant(case.sea.peaking_at(period))
         seas.append(there.sea.to_spectrum())
         steep.append(there.sea.steepness > there.sea.breaking_steepness)
     return periods, seas, np.array(steep)

@@ -121,6 +121,9 @@ class SeaSection(Section):
     alternatives = (("peak_period", "significant_period", "wind_speed"), ("table", "file"))
     forgets = False
 
+    period_field: ClassVar[str] = ""
+    """Field of the period that sets the peak, if the kind has one."""
+
     @model_validator(mode="before")
     @classmethod
     def _fields(cls, data: Any) -> Any:
@@ -161,6 +164,30 @@ class SeaSection(Section):
         """Period of the spectrum's peak [s], also where it is not a field."""
         return 2.0 * math.pi / self.to_spectrum().peak_frequency
 
+    def peaking_at(self, period: float) -> dict[str, float]:
+        """Return the changes of a case that put the peak of its sea at a period.
+
+        Parameters
+        ----------
+        period
+            T_p [s]; the height stays, also where it came from the wind.
+
+        Raises
+        ------
+        InputError
+            If the spectrum has no period of its own.
+        """
+        if not self.period_field:
+            raise InputError(
+                f"sea: the {self.spectrum} spectrum has no peak_period to vary; use jonswap, or "
+                "leave the periods out"
+            )
+        ratio: float = getattr(self, self.period_field) / self.spectral_peak_period
+        return {
+            "sea.significant_height": self.significant_height,
+            f"sea.{self.period_field}": ratio * period,
+        }
+
     @property
     def steepness(self) -> float:
         """Significant steepness, H_s over the deep-water length of the peak's wave [-]."""
@@ -195,6 +222,8 @@ class _SeaByPeak(SeaSection):
 
     significant_height: _Height
     peak_period: _PeakPeriod
+
+    period_field = "peak_period"
 
     @property
     def spectral_peak_period(self) -> float:
@@ -279,18 +308,19 @@ class _SeaByWind(SeaSection):
         default_factory=lambda data: fully_arisen(data["wind_speed"])[0]
     )
 
-    _period: ClassVar[str] = ""
-    """Field of the period, if the kind has one."""
-
     @classmethod
     def _needs(cls, data: Mapping[str, Any]) -> tuple[str, ...]:
         if data.get("wind_speed") is not None:
             return ()
-        return (cls._period, "significant_height") if cls._period else ("significant_height",)
+        return (
+            (cls.period_field, "significant_height")
+            if cls.period_field
+            else ("significant_height",)
+        )
 
     def _faults(self) -> Iterator[tuple[str, str]]:
-        if self.wind_speed is not None and self._period in self.model_fields_set:
-            yield (self._period, "is not for a sea by its wind_speed, which gives the period")
+        if self.wind_speed is not None and self.period_field in self.model_fields_set:
+            yield (self.period_field, "is not for a sea by its wind_speed, which gives the period")
 
 
 class Bretschneider1975Sea(_SeaByWind):
@@ -303,7 +333,7 @@ class Bretschneider1975Sea(_SeaByWind):
     )
     """Significant period T_S, for `bretschneider-1975` only (T_mean = 0.9 T_S)."""
 
-    _period = "significant_period"
+    period_field = "significant_period"
 
 
 class BretschneiderSea(_SeaByWind):
@@ -315,7 +345,7 @@ class BretschneiderSea(_SeaByWind):
         default_factory=lambda data: _PEAK_OF_SIGNIFICANT * fully_arisen(data["wind_speed"])[1]
     )
 
-    _period = "peak_period"
+    period_field = "peak_period"
 
 
 class PiersonMoskowitzSea(_SeaByWind):

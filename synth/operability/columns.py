@@ -27,7 +27,6 @@ from .systems import System
 
 _RTOL = 1e-8  # of every variance, as in `synth.loop.assess`
 _SAME = 1e-9  # relative, of densities that scale with H_s^2
-_WITHOUT_PERIOD = ("pierson-moskowitz", "sum", "measured")
 _HEIGHTS = (0.25, 2.0, 5.0, 14.0)  # at which that is looked at [m]
 _FLOOR = 1e-3  # lowest H_s that is looked at [m], and how well the lowest that is defined is known
 _SPEEDS = (1e-3, 3e-2, 1.0)  # rms speeds of the payload whose drag the nodes are made for [m/s]
@@ -156,7 +155,7 @@ def sea_column(
         If the sea of the case has no period that could be changed, or the vessel no headings.
     """
     # Of seas that nobody has asked for: a contour goes up to where waves break and beyond.
-    changed = case.variant({} if period is None else _period_changes(case, period))
+    changed = case.variant({} if period is None else case.sea.peaking_at(period))
     cases = [changed]
     if headings is not None:
         if not has_headings(case):
@@ -182,25 +181,7 @@ def has_headings(case: Case) -> bool:
 
 def has_period(case: Case) -> bool:
     """Return whether the sea of a case has a period that can be changed."""
-    return case.sea.spectrum not in _WITHOUT_PERIOD
-
-
-def _period_changes(case: Case, period: float) -> dict[str, float | None]:
-    sea = case.sea
-    if not has_period(case):
-        raise InputError(
-            f"{case.label}: sea: the {sea.spectrum} spectrum has no peak_period "
-            "that could be changed; leave the periods out for a limit in its own shape"
-        )
-    if sea.spectrum == "bretschneider-1975":
-        # It peaks at 0.9 T_S / 0.54^(1/4), see `models.sea.sea_section.Sea`.  Where height and
-        # period came from the wind they are taken apart.
-        return {
-            "sea.wind_speed": None,
-            "sea.significant_height": sea.significant_height,
-            "sea.significant_period": period * 0.54**0.25 / 0.9,
-        }
-    return {"sea.peak_period": period}
+    return bool(case.sea.period_field)
 
 
 def _scales(case: Case, hook: HookMotion) -> bool:

@@ -38,14 +38,8 @@ class SeaState:
 
     def changes(self, case: Case) -> dict[str, float]:
         """Return the sea's fields as changes of a case, in the variables of its spectrum."""
-        found = {"sea.significant_height": self.significant_height}
-        if self.peak_period is None:
-            return found
-        if case.sea.spectrum == "bretschneider-1975":
-            # The 1975 form peaks at 0.9 T_S / 0.54^(1/4), see `models.sea.sea_section`.
-            period = self.peak_period * 0.54**0.25 / 0.9
-            return {**found, "sea.significant_period": period}
-        return {**found, "sea.peak_period": self.peak_period}
+        period = {} if self.peak_period is None else case.sea.peaking_at(self.peak_period)
+        return {**period, "sea.significant_height": self.significant_height}
 
     def __str__(self) -> str:
         """Return the state in a few characters."""

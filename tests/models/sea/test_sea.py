@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from scipy.special import gamma as gamma_function
 from scipy.special import gammaincc
 
-from models import load_case
+from models import Case, load_case
 from models.basics import InputError, spectral_nodes
 from models.hook import HookMotion
 from models.sea import SeaSpectrum
@@ -453,3 +453,13 @@ def test_the_thesis_sea_does_without_the_library():
     )
     root = Path(__file__).parents[3]
     assert subprocess.run([sys.executable, "-c", code], cwd=root, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("kind", ["bretschneider-1975", "bretschneider"])
+def test_a_sea_by_its_wind_keeps_its_height_at_another_period(kind):
+    tree = load_case("thesis-1975").to_dict()
+    case = Case.from_dict({**tree, "sea": {"spectrum": kind, "wind_speed": "20 knots"}})
+    other = case.replace(case.sea.peaking_at(9.5)).sea
+    assert other.spectral_peak_period == pytest.approx(9.5, rel=1e-12)
+    assert other.significant_height == case.sea.significant_height
+    assert other.wind_speed is None
