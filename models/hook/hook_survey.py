@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,7 +24,6 @@ from ..basics import (
     check_choice,
     check_finite,
     check_range,
-    fractile_factor,
     spectral_nodes,
 )
 from ..case import Case
@@ -68,8 +67,6 @@ class HookSurvey(ReadOnlyArrays):
         Whether a sea of this peak period would be steeper than breaking (t,).
     own
         The figures of the case as it stands.
-    probability
-        Fractile of the extremes beside the most probable one.
     """
 
     case: Case
@@ -79,12 +76,6 @@ class HookSurvey(ReadOnlyArrays):
     moments: FloatArray
     steep: BoolArray
     own: HookDemand
-    probability: float = 0.9
-
-    @property
-    def headings_deg(self) -> FloatArray:
-        """The headings (h,) [deg]."""
-        return np.degrees(self.headings)
 
     def rms(self, motion: str = "velocity") -> FloatArray:
         """Return standard deviations (s, h, t) [m, m/s or m/s2].
@@ -99,12 +90,7 @@ class HookSurvey(ReadOnlyArrays):
 
     def figures(self, side: int, heading: int, period: int) -> HookDemand:
         """Return all figures of one point, by its indices."""
-        return HookDemand(
-            moments=self.moments[side, heading, period],
-            tension=self.own.tension,
-            duration=self.own.duration,
-            probability=self.probability,
-        )
+        return replace(self.own, moments=self.moments[side, heading, period])
 
     @cached_property
     def best(self) -> tuple[int, int]:
@@ -132,14 +118,14 @@ class HookSurvey(ReadOnlyArrays):
         for s in range(self.moments.shape[0]):
             place = self.points[s][:2] if self.points else (math.nan, math.nan)
             for h in range(self.moments.shape[1]):
-                heading = self.headings_deg[h] if self.headings.size else math.nan
+                heading = math.degrees(self.headings[h]) if self.headings.size else math.nan
                 for t, period in enumerate(self.peak_periods):
                     demand = self.figures(s, h, t)
                     row = [*place, heading, period, height]
                     for m in demand.motions:
                         row += [m.rms, m.zero_crossing_period, m.width]
                         row.append(m.most_probable_maximum(demand.duration))
-                        row.append(m.fractile(self.probability, demand.duration))
+                        row.append(m.fractile(demand.probability, demand.duration))
                     row += [demand.peak_power, demand.mean_power]
                     lines.append(",".join("" if math.isnan(v) else f"{v:.6g}" for v in row))
         return "\n".join(lines) + "\n"
@@ -187,9 +173,8 @@ def hook_motion(
     >>> [round(float(z), 2) for z in survey.rms("displacement")[0, 0]]
     [0.37, 0.56, 0.65]
     """
-    fractile_factor(1.0, fractile)
-    periods, seas, steep = _seas(case, peak_periods)
     own = HookDemand.from_case(case, probability=fractile)
+    periods, seas, steep = _seas(case, peak_periods)
     if case.vessel.raos is None:
         if headings is not None:
             raise InputError(
@@ -211,7 +196,7 @@ def hook_motion(
         table = np.array([[_point(case, waves, side, angle) for angle in angles] for side in sides])
     return HookSurvey(
         case=case, headings=angles, peak_periods=periods, points=sides, moments=table,
-        steep=steep, own=own, probability=fractile,
+        steep=steep, own=own,
     )  # fmt: skip
 
 

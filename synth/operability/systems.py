@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import brentq
 from typing_extensions import override
 
 from models.basics import ComplexArray, FloatArray, Quadrature
@@ -33,7 +34,7 @@ from .responses import DragResponses
 
 VELOCITY, FORCE = "payload.velocity", "payload.force"
 _COEFFICIENTS = np.concatenate([[0.0], np.geomspace(1e-6, 1e2, 33)])  # over the slope [m/s]
-_EDGE = 60  # halvings that find the edge of stability
+_EDGE = 1e-18  # how well the edge of stability is known, over the slope [m/s]
 _HIGHEST = 60.0  # where seas end [rad/s]
 
 
@@ -98,17 +99,20 @@ class System(ABC):
         of usual size.
         """
         if self.slope == 0.0:
-            return (0.0, np.inf) if self._stable(self.reference) else (np.inf, 0.0)
+            return (0.0, np.inf) if self._growth(self.reference) < 0.0 else (np.inf, 0.0)
         values = self.slope * _COEFFICIENTS
-        kept = [self._stable(float(v)) for v in values]
+        kept = [self._growth(float(v)) < 0.0 for v in values]
         if all(kept):
             return 0.0, np.inf
         if not any(kept):
             return np.inf, 0.0
         first = kept.index(True)
         last = next((k for k in range(first, len(kept)) if not kept[k]), len(kept))
-        low = 0.0 if first == 0 else self._edge(values[first - 1], values[first])
-        high = np.inf if last == len(kept) else self._edge(values[last], values[last - 1])
+        low, high = 0.0, np.inf
+        if first > 0:
+            low = brentq(self._growth, values[first - 1], values[first], xtol=_EDGE * self.slope)
+        if last < len(kept):
+            high = brentq(self._growth, values[last - 1], values[last], xtol=_EDGE * self.slope)
         return low, high
 
     @cached_property
@@ -117,20 +121,11 @@ class System(ABC):
 
         Whatever the sea, its motion is then at least the one that gives it drag enough.
         """
-        return self.slope > 0.0 and bool(self.poles(0.0).real.max(initial=-np.inf) > 0.0)
+        return self.slope > 0.0 and self._growth(0.0) > 0.0
 
-    def _stable(self, coefficient: float) -> bool:
-        return bool(self.poles(coefficient).real.max(initial=-np.inf) < 0.0)
-
-    def _edge(self, unstable: float, stable: float) -> float:
-        """Return where stability ends, on its stable side."""
-        for _ in range(_EDGE):
-            middle = 0.5 * (unstable + stable)
-            if self._stable(middle):
-                stable = middle
-            else:
-                unstable = middle
-        return float(stable)
+    def _growth(self, coefficient: float) -> float:
+        """Return the growth rate of the motion without a sea [1/s]; below zero it is stable."""
+        return float(self.poles(coefficient).real.max(initial=-np.inf))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -181,9 +176,9 @@ class HeldSystem(System):
         return held_poles(self.data, coefficient, _HIGHEST)
 
     @override
-    def _stable(self, coefficient: float) -> bool:
+    def _growth(self, coefficient: float) -> float:
         # Nothing drives the rope's own modes; the first, undamped, would have no variance.
-        return bool(self.poles(coefficient)[0].real < 0.0)
+        return float(self.poles(coefficient)[0].real)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
