@@ -29,7 +29,7 @@ from ...sweeps import (
     write_sweep,
 )
 from ...text import OutputFolder, count, picture
-from ..declare import OPTIONAL_CASE, options, within
+from ..declare import OPTIONAL_CASE, changed_words, options, within
 from ..given import case_words, given_case, parse_options, split_pairs
 from ..given_design import design_words, given_design, with_design
 from ..lists import names
@@ -39,6 +39,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _MOST = 100  # of the worst cases that are told
+_IN_TIME = (
+    "--follow", "--faults", "--settle", "--scenario", "--option", "--masses", "--common-seed",
+    "--first", "--jobs", "--cluster",
+)  # fmt: skip
+"""Options that do nothing in the frequency domain."""
 
 ARGUMENTS = (
     OPTIONAL_CASE,
@@ -285,19 +290,7 @@ def _only_in_time(arguments: argparse.Namespace) -> None:
     InputError
         If there is one.
     """
-    given = {
-        "--follow": arguments.follow,
-        "--faults": arguments.faults is not None,
-        "--settle": arguments.settle is not None,
-        "--scenario": arguments.scenario != "hold",
-        "--option": bool(arguments.option),
-        "--masses": arguments.masses is not None,
-        "--common-seed": arguments.common_seed,
-        "--first": arguments.first != 0,
-        "--jobs": arguments.jobs is not None,
-        "--cluster": arguments.cluster is not None,
-    }
-    wrong = [name for name, there in given.items() if there]
+    wrong = [word for word in changed_words(arguments, ARGUMENTS) if word in _IN_TIME]
     if wrong:
         raise InputError(f"sweep: {', '.join(wrong)}: only with --mode time")
 
