@@ -73,7 +73,7 @@ def payload_spectrum(design: Design) -> Figure:
     view = MotionView(design)
     omega = view.frequencies
     curves = [
-        ("hook", HOOK, view.hook.density(omega), view.hook_motion.rms),
+        ("hook", HOOK, view.hook.density(omega), view.hook.displacement.rms),
         ("payload, drum held", BEFORE, view.held_density(omega), design.payload_rms_before),
     ]
     for other in design.alternatives:

@@ -22,7 +22,6 @@ from models.basics import (
     most_probable_maximum,
     zero_crossing_period,
 )
-from models.case import Case
 from models.hook import HookMotion
 from synth.design import Design
 from synth.question import locked_response
@@ -30,30 +29,6 @@ from synth.question import locked_response
 PAYLOAD = "payload.displacement"
 DRUM = "drum.haul"
 HOOK = "hook.heave"
-
-
-@dataclass(frozen=True, kw_only=True)
-class GaussianMotion:
-    """A Gaussian motion in three figures and one period.
-
-    Attributes
-    ----------
-    rms
-        Standard deviation [m].
-    mean_period
-        Mean zero-crossing period T_z [s].
-    largest
-        Most probable maximum in the exposure time, from the mean [m].
-    """
-
-    rms: float
-    mean_period: float
-    largest: float
-
-    @property
-    def significant_height(self) -> float:
-        """Significant double amplitude, 4 sigma [m]."""
-        return 4.0 * self.rms
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +45,8 @@ class MotionView:
 
     @cached_property
     def hook(self) -> HookMotion:
-        """GaussianMotion of the hook."""
-        return hook_of(self.design.sea_case)
+        """Motion of the hook; its user has been warned of it already."""
+        return HookMotion.from_case(self.design.sea_case, warn=False)
 
     @property
     def compensated(self) -> bool:
@@ -112,17 +87,8 @@ class MotionView:
         return float(low), float(high)
 
     @cached_property
-    def hook_motion(self) -> GaussianMotion:
-        """The hook's motion."""
-        found = self.hook.displacement
-        return self._motion(found.rms, found.zero_crossing_period)
-
-    @cached_property
-    def before(self) -> GaussianMotion:
-        """The payload's motion with the drum held."""
-        rms = self.design.payload_rms_before
-        if not math.isfinite(rms):
-            return GaussianMotion(rms=math.inf, mean_period=math.nan, largest=math.inf)
+    def held_period(self) -> float:
+        """Mean zero-crossing period of the payload with the drum held [s]."""
         peak, damping = self._resonance
         low, high = self.hook.band
         powers = np.array([[0.0], [2.0]])
@@ -139,15 +105,27 @@ class MotionView:
             rtol=1e-7,
         )
         m0, m2 = (float(m) for m in nodes.integrate(integrands(nodes.omega)))
-        return self._motion(rms, zero_crossing_period(m0, m2))
+        return zero_crossing_period(m0, m2)
 
-    @cached_property
-    def after(self) -> GaussianMotion | None:
-        """The payload's motion with the gains; None if the loop is unstable."""
-        if not self.compensated:
-            return None
-        period = self.design.assessment.mean_period(PAYLOAD)
-        return self._motion(self.design.payload_rms, period)
+    def motions(self) -> list[tuple[str, float, float, float]]:
+        """Return hook and payload, before and after: rms, 4 rms, largest [m].
+
+        The largest is the most probable maximum in the exposure time; what resonates without
+        damping has no end.
+        """
+        design, hook = self.design, self.hook.displacement
+        time = design.case.limits.exposure_time
+        found = [("hook", hook.rms, hook.most_probable_maximum(time))]
+        held = design.payload_rms_before
+        largest = math.inf
+        if math.isfinite(held):
+            largest = most_probable_maximum(held, self.held_period, time)
+        found.append(("payload, drum held", held, largest))
+        if self.compensated:
+            period = design.assessment.mean_period(PAYLOAD)
+            largest = most_probable_maximum(design.payload_rms, period, time)
+            found.append(("payload, compensated", design.payload_rms, largest))
+        return [(name, rms, 4.0 * rms, top) for name, rms, top in found]
 
     @cached_property
     def _resonance(self) -> tuple[float, float]:
@@ -157,16 +135,6 @@ class MotionView:
         height = float(np.abs(self.held_response(np.array([peak])))[0])
         # A resonance of height h has a damping ratio of about 1/(2 h).
         return peak, peak / (2.0 * max(height, 1.0))
-
-    def _motion(self, rms: float, period: float) -> GaussianMotion:
-        time = self.design.case.limits.exposure_time
-        largest = most_probable_maximum(rms, period, time)
-        return GaussianMotion(rms=rms, mean_period=period, largest=largest)
-
-
-def hook_of(case: Case) -> HookMotion:
-    """Return the hook motion of a case, without the warnings that its user has had already."""
-    return HookMotion.from_case(case, warn=False)
 
 
 def highest(function: Callable[[FloatArray], FloatArray], low: float, high: float) -> float:

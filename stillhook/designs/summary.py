@@ -80,14 +80,9 @@ def about_of(design: Design) -> str:
 
 def motion_table(design: Design) -> Table:
     """Return hook and payload motion, before and after."""
-    view = MotionView(design)
-    found = [("hook", view.hook_motion), ("payload, drum held", view.before)]
-    if view.after is not None:
-        found.append(("payload, compensated", view.after))
     largest = f"largest in {duration(design.case.limits.exposure_time)}"
     heads = columns(f"motion=; rms [m]; significant height [m]; largest={largest} [m]")
-    rows = [(name, m.rms, m.significant_height, m.largest) for name, m in found]
-    return Table(columns=heads, rows=rows)
+    return Table(columns=heads, rows=MotionView(design).motions())
 
 
 def effect(design: Design) -> str:
