@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +29,9 @@ from ..text import (
     DRUM,
     HOOK,
     REFERENCE,
+    Axes,
     Bar,
+    Figure,
     Table,
     annotate,
     decibels,
@@ -46,10 +47,6 @@ from .motion import DRUM as DRUM_HAUL
 from .motion import HOOK as HOOK_HEAVE
 from .motion import PAYLOAD, MotionView, highest
 from .summary import about_of, has_loop, limit_table
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _WEIGHT = 0.999  # share of a variance that a spectrum's axis has to hold
 _PERIODS = (20.0, 12.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5)  # marks on an axis [s]

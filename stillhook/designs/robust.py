@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from ..text import (
     REFERENCE,
     Column,
     Drawing,
+    Figure,
     Item,
     Report,
     ReportSection,
@@ -32,9 +32,6 @@ from ..text import (
     scale,
     typeset,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _SHOWN = 24  # scenarios of the figure
 _ROWS = 12  # and of the table

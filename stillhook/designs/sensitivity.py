@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from ..text import (
     HOOK,
     Column,
     Drawing,
+    Figure,
     Report,
     ReportSection,
     Table,
@@ -30,9 +30,6 @@ from ..text import (
     quantity,
     typeset,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Wide = tuple[Sequence[SobolIndices], Screening]
 """Sobol's indices, one study for each figure, and Morris's effects over the same ranges."""

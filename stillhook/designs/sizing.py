@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ..text import (
     REFERENCE,
     Column,
     Drawing,
+    Figure,
     Item,
     Report,
     ReportSection,
@@ -33,9 +34,6 @@ from ..text import (
     scale,
     typeset,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "X")
 _ROWS = 14  # of the bar figure

@@ -15,8 +15,10 @@ from ..text import (
     DRUM,
     HOOK,
     REFERENCE,
+    Axes,
     Column,
     Drawing,
+    Figure,
     Report,
     ReportSection,
     Table,
@@ -33,9 +35,6 @@ from .bound_text import bound_cell, bound_figure, bounds_note
 from .summary import SHARES, share_of
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from synth.design import Design
 
 _TORQUE = "motor.torque.peak"
