@@ -216,7 +216,6 @@ def _simulate(
 
 
 def _prepared(asked: SimulationRequest, name: str, tune: Callable[[float], None]) -> Series:
-    feedback = name.startswith("feedback")
     if "mpc" in name:  # whose weights take seconds: tuned here, where it can be told, and kept
         from mpc.winch import tune_weights
 
@@ -225,8 +224,7 @@ def _prepared(asked: SimulationRequest, name: str, tune: Callable[[float], None]
     controller = controller_of(
         name,
         asked.scenario.case_for(asked.case),
-        design=asked.design if feedback else None,
-        gains=asked.gains if feedback else None,
+        design=asked.design if name.startswith("feedback") else None,
         sample_time=asked.sample_time,
     )
     return Series.prepare(asked.case, controller, asked.scenario, asked.how)
@@ -242,7 +240,7 @@ def _question(asked: SimulationRequest, arguments: argparse.Namespace) -> dict[s
         "hook": "the case's own sea" if hook is None else hook.description,
         "seeds": list(asked.seeds),
         "structure": None if design is None else design.structure,
-        "gains": dict(design.parameters) if design is not None else asked.gains,
+        "gains": None if design is None else dict(design.parameters),
         "command": _again(arguments, case_words(arguments)),
     }
 

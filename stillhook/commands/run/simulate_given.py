@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -38,7 +37,7 @@ class SimulationRequest:
         Whether all were asked for, so that one that the case does not allow may be left out.
     seeds, duration
         Seeds of the runs, and their length [s].
-    gains, design
+    design
         Of the feedback, if given.
     sample_time
         Of the controllers [s]; None: their own.
@@ -52,7 +51,6 @@ class SimulationRequest:
     every: bool
     seeds: range
     duration: float
-    gains: Mapping[str, float] | None
     design: Design | None
     sample_time: float | None
     how: SimulationOptions
@@ -71,9 +69,6 @@ def asked_of(arguments: argparse.Namespace) -> SimulationRequest:
 
     names = parse_controllers(arguments.controller)
     options = parse_options(arguments.option)
-    gains = None
-    if arguments.gains is not None and arguments.structure is None:
-        gains = parse_gains(arguments.gains)
     case = given_case(arguments)
     scenario = scenario_named(arguments.scenario, case, **options)
     hook = _hook(arguments)
@@ -90,7 +85,6 @@ def asked_of(arguments: argparse.Namespace) -> SimulationRequest:
         every=arguments.controller == "all",
         seeds=range(first, first + arguments.seeds),
         duration=lasting,
-        gains=gains,
         design=_design(arguments, case),
         sample_time=arguments.sample_time,
         how=SimulationOptions(
@@ -159,14 +153,14 @@ def _fitting(lasting: float, hook: MotionSource | None, sample_time: float | Non
 
 
 def _design(arguments: argparse.Namespace, case: Case) -> Design | None:
-    structure = arguments.structure
     if arguments.design is None:
-        if arguments.gains is None or structure is None:
+        if arguments.gains is None:
             return None
         from synth import evaluate_gains
 
+        structure = arguments.structure or "payload-feedback"
         return evaluate_gains(case, parse_gains(arguments.gains, structure), structure)
-    if structure is not None:
+    if arguments.structure is not None:
         raise InputError("simulate: give --design, or --structure and --gains, not both")
     import sys
 
