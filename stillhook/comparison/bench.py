@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from models.basics import PhysicsWarning, StillhookError
+from models.basics import PhysicsWarning
 
 from ..controllers import Contender, StoredDesign, design_law
-from .cell import ComparisonQuestion, prepare
+from ..keeper import failure
+from .cell import ComparisonQuestion, Floor, Prepared
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,15 +84,16 @@ class CellBench:
                 if self._at != task.group:
                     self._at, self._prepared = None, None
                     contender = self._contenders[task.name]
-                    self._prepared = prepare(self._question, contender, task.height, task.law)
+                    how = (self._question, contender, task.height)
+                    floor = contender.recipe is None
+                    self._prepared = Floor(*how) if floor else Prepared(*how, task.law)
                     self._at = task.group
-            except StillhookError as error:
-                return Refused(reason=str(error), always=True)
+            except Exception as error:  # what a contender of the user's own may do
+                return Refused(reason=failure(error), always=True)
             try:
                 if task.kind == "trace":
                     return self._prepared.trace(task.seed, task.moment, progress)
                 return self._prepared.run(task.seed, progress)
-            except Exception as error:  # what a controller of the user's own may do
+            except Exception as error:
                 self._at = None
-                known = isinstance(error, StillhookError)
-                return Refused(reason=str(error) if known else f"{type(error).__name__}: {error}")
+                return Refused(reason=failure(error))

@@ -1,6 +1,6 @@
 """One run of a comparison (`Cell`): a contender in a sea with a seed, as plain data.
 
-    question, Contender, H_s, StoredDesign --> prepare --> Prepared (a controller) or Floor
+    question, Contender, H_s, StoredDesign --> Prepared (a controller) or Floor
                                            --> run(seed) --> Cell (plain data)
 
 Common random numbers: every contender meets the same motion of the hook, to the last bit at the
@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import FloatArray, InputError, StillhookError
+from models.basics import FloatArray, InputError
 from models.case import Case
 from models.operation import Motion, SpectrumMotion, scenario_named
 from models.run import ERROR, Run
@@ -362,23 +362,3 @@ def _broken(run: Run, settle: float) -> dict[str, float]:
         "tension low": share("rope.minimum_tension", limits.minimum_tension, None),
         "tension high": share("rope.tension", None, limits.rope_tension_peak),
     }
-
-
-def prepare(
-    question: ComparisonQuestion, contender: Contender, height: float, law: StoredDesign | None
-) -> Prepared | Floor:
-    """Return a contender in one sea, ready to run.
-
-    Raises
-    ------
-    InputError
-        With the reason, if it cannot take part: no gains, no design, not stable, no such thing.
-    """
-    try:
-        if contender.recipe is None:
-            return Floor(question, contender, height)
-        return Prepared(question, contender, height, law)
-    except StillhookError:
-        raise
-    except Exception as error:  # a contender of the user's own may fail in any way
-        raise InputError(f"{type(error).__name__}: {error}") from error

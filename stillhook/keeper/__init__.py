@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .cluster import Cluster
     from .digest import code_digest, versions
     from .journal import Journal, question_in
-    from .pool import POLL, Alone, Died, Pool, usable_cores
+    from .pool import POLL, Alone, Died, Pool, failure, usable_cores
     from .processes import Processes
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -18,6 +18,8 @@ from typing import Any, Protocol, Self, TypeVar
 
 from typing_extensions import override
 
+from models.basics import StillhookError
+
 POLL = 0.2
 """Time between two looks at Ctrl-C [s]."""
 
@@ -173,6 +175,11 @@ class Alone(Pool):
     def _answer(self, timeout: float) -> tuple[Any, Any] | None:
         task = self._tasks.popleft()
         return task, self._bench.do(task, self._progress)
+
+
+def failure(error: Exception) -> str:
+    """Return what a task failed of, which may be anything where the user's own code is called."""
+    return str(error) if isinstance(error, StillhookError) else f"{type(error).__name__}: {error}"
 
 
 def usable_cores() -> int:

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import PhysicsWarning, StillhookError, one_thread
+from models.basics import PhysicsWarning, one_thread
 from models.case import Case
 from models.operation import scenario_named, with_faults
 from models.run import Run
@@ -27,6 +27,7 @@ from models.sensing import Controller
 from models.simulation import Progress, SimulationOptions
 
 from ..controllers import Recipe
+from ..keeper import failure
 from ..runs import Series
 from .time_metrics import numbers_of, status_of
 from .trim import Shift, shift_between, static_of, trimmed
@@ -143,8 +144,7 @@ class TimeQuestion:
                 status, message = status_of(run), run.message
                 values = numbers_of(run, self.metrics)
             except Exception as error:  # what a controller of the user's own may do
-                known = isinstance(error, StillhookError)
-                message = str(error) if known else f"{type(error).__name__}: {error}"
+                message = failure(error)
                 status, values = "failed", dict.fromkeys(self.metrics, math.nan)
         wall = clock.perf_counter() - began
         return CaseResult(
