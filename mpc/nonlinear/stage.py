@@ -31,10 +31,9 @@ import casadi as ca
 import numpy as np
 
 from models.basics import FloatArray, InputError, ReadOnlyArrays
-from models.plant import DrumTravel, build_plant, displacement_names, zero_order_hold
+from models.plant import DrumTravel, build_plant, displacement_names, hermite_hold, zero_order_hold
 from models.simulation import Kernel
 
-from ..programme import hermite_hold
 from ..winch import SampledWinch
 from .mean_torque import Drift, mean_torque
 

@@ -38,10 +38,15 @@ import scipy.linalg
 from models.basics import FloatArray, ReadOnlyArrays, SolverError, check_range, read_only
 from models.case import Case
 from models.hook import HookMotion
-from models.plant import MEASUREMENTS, ShapingFilter, fit_shaping_filter
+from models.plant import (
+    MEASUREMENTS,
+    ShapingFilter,
+    fit_shaping_filter,
+    noisy_hold,
+    root_of,
+)
 from models.sensing import MEASURED, MruModel, SensorModel
 
-from ..programme import noisy_hold, root_of
 from .sampled import SampledWinch
 
 _OWNER = "prediction model"

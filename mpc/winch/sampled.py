@@ -36,11 +36,10 @@ from models.plant import (
     Plant,
     PlantData,
     build_plant,
+    hermite_hold,
     zero_order_hold,
 )
 from models.sensing import sensed_plant
-
-from ..programme import hermite_hold
 
 _OWNER = "predictive control"
 

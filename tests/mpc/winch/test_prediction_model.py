@@ -11,9 +11,9 @@ from scipy.integrate import solve_ivp
 
 from models import SolverError
 from models.hook import HookMotion
-from models.plant import build_plant
+from models.plant import build_plant, hermite_hold, noisy_hold, root_of
 from models.sensing import MEASURED
-from mpc.programme import hermite_hold, kalman_gain, noisy_hold, root_of
+from mpc.programme import kalman_gain
 from mpc.winch import plan_model, prediction_model, regulator, tune_weights, with_noise
 from mpc.winch.estimator import kalman_covariance
 from mpc.winch.prediction import CONSTANTS
