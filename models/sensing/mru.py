@@ -18,7 +18,7 @@ can be cut anywhere.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -31,6 +31,7 @@ from ..basics import (
     ReadOnlyArrays,
     read_only,
 )
+from ..plant import hermite_hold, noisy_hold
 from ..rig import MRU
 from .draws import MRU_ERROR, draw
 from .telemetry import Interval, Size, during
@@ -288,19 +289,10 @@ class MruModel:
     @cached_property
     def _filter_step(self) -> tuple[complex, ComplexArray]:
         """Factor of the mode over a sample, and gains of z, v before and z, v after it."""
-        T, pole = self.sample_time, low_pass_pole(self._corner or 1.0)
-
-        def integrand(t: FloatArray) -> ComplexArray:
-            x = t / T
-            hermite = (
-                (1.0 + 2.0 * x) * (1.0 - x) ** 2,
-                T * x * (1.0 - x) ** 2,
-                x**2 * (3.0 - 2.0 * x),
-                T * x**2 * (x - 1.0),
-            )
-            return np.asarray(np.exp(pole * (T - t)) * np.array(hermite), dtype=np.complex128)
-
-        return complex(np.exp(pole * T)), integrate_to(integrand, T, abs(pole))
+        T, corner = self.sample_time, self._corner or 1.0
+        pole, driven = low_pass_pole(corner), np.array([[0.0, 0.0], [1.0, 0.0]])
+        (low, rate), _ = hermite_hold(_low_pass(corner), driven, T, T)
+        return complex(np.exp(pole * T)), to_mode(low, rate, pole)
 
     def _advance(self, mode: complex, path: FloatArray) -> ComplexArray:
         """Return the filter's mode at every sample of a path, given that at the first."""
@@ -313,7 +305,8 @@ class MruModel:
         """Factor of the error's mode over a sample, and the root of what a sample adds (2, 2)."""
         width = self._unit.noise_bandwidth
         factor = complex(np.exp(low_pass_pole(width) * self.sample_time))
-        return factor, self.error_rms * noise_root(width, self.sample_time)
+        _, added = low_pass_noise(width, self.sample_time)
+        return factor, self.error_rms * np.linalg.cholesky(added)
 
     def _errors(self, mode: complex, start: int, n: int) -> ComplexArray:
         """Return the error's mode at n samples; `mode` is that at the sample before."""
@@ -351,20 +344,8 @@ def mode_recursion(factor: complex, first: complex, drive: ComplexArray) -> Comp
     return np.asarray(lfilter([1.0], [1.0, -factor], driven), dtype=np.complex128)
 
 
-def integrate_to(
-    integrand: Callable[[FloatArray], ComplexArray], end: float, rate: float
-) -> ComplexArray:
-    """Return the integral from 0 to `end`, by Gauss-Legendre panels shorter than 1/rate."""
-    panels = math.ceil(end * rate)
-    nodes, weights = np.polynomial.legendre.leggauss(16)
-    edges = np.linspace(0.0, end, panels + 1)
-    half = 0.5 * np.diff(edges)
-    t = (edges[:-1, None] + half[:, None] * (1.0 + nodes)).ravel()
-    return np.asarray(integrand(t) @ (half[:, None] * weights).ravel(), dtype=np.complex128)
-
-
-def noise_root(corner: float, step: float) -> FloatArray:
-    """Return what a time step adds to white noise behind the low-pass, of variance 1 in all.
+def low_pass_noise(corner: float, step: float, rms: float = 1.0) -> tuple[FloatArray, FloatArray]:
+    """Return what becomes of white noise behind the low-pass over a time step.
 
     Parameters
     ----------
@@ -372,19 +353,20 @@ def noise_root(corner: float, step: float) -> FloatArray:
         Corner frequency [rad/s].
     step
         Time step [s].
+    rms
+        Of the value, in all.
 
     Returns
     -------
-    ndarray
-        Lower triangular root (2, 2) of the covariance that value and derivative gain.
+    over, added
+        Value and derivative after the step by those before it, (2, 2), and the covariance of what
+        they gain, (2, 2).
     """
-    pole = low_pass_pole(corner)
+    over, added = noisy_hold(_low_pass(corner), np.array([[0.0], [1.0]]), step)
+    # Variance of the value under white noise of intensity one: 1/(2 sqrt(2) corner^3).
+    return over, added * rms**2 * 2.0 * math.sqrt(2.0) * corner**3
 
-    def integrand(t: FloatArray) -> ComplexArray:
-        impulse, rate = from_mode(np.exp(pole * t), pole)
-        return np.array((impulse**2, impulse * rate, rate**2), dtype=np.complex128)
 
-    # From the integral itself: P - Phi P Phi' would lose all digits at short steps.
-    strength = 2.0 * math.sqrt(2.0) * corner**3
-    a, b, c = strength * integrate_to(integrand, step, abs(pole)).real
-    return np.linalg.cholesky(np.array([[a, b], [b, c]]))
+def _low_pass(corner: float) -> FloatArray:
+    """Return A of value and derivative of a second-order Butterworth low-pass, (2, 2)."""
+    return np.array([[0.0, 1.0], [-(corner**2), -math.sqrt(2.0) * corner]])

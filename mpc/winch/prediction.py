@@ -45,7 +45,7 @@ from models.plant import (
     noisy_hold,
     root_of,
 )
-from models.sensing import MEASURED, MruModel, SensorModel
+from models.sensing import MEASURED, MruModel, SensorModel, low_pass_noise
 
 from .sampled import SampledWinch
 
@@ -377,19 +377,12 @@ def _unit_error(case: Case, hook: HookMotion, T: float) -> tuple[FloatArray, Flo
     """Return the error (e, e') of the reference unit over a sample, and what is added to it."""
     unit = MruModel(case.sensors.mru, T, float(hook.displacement.rms), seed=0)
     w = 1.0 if case.sensors.mru is None else case.sensors.mru.noise_bandwidth
-    return _low_pass_error(w, T, unit.error_rms)
+    return low_pass_noise(w, T, unit.error_rms)
 
 
 def _slow_error(hook: HookMotion, T: float) -> tuple[FloatArray, FloatArray]:
     """Return a slow error of the unit (e, e') over a sample, and what adds up to an rms of one."""
-    return _low_pass_error(_SLOW * float(hook.velocity.rms / hook.displacement.rms), T, 1.0)
-
-
-def _low_pass_error(w: float, T: float, rms: float) -> tuple[FloatArray, FloatArray]:
-    A = np.array([[0.0, 1.0], [-(w**2), -math.sqrt(2.0) * w]])
-    over, added = noisy_hold(A, np.array([[0.0], [1.0]]), T)
-    # variance of e under white noise of intensity one: 1/(2 sqrt(2) w^3)
-    return over, added * rms**2 * 2.0 * math.sqrt(2.0) * w**3
+    return low_pass_noise(_SLOW * float(hook.velocity.rms / hook.displacement.rms), T)
 
 
 def _depths(case: Case, T: float) -> dict[str, int]:

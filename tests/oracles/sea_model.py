@@ -18,8 +18,7 @@ import scipy.linalg
 from models.basics import FloatArray, read_only
 from models.hook import HookMotion
 from models.plant import ShapingFilter
-from models.sensing import MruModel
-from models.sensing.mru import noise_root
+from models.sensing import MruModel, low_pass_noise
 
 _PANEL = 0.25  # [rad/s], of the quadrature over the true spectrum
 _BUTTERWORTH = math.sqrt(2.0)
@@ -110,10 +109,11 @@ def seen_hook(shaping: ShapingFilter, unit: MruModel, noise: FloatArray) -> Seen
         width = unit.mru.noise_bandwidth
         scale = unit.error_rms * np.diag([1.0, width])
         last = slice(n - 2, n)
-        A_error = np.array([[0.0, 1.0], [-(width**2), -_BUTTERWORTH * width]])
-        F[last, last] = np.linalg.solve(scale, scipy.linalg.expm(A_error * T) @ scale)
-        root = np.linalg.solve(scale, unit.error_rms * noise_root(width, T))
-        G[last, last], H[:, last] = root @ root.T, scale
+        over, added = low_pass_noise(width, T)
+        inverse = np.linalg.inv(scale)
+        F[last, last] = inverse @ over @ scale
+        G[last, last] = unit.error_rms**2 * inverse @ added @ inverse
+        H[:, last] = scale
     G = 0.5 * (G + G.T)
     stationary = np.asarray(scipy.linalg.solve_discrete_lyapunov(F, G), dtype=np.float64)
     return SeenHook(
