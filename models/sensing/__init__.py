@@ -11,7 +11,7 @@ from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .control import HEARD, Controller, Measurement, Recursion, holds_brake, recursion_of
-    from .mru import BIAS, Bias, MruModel, MruState, low_pass_noise
+    from .mru import BIAS, Bias, MruModel, MruState, low_pass_noise, unit_response
     from .plant import (
         ENCODER,
         MEASURED,

@@ -147,15 +147,6 @@ class MruModel:
         """Standard deviation of the error of the heave [m]."""
         return max(self._unit.noise_floor, self._unit.noise_fraction * self.heave_rms)
 
-    def transfer(self, omega: npt.ArrayLike) -> ComplexArray:
-        """Return reported heave over heave [-] at `omega` [rad/s], without the error."""
-        s = 1j * np.asarray(omega, dtype=np.float64)
-        response = np.exp(-s * self.delay)
-        if self._corner is not None:
-            w = self._corner
-            response = response * (s**2 / (s**2 + math.sqrt(2.0) * w * s + w**2))
-        return np.asarray(response, dtype=np.complex128)
-
     def noise_density(self, omega: npt.ArrayLike) -> FloatArray:
         """Return the one-sided variance density of the heave's error [m2 s/rad].
 
@@ -317,6 +308,16 @@ class MruModel:
         pushes = draw(self.seed, MRU_ERROR, first, start + n - first, 2) @ root.T
         modes = mode_recursion(factor, mode, to_mode(pushes[:, 0], pushes[:, 1], pole))
         return modes if start == 0 else modes[1:]
+
+
+def unit_response(unit: MRU | None, s: npt.ArrayLike) -> ComplexArray:
+    """Return reported heave over heave [-] of a unit at points s [1/s], without the error."""
+    unit, points = unit or PERFECT, np.asarray(s, dtype=np.complex128)
+    response = np.exp(-points * unit.delay)
+    if unit.heave_filter_period is not None:
+        w = 2.0 * math.pi / unit.heave_filter_period
+        response = response * (points**2 / (points**2 + math.sqrt(2.0) * w * points + w**2))
+    return np.asarray(response)
 
 
 def low_pass_pole(corner: float) -> complex:

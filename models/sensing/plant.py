@@ -31,7 +31,7 @@ from ..plant import (
     line_response,
 )
 from ..rig import Sensors
-from .mru import PERFECT, MruModel
+from .mru import PERFECT, MruModel, unit_response
 
 #: What is measured, in the order of the plant's measurements.
 MEASURED = (
@@ -223,12 +223,9 @@ def sensed_line_at(
         for block in (yw, yu):
             block[:, at("rope.tension")] *= weighed[:, None]
     unit = sensors.mru or PERFECT
-    late, passed = np.exp(-points * unit.delay), np.ones_like(points)
-    if unit.heave_filter_period is not None:
-        w = 2.0 * math.pi / unit.heave_filter_period
-        passed = points**2 / (points**2 + math.sqrt(2.0) * w * points + w**2)
+    shown, late = unit_response(unit, points), np.exp(-points * unit.delay)
     for name, rate in (("mru.heave", 1.0), ("mru.heave_rate", points)):
-        yw[:, at(name), line.disturbances.index("hook.heave")] = rate * passed * late
+        yw[:, at(name), line.disturbances.index("hook.heave")] = rate * shown
         yw[:, at(name), nw + noises.index("mru.error")] = rate * late
     sent = np.exp(-points * sensors.telemetry.delay)
     for name in (*MEASUREMENTS, "rope.tension"):

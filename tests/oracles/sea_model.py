@@ -18,7 +18,7 @@ import scipy.linalg
 from models.basics import FloatArray, read_only
 from models.hook import HookMotion
 from models.plant import ShapingFilter
-from models.sensing import MruModel, low_pass_noise
+from models.sensing import MruModel, low_pass_noise, unit_response
 
 _PANEL = 0.25  # [rad/s], of the quadrature over the true spectrum
 _BUTTERWORTH = math.sqrt(2.0)
@@ -195,7 +195,7 @@ def true_variances(
     """
     omega, weight = _nodes(hook)
     turn = np.exp(-1j * omega * unit.sample_time)
-    shown = unit.transfer(omega) * np.exp(1j * omega * unit.delay)
+    shown = unit_response(unit.mru, 1j * omega) * np.exp(1j * omega * unit.delay)
     shown = shown * turn**model.whole * (1.0 - model.share + model.share * turn)
     seen = gain[:, 0, None] * shown + gain[:, 1, None] * (1j * omega * shown)
     modes, basis = np.linalg.eig(closed)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from models.hook import HookMotion
-from models.sensing import MruModel
+from models.sensing import MruModel, unit_response
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -80,7 +80,9 @@ class Wiener:
         share = self.unit.delay / T - whole
         step = np.exp(-1j * omega * T)
         late = step**whole * (1.0 - share + share * step)
-        return np.asarray(self.unit.transfer(omega) * np.exp(1j * omega * self.unit.delay) * late)
+        return np.asarray(
+            unit_response(self.unit.mru, 1j * omega) * np.exp(1j * omega * self.unit.delay) * late
+        )
 
     def _series(self, lines: npt.NDArray[np.generic]) -> FloatArray:
         """Real part of the sum of lines times exp(i omega t) at all samples."""

@@ -10,7 +10,14 @@ from models.basics import InputError, White
 from models.hook import HookMotion
 from models.plant import PlantData, build_plant
 from models.sensing import HEARD as SIMULATED
-from models.sensing import MEASURED, MruModel, SensorModel, sensed_plant, sensed_spectra
+from models.sensing import (
+    MEASURED,
+    MruModel,
+    SensorModel,
+    sensed_plant,
+    sensed_spectra,
+    unit_response,
+)
 from models.sensing.plant import NOISES
 from synth.loop import disturbances
 
@@ -55,7 +62,7 @@ def test_reference_unit_shows_what_its_model_shows(crane: Case) -> None:
     unit = MruModel(mru=crane.sensors.mru, sample_time=0.01, heave_rms=0.5, seed=0)
     column = response.disturbances.index("hook.heave")
     heave, rate = (response.measurements.index(f"mru.{n}") for n in ("heave", "heave_rate"))
-    wanted = unit.transfer(OMEGA)
+    wanted = unit_response(unit.mru, 1j * OMEGA)
     assert response.yw[:, heave, column] == pytest.approx(wanted, rel=1e-10)
     assert response.yw[:, rate, column] == pytest.approx(1j * OMEGA * wanted, rel=1e-10)
     assert np.abs(response.yu[:, [heave, rate]]).max() == 0.0  # the winch does not move the ship
