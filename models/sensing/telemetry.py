@@ -122,8 +122,6 @@ class TelemetrySchedule:
         start, count
             First sample, not negative, and number of samples.
         """
-        if self._steady and start >= self.lags.stop:
-            return self._steady_block(count)
         arrival, content, usable = self._messages(start - self.lags.stop, start + count)
         inside = usable & (arrival >= start) & (arrival < start + count)
         best = np.full(count + 1, -math.inf)
@@ -144,23 +142,6 @@ class TelemetrySchedule:
             fresh=fresh.astype(np.float64),
             age=np.asarray(age * self.sample_time, dtype=np.float64),
         )
-
-    @property
-    def _steady(self) -> bool:
-        """Whether every message comes, and all after the same time."""
-        link = self.telemetry
-        return link.jitter == link.dropout == 0.0 and not (self.outages or self.broken or self.late)
-
-    def _steady_block(self, count: int) -> TelemetryBlock:
-        """Return what arrives on such a link, the first messages aside."""
-        transit, _ = self._transit
-        share = transit - self.lags.start
-        weights = np.zeros((count, len(self.lags)))
-        weights[:, 0] = 1.0 - share
-        if share > 0.0:
-            weights[:, 1] = share
-        age = np.full(count, transit * self.sample_time)
-        return TelemetryBlock(weights=weights, fresh=np.ones(count), age=age)
 
     @cached_property
     def _transit(self) -> tuple[float, float]:
