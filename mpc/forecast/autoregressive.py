@@ -40,11 +40,12 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import lapack
 
 from models.basics import FloatArray, check_range, read_only
 
-from .forecast import Forecast, hermite_weights, leads_of
+from .forecast import Forecast, leads_of
 
 _TRAIN_EVERY = 0.2  # [s] between two regressions
 _FADING = 1.0  # [s] in which a forecast fades before there is a model
@@ -145,7 +146,7 @@ class AdaptiveAR:
         self._share = Ts / memory
         self._at = read_only(self.leads + late)
         n, knots = self.leads.size, self._regression.knots
-        weights = hermite_weights(owner, knots, np.append(self._at, Ts))
+        weights = hermite_weights(knots, np.append(self._at, Ts))
         weights[:, 1::2] /= D  # rates are kept times the spacing
         self._weights = read_only(np.delete(weights, (n, 2 * n + 1), axis=0))
         self._next_sample = read_only(weights[[n, 2 * n + 1]] * np.array(((1.0,), (D,))))
@@ -484,3 +485,23 @@ def smoother(at: npt.NDArray[np.int64], half: int, step: float, spacing: float) 
     for i, knot in enumerate(at.tolist()):
         rows[2 * i : 2 * i + 2, 2 * knot : 2 * knot + fit.shape[1]] = fit
     return read_only(rows)
+
+
+def hermite_weights(knots: FloatArray, at: FloatArray) -> FloatArray:
+    """Return the matrix that interpolates values and rates at knots (cubic Hermite).
+
+    Parameters
+    ----------
+    knots
+        Ascending times of the knots [s], (k,), k >= 2.
+    at
+        Times within the knots' range [s], (n,).
+
+    Returns
+    -------
+    ndarray
+        (2n, 2k): [value; rate] at the times from [value, rate] of the first knot, the second...
+    """
+    each = np.eye(2 * knots.size)
+    spline = CubicHermiteSpline(knots, each[0::2], each[1::2])
+    return np.concatenate([spline(at), spline(at, 1)])

@@ -14,7 +14,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from models.basics import FloatArray, InputError, check_range, read_only
+from models.basics import FloatArray, check_range, read_only
 
 _MOST_LEADS = 100_000
 
@@ -86,48 +86,3 @@ def leads_of(owner: str, sample_time: float, horizon: float) -> FloatArray:
     step = check_range(owner, "sample_time", sample_time, low=0.0, unit="s", open_low=True)
     last = check_range(owner, "horizon", horizon, low=0.0, high=_MOST_LEADS * step, unit="s")
     return read_only(step * np.arange(round(last / step) + 1))
-
-
-def hermite_weights(owner: str, knots: FloatArray, at: FloatArray) -> FloatArray:
-    """Return the matrix that interpolates values and rates at knots (cubic Hermite).
-
-    Parameters
-    ----------
-    owner
-        Who asks, for the message.
-    knots
-        Ascending times of the knots [s], (k,), k >= 2.
-    at
-        Times within the knots' range [s], (n,).
-
-    Returns
-    -------
-    ndarray
-        (2n, 2k): [value; rate] at the times from [value, rate] of the first knot, the second...
-
-    Raises
-    ------
-    InputError
-        If a time lies outside the knots.
-    """
-    if at.min() < knots[0] - 1e-9 or at.max() > knots[-1] + 1e-9:
-        raise InputError(
-            f"{owner}: times must be in [{knots[0]:g}, {knots[-1]:g}] s, "
-            f"got {at.min():g} to {at.max():g} s"
-        )
-    n, k = at.size, knots.size
-    left = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, k - 2)
-    h = knots[left + 1] - knots[left]
-    x = (at - knots[left]) / h
-    rows = np.arange(n)
-    weights = np.zeros((2 * n, 2 * k))
-    bends = (
-        ((1.0 + 2.0 * x) * (1.0 - x) ** 2, -6.0 * x * (1.0 - x) / h),
-        (h * x * (1.0 - x) ** 2, (1.0 - x) * (1.0 - 3.0 * x)),
-        (x**2 * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / h),
-        (h * x**2 * (x - 1.0), x * (3.0 * x - 2.0)),
-    )
-    for column, (value, rate) in enumerate(bends):
-        weights[rows, 2 * left + column] = value
-        weights[n + rows, 2 * left + column] = rate
-    return weights
