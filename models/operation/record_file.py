@@ -39,7 +39,6 @@ from ..basics import (
     PhysicsWarning,
     check_choice,
     check_finite,
-    check_range,
     parse_quantity,
     read_only,
     read_text,
@@ -88,8 +87,7 @@ class RecordMotion:
         *,
         tip: Sequence[float] | None = None,
         exact: bool = False,
-        detrend: Literal["none", "mean", "linear"] = "mean",
-        high_pass: float | None = None,
+        detrend: Literal["none", "mean"] = "mean",
     ) -> RecordMotion:
         """Read a file with the columns time and displacement; velocity, acceleration may be there.
 
@@ -100,7 +98,7 @@ class RecordMotion:
         tip, exact
             Of a file with the columns time, heave, roll and pitch, as in
             `models.operation.six_dof.tip_heave`: the crane's tip moves.
-        detrend, high_pass
+        detrend
             As in `from_arrays`.
 
         Raises
@@ -118,11 +116,11 @@ class RecordMotion:
         source = Path(path).name
         if tip is None:
             columns = read_columns(path, _KINDS, required=("time", "displacement"))
-            return cls.from_arrays(**columns, detrend=detrend, high_pass=high_pass, source=source)
+            return cls.from_arrays(**columns, detrend=detrend, source=source)
         motions = read_columns(path, _SIX_DOF, required=tuple(_SIX_DOF))
         time = motions.pop("time")
         z = tip_heave(**motions, tip=tip, exact=exact, source=source)
-        found = cls.from_arrays(time, z, detrend=detrend, high_pass=high_pass, source=source)
+        found = cls.from_arrays(time, z, detrend=detrend, source=source)
         place = ", ".join(f"{value:g}" for value in tip)
         return replace(found, description=f"{found.description}, tip at ({place}) m")
 
@@ -134,8 +132,7 @@ class RecordMotion:
         velocity: npt.ArrayLike | None = None,
         acceleration: npt.ArrayLike | None = None,
         *,
-        detrend: Literal["none", "mean", "linear"] = "mean",
-        high_pass: float | None = None,
+        detrend: Literal["none", "mean"] = "mean",
         source: str = "record",
     ) -> RecordMotion:
         """Return the motion of a record.
@@ -149,10 +146,7 @@ class RecordMotion:
         velocity, acceleration
             Only compared with the displacement's derivatives (n,) [m/s], [m/s2].
         detrend
-            What is taken off first: nothing, the mean, or the straight line of best fit.
-        high_pass
-            Period of a second-order Butterworth high-pass, forwards and backwards so that it
-            shifts no phase [s]: takes slow drift off.  None for none.
+            What is taken off first: nothing or the mean.
         source
             What to call it in messages.
 
@@ -176,16 +170,17 @@ class RecordMotion:
                     f"got {column.size}"
                 )
         step = even_step(source, times)
-        z = _without_trend(values["displacement"], source, detrend)
-        if high_pass is not None:
-            z = _high_passed(z, step, source, high_pass)
+        check_choice(source, "detrend", detrend, ("none", "mean"))
+        z = values["displacement"]
+        if detrend == "mean":
+            z = z - z.mean()
         from scipy.interpolate import make_interp_spline
 
         clock = step * np.arange(float(times.size))
         spline = make_interp_spline(clock, z, k=5)
         shown = {"velocity": spline(clock, 1), "acceleration": spline(clock, 2)}
         for name, of_spline in shown.items():
-            if name in values and high_pass is None:
+            if name in values:
                 _compare(source, name, values[name], of_spline)
         return cls(
             displacement=read_only(z),
@@ -323,26 +318,6 @@ def _number(where: str, row: Sequence[str], i: int) -> float:
     if not math.isfinite(value):
         raise InputError(f"{where} must be a finite number, got {text!r}")
     return value
-
-
-def _without_trend(z: FloatArray, source: str, detrend: str) -> FloatArray:
-    from scipy.signal import detrend as without
-
-    check_choice(source, "detrend", detrend, ("none", "mean", "linear"))
-    if detrend == "none":
-        return z
-    return np.asarray(without(z, type="constant" if detrend == "mean" else "linear"))
-
-
-def _high_passed(z: FloatArray, step: float, source: str, period: float) -> FloatArray:
-    from scipy.signal import butter, sosfiltfilt
-
-    longest = (z.size - 1) * step
-    check_range(source, "high_pass", period, low=4.0 * step, high=longest, unit="s")
-    sections = butter(2, 1.0 / period, "highpass", fs=1.0 / step, output="sos")
-    # Its memory is about a period, which the mirrored ends have to be as long as.
-    ends = min(z.size - 1, math.ceil(period / step))
-    return np.asarray(sosfiltfilt(sections, z, padlen=ends), dtype=np.float64)
 
 
 def _compare(source: str, name: str, measured: FloatArray, of_spline: FloatArray) -> None:
