@@ -21,7 +21,7 @@ from models.sensing import HEARD, Measurement
 from .winch_mpc import WinchMPC, WinchOptions
 
 _SAME = 1e-3  # of the peak torque
-_TORQUE = HEARD.index("motor.torque")
+_TORQUE, _SPEED = HEARD.index("motor.torque"), HEARD.index("motor.speed")
 _REFERENCE = HEARD.index("reference.displacement")
 
 
@@ -161,7 +161,9 @@ class LinearMPC(WinchMPC):
         began = clock.perf_counter()
         shown, winch, products = measurement.values, self.model.winch, self.products
         self._counts["steps"] += 1
-        chi = self.estimator.update(measurement, self._held(float(shown[_TORQUE])))
+        chi = self.estimator.update(
+            measurement, applied=self._held(float(shown[_TORQUE]), float(shown[_SPEED]))
+        )
         ahead, gradient, free = products.known(chi)
         self.estimator.advance(ahead)
         reference = shown[_REFERENCE : _REFERENCE + 2]
@@ -199,12 +201,15 @@ class LinearMPC(WinchMPC):
         self._asked = min(max(torque + winch.rest_torque, -self.window.peak), self.window.peak)
         return min(max(command, -self.window.voltage), self.window.voltage)
 
-    def _held(self, torque: float) -> float:
-        """Return the torque that the drive has held over the last sample, NaN if it did not.
+    def _held(self, torque: float, speed: float) -> float:
+        """Return the command that does as much as the torque held over the last sample.
 
-        It was asked to hold its peak, and shows that it still did at the end [N m].
+        The drive was asked to hold its peak, and shows that it still did at the end [N m], at a
+        motor speed [rad/s]; NaN if it did not.
         """
-        rest = self.model.winch.rest_torque
-        if abs(torque - rest - self._kept) < _SAME * self.window.peak:
-            return self._kept
-        return math.nan
+        winch, before = self.model.winch, self.estimator.speed
+        if not abs(torque - winch.rest_torque - self._kept) < _SAME * self.window.peak:
+            return math.nan
+        # A torque that is held does as much as one that falls to as much below it.
+        fall = 0.5 * winch.gain * winch.back * (speed - before)
+        return winch.command(self._kept + fall, before)

@@ -27,7 +27,7 @@ _AT = np.array([HEARD.index(name) for name in MEASURED])
 _AGE, _FRESH = HEARD.index("payload.age"), HEARD.index("payload.valid")
 _UNIT = HEARD.index("mru.valid")
 _TELEMETRY, _REFERENCE = slice(0, 3), slice(3, 5)  # among the measurements
-_APPLIED, _SPEED = HEARD.index("drive.applied"), HEARD.index("motor.speed")
+_APPLIED = HEARD.index("drive.applied")
 _STARTING = 10.0  # in which the gain comes to its steady value [s]
 # What is not known of the constants at first, over `constant_scales`.
 _AT_FIRST = (0.3, 0.1, 0.01, 0.3)
@@ -108,9 +108,7 @@ class WinchEstimator:
         kept = self.covariance - self.gain @ self.model.C @ self.covariance
         return np.array(0.5 * (kept + kept.T)[at, at])
 
-    def update(
-        self, measurement: Measurement, held: float = math.nan, applied: float = math.nan
-    ) -> FloatArray:
+    def update(self, measurement: Measurement, applied: float = math.nan) -> FloatArray:
         """Return chi at this sample, given what is shown now.
 
         The input over the sample before is that which the drive says it has followed, not the one
@@ -120,9 +118,6 @@ class WinchEstimator:
         ----------
         measurement
             What the sensors show.
-        held
-            Torque over the one at rest that the drive has held since the last sample, if it was at
-            its peak all the time [N m]; NaN if it followed a command.
         applied
             Command that does as much as a drive which cut its torque for a part of the sample; NaN
             for the one that the drive says it has followed.
@@ -133,14 +128,9 @@ class WinchEstimator:
         # What A chi lacks: the input, which is known only now that the drive has told of it, and
         # the drag.  At the first sample there was no input, and the load is taken to be at rest.
         if self._begun:
-            speed = float(shown[_SPEED])
             if not math.isfinite(applied):
                 applied = float(shown[_APPLIED])
-            if math.isfinite(held) and math.isfinite(speed):
-                # A torque that is held does as much as one that falls to as much below it.
-                fall = 0.5 * winch.gain * winch.back * (speed - self.speed)
-                ahead = ahead + self._B * (held + fall)
-            elif math.isfinite(applied):  # what is not known is taken as having held the load
+            if math.isfinite(applied):  # what is not known is taken as having held the load
                 ahead = ahead + self._B * winch.torque(applied, self.speed)
             # Quadratic drag at the mean of the velocities before and after: no linear model has it.
             before, after = self._drag, winch.extra_drag(float(self._velocity @ ahead))
