@@ -77,10 +77,7 @@ def _controller(runs: Runs) -> dict[str, Any]:
             "exposure": falls.exposure,
             **dict(zip(("mean", "low", "high"), falls.mean, strict=True)),
         },
-        "extremes": {
-            name: {method: _extreme(estimate) for method, estimate in methods.items()}
-            for name, methods in runs.extremes.items()
-        },
+        "extremes": {name: _extreme(estimate) for name, estimate in runs.extremes.items()},
         "runs": [_run(run) for run in runs],
     }
 

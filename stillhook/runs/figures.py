@@ -172,7 +172,7 @@ def _gumbel_line(
     axes: Axes, runs: Runs, colour: str, factor: float, reach: float, label: str | None
 ) -> None:
     """Draw Gumbel's line from a block on, and the interval at the exposure time."""
-    estimate = runs.extremes["payload up"]["gumbel"] if runs.extremes else None
+    estimate = runs.extremes["payload up"] if runs.extremes else None
     if estimate is None or math.isnan(estimate.value):
         return
     block = runs[0].statistics.block
@@ -250,9 +250,9 @@ def _comparison_finding(compared: Sequence[Runs], values: Sequence[FloatArray]) 
 
 def _exceedance_finding(compared: Sequence[Runs]) -> str:
     known = {
-        runs.controller: runs.extremes["payload up"]["gumbel"]
+        runs.controller: runs.extremes["payload up"]
         for runs in compared
-        if runs.extremes and not math.isnan(runs.extremes["payload up"]["gumbel"].value)
+        if runs.extremes and not math.isnan(runs.extremes["payload up"].value)
     }
     if not known:
         return "How high the payload comes, and how often"

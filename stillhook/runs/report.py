@@ -300,8 +300,7 @@ def _told(run: Run) -> list[str]:
 
 def _missing_extremes(runs: Runs) -> list[str]:
     """Return why there is no most probable maximum, if there should be one."""
-    known = runs.extremes["payload up"].values() if runs.extremes else ()
-    if not runs.extremes or any(not math.isnan(estimate.value) for estimate in known):
+    if not runs.extremes or not math.isnan(runs.extremes["payload up"].value):
         return []
     blocks = sum(run.statistics.blocks[ERROR].maxima.size for run in runs.judged)
     length = duration(runs[0].statistics.block)

@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, overload
+from typing import overload
 
 import numpy as np
 
@@ -42,7 +42,6 @@ MAIN: Mapping[str, str] = {
 }
 """What tells controllers apart, by name: of a payload that stays, that lands, that is moved."""
 
-_METHODS: tuple[Literal["gumbel", "pareto"], ...] = ("gumbel", "pareto")
 _EVENTS_SHOWN = 4
 
 
@@ -118,25 +117,19 @@ class Runs(Sequence[Run]):
         return Summary.of(self.judged)
 
     @cached_property
-    def extremes(self) -> Mapping[str, Mapping[str, ExtremeEstimate]]:
-        """Most probable extremes in the exposure time of the case, by name and method.
+    def extremes(self) -> Mapping[str, ExtremeEstimate]:
+        """Most probable extremes in the exposure time of the case, by name.
 
-        ``runs.extremes["payload up"]["gumbel"]``; the names are those of `EXTREMES`, the methods
-        "gumbel" and "pareto".  Where there are too few data the estimate is NaN and its status
-        says why.  Empty where the payload is moved or something fails: then no part of a run
-        is like another.
+        ``runs.extremes["payload up"]``; the names are those of `EXTREMES`.  Where there are too few
+        data the estimate is NaN and its status says why.  Empty where the payload is moved or
+        something fails: then no part of a run is like another.
         """
         sound = [run for run in self.judged if run.status != "diverged"]
         if not self.stays or not sound:
             return {}
         duration = self.case.limits.exposure_time
         return {
-            name: {
-                method: extreme_over_seeds(
-                    sound, signal, method=method, minimum=minimum, duration=duration
-                )
-                for method in _METHODS
-            }
+            name: extreme_over_seeds(sound, signal, minimum=minimum, duration=duration)
             for name, (signal, minimum) in EXTREMES.items()
         }
 

@@ -70,7 +70,6 @@ _EXTREMES = {
     "payload down": "payload lowest",
     "rope tension": "largest tension",
 }
-_METHODS = {"gumbel": "Gumbel", "pareto": "peaks"}  # over a threshold
 
 
 class Estimate(NamedTuple):
@@ -274,16 +273,14 @@ def _extremes(compared: Sequence[Runs]) -> list[QuantityRow]:
     rows = []
     group = f"most probable in {duration(compared[0].case.limits.exposure_time)}"
     for name, label in _EXTREMES.items():
-        for method, called in _METHODS.items():
-            found = [runs.extremes[name][method] if runs.extremes else None for runs in compared]
-            known = [e for e in found if e is not None and not math.isnan(e.value)]
-            if not known:
-                continue
-            unit = "N" if name == "rope tension" else "m"
-            note = f"Rayleigh {quantity(known[0].rayleigh, unit)}" if len(compared) == 1 else ""
-            figures = tuple(Estimate(e.value, e.low, e.high) if e else _NONE for e in found)
-            names = (f"{name}, {method}", f"{label}, {called}")
-            rows.append(QuantityRow(group, *names, unit, figures, note))
+        found = [runs.extremes[name] if runs.extremes else None for runs in compared]
+        known = [e for e in found if e is not None and not math.isnan(e.value)]
+        if not known:
+            continue
+        unit = "N" if name == "rope tension" else "m"
+        note = f"Rayleigh {quantity(known[0].rayleigh, unit)}" if len(compared) == 1 else ""
+        figures = tuple(Estimate(e.value, e.low, e.high) if e else _NONE for e in found)
+        rows.append(QuantityRow(group, f"{name}, gumbel", f"{label}, Gumbel", unit, figures, note))
     return rows
 
 

@@ -215,17 +215,17 @@ def test_the_summary_has_students_interval_over_the_seeds():
     assert (found.low, found.high) == pytest.approx((values.mean() - half, values.mean() + half))
 
 
-def test_extremes_are_those_of_gumbel_and_pareto():
+def test_extremes_are_those_of_gumbel():
     runs = sh.simulate(calm(), "none", seeds=3, duration="65 min", settle=60.0, traces="worst")
     assert set(runs.extremes) == set(EXTREMES)
     up, down = runs.extremes["payload up"], runs.extremes["payload down"]
-    assert up["gumbel"].count == 9  # three blocks of 20 minutes in each run
-    assert up["gumbel"].low < up["gumbel"].value < up["gumbel"].high
-    assert down["gumbel"].value < 0.0 < up["pareto"].value
+    assert up.count == 9  # three blocks of 20 minutes in each run
+    assert up.low < up.value < up.high
+    assert down.value < 0.0 < up.value
     largest = max(run.statistics["payload.error"].maximum for run in runs)
-    assert 0.7 * largest < up["gumbel"].value < 1.4 * largest
+    assert 0.7 * largest < up.value < 1.4 * largest
     rows = {row.name: row for row in rows_of([runs])}
-    assert rows["payload up, gumbel"].figures[0].mean == up["gumbel"].value
+    assert rows["payload up, gumbel"].figures[0].mean == up.value
     assert "Rayleigh" in rows["payload up, gumbel"].note
 
 
