@@ -297,7 +297,7 @@ class MruModel:
         width = self._unit.noise_bandwidth
         factor = complex(np.exp(low_pass_pole(width) * self.sample_time))
         _, added = low_pass_noise(width, self.sample_time)
-        return factor, self.error_rms * np.linalg.cholesky(added)
+        return factor, np.asarray(self.error_rms * np.linalg.cholesky(added), dtype=np.float64)
 
     def _errors(self, mode: complex, start: int, n: int) -> ComplexArray:
         """Return the error's mode at n samples; `mode` is that at the sample before."""

@@ -223,9 +223,9 @@ def sensed_line_at(
         for block in (yw, yu):
             block[:, at("rope.tension")] *= weighed[:, None]
     unit = sensors.mru or PERFECT
-    shown, late = unit_response(unit, points), np.exp(-points * unit.delay)
+    passed, late = unit_response(unit, points), np.exp(-points * unit.delay)
     for name, rate in (("mru.heave", 1.0), ("mru.heave_rate", points)):
-        yw[:, at(name), line.disturbances.index("hook.heave")] = rate * shown
+        yw[:, at(name), line.disturbances.index("hook.heave")] = rate * passed
         yw[:, at(name), nw + noises.index("mru.error")] = rate * late
     sent = np.exp(-points * sensors.telemetry.delay)
     for name in (*MEASUREMENTS, "rope.tension"):
