@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         new_figure,
         panel,
         picture,
+        styled,
         typeset,
     )
     from .table import (
