@@ -633,9 +633,9 @@ def studies(found: Figures) -> None:
     worth = sh.worth(one, starts=1)
     found.put("studies.worth.payload_rms", worth.payload_rms, "optimum")
     for row in worth.rows:
-        if row.price is not None and math.isfinite(row.price):
-            name = f"studies.worth.{row.item.name}"
-            found.put(name, row.price, "optimum", tolerance=1e-3, note="a multiplier")
+        if row.item.value > 0.0:
+            name, note = f"studies.worth.{row.item.name}", "gains optimised again"
+            found.put(name, row.elasticity, "optimum", tolerance=1e-3, note=note)
     schedule = sh.schedule_gains(one, (1500.0, 2000.0))
     for point in (schedule.points[0], schedule.points[-1]):
         found.put(
