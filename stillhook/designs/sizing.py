@@ -190,13 +190,12 @@ def worth_report(result: Worth) -> Report:
         if row.elasticity == 0.0 and row.gain == 0.0 and row.item.value != 0.0:
             idle.append(row.item.name)
             continue
-        share = row.elasticity if math.isfinite(row.elasticity) else row.price
-        better = (-1.0 if row.factor < 1.0 else 1.0) * share
+        better = (-1.0 if row.factor < 1.0 else 1.0) * row.elasticity
         rows.append(
             (
                 row.item.name + ("" if row.item.sold else " *"),
                 Written(row.item.value, _value_text(row.item.value, row.item.unit)),
-                f"{number(better, 2)} %" if math.isfinite(share) else "-",
+                f"{number(better, 2)} %" if math.isfinite(better) else "-",
                 step_text(row),
                 row.twice_rms if math.isfinite(row.twice_rms) else "-",
             )

@@ -114,7 +114,6 @@ class Found:
                 prices=self.solved.prices[index : index + 1],
                 costs=self.solved.costs[index : index + 1],
                 pressure=np.ones(1),
-                multipliers=None,
             ),
             assessments=self.assessments[index : index + 1],
             excess=self.excess,

@@ -72,8 +72,6 @@ class Solution:
         takes off counts as negative.
     costs, pressure
         Cost of each member on the nodes, and how much of the objective hangs on it (adds up to 1).
-    multipliers
-        Those of the programme's rows and equations.
     """
 
     values: FloatArray
@@ -86,7 +84,6 @@ class Solution:
     costs: FloatArray
     pressure: FloatArray
     extra: float = 0.0
-    multipliers: FloatArray | None = None
 
     @property
     def coefficient(self) -> float | None:
@@ -199,7 +196,7 @@ class Programme:
         if self._extra_at is not None:
             x[self._extra_at] = 0.0 if extra is None else extra
         if self._bound_at is not None:
-            costs = np.array([c.item() for c in self._numbers(x, slopes=False)[0]])
+            costs = np.array([c.item() for c in self._numbers(x)[0]])
             excess = (costs - self._best)[np.isfinite(costs)]
             x[self._bound_at] = float(excess.max(initial=-20.0)) + 1e-6
         return x
@@ -208,7 +205,7 @@ class Programme:
         self, x: FloatArray, tighten: Tighten | None = None
     ) -> tuple[FloatArray, dict[tuple[int, str], float]]:
         """Return the log costs and the largest row of each limit at a vector; see `solve`."""
-        costs, rows, _ = self._numbers(x, tighten, slopes=False)
+        costs, rows = self._numbers(x, tighten)
         worst = {key: float(np.max(row, initial=-np.inf)) for key, row in rows if key[1] != _SLOW}
         return np.array([cost.item() for cost in costs]), worst
 
@@ -241,20 +238,6 @@ class Programme:
         )
         return self._solution(found, tighten)
 
-    def lagrangian(self, x: FloatArray, multipliers: FloatArray) -> float:
-        """Return log cost plus multipliers times rows and equations at a vector.
-
-        The row that keeps slow poles off is normalised by the reference: it has no price.  With
-        true margins it is nan where other rows are there than the multipliers are for: a crossing
-        has come or gone.
-        """
-        costs, rows, balances = self._numbers(x, slopes=False)
-        priced = [row if key[1] != _SLOW else 0.0 * row for key, row in rows]
-        flat = np.concatenate([*priced, *balances])
-        if flat.size != multipliers.size:
-            return np.nan
-        return float(costs[0].item() + multipliers @ flat)
-
     def _box(self, start: FloatArray, reach: float | None) -> tuple[FloatArray, FloatArray]:
         """Return the least and greatest values that variables may take from a start."""
         family, count = self.family, self._unit.size
@@ -273,16 +256,12 @@ class Programme:
         return limit.bound * (1.0 + step if limit.at_least else 1.0 - step)
 
     def _numbers(
-        self, x: FloatArray, tighten: Tighten | None = None, *, slopes: bool, shift: float = 0.0
-    ) -> tuple[list[FloatArray], list[tuple[tuple[int, str], FloatArray]], list[FloatArray]]:
-        """Return log costs, rows by member and limit, and drag balances, without slopes."""
-        costs, rows, balances, _ = self._parts(x, tighten, slopes=slopes, shift=shift)
+        self, x: FloatArray, tighten: Tighten | None = None, *, shift: float = 0.0
+    ) -> tuple[list[FloatArray], list[tuple[tuple[int, str], FloatArray]]]:
+        """Return log costs, and rows by member and limit, without slopes."""
+        costs, rows, _, _ = self._parts(x, tighten, slopes=False, shift=shift)
         plain = [(key, np.asarray(value_of(row))) for key, row, _ in rows]
-        return (
-            [np.asarray(value_of(c)) for c, _ in costs],
-            plain,
-            [np.asarray(value_of(b)) for b, _ in balances],
-        )
+        return [np.asarray(value_of(c)) for c, _ in costs], plain
 
     def _parts(
         self, x: FloatArray, tighten: Tighten | None, *, slopes: bool, shift: float = 0.0
@@ -397,7 +376,7 @@ class Programme:
             reached = np.isfinite(found.at.objective)
             costs = np.full(len(family.scenarios), np.inf)
             if reached:
-                costs = np.exp([c.item() for c in self._numbers(x, tighten, slopes=False)[0]])
+                costs = np.exp([c.item() for c in self._numbers(x, tighten)[0]])
         pressure = np.ones(len(family.scenarios))
         if self._bound_at is not None and reached:
             pressure = found.prices[-len(family.scenarios) :]
@@ -418,7 +397,6 @@ class Programme:
             prices=self._prices(found, tighten) if reached else self._free(),
             costs=np.asarray(costs),
             pressure=np.asarray(pressure / max(float(np.sum(pressure)), 1e-300)),
-            multipliers=np.concatenate([found.prices, found.equation_prices]),
         )
 
     def _free(self) -> tuple[dict[str, float], ...]:
@@ -427,8 +405,8 @@ class Programme:
     def _prices(self, found: Descent, tighten: Tighten | None) -> tuple[dict[str, float], ...]:
         """Return the price of each limit: multipliers times the slope of its rows by its bound."""
         result = self._free()
-        above = self._numbers(found.x, tighten, slopes=False, shift=_SHIFT)[1]
-        below = self._numbers(found.x, tighten, slopes=False, shift=-_SHIFT)[1]
+        above = self._numbers(found.x, tighten, shift=_SHIFT)[1]
+        below = self._numbers(found.x, tighten, shift=-_SHIFT)[1]
         at = 0
         for (key, more), (_, less) in zip(above, below, strict=True):
             own = found.prices[at : at + more.size]

@@ -90,7 +90,6 @@ class Descent:
     x: FloatArray
     at: Evaluation
     prices: FloatArray
-    equation_prices: FloatArray
     converged: bool
     message: str
     steps: int
@@ -137,10 +136,10 @@ def descend(
             equation_slopes=np.zeros((0, x.size)),
             curvature=np.zeros((x.size, x.size)),
         )
-        return _ended(x, empty, none, none, "the start is unstable", 0)
+        return _ended(x, empty, none, "the start is unstable", 0)
     at = evaluate(x)
     if not at.finite:
-        return _ended(x, at, np.zeros(at.rows.size), np.zeros(at.equations.size), "no number", 0)
+        return _ended(x, at, np.zeros(at.rows.size), "no number", 0)
     rest = np.zeros((x.size, x.size))  # of the Hessian beside the model of the curvature
     room, weight, stalled = _ROOM, _FIRST_WEIGHT, 0
     prices, equation_prices = np.zeros(at.rows.size), np.zeros(at.equations.size)
@@ -151,7 +150,7 @@ def descend(
         box = np.maximum(low - x, -reach), np.minimum(high - x, reach)
         found = _quadratic(at, at.rows, at.equations, hessian, box, weight)
         if found is None:
-            return _ended(x, at, prices, equation_prices, "no quadratic programme", k)
+            return _ended(x, at, prices, "no quadratic programme", k)
         step, slack, new_prices, new_equation_prices = found
         total = float(np.abs(new_prices).sum() + np.abs(new_equation_prices).sum())
         if at.broken > _KEPT and slack > max(_KEPT, 0.9 * at.broken):
@@ -159,7 +158,7 @@ def descend(
                 weight *= 10.0
                 continue
             if slack > _HOPELESS * at.broken and np.all(np.abs(step) < 0.5 * reach):
-                return _ended(x, at, prices, equation_prices, INFEASIBLE, k)
+                return _ended(x, at, prices, INFEASIBLE, k)
         prices, equation_prices = new_prices, new_equation_prices
         if slack <= _KEPT:
             # No heavier than it must be: a stiff penalty creeps along rows that are curved.
@@ -171,9 +170,9 @@ def descend(
         promised = weight * (at.broken - slack) - model
         if promised <= tolerance:
             if at.broken <= _KEPT * 10.0:
-                return _ended(x, at, prices, equation_prices, "", k + 1)
+                return _ended(x, at, prices, "", k + 1)
             if weight >= _HEAVY or slack > _KEPT:
-                return _ended(x, at, prices, equation_prices, INFEASIBLE, k)
+                return _ended(x, at, prices, INFEASIBLE, k)
         moved, new, share = _tried(evaluate, stable, x, step, weight, promised, at, hessian, box)
         length = float(np.max(np.abs(moved - x) / size))
         if new is not None:  # what a step that failed tells of the curvature is worth as much
@@ -184,7 +183,7 @@ def descend(
             if room < _LEAST_ROOM or stalled > _STALLED:
                 small = promised <= max(1e2 * tolerance, _NOTHING) and at.broken <= 1e2 * _KEPT
                 done = "" if small else "no step helps"
-                return _ended(x, at, prices, equation_prices, done, k + 1)
+                return _ended(x, at, prices, done, k + 1)
             continue
         stalled = 0
         if share > 0.75 and np.any(np.abs(step) >= 0.99 * reach):
@@ -194,7 +193,7 @@ def descend(
         x, at = moved, new
         if prices.size != at.rows.size:
             prices = np.zeros(at.rows.size)
-    return _ended(x, at, prices, equation_prices, UNFINISHED, most)
+    return _ended(x, at, prices, UNFINISHED, most)
 
 
 def _sizes(x: FloatArray, at: Evaluation) -> FloatArray:
@@ -208,7 +207,6 @@ def _ended(
     x: FloatArray,
     at: Evaluation,
     prices: FloatArray,
-    equation_prices: FloatArray,
     message: str,
     steps: int,
 ) -> Descent:
@@ -216,7 +214,6 @@ def _ended(
         x=x,
         at=at,
         prices=prices,
-        equation_prices=equation_prices,
         converged=not message,
         message=message or "solved",
         steps=steps,

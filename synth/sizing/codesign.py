@@ -1,14 +1,12 @@
-r"""Co-design: gear ratio and drum radius together with the gains, for a given motor.
+"""Co-design: gear ratio and drum radius together with the gains, for a given motor.
 
     case, ranges -> optimum of the gains behind each gear, from neighbour to neighbour
-                 -> Brent's method on log n (and log r) -> slope by the envelope theorem -> CoDesign
+                 -> Brent's method on log n (and log r) -> CoDesign
 
 The gear enters plant and limits: reflected inertia I_D/n^2, speed n/r of the haul, torque r/n of
 the tension.  So it is searched around the gains, whose optimum behind a neighbouring gear is a
-start that needs a few steps.  That the outer search has arrived is checked by another route: the
-derivative of the optimum by the envelope theorem (`synth.sizing.follow.slope`), zero at a smooth
-optimum, pointing out of the range at its ends, and of either sign at a corner, where one limit
-hands over to another.
+start that needs a few steps.  The best gear is a smooth optimum, an end of the range, or a corner,
+where one limit hands over to another and the motion rises steeply on either side.
 
 A drum of another radius keeps its width and the thickness of its wall: its inertia goes with the
 cube.  Nearly everything hangs on n/r alone, so the pair is searched in n/r and r, whose optima
@@ -29,14 +27,12 @@ from models.case import Case
 from ..design import Design, optimise_gains
 from ..question import Problem
 from ..search import Progress
-from .follow import Answer, answer_of, asked_by, designed, follow, least_between, posed, slope
+from .follow import Answer, answer_of, asked_by, designed, follow, least_between, posed
 
 _GRID = 7  # gears that are tried before the Brent's method
 _FINE = 2e-3  # of the logarithm of the gear
 _RADII = 3  # Brent's methods along the radius and back
-_STEP = 1e-5  # of the logarithm, for the slope
 _GAIN = 1e-3  # share of the rms that another drum must gain at least
-_SMOOTH = 0.02  # slope below which an optimum is one without a corner
 _DRUM = 3.0  # inertia of a drum over its radius
 
 
@@ -65,8 +61,6 @@ class CoDesign:
     payload_rms, given_rms
         Of the payload there, and behind the case's own gear (infinite if its limits cannot be
         kept) [m].
-    slope
-        d log(rms) / d log(gear) at the answer, by the envelope theorem; nan where it is unknown.
     points
         All gears that were tried, by ratio.
     best_case, design
@@ -81,7 +75,6 @@ class CoDesign:
     radius: float
     payload_rms: float = math.inf
     given_rms: float
-    slope: float = math.nan
     points: tuple[CoPoint, ...]
     best_case: Case | None = None
     design: Design | None = None
@@ -258,7 +251,6 @@ def _finished(
         return result
     best_case = case.variant(gear_changes(case, gear, radius))
     design = designed(best_case, search.structure, answer, search.masses, search.tell)
-    tilt = slope(answer, search.problem(gear * math.exp(_STEP), radius), _STEP)
     binding = _binding(answer)
     text = f"the best gear is {gear:.4g}" + (
         "" if radius == case.drum_radius else f", drum {radius:.4g} m"
@@ -270,7 +262,7 @@ def _finished(
         text += f"; {', '.join(binding)} bind"
     if min(gear / ends[0], ends[1] / gear) < math.exp(2.0 * _FINE):
         text += "; it stands at an end of the range"
-    elif abs(tilt) > _SMOOTH:
+    else:
         beside = [
             a for (g, r), a in sorted(search.answers.items()) if r == radius and a is not None
         ]
@@ -285,7 +277,6 @@ def _finished(
         ok=design is not None and design.ok,
         status=text,
         payload_rms=answer.payload_rms,
-        slope=tilt,
         best_case=best_case,
         design=design,
     )

@@ -1,15 +1,9 @@
-r"""Optima followed from case to case: each solved again from its neighbour's answer.
+"""Optima followed from case to case: each solved again from its neighbour's answer.
 
     case, structure + neighbour's Answer -> descent on true margins -> Answer
 
 A sweep over gear ratios, motors or seas solves nearly the same problem again and again.  Each
-descent begins at its neighbour's answer, where a few steps suffice.  `slope` gives the derivative
-of the optimum by the envelope theorem: that of the Lagrangian at the answer,
-
-.. math:: dJ^*/d\theta = \partial_\theta (\log J + \lambda^T g),
-
-with the multipliers of every row, so that a limit that is pressed at several frequencies at once
-is counted right.
+descent begins at its neighbour's answer, where a few steps suffice.
 """
 
 from __future__ import annotations
@@ -30,19 +24,15 @@ from ..question import PAYLOAD, DesignQuestion, Goal, Problem, pose
 from ..search import (
     KEPT,
     Found,
-    Programme,
     Progress,
     Solution,
     assess,
     begin_points,
-    cost_nodes,
-    margin_nodes,
     polish,
     settle,
 )
 
 _FRESH = 3  # starts where no neighbour's answer is stable
-_PER_DECADE = 60  # margin nodes of a slope
 
 
 def posed(case: Case, structure: str, masses: int | None = None) -> DesignQuestion:
@@ -241,33 +231,3 @@ def least_between(cost: Callable[[float], float], low: float, high: float, fine:
             options={"xatol": fine},
         )
     return float(np.exp(found.x))
-
-
-def slope(answer: Answer, changed: Problem, step: float) -> float:
-    """Return d log(cost) of the optimum per `step`, by the envelope theorem.
-
-    It is nan where a crossing that a margin is measured at comes or goes with the change.
-
-    Parameters
-    ----------
-    answer
-        An optimum with the goal COST.
-    changed
-        The same problem with one figure changed by `step` [unit of the figure].
-    step
-        By how much.
-    """
-    problem, values, drags = answer.problem, answer.solved.values, answer.solved.coefficients
-    poles = problem.loop_poles(values, drags[0])
-    nodes = [cost_nodes(problem, poles, fine=True)], [margin_nodes(problem, poles, _PER_DECADE)]
-    here, there = (
-        Programme(asked, *nodes, reference=values, tolerance=1e-10, exact=True)
-        for asked in (problem, changed)
-    )
-    solved = here.solve(here.pack(values, drags))
-    assert solved.multipliers is not None
-    costs = [
-        programme.lagrangian(programme.pack(solved.values, solved.coefficients), solved.multipliers)
-        for programme in (there, here)
-    ]
-    return (costs[0] - costs[1]) / step

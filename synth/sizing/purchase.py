@@ -1,15 +1,12 @@
-r"""Worth of each limit, sensor, delay and gear of a case: what to buy first.
+"""Worth of each limit, sensor, delay and gear of a case: what to buy first.
 
     case or design -> optimum (`synth.sizing.follow`) -> items
-        -> price, optimised again with the item a little better, and twice as good -> Worth
+        -> optimised again with the item a little better, and twice as good -> Worth
 
-Two routes to the same number.  The *price* is the derivative of the optimum by the envelope
-theorem: that of the Lagrangian with the multipliers of every row, for a limit its multiplier.  The
-*elasticity* comes from gains that were optimised again with the figure a little better.  Where the
-optimum is smooth they agree; where limits are about to change hands, and for margins that are
-pressed at several frequencies at once, the second one counts.  Last, the figure is made twice as
-good and the gains are searched for anew, from this optimum and from fresh starts, since the best
-may lie elsewhere then: what stillness that buys is what the list is sorted by.
+The elasticity of the optimum comes from gains that were optimised again with the figure a little
+better.  Last, the figure is made twice as good and the gains are searched for anew, from this
+optimum and from fresh starts, since the best may lie elsewhere then: what stillness that buys is
+what the list is sorted by.
 """
 
 from __future__ import annotations
@@ -27,7 +24,7 @@ from ..design import Design, optimise_gains
 from ..limits import Limit
 from ..question import Problem
 from ..search import Progress, search
-from .follow import Answer, answer_of, asked_by, follow, posed, slope, with_bound
+from .follow import Answer, answer_of, asked_by, follow, posed, with_bound
 from .motor import motor_changes
 
 _RPM = 0.10471975511965977
@@ -50,8 +47,7 @@ _PARTS: tuple[tuple[str, str, str, int, float | None, str], ...] = (
     ("load cell bandwidth", "load_cell.bandwidth", "rad/s", 1, 10.0, "rope.tension"),
 )
 _STEP = 0.05  # of the logarithm, for the elasticity
-_SMALL = 1e-5  # of the logarithm, for the price
-_FREE = 1e-6  # price below which a limit is one that does not bind
+_FREE = 1e-6  # price (d log rms / d log bound) below which a limit is one that does not bind
 _SHARES = (1.0, 0.5, 0.25, 0.125)  # of a factor of two, for the gear
 _WORTH = 0.01  # share of the rms below which nothing is worth its money
 
@@ -196,9 +192,9 @@ class WorthRow:
     ----------
     item
         The figure: its name, value, unit, and what kind of thing it is.
-    price, elasticity
-        d log(rms) / d log(figure) by the envelope theorem, and by optimising again with the
-        figure 5 % better; nan where the figure is zero or that could not be done.
+    elasticity
+        d log(rms) / d log(figure), by optimising again with the figure 5 % better; nan where
+        that could not be done.
     per_step
         What the payload's rms changes by if the figure gets better by its natural step [m].
     factor, twice_rms
@@ -209,7 +205,6 @@ class WorthRow:
     """
 
     item: Item
-    price: float
     elasticity: float = 0.0
     per_step: float = 0.0
     factor: float
@@ -248,10 +243,10 @@ class Worth:
 
     def to_csv(self) -> str:
         """Return the rows as CSV, SI units."""
-        lines = ["item,kind,value,unit,price,elasticity,step,rms_per_step,rms_twice_as_good"]
+        lines = ["item,kind,value,unit,elasticity,step,rms_per_step,rms_twice_as_good"]
         for row in self.rows:
             item = row.item
-            figures = (row.price, row.elasticity, item.step, row.per_step, row.twice_rms)
+            figures = (row.elasticity, item.step, row.per_step, row.twice_rms)
             numbers = ["" if math.isnan(v) else f"{v:.8g}" for v in figures]
             lines.append(",".join([item.name, item.kind, f"{item.value:.8g}", item.unit, *numbers]))
         return "\n".join(lines) + "\n"
@@ -314,17 +309,16 @@ def worth(
 
 
 def _row(design: Design, here: Answer, item: Item, starts: int, seed: int) -> WorthRow:
-    """Return what one figure is worth, by both routes."""
-    price = _price(design, here, item)
-    factor = 2.0 if item.better > 0 else 0.5
-    row = WorthRow(item=item, price=price, factor=factor, twice_rms=here.payload_rms)
-    if item.limit is not None and abs(price) < _FREE:
-        return row  # a limit that does not bind: looser, it leaves the optimum where it is
-    way = item.better or (-1 if price > 0.0 else 1)
+    """Return what one figure is worth."""
     rms = here.payload_rms
+    row = WorthRow(item=item, factor=2.0 if item.better > 0 else 0.5, twice_rms=rms)
     if item.value == 0.0:
         return row  # as good as it gets
-    near = _again(design, here, item, math.exp(way * _STEP), here)
+    if item.limit is not None and abs(here.prices[item.limit]) < _FREE:
+        return row  # a limit that does not bind: looser, it leaves the optimum where it is
+    ways = (item.better,) if item.better else (1, -1)
+    found = [(way, _again(design, here, item, math.exp(way * _STEP), here)) for way in ways]
+    way, near = min(found, key=lambda pair: math.inf if pair[1] is None else pair[1].payload_rms)
     twice = None
     for share in _SHARES if item.kind == "gear" else (1.0,):
         # Half or twice the gear may be more than the drive stands: then as much as it does.
@@ -335,25 +329,14 @@ def _row(design: Design, here: Answer, item: Item, starts: int, seed: int) -> Wo
             break
     step = way * item.step / item.value
     elasticity = math.nan if near is None else math.log(near.payload_rms / rms) / (way * _STEP)
-    slope_used = elasticity if math.isfinite(elasticity) else price
     return replace(
         row,
         elasticity=elasticity,
-        per_step=rms * math.expm1(slope_used * math.log1p(step)) if step > -1.0 else math.nan,
+        per_step=rms * math.expm1(elasticity * math.log1p(step)) if step > -1.0 else math.nan,
         factor=factor,
         twice_rms=twice.payload_rms if twice is not None else math.nan,
         gain=rms - twice.payload_rms if twice is not None else 0.0,
     )
-
-
-def _price(design: Design, here: Answer, item: Item) -> float:
-    """Return d log(rms) / d log(figure) by the envelope theorem; nan if the figure is zero."""
-    if item.value == 0.0:
-        return math.nan
-    if item.limit is not None:
-        return -item.better * abs(here.prices[item.limit])
-    changed = _changed(design, here, item, math.exp(_SMALL))
-    return slope(here, changed, _SMALL) if changed is not None else math.nan
 
 
 def _again(design: Design, here: Answer, item: Item, factor: float, near: Answer) -> Answer | None:

@@ -1,4 +1,4 @@
-"""What is worth buying: prices against gains optimised again, the order, and what is for sale."""
+"""What is worth buying: elasticities by two routes, the order, and what is for sale."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import stillhook as sh
-from synth.sizing import Worth, purchase
+from synth.sizing import Worth
 from synth.sizing.follow import follow, posed
-from synth.sizing.purchase import limit_items, part_items
+from synth.sizing.purchase import part_items
 from synth.structures import structure_named
 
 pytestmark = pytest.mark.ci  # whole optimisations in fixtures
@@ -29,31 +29,26 @@ def late() -> Worth:
     return sh.worth(sh.load_case("thesis-1975").replace(LATE), starts=8)
 
 
-def test_prices_are_what_optimising_again_gives_where_the_optimum_is_smooth(late: Worth) -> None:
+def test_elasticities_are_the_multipliers_of_the_limits() -> None:
     case = sh.load_case("thesis-1975").replace(HARD)
     design = sh.optimise_gains(case, "payload-feedback", starts=2)
     problem = posed(case, "payload-feedback", design.masses).problem
     here = follow(problem, [np.array(design.question.values(design.parameters))])
     assert here is not None
-    items = [
-        *limit_items(problem.limits),
-        *part_items(case, design.question.structure.measurements, design.hook_rms),
-    ]
-    step = 0.01
-    for name in ("gear ratio", "motor, all of it", "motor.current.peak"):
-        item = next(item for item in items if item.name == name)
-        price = purchase._price(design, here, item)
-        logs = []
-        for way in (-1.0, 1.0):
-            again = purchase._again(design, here, item, math.exp(way * step), here)
-            assert again is not None
-            logs.append(math.log(again.payload_rms))
-        # Central: what is left is the third derivative, and answers that are good to 1e-4.
-        assert abs(price) > 0.1, name
-        assert (logs[1] - logs[0]) / (2.0 * step) == pytest.approx(price, rel=0.01, abs=5e-3), name
+    found = sh.worth(design, starts=1)
+    (current,) = (row for row in found.rows if row.item.name == "motor.current.peak")
     # A few per cent are what the curve bends over a step of 5 %.
+    assert abs(current.elasticity) > 0.1
+    assert abs(current.elasticity) == pytest.approx(abs(here.prices["motor.current.peak"]), rel=0.1)
+
+
+def test_elasticities_are_what_optimising_anew_gives(late: Worth) -> None:
     assert late.first is not None
-    assert late.first.elasticity == pytest.approx(late.first.price, rel=0.03)
+    assert late.first.item.name == "telemetry delay"
+    less = sh.load_case("thesis-1975").replace({"sensors.telemetry.delay": 0.05 * math.exp(-0.05)})
+    design = sh.optimise_gains(less, "payload-feedback", starts=8)
+    share = math.log(design.payload_rms / late.payload_rms) / -0.05
+    assert late.first.elasticity == pytest.approx(share, rel=1e-2)
 
 
 def test_the_first_thing_to_buy_is_the_delay_and_no_margin(late: Worth) -> None:
