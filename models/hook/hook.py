@@ -36,7 +36,7 @@ from ..basics import (
 )
 from ..case import Case
 from ..sea import SeaSpectrum
-from ..vessel import HeaveRao, OutsideShare, hook_rao, speed_remark
+from ..vessel import HeaveRao, hook_rao, speed_remark
 from .encounter import Encounter, MetSpectrum
 
 MOTIONS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}
@@ -207,17 +207,9 @@ class HookMotion:
         """
         return motion_statistics(self.moments)[2]
 
-    @cached_property
-    def outside(self) -> dict[str, OutsideShare]:
-        """Share of each variance from outside the RAO's table, by the motion's name."""
-        return {
-            name: self.rao.share_outside(self.sea, derivative=order)
-            for order, name in enumerate(MOTIONS)
-        }
-
     def warn_if_outside(self) -> None:
         """Warn with a :class:`PhysicsWarning` if over 5 % of the variance is outside the table."""
-        share = self.outside["displacement"]
+        share = self.rao.share_outside(self.sea)
         if share.total <= _SHARE_TO_WARN:
             return
         first, last = self.rao.splits[0], self.rao.splits[-1]

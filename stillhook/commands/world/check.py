@@ -68,7 +68,7 @@ def _sea(case: Case, hook: HookMotion) -> Rows:
     sea, statistics = case.sea, hook.sea.statistics
     moved, speed = hook.displacement, hook.velocity
     time = case.limits.exposure_time
-    outside = hook.outside["displacement"].total
+    outside = hook.rao.share_outside(hook.sea).total
     rows = [
         (
             "sea",

@@ -69,19 +69,22 @@ def test_heave_of_the_thesis_design_sea():
     assert motion.displacement.rms == pytest.approx(0.594, abs=5e-4)
     assert thesis_motion(2.43).displacement.rms == pytest.approx(0.592, abs=5e-4)
     # Nearly nothing of the displacement is extrapolated, most of the acceleration is.
-    outside = motion.outside
-    assert outside["displacement"].below < 1e-9
-    assert outside["displacement"].beyond == pytest.approx(0.0084, abs=1e-4)
-    assert outside["velocity"].beyond == pytest.approx(0.0559, abs=1e-4)
-    assert outside["acceleration"].beyond == pytest.approx(0.568, abs=1e-3)
+    displacement, velocity, acceleration = (
+        motion.rao.share_outside(motion.sea, derivative=n) for n in range(3)
+    )
+    assert displacement.below < 1e-9
+    assert displacement.beyond == pytest.approx(0.0084, abs=1e-4)
+    assert velocity.beyond == pytest.approx(0.0559, abs=1e-4)
+    assert acceleration.beyond == pytest.approx(0.568, abs=1e-3)
     motion.warn_if_outside()  # warnings are errors here
 
 
 def test_shares_against_the_choice_zero():
     held, cut = thesis_motion(), thesis_motion(below="zero", beyond="zero")
-    for name in ("displacement", "velocity", "acceleration"):
-        share = held.outside[name].total
-        assert cut.outside[name].total == pytest.approx(share, rel=1e-6)
+    for n, name in enumerate(("displacement", "velocity", "acceleration")):
+        share = held.rao.share_outside(held.sea, derivative=n).total
+        there = cut.rao.share_outside(cut.sea, derivative=n).total
+        assert there == pytest.approx(share, rel=1e-6)
         m0 = getattr(held, name).m0
         assert getattr(cut, name).m0 == pytest.approx(m0 * (1.0 - share), rel=1e-6)
 
@@ -138,7 +141,7 @@ def test_too_short_a_table_is_reported():
 @pytest.mark.parametrize("name", ["thesis-1975", "thesis-1975-rope", "subsea-crane"])
 def test_the_bundled_cases_stay_within_their_tables(name):
     motion = HookMotion.from_case(load_case(name))  # warnings are errors here
-    assert motion.outside["displacement"].total < 0.01
+    assert motion.rao.share_outside(motion.sea).total < 0.01
     assert 0.1 < motion.displacement.rms < 1.0
 
 
