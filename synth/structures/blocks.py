@@ -4,19 +4,18 @@ Each section is one transfer function N(s/w)/D(s/w) with named, bounded paramete
 two polynomials; what the optimiser wants (`response`, numbers or duals) and what everything wants
 that runs or checks the controller (`matrices`, a state-space form) follow from them.
 
-* `RollOffFilter`: w^2 / (s^2 + 2 z w s + w^2), static gain 1
-* `LeadLag`: (1 + s/w_z) / (1 + s/w_p), static gain 1
-* `Notch`: (s^2 + 2 b d w s + w^2) / (s^2 + 2 b w s + w^2), static gain 1
-* `Integral`: (s + w) / s, static gain infinite
-* `LeadTime`: (1 + tau s) / (1 + s/w), static gain 1
+* `roll_off`: w^2 / (s^2 + 2 z w s + w^2), static gain 1
+* `lead_lag`: (1 + s/w_z) / (1 + s/w_p), static gain 1
+* `notch`: (s^2 + 2 b d w s + w^2) / (s^2 + 2 b w s + w^2), static gain 1
+* `integral`: (s + w) / s, static gain infinite
+* `lead_time`: (1 + tau s) / (1 + s/w), static gain 1
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -28,45 +27,46 @@ Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 Range = tuple[float, float]
 
 
+Fraction = Callable[..., tuple[Any, Sequence[Any], Sequence[Any]]]
+
+
 @dataclass(frozen=True, kw_only=True)
-class FilterSection(ABC):
+class FilterSection:
     """A transfer function with parameters.
 
     Parameters
     ----------
     name
         What its parameters' names begin with: a corner becomes ``<name>.corner``.
+    ranges
+        Bounds and unit of each parameter, in the order in which the methods take their values.
+    fraction
+        From the values to w [rad/s], and N and D by rising powers of s/w; D is without its last, 1.
     """
 
     name: str
-
-    bounded: ClassVar[tuple[tuple[str, str], ...]]
-    """Field of the bounds and unit of each parameter, in the order of the values."""
+    ranges: Mapping[str, tuple[float, float, str]]
+    fraction: Fraction
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The parameters, in the order in which the methods take their values."""
         found = []
-        for field, unit in self.bounded:
-            low, high = getattr(self, field)
+        for own, (low, high, unit) in self.ranges.items():
             scale = float(np.sqrt(low * high)) if low > 0.0 else high
-            name = f"{self.name}.{field}"
+            name = f"{self.name}.{own}"
             found.append(Parameter(name=name, scale=scale, low=low, high=high, unit=unit))
         return tuple(found)
 
-    @abstractmethod
-    def fraction(self, values: Sequence[Any]) -> tuple[Any, Sequence[Any], Sequence[Any]]:
-        """Return w [rad/s], and N and D by rising powers of s/w; D is without its last, 1."""
-
     def response(self, values: Sequence[Any], s: Any) -> Any:
         """Return the transfer function at s [1/s] for numbers or `synth.loop.Dual` values."""
-        w, above, below = self.fraction(values)
+        w, above, below = self.fraction(*values)
         x = s * (1.0 / w)
         return _polynomial(above, x) / _polynomial([*below, 1.0], x)
 
     def matrices(self, values: Sequence[float]) -> Matrices:
         """Return A (n, n), B (n, 1), C (1, n), D (1, 1), its states the size of the signal."""
-        w, above, below = self.fraction(values)
+        w, above, below = self.fraction(*values)
         n = len(below)
         above = [*above, *[0.0] * (n + 1 - len(above))]
         A, B = w * np.eye(n, k=1), w * np.eye(n)[:, -1:]
@@ -86,111 +86,70 @@ class FilterSection(ABC):
         return found
 
 
-@dataclass(frozen=True, kw_only=True)
-class RollOffFilter(FilterSection):
-    """Second-order low-pass w^2 / (s^2 + 2 z w s + w^2).
+def roll_off(name: str, corner: Range, damping: Range = (0.2, 2.0)) -> FilterSection:
+    """Return a second-order low-pass w^2 / (s^2 + 2 z w s + w^2).
 
-    Parameters
-    ----------
-    corner, damping
-        Bounds of w [rad/s] and z [-].
+    `corner` and `damping` are the bounds of w [rad/s] and z [-].
     """
-
-    corner: Range
-    damping: Range = (0.2, 2.0)
-
-    bounded = (("corner", "rad/s"), ("damping", ""))
-
-    def fraction(self, values: Sequence[Any]) -> tuple[Any, Sequence[Any], Sequence[Any]]:
-        """Return w and the polynomials; see `FilterSection.fraction`."""
-        w, z = values
-        return w, (1.0,), (1.0, 2.0 * z)
+    return FilterSection(
+        name=name,
+        ranges={"corner": (*corner, "rad/s"), "damping": (*damping, "")},
+        fraction=lambda w, z: (w, (1.0,), (1.0, 2.0 * z)),
+    )
 
 
-@dataclass(frozen=True, kw_only=True)
-class LeadLag(FilterSection):
-    """First-order lead or lag (1 + s/w_z) / (1 + s/w_p).
+def lead_lag(name: str, zero: Range, pole: Range) -> FilterSection:
+    """Return a first-order lead or lag (1 + s/w_z) / (1 + s/w_p).
 
-    Parameters
-    ----------
-    zero, pole
-        Bounds of w_z and w_p [rad/s]: a lead has w_z < w_p, a lag w_z > w_p.
+    `zero` and `pole` are the bounds of w_z and w_p [rad/s]: a lead has w_z < w_p, a lag w_z > w_p.
     """
-
-    zero: Range
-    pole: Range
-
-    bounded = (("zero", "rad/s"), ("pole", "rad/s"))
-
-    def fraction(self, values: Sequence[Any]) -> tuple[Any, Sequence[Any], Sequence[Any]]:
-        """Return w and the polynomials; see `FilterSection.fraction`."""
-        zero, pole = values
-        return pole, (1.0, pole / zero), (1.0,)
+    return FilterSection(
+        name=name,
+        ranges={"zero": (*zero, "rad/s"), "pole": (*pole, "rad/s")},
+        fraction=lambda zero, pole: (pole, (1.0, pole / zero), (1.0,)),
+    )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Notch(FilterSection):
-    """Notch (s^2 + 2 b d w s + w^2) / (s^2 + 2 b w s + w^2).
+def notch(name: str, frequency: Range) -> FilterSection:
+    """Return a notch (s^2 + 2 b d w s + w^2) / (s^2 + 2 b w s + w^2).
 
-    Parameters
-    ----------
-    frequency, width, depth
-        Bounds of w [rad/s], b [-] and d [-], which is the gain at w.
+    `frequency` are the bounds of w [rad/s]; b is the width [-], and d [-] the gain at w.
     """
-
-    frequency: Range
-    width: Range = (0.05, 2.0)
-    depth: Range = (0.0, 1.0)
-
-    bounded = (("frequency", "rad/s"), ("width", ""), ("depth", ""))
-
-    def fraction(self, values: Sequence[Any]) -> tuple[Any, Sequence[Any], Sequence[Any]]:
-        """Return w and the polynomials; see `FilterSection.fraction`."""
-        w, b, d = values
-        return w, (1.0, 2.0 * b * d, 1.0), (1.0, 2.0 * b)
+    return FilterSection(
+        name=name,
+        ranges={
+            "frequency": (*frequency, "rad/s"),
+            "width": (0.05, 2.0, ""),
+            "depth": (0.0, 1.0, ""),
+        },
+        fraction=lambda w, b, d: (w, (1.0, 2.0 * b * d, 1.0), (1.0, 2.0 * b)),
+    )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Integral(FilterSection):
-    """Integral action (s + w) / s.
+def integral(name: str, corner: Range) -> FilterSection:
+    """Return integral action (s + w) / s.
 
-    Parameters
-    ----------
-    corner
-        Bounds of w [rad/s], above zero: with w = 0 the integrator would act on nothing and be
-        there all the same.
+    `corner` are the bounds of w [rad/s], above zero: with w = 0 the integrator would act on nothing
+    and be there all the same.
     """
-
-    corner: Range
-
-    bounded = (("corner", "rad/s"),)
-
-    def fraction(self, values: Sequence[Any]) -> tuple[Any, Sequence[Any], Sequence[Any]]:
-        """Return w and the polynomials; see `FilterSection.fraction`."""
-        return values[0], (1.0, 1.0), (0.0,)
+    return FilterSection(
+        name=name,
+        ranges={"corner": (*corner, "rad/s")},
+        fraction=lambda w: (w, (1.0, 1.0), (0.0,)),
+    )
 
 
-@dataclass(frozen=True, kw_only=True)
-class LeadTime(FilterSection):
-    """What a signal will be a lead time ahead, as far as its bandwidth goes.
+def lead_time(name: str, bandwidth: Range = (2.0, 60.0)) -> FilterSection:
+    """Return what a signal will be a lead time ahead, as far as its bandwidth goes.
 
-    (1 + tau s) / (1 + s/w): the extrapolation x + tau x' behind a low-pass.
-
-    Parameters
-    ----------
-    lead, bandwidth
-        Bounds of tau [s] and w [rad/s].
+    (1 + tau s) / (1 + s/w): the extrapolation x + tau x' behind a low-pass.  tau [s] is the lead,
+    and `bandwidth` are the bounds of w [rad/s].
     """
-
-    lead: Range = (0.0, 2.0)
-    bandwidth: Range = (2.0, 60.0)
-
-    bounded = (("lead", "s"), ("bandwidth", "rad/s"))
-
-    def fraction(self, values: Sequence[Any]) -> tuple[Any, Sequence[Any], Sequence[Any]]:
-        """Return w and the polynomials; see `FilterSection.fraction`."""
-        time, w = values
-        return w, (1.0, time * w), (1.0,)
+    return FilterSection(
+        name=name,
+        ranges={"lead": (0.0, 2.0, "s"), "bandwidth": (*bandwidth, "rad/s")},
+        fraction=lambda time, w: (w, (1.0, time * w), (1.0,)),
+    )
 
 
 def series(first: Matrices, then: Matrices) -> Matrices:

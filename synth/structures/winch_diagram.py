@@ -37,7 +37,7 @@ from models.basics import ComplexArray, FloatArray, InputError, check_range, pic
 from models.plant import LinearPlant, PlantResponse
 from models.sensing import MEASURED
 
-from .blocks import FilterSection, LeadTime
+from .blocks import FilterSection, lead_time
 from .diagram import Branch, DiagramLaw, Weight
 from .drum_speed import SteadyMotion
 from .structure import (
@@ -186,7 +186,7 @@ class WinchStructure(Structure):
         if self.heave:
             place = _product(-ratio, *gains, "drum.position_gain", "heave.gain")
             heave = {_HEAVE: place, _HEAVE_RATE: asked("heave.gain")}
-            lead = LeadTime(name="heave", bandwidth=(1.0, 100.0))
+            lead = lead_time("heave", bandwidth=(1.0, 100.0))
             found.append(Branch(weights=heave, sections=(lead,)))
         return found
 

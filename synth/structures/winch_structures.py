@@ -14,7 +14,7 @@ from models.case import Case
 from models.plant import PlantData, fixed_top_modes
 from models.sensing import SENSORS, aboard
 
-from .blocks import FilterSection, Integral, LeadLag, Notch, RollOffFilter
+from .blocks import FilterSection, integral, lead_lag, notch, roll_off
 from .drum_speed import SteadyMotion
 from .low_order import LowOrderFeedback
 from .structure import PayloadFeedback
@@ -104,15 +104,15 @@ def structure_named(name: str, case: Case) -> PayloadFeedback | WinchStructure |
     feedback = name.removeprefix("payload-feedback") if name.startswith("payload") else None
     corner = (1.0, TRANSPARENT)
     sections: dict[str, tuple[FilterSection, ...]] = {
-        "-rolloff": (RollOffFilter(name="rolloff", corner=corner),),
-        "-lead": (LeadLag(name="lead", zero=(0.05, 100.0), pole=(0.5, 200.0)),),
+        "-rolloff": (roll_off("rolloff", corner=corner),),
+        "-lead": (lead_lag("lead", zero=(0.05, 100.0), pole=(0.5, 200.0)),),
         "-notch": (
-            Notch(name="notch", frequency=(0.5 * modes[1], 2.0 * modes[1])),
-            RollOffFilter(name="rolloff", corner=corner),
+            notch("notch", frequency=(0.5 * modes[1], 2.0 * modes[1])),
+            roll_off("rolloff", corner=corner),
         ),
         "-integral": (
-            Integral(name="integral", corner=(0.002, 0.5)),
-            RollOffFilter(name="rolloff", corner=corner),
+            integral("integral", corner=(0.002, 0.5)),
+            roll_off("rolloff", corner=corner),
         ),
     }
     payload = name != "feed-forward" and name != "constant-tension"

@@ -10,20 +10,20 @@ from hypothesis import strategies as st
 from synth.loop import Dual
 from synth.structures.blocks import (
     FilterSection,
-    Integral,
-    LeadLag,
-    LeadTime,
-    Notch,
-    RollOffFilter,
+    integral,
+    lead_lag,
+    lead_time,
+    notch,
+    roll_off,
     series,
 )
 
 SECTIONS: dict[str, FilterSection] = {
-    "roll-off": RollOffFilter(name="f", corner=(0.5, 50.0)),
-    "lead-lag": LeadLag(name="f", zero=(0.1, 30.0), pole=(0.1, 60.0)),
-    "notch": Notch(name="f", frequency=(1.0, 20.0)),
-    "integral": Integral(name="f", corner=(0.01, 1.0)),
-    "lead time": LeadTime(name="f"),
+    "roll-off": roll_off("f", corner=(0.5, 50.0)),
+    "lead-lag": lead_lag("f", zero=(0.1, 30.0), pole=(0.1, 60.0)),
+    "notch": notch("f", frequency=(1.0, 20.0)),
+    "integral": integral("f", corner=(0.01, 1.0)),
+    "lead time": lead_time("f"),
 }
 OMEGA = np.geomspace(0.03, 300.0, 9)
 
@@ -62,15 +62,15 @@ def test_slopes_are_differences(name: str) -> None:
 
 
 def test_textbook_values() -> None:
-    at_corner = RollOffFilter(name="f", corner=(1.0, 10.0)).response([4.0, 0.5], np.array([4.0j]))
+    at_corner = roll_off("f", corner=(1.0, 10.0)).response([4.0, 0.5], np.array([4.0j]))
     assert at_corner == pytest.approx([-1.0j])  # 1/(2 i z)
-    at_notch = Notch(name="f", frequency=(1.0, 10.0)).response([7.0, 0.3, 0.1], np.array([7.0j]))
+    at_notch = notch("f", frequency=(1.0, 10.0)).response([7.0, 0.3, 0.1], np.array([7.0j]))
     assert at_notch == pytest.approx([0.1])
-    lead = LeadTime(name="f").response([0.2, 1e6], np.array([0.5j]))
+    lead = lead_time("f").response([0.2, 1e6], np.array([0.5j]))
     assert lead == pytest.approx([1.0 + 0.1j], rel=1e-5)
-    integral = Integral(name="f", corner=(0.01, 1.0)).response([0.2], np.array([0.2j]))
-    assert integral == pytest.approx([1.0 - 1.0j])
-    lag = LeadLag(name="f", zero=(0.1, 9.0), pole=(0.1, 9.0)).response([1.0, 5.0], np.array([1e9j]))
+    action = integral("f", corner=(0.01, 1.0)).response([0.2], np.array([0.2j]))
+    assert action == pytest.approx([1.0 - 1.0j])
+    lag = lead_lag("f", zero=(0.1, 9.0), pole=(0.1, 9.0)).response([1.0, 5.0], np.array([1e9j]))
     assert lag == pytest.approx([5.0], rel=1e-6)
 
 
