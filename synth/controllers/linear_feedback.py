@@ -39,7 +39,7 @@ import numpy as np
 
 from models.basics import InputError, check_range, pick
 from models.case import Case
-from models.plant import MEAN_LOSSES, build_plant
+from models.plant import MEAN_LOSSES, MEASUREMENTS, build_plant
 
 from ..design import Design, Tuning
 from ..loop import LinearController
@@ -54,9 +54,8 @@ from ..structures import (
 )
 
 _OWNER = "linear feedback"
-PAYLOAD = ("payload.acceleration", "payload.velocity", "payload.displacement")
 HOOK = ("mru.heave", "mru.heave_rate")
-HEARD = (*PAYLOAD, *HOOK, "drum.haul", "motor.speed", "motor.torque", "rope.tension")
+HEARD = (*MEASUREMENTS, *HOOK, "drum.haul", "motor.speed", "motor.torque", "rope.tension")
 FADE = 1.0  # in which an old measurement loses its weight [s]
 
 
@@ -189,9 +188,9 @@ class LinearFeedback(RecursiveController):
             "motor.speed": self.motor.per_rope_speed * m["reference.velocity"],
             **static,
         }
-        wanted |= {name: m[name.replace("payload", "reference")] for name in PAYLOAD}
+        wanted |= {name: m[name.replace("payload", "reference")] for name in MEASUREMENTS}
         # A reference unit that is lost shows its last values: a heave rate that goes on for ever.
-        trust = {**dict.fromkeys(PAYLOAD, fresh), **dict.fromkeys(HOOK, m["mru.valid"])}
+        trust = {**dict.fromkeys(MEASUREMENTS, fresh), **dict.fromkeys(HOOK, m["mru.valid"])}
         rows = []
         for name in self.controller.measurements:
             deviation = m[name] - wanted.get(name, 0.0)
@@ -209,7 +208,7 @@ def _from_gains(case: Case, gains: Mapping[str, float]) -> LinearController:
     own = case.gains.A if case.gains is not None else 1.0
     values = {name: check_range("gains", name, v) for name, v in {"A": own, **gains}.items()}
     products = [-values["A"] * values[name] for name in ("a", "a1", "a2")]
-    return LinearController.static([products], PAYLOAD, ("drive.command",))
+    return LinearController.static([products], MEASUREMENTS, ("drive.command",))
 
 
 def _check_signals(controller: LinearController) -> None:

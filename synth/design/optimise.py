@@ -207,7 +207,7 @@ def _high_order(posed: PosedFamily, order: int | None, progress: Progress | None
     )
     designs = []
     for member in (question, *others):
-        growth = _growth(member, parameters)
+        growth = member.problem.growth(member.values(parameters))
         loop = member.assess(parameters) if growth <= 0.0 else None
         designs.append(evaluated(member, parameters, loop, growth=growth))
     design = with_members(designs, posed)
@@ -539,23 +539,16 @@ def verified(
     return replace(design, ok=design.ok and checked.ok, status=status, verification=checked)
 
 
-def _growth(
-    question: DesignQuestion, parameters: Mapping[str, float], drag: float | None = None
-) -> float:
-    """Return the largest growth rate of the loop [1/s], by default with the drag before."""
-    coefficient = question.drag_before if drag is None else drag
-    return float(question.assess(parameters, coefficient).poles.real.max())
-
-
 def _in_small_motion(questions: Sequence[DesignQuestion], parameters: Mapping[str, float]) -> str:
     """Return a remark if a loop needs its drag to be stable, else nothing.
 
     Quadratic drag vanishes in small motion: such a loop swings by itself, at the amplitude
     that gives it drag enough.
     """
-    if all(q.drag is None or _growth(q, parameters, 0.0) <= 0.0 for q in questions):
-        return ""
-    return "; without drag, in small motion, the loop is unstable and swings by itself"
+    for q in questions:
+        if q.drag is not None and q.problem.loop_poles(q.values(parameters), 0.0).real.max() > 0.0:
+            return "; without drag, in small motion, the loop is unstable and swings by itself"
+    return ""
 
 
 def checked_parameters(question: DesignQuestion, gains: object) -> dict[str, float]:

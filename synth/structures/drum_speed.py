@@ -110,6 +110,10 @@ class SteadyMotion:
             per_rope_speed=data.gear_ratio / data.drum_radius,
         )
 
+    def widest(self, sample_time: float) -> float:
+        """Return the bandwidth that sampling and the drive leave a drum loop room for [rad/s]."""
+        return _PHASE / (sample_time + self.lag)
+
     @property
     def feed(self) -> float:
         """Command per motor speed in steady motion, D/kappa."""
@@ -180,8 +184,7 @@ class DrumSpeedLoop:
         checked_sample_time(_OWNER, sample_time)
         plant = build_plant(case) if plant is None else plant
         point, motor = plant.operating_point(MEAN_LOSSES), SteadyMotion.of(plant.data)
-        allowed = _PHASE / (sample_time + motor.lag)
-        wanted = allowed
+        wanted = motor.widest(sample_time)
         if bandwidth is not None:
             wanted = check_range(
                 _OWNER, "bandwidth", bandwidth, low=0.0, unit="rad/s", open_low=True

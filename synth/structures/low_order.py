@@ -36,7 +36,7 @@ from scipy.stats import qmc
 from typing_extensions import override
 
 from models.basics import ComplexArray, FloatArray, InputError, SolverError
-from models.plant import LinearPlant
+from models.plant import MEASUREMENTS, LinearPlant
 
 from ..loop import LinearController
 from .lqg import (
@@ -51,7 +51,6 @@ from .lqg import (
     whitened,
 )
 from .structure import (
-    PAYLOAD_MEASUREMENTS,
     Bounds,
     GeneralisedPlant,
     Parameter,
@@ -430,7 +429,7 @@ class LowOrderFeedback(Structure):
 
     order: int
     family: str = "low-order"
-    measurements: tuple[str, ...] = PAYLOAD_MEASUREMENTS
+    measurements: tuple[str, ...] = MEASUREMENTS
     hears_payload: bool = True
 
     @property

@@ -27,12 +27,11 @@ import scipy.linalg
 
 from models.basics import ComplexArray, FloatArray
 from models.case import Case
-from models.plant import MEAN_LOSSES, LinearPlant, Plant, zero_order_hold
+from models.plant import MEAN_LOSSES, MEASUREMENTS, LinearPlant, Plant, zero_order_hold
 from models.sensing import HEARD, Measurement, Recursion
 
 from .recursive import at_rest
 
-PAYLOAD = ("payload.acceleration", "payload.velocity", "payload.displacement")
 WINCH = ("drum.haul", "motor.speed", "motor.torque", "rope.tension")
 ON_CIRCLE = 1e-9  # an eigenvalue this far outside is a drum that integrates, not instability
 
@@ -124,7 +123,7 @@ class SampledLoop:
                 world.H[place[name], n] = 1.0
                 continue
             world.H[place[name], :n], world.H[place[name], -1] = p.Cz[row], p.Dz[row, 0]
-        for i, name in enumerate(PAYLOAD):
+        for i, name in enumerate(MEASUREMENTS):
             row, into, at = p.measurements.index(name), world.H, place[name]
             if late:
                 world.H[at, len(A) + 3 * (late - 1) + i] = 1.0

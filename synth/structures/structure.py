@@ -19,14 +19,13 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from models.basics import ComplexArray, FloatArray, InputError, check_range, pick
-from models.plant import LinearPlant
+from models.plant import MEASUREMENTS, LinearPlant
 
 from ..loop import Disturbance, LinearController, closed_loop_matrix
 from .lqg import designs, projected, whitened
 
 Bounds = Mapping[str, tuple[float, float]]
 
-PAYLOAD_MEASUREMENTS = ("payload.acceleration", "payload.velocity", "payload.displacement")
 _DECADES = 3.0  # candidates' loop gains spread over this many decades, both signs
 _PADE = 4  # of the delays, in the state feedback that is projected
 _TOP = 3.0  # ... up to this loop gain at the candidate crossover
@@ -174,7 +173,7 @@ class PayloadFeedback(Structure):
     name: ClassVar[str] = "payload-feedback"
     hears_payload: ClassVar[bool] = True
     amplifier: float = 1.0
-    measurements: tuple[str, str, str] = PAYLOAD_MEASUREMENTS
+    measurements: tuple[str, ...] = MEASUREMENTS
     bounds: Bounds = field(default_factory=dict)
 
     def bind(self, plant: LinearPlant) -> ParametrisedController:

@@ -34,14 +34,13 @@ import numpy as np
 from scipy.stats import qmc
 
 from models.basics import ComplexArray, FloatArray, InputError, check_range, pick
-from models.plant import LinearPlant, PlantResponse
+from models.plant import MEASUREMENTS, LinearPlant, PlantResponse
 from models.sensing import MEASURED
 
 from .blocks import FilterSection, lead_time
 from .diagram import Branch, DiagramLaw, Weight
 from .drum_speed import SteadyMotion
 from .structure import (
-    PAYLOAD_MEASUREMENTS,
     Bounds,
     GeneralisedPlant,
     Parameter,
@@ -53,7 +52,6 @@ from .structure import (
 
 SAMPLE_TIME = 0.01  # that the drum loop must leave room for [s]
 TRANSPARENT = 500.0  # a roll-off with this corner is hardly there [rad/s]
-_PHASE = 0.25  # what sampling and drive may take from the drum loop at its bandwidth [rad]
 _LEAST_BANDWIDTH = 0.3  # of the drum loop [rad/s]
 _TENSION = "rope.tension"
 _HAUL, _SPEED, _HEAVE, _HEAVE_RATE = "drum.haul", "motor.speed", "mru.heave", "mru.heave_rate"
@@ -120,7 +118,7 @@ class WinchStructure(Structure):
     @property
     def widest(self) -> float:
         """Bandwidth of the drum loop that sampling and the drive leave room for [rad/s]."""
-        return _PHASE / (SAMPLE_TIME + self.motor.lag)
+        return self.motor.widest(SAMPLE_TIME)
 
     def speed_gain(self, bandwidth: float) -> float:
         """Return k for a bandwidth of the drum loop, without rope and load."""
@@ -141,9 +139,9 @@ class WinchStructure(Structure):
             for k, (name, unit) in enumerate(zip(ASKED, ("s", "-", "1/s"), strict=True)):
                 add(name, unit, 0.3 * self.pace ** (k - 1))
         elif self.hears_payload:
-            columns = [plant.measurements.index(name) for name in PAYLOAD_MEASUREMENTS]
+            columns = [plant.measurements.index(name) for name in MEASUREMENTS]
             scales = gain_scales(plant, [(0, j) for j in columns]) / self.amplifier
-            for name, y, scale in zip(_GAINS, PAYLOAD_MEASUREMENTS, scales, strict=True):
+            for name, y, scale in zip(_GAINS, MEASUREMENTS, scales, strict=True):
                 add(name, gain_unit(plant, plant.inputs[0], y), float(scale))
         if self.drum and not self.motor.regulated:
             low, high = self.speed_gain(0.0), self.speed_gain(self.widest)
@@ -161,7 +159,7 @@ class WinchStructure(Structure):
 
     def branches(self) -> list[Branch]:
         """Return the diagram."""
-        names = zip(PAYLOAD_MEASUREMENTS, ASKED if self.drum else _GAINS, strict=True)
+        names = zip(MEASUREMENTS, ASKED if self.drum else _GAINS, strict=True)
         if not self.drum:
             weights = {y: _product(-self.amplifier, name) for y, name in names}
             return [Branch(weights=weights, sections=self.filters)]
@@ -244,7 +242,7 @@ class WinchLaw(DiagramLaw):
         decades, chosen = (2.0, points[:, -2]) if drum else (3.0, points[:, -1])
         at = np.minimum((chosen * omega.size).astype(int), omega.size - 1)
         columns = [self.index(name) for name in (ASKED if drum else _GAINS)]
-        heard = [self._columns[name] for name in PAYLOAD_MEASUREMENTS]
+        heard = [self._columns[name] for name in MEASUREMENTS]
         for k, row in enumerate(values):
             row[columns] = 1.0
             own = self.response(list(row), 1j * omega[at[k] : at[k] + 1])[0]

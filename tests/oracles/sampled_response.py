@@ -11,9 +11,10 @@ import scipy.linalg
 
 from models.basics import ComplexArray, FloatArray
 from models.case import Case
+from models.plant import MEASUREMENTS
 from models.sensing import HEARD
 from synth.structures import SampledLoop
-from synth.structures.sampling import PAYLOAD, WINCH
+from synth.structures.sampling import WINCH
 
 HOOK = ("hook.heave", "hook.heave_rate")
 REFERENCE = ("reference.displacement", "reference.velocity", "reference.acceleration")
@@ -63,7 +64,7 @@ def _answer(
             measured[HEARD.index(name)] = row @ hook
     n = len(w.continuous)
     late = (len(w.A) - n - 1) // 3
-    for i, name in enumerate(PAYLOAD):
+    for i, name in enumerate(MEASUREMENTS):
         felt = p.F[p.measurements.index(name), columns] @ hook
         if late:
             moved[n + i] = felt
