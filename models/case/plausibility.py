@@ -7,6 +7,7 @@ will change that.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 from ..basics import InputError
 from ..rig import DCMotor
@@ -21,57 +22,56 @@ def contradictions(case: Contents) -> list[Finding]:
         overloads = _overloads(case)
     except InputError as error:
         return [("winch.drum", str(error))]
-    found = _static_limits(case)
+    found = list(_static_limits(case))
     if case.limits.drive == "enforce":
         found += [(at, f"must be at least {load}, got {rating}") for at, load, rating in overloads]
     return found
 
 
-def remarks(case: Contents) -> list[Finding]:
-    """Return what is implausible, as pairs of a dotted path and a sentence."""
-    found: list[Finding] = []
+def remarks(case: Contents) -> Iterator[Finding]:
+    """Yield what is implausible, as pairs of a dotted path and a sentence."""
     sea, delay = case.sea, case.sensors.telemetry.delay
     if sea.steepness > sea.breaking_steepness:
-        text = (
+        yield (
+            "sea.significant_height",
             f"{sea.significant_height:g} m with a peak period of {sea.spectral_peak_period:.3g} s "
             f"is steeper than breaking: steepness 2 pi H_s/(g T_p^2) is {sea.steepness:.3f}, seas "
-            f"stay below {sea.breaking_steepness:.3f} (DNV-RP-C205)"
+            f"stay below {sea.breaking_steepness:.3f} (DNV-RP-C205)",
         )
-        found.append(("sea.significant_height", text))
     if delay > sea.spectral_peak_period / 4.0:
-        text = (
+        yield (
+            "sensors.telemetry.delay",
             f"{delay:g} s is more than a quarter of the sea's peak period, "
-            f"{sea.spectral_peak_period:.3g} s: feedback cannot act on the waves"
+            f"{sea.spectral_peak_period:.3g} s: feedback cannot act on the waves",
         )
-        found.append(("sensors.telemetry.delay", text))
     table = case.vessel.heave_rao
     phase = (table.phase if table is not None else None) or ()
     if any(abs(angle) > 2.0 * math.pi for angle in phase):
         largest = max(phase, key=abs)
-        text = (
+        yield (
+            "vessel.heave_rao.phase",
             f"{largest:g} rad is more than a turn: numbers are in radians, write '{largest:g} deg' "
-            "for degrees"
+            "for degrees",
         )
-        found.append(("vessel.heave_rao.phase", text))
     motor, drive = case.winch.motor, case.winch.drive
     if isinstance(motor, DCMotor):
         back_emf = motor.back_emf_constant * case.winch.speed_limit
         if drive.voltage is not None and drive.voltage < back_emf:
-            text = (
+            yield (
+                "winch.drive.voltage",
                 f"{drive.voltage:g} V is below the back-EMF at the highest speed, "
-                f"{back_emf:.4g} V: the motor cannot reach it"
+                f"{back_emf:.4g} V: the motor cannot reach it",
             )
-            found.append(("winch.drive.voltage", text))
     brake = case.winch.brake
     if brake is not None and brake.torque is not None and brake.torque < case.static_torque:
-        text = (
+        yield (
+            "winch.brake.torque",
             f"{brake.torque / 1e3:.4g} kN m is below the static torque at the motor, "
-            f"{case.static_torque / 1e3:.4g} kN m: the brake slips under the load"
+            f"{case.static_torque / 1e3:.4g} kN m: the brake slips under the load",
         )
-        found.append(("winch.brake.torque", text))
     if case.limits.drive == "report":
-        found += [(at, f"{rating} is below {load}") for at, load, rating in _overloads(case)]
-    return found
+        for at, load, rating in _overloads(case):
+            yield at, f"{rating} is below {load}"
 
 
 def _overloads(case: Contents) -> list[tuple[str, str, str]]:
@@ -97,22 +97,20 @@ def _overloads(case: Contents) -> list[tuple[str, str, str]]:
     return found
 
 
-def _static_limits(case: Contents) -> list[Finding]:
-    """Return the rope tension limits that the tension at rest breaks already."""
-    found = []
+def _static_limits(case: Contents) -> Iterator[Finding]:
+    """Yield the rope tension limits that the tension at rest breaks already."""
     limits, tension = case.limits, case.static_tension / 1e3
     if limits.rope_tension_peak is not None and limits.rope_tension_peak / 1e3 < tension:
-        text = (
+        yield (
+            "limits.rope_tension_peak",
             f"must be at least the static rope tension at the winch, {tension:.4g} kN, "
-            f"got {limits.rope_tension_peak / 1e3:.4g} kN"
+            f"got {limits.rope_tension_peak / 1e3:.4g} kN",
         )
-        found.append(("limits.rope_tension_peak", text))
     if limits.minimum_tension is not None:
         lowest = case.payload.submerged_weight / 1e3
         if limits.minimum_tension / 1e3 > lowest:
-            text = (
+            yield (
+                "limits.minimum_tension",
                 f"must be at most the static tension at the payload, {lowest:.4g} kN, "
-                f"got {limits.minimum_tension / 1e3:.4g} kN"
+                f"got {limits.minimum_tension / 1e3:.4g} kN",
             )
-            found.append(("limits.minimum_tension", text))
-    return found
