@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -170,12 +171,19 @@ def read_only(array: npt.ArrayLike) -> FloatArray:
 
 
 class ReadOnlyArrays:
-    """Base of frozen dataclasses: every field declared as FloatArray becomes a read-only copy."""
+    """Base of frozen dataclasses: FloatArray and ComplexArray fields become read-only copies."""
 
     def __post_init__(self) -> None:
         for field in fields(self):  # type: ignore[arg-type]
-            if field.type == "FloatArray":
-                object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
+            if field.type in _KINDS:
+                copy: npt.NDArray[Any] = np.array(
+                    getattr(self, field.name), dtype=_KINDS[field.type]
+                )
+                copy.setflags(write=False)
+                object.__setattr__(self, field.name, copy)
+
+
+_KINDS = {"FloatArray": np.float64, "ComplexArray": np.complex128}
 
 
 def range_text(

@@ -30,7 +30,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .arrays import FloatArray
-from .checks import InputError, SolverError, check_finite, check_range, read_only
+from .checks import InputError, ReadOnlyArrays, SolverError, check_finite, check_range
 from .panels import FrequencyAxis, cut_panels, distance, longest_panel
 
 # Rules that the adaptive scheme tries on a panel before it cuts the panel in two.
@@ -59,7 +59,7 @@ class SpectralDensity(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Quadrature:
+class Quadrature(ReadOnlyArrays):
     """Nodes and weights of an integral over frequency.
 
     Attributes
@@ -82,8 +82,7 @@ class Quadrature:
                 "quadrature: omega and weights must be one-dimensional and equally long, "
                 f"got shapes {omega.shape} and {weights.shape}"
             )
-        object.__setattr__(self, "omega", read_only(omega))
-        object.__setattr__(self, "weights", read_only(weights))
+        super().__post_init__()
 
     def __len__(self) -> int:
         """Return the number of nodes."""

@@ -26,10 +26,10 @@ from ..basics import (
     ComplexArray,
     FloatArray,
     InputError,
+    ReadOnlyArrays,
     check_ascending,
     check_finite,
     check_range,
-    read_only,
     wave_number,
 )
 from .crane import transport
@@ -48,7 +48,7 @@ _ANGLES = (3, 4, 5)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class VesselRaos:
+class VesselRaos(ReadOnlyArrays):
     """Response amplitude operators (RAOs) of a vessel's six motions.
 
     Attributes
@@ -112,7 +112,7 @@ class VesselRaos:
         check_range(
             owner, "heading", heading[-1], low=0.0, high=2.0 * math.pi, open_high=True, unit="rad"
         )
-        values = np.array(self.values, dtype=np.complex128)
+        values = np.asarray(self.values, dtype=np.complex128)
         wanted = (omega.size, heading.size, len(MODES))
         if values.shape != wanted:
             raise InputError(
@@ -127,7 +127,6 @@ class VesselRaos:
                 f"{MODES[mode]} at {omega[row]:g} rad/s, heading "
                 f"{math.degrees(heading[column]):g} deg"
             )
-        values.setflags(write=False)
         for name, size in (("origin", 3), ("phase_origin", 2)):
             point = check_finite(owner, name, getattr(self, name))
             if point.shape != (size,):
@@ -138,10 +137,10 @@ class VesselRaos:
         if not (math.isinf(self.depth) and self.depth > 0.0):
             check_range(owner, "depth", self.depth, low=0.0, open_low=True, unit="m")
         check_range(owner, "speed", self.speed, low=-50.0, high=50.0, unit="m/s")
-        object.__setattr__(self, "omega", read_only(omega))
-        object.__setattr__(self, "heading", read_only(heading))
-        object.__setattr__(self, "values", values)
+        object.__setattr__(self, "omega", omega)
+        object.__setattr__(self, "heading", heading)
         object.__setattr__(self, "notes", tuple(self.notes))
+        super().__post_init__()
 
     @property
     def heading_deg(self) -> FloatArray:

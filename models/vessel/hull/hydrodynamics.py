@@ -30,9 +30,9 @@ from ...basics import (
     ComplexArray,
     FloatArray,
     InputError,
+    ReadOnlyArrays,
     check_ascending,
     check_range,
-    read_only,
 )
 from ..crane import Point
 from ..raos import MIRRORED, MODES
@@ -53,7 +53,7 @@ class NaturalPeriods:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Hydrodynamics:
+class Hydrodynamics(ReadOnlyArrays):
     """Coefficients of a body in waves, about one point.
 
     Attributes
@@ -88,20 +88,14 @@ class Hydrodynamics:
         omega = check_ascending(owner, "omega", self.omega)
         heading = check_ascending(owner, "heading", self.heading)
         k, h = omega.size, heading.size
-        for name, shape, kind in (
-            ("added_mass", (k, 6, 6), np.float64),
-            ("damping", (k, 6, 6), np.float64),
-            ("excitation", (k, h, 6), np.complex128),
-        ):
-            found = np.array(getattr(self, name), dtype=kind)
+        shapes = {"added_mass": (k, 6, 6), "damping": (k, 6, 6), "excitation": (k, h, 6)}
+        for name, shape in shapes.items():
+            found = np.asarray(getattr(self, name))
             if found.shape != shape or not np.all(np.isfinite(found)):
                 raise InputError(
                     f"{owner}: {name} must be finite numbers of shape {shape}, got {found.shape}"
                 )
-            found.setflags(write=False)
-            object.__setattr__(self, name, found)
-        object.__setattr__(self, "omega", read_only(omega))
-        object.__setattr__(self, "heading", read_only(heading))
+        super().__post_init__()
 
     def resampled(self, omega: npt.ArrayLike) -> Hydrodynamics:
         """Return the coefficients at other frequencies, by cubic splines.
@@ -195,7 +189,7 @@ class Hydrodynamics:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class FloatingBody:
+class FloatingBody(ReadOnlyArrays):
     """A body's mass and stiffness beside its hydrodynamics, all about the same point.
 
     Attributes
@@ -224,7 +218,7 @@ class FloatingBody:
                 raise InputError(
                     f"floating body: {name} must be 6 by 6 finite numbers, got {found.shape}"
                 )
-            object.__setattr__(self, name, read_only(found))
+        super().__post_init__()
         check_range("floating body", "roll_damping", self.roll_damping, low=0.0, high=1.0)
 
     def natural_periods(self) -> NaturalPeriods:
