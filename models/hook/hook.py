@@ -39,9 +39,6 @@ from ..sea import SeaSpectrum
 from ..vessel import HeaveRao, hook_rao, speed_remark
 from .encounter import Encounter, MetSpectrum
 
-MOTIONS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}
-"""The motions with their units: each is the derivative of the one before."""
-
 ORDERS = np.arange(9.0)[:, np.newaxis]
 """Orders of the displacement's moments that the statistics of all three motions are made of."""
 

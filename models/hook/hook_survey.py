@@ -39,11 +39,13 @@ from ..vessel import (
     vessel_raos,
 )
 from .encounter import Encounter, speed_along
-from .hook import MOTIONS, ORDERS
+from .hook import ORDERS
 from .hook_demand import HookDemand
 
 HEADINGS = tuple(float(b) for b in range(0, 360, 15))
 PEAK_PERIODS = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0)
+
+_MOTIONS = ("displacement", "velocity", "acceleration")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,8 +87,8 @@ class HookSurvey(ReadOnlyArrays):
         motion
             `displacement`, `velocity` or `acceleration`.
         """
-        check_choice("hook", "motion", motion, MOTIONS)
-        return np.sqrt(np.maximum(self.moments[..., 2 * list(MOTIONS).index(motion)], 0.0))
+        check_choice("hook", "motion", motion, _MOTIONS)
+        return np.sqrt(np.maximum(self.moments[..., 2 * _MOTIONS.index(motion)], 0.0))
 
     def figures(self, side: int, heading: int, period: int) -> HookDemand:
         """Return all figures of one point, by its indices."""
@@ -109,7 +111,7 @@ class HookSurvey(ReadOnlyArrays):
         """Return every point as a row: place, sea, and the figures of the three motions in SI."""
         names = [
             f"{motion}_{what}"
-            for motion in MOTIONS
+            for motion in _MOTIONS
             for what in ("rms", "T_z", "width", "most_probable_max", "fractile_max")
         ]
         head = ["x", "y", "heading_deg", "peak_period", "significant_height", *names]
