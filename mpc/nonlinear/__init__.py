@@ -1,6 +1,6 @@
 """Predictive control with the nonlinear plant, as one Gauss-Newton step a sample.
 
-The winch's recipe of `mpc.linear` comes in, with quadratic drag, slack rope, losses and layers of
+The winch's recipe of `mpc.linear` comes in, with quadratic drag, slack rope and layers of
 the drum as forces beside the linear plant; a controller with the `step` protocol goes out.
 """
 

@@ -46,14 +46,13 @@ class NonlinearMPC(WinchMPC):
         & \text{the limits of } \texttt{LinearMPC},
             \qquad |(\tau_0 + d_j) \, \omega_j| \le P_{max},
 
-    where the forces n are quadratic drag, slack rope, losses of the gear and friction, layers of
-    the drum (`mpc.nonlinear.stage`).  It is solved by multiple shooting: the forces are linearised
-    at the plan of the sample before, a sample on; what follows is a quadratic programme of the
-    moves, and its answer is one Gauss-Newton step (M. Diehl, H. G. Bock and J. P. Schloeder, "A
-    real-time iteration scheme for nonlinear optimization in optimal feedback control", SIAM J.
-    Control Optim. 43, 2005).  Linearising and condensing need no measurement and are done at the
-    end of the step before; when the measurement is there, a few products of matrices with vectors
-    and the solver are left.
+    where the forces n are quadratic drag, slack rope, layers of the drum (`mpc.nonlinear.stage`).
+    It is solved by multiple shooting: the forces are linearised at the plan of the sample before, a
+    sample on; what follows is a quadratic programme of the moves, and its answer is one
+    Gauss-Newton step (M. Diehl, H. G. Bock and J. P. Schloeder, "A real-time iteration scheme for
+    nonlinear optimization in optimal feedback control", SIAM J. Control Optim. 43, 2005).
+    Linearising and condensing need no measurement and are done at the end of the step before; when
+    the measurement is there, a few products of matrices with vectors and the solver are left.
 
     * n_j, (M m): forces that the linear plant lacks [N], [N m]; F, O: what they do
     * phi: forces as functions of a few numbers y (velocity of the payload, tensions, motor speed)
@@ -69,9 +68,8 @@ class NonlinearMPC(WinchMPC):
         As for `LinearMPC`; the deadline is that of the feedback.
     iterations
         Gauss-Newton steps in a sample.
-    drag, slack, losses, travel
-        What is nonlinear, as for `mpc.nonlinear.stage.force_law`.  Losses of the gear are left out
-        unless asked for: they cost three times the time of all else and gained three per cent.
+    drag, slack, travel
+        What is nonlinear, as for `mpc.nonlinear.stage.force_law`.
     mean_torque
         Whether a move is the mean torque of a sample, which the drive can hold at its peak
         (`mpc.nonlinear.mean_torque`), else that at its start, as in `LinearMPC`.
@@ -114,7 +112,6 @@ class NonlinearMPC(WinchMPC):
         iterations: int = 1,
         drag: bool = True,
         slack: Sequence[int] | None = None,
-        losses: bool = False,
         travel: DrumTravel | None = None,
         mean_torque: bool = True,
         compiled: bool | None = None,
@@ -126,7 +123,7 @@ class NonlinearMPC(WinchMPC):
             self.name = f"nonlinear-{self.name}"
         self.iterations = int(iterations)
         winch = self.model.winch
-        law = force_law(winch, drag=drag, slack=slack, losses=losses, travel=travel)
+        law = force_law(winch, drag=drag, slack=slack, travel=travel)
         self.stage = make_stage(winch, law, mean=mean_torque, compiled=compiled)
         model = self.model
         if mean_torque:

@@ -6,16 +6,16 @@ r"""One sample of the nonlinear winch, `Stage`: the exact linear part, and force
     y_j &= C x_j + D d_j + C_w w_j + C_c c + O n_j + y_{rest}, \qquad n_j = \varphi(y_j) .
 
 A rope of fifteen masses has axial modes up to 60 rad/s, and yet next to nothing of it is nonlinear:
-the drag of the payload, the tension of a rope that goes slack, the losses of the gear,
-the layers of the drum (`force_law`).  So the linear plant is sampled exactly, by its matrix
-exponential, and the forces n that it lacks are held over a sample at their value in its
-middle, where the few numbers y decide on them: the implicit midpoint rule for the nonlinear part
-alone, of second order and stable however stiff the rope is.  phi with its derivative is one CasADi
-function that is mapped over the horizon and compiled where there is a compiler.
+the drag of the payload, the tension of a rope that goes slack, the layers of the drum
+(`force_law`).  So the linear plant is sampled exactly, by its matrix exponential, and the forces n
+that it lacks are held over a sample at their value in its middle, where the few numbers y decide on
+them: the implicit midpoint rule for the nonlinear part alone, of second order and stable however
+stiff the rope is.  phi with its derivative is one CasADi function that is mapped over the horizon
+and compiled where there is a compiler.
 
 What is approximated: springs between the first and the last can push, unless asked for; a rope
-does not get longer or heavier by the layers of its drum; losses change sides over 2 rad/s of the
-motor; and what the drive cuts within a sample does not change its mean torque
+does not get longer or heavier by the layers of its drum; the gear has the mean of its losses, and
+the motor no dry friction; and what the drive cuts within a sample does not change its mean torque
 (`mpc.nonlinear.mean_torque`).
 
 Each force acts through one column on the state's derivative and depends on a few linear functions
@@ -41,7 +41,6 @@ _OWNER = "nonlinear predictive control"
 _NOTHING = np.zeros(0)
 
 _SMOOTH = 0.002  # eps of a tension, over that at rest
-_TURN = 2.0  # motor speed over which gear's losses and friction change sides [rad/s]
 _VELOCITY, _SPEED, _ANGLE = "payload.velocity", "motor.speed", "motor.angle"
 
 
@@ -208,7 +207,6 @@ def force_law(
     *,
     drag: bool = True,
     slack: Sequence[int] | None = None,
-    losses: bool = False,
     travel: DrumTravel | None = None,
 ) -> ForceLaw:
     """Return the forces of a winch.
@@ -221,9 +219,6 @@ def force_law(
         Whether the payload's drag is quadratic.
     slack
         Springs, counted from the drum, that can go slack; by default the first and the last.
-    losses
-        Whether the gear has losses that follow its direction, and the motor Coulomb friction, if
-        the case has any.
     travel
         Layers of the drum; by default its radius does not change.
 
@@ -238,7 +233,6 @@ def force_law(
         raise InputError(
             f"{_OWNER}: slack must be springs from 0 to {winch.masses - 1}, got {springs}"
         )
-    losses = losses and (data.gear_efficiency < 1.0 or data.coulomb_friction > 0.0)
     arguments: dict[str, Argument] = {}
     columns: dict[str, FloatArray] = {}
     forces: list[ca.SX] = []
@@ -283,17 +277,10 @@ def force_law(
         at_rest = smooth(k, ca.SX(rope.hanging[k])) - rope.hanging[k]
         held[k] = smooth(k, whole) - at_rest if k in springs else whole
         act(f"slack.{k}", rope.column(k), held[k] - linear)
-    if losses or travel is not None:
-        speed, force = of(_SPEED), ca.SX(0)
-        top = held[0] if 0 in held else of("spring.0")
-        mean = data.mean_gear_factor
-        gear: ca.SX = ca.SX(mean)
-        if losses:
-            way = ca.tanh(speed / _TURN)
-            gear = gear + 0.5 * way * (1.0 / data.gear_efficiency - data.gear_efficiency)
-            force = -data.coulomb_friction * ca.tanh(speed / max(data.friction_speed, _TURN))
-        lever = rope.haul_per_angle * (gear * changes[1] - mean)
-        act("motor", rope.unit(_SPEED) / data.inertia, force - lever * (top + rope.at_drum))
+    if travel is not None:
+        top = held[0]
+        lever = rope.haul_per_angle * data.mean_gear_factor * (changes[1] - 1.0)
+        act("motor", rope.unit(_SPEED) / data.inertia, -lever * (top + rope.at_drum))
     y = ca.vertcat(*symbols.values()) if symbols else ca.SX(0, 1)
     n = ca.vertcat(*forces) if forces else ca.SX(0, 1)
     return ForceLaw(

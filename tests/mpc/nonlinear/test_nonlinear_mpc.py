@@ -47,12 +47,11 @@ def a_sea(controller: LinearMPC, size: float, seed: int) -> FloatArray:
 @pytest.mark.parametrize("name", ["thesis-1975", "thesis-1975-rope", "subsea-crane"])
 def test_linear_plant_and_forces_together_are_the_nonlinear_plant(name: str) -> None:
     winch = sampled_winch(sh.load_case(name))
-    law = force_law(winch, slack=range(winch.masses), losses=True)
+    law = force_law(winch, slack=range(winch.masses))
     stage = make_stage(winch, law, compiled=False)
     plant = build_plant(winch.data, winch.masses)
     rest = plant.operating_point(MEAN_LOSSES)
-    lossy = {"winch.gear_switching": 0.5} if winch.data.gear_efficiency < 1.0 else {}
-    p, nx = plant.parameter_vector(lossy), len(plant.states)
+    p, nx = plant.parameter_vector(), len(plant.states)
     rng = np.random.default_rng(0)
     size = [{"speed": 20.0, "angle": 300.0}.get(s.rsplit(".", 1)[-1], 3.0) for s in plant.states]
     known = {name: k for k, name in enumerate(winch.plant.disturbances)}
@@ -76,7 +75,7 @@ def test_linear_plant_and_forces_together_are_the_nonlinear_plant(name: str) -> 
 
 def test_derivatives_of_the_forces_are_finite_differences(crane: sh.Case) -> None:
     winch = sampled_winch(crane)
-    stage = make_stage(winch, force_law(winch, losses=True), compiled=False)
+    stage = make_stage(winch, force_law(winch), compiled=False)
     rng = np.random.default_rng(1)
     scale = np.maximum(stage.rest, 1.0)
     y = stage.rest * rng.normal(0.5, 0.5, size=(40, len(stage.rest))) + rng.normal(size=(40, 1))
@@ -182,7 +181,6 @@ def test_without_nonlinearities_it_is_the_linear_controller(name: str) -> None:
         limits=limits,
         drag=False,
         slack=(),
-        losses=False,
         mean_torque=False,
     )
     for seed, size in enumerate((0.1, 0.5, 1.0, 2.0)):
@@ -240,9 +238,7 @@ def test_condensed_linearisation_is_the_slope_of_a_simulation(thesis: sh.Case) -
 )
 def test_converged_iterations_are_ipopts_answer(name: str, seed: int, size: float) -> None:
     case = sh.load_case(name)
-    controller = NonlinearMPC(
-        case, weights=WEIGHTS, horizon=2.0, masses=1, minimum_tension=0.0, losses=False
-    )
+    controller = NonlinearMPC(case, weights=WEIGHTS, horizon=2.0, masses=1, minimum_tension=0.0)
     chi = a_sea(controller, size, seed)
     moves = controller.optimise(chi)
     answer = nlp_oracle(controller, chi)
