@@ -171,11 +171,6 @@ class Run:
         """Whether the run went to its end."""
         return self.status == "completed"
 
-    @property
-    def store_step(self) -> float:
-        """Time between stored samples [s]; NaN with less than two."""
-        return float(self.time[1] - self.time[0]) if self.time.size > 1 else math.nan
-
     def __contains__(self, name: object) -> bool:
         """Return whether there is a signal of that name."""
         return name in self.signals

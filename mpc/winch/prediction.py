@@ -188,17 +188,6 @@ class PredictionModel(ReadOnlyArrays):
             delay / self.winch.sample_time,
         )
 
-    def __str__(self) -> str:
-        """Return a small tree of sizes."""
-        waiting = sum(self.depth.values())
-        return (
-            f"PredictionModel of {self.winch.case.name}, every {self.winch.sample_time:g} s\n"
-            f"├ winch and sensors: {self.winch.size} states, {self.winch.masses} rope masses\n"
-            f"├ sea: {self.sea.order} states, misfit {100 * self.sea.shape_error:.2g} %\n"
-            f"├ constants: {', '.join(CONSTANTS)}\n"
-            f"└ on their way: {waiting} values"
-        )
-
 
 def prediction_model(winch: SampledWinch) -> PredictionModel:
     """Return the prediction model of a winch, next to certain of the world: see `with_noise`.
