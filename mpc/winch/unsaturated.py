@@ -100,34 +100,27 @@ class Unsaturated:
         """Return the largest modulus of the poles, below one where the loop is stable."""
         return float(np.abs(self.poles(plant, share=share)).max())
 
-    def sensitivity(
-        self, omega: FloatArray, *, at: str = "torque", plant: PredictionModel | None = None
-    ) -> ComplexArray:
-        """Return S = 1/(1 + L), the loop broken at the torque or at the command, (k,).
+    def sensitivity(self, omega: FloatArray, plant: PredictionModel | None = None) -> ComplexArray:
+        """Return S = 1/(1 + L), the loop broken at the torque, (k,).
 
-        At the torque the drive's back-EMF, or its speed regulator, stays part of the plant's own
-        behaviour that the controller compensates; at the command it is part of the loop.
+        The drive's back-EMF, or its speed regulator, is part of the plant's own behaviour, which
+        the controller compensates.
 
         Parameters
         ----------
         omega
             [rad/s], below half the sample rate, (k,).
-        at
-            ``torque`` or ``command``.
         plant
             The plant; by default that of the model.
         """
         true = self.model if plant is None else plant
-        step = self.model.winch.sample_time
-        z = np.exp(1j * np.asarray(omega, dtype=np.float64) * step)
-        A, B, C = _plant(true)
-        Ac, Bc, Cc, Dc = self.controller
-        if at == "torque":
-            # The model's own input: what the back-EMF takes away is part of its A.
-            kept = _reached(true)
-            A, B = true.A[np.ix_(kept, kept)], true.B[kept]
-            row = -self._feedback
-            Cc, Dc = (row @ self._kept)[None, :], (row @ self.gain)[None, :]
+        z = np.exp(1j * np.asarray(omega, dtype=np.float64) * self.model.winch.sample_time)
+        # The model's own input: what the back-EMF takes away is part of its A.
+        kept = _reached(true)
+        A, B, C = true.A[np.ix_(kept, kept)], true.B[kept], true.C[:, kept]
+        Ac, Bc, _, _ = self.controller
+        row = -self._feedback
+        Cc, Dc = (row @ self._kept)[None, :], (row @ self.gain)[None, :]
         through = C @ np.linalg.solve(_pencil(A, z), np.broadcast_to(B, (z.size, *B.shape)))
         back = Cc @ np.linalg.solve(_pencil(Ac, z), np.broadcast_to(Bc, (z.size, *Bc.shape))) + Dc
         return np.asarray(1.0 / (1.0 - (back @ through)[:, 0, 0]))

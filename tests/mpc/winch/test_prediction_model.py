@@ -202,19 +202,16 @@ def test_sensitivity_agrees_with_python_control():
     T = model.winch.sample_time
     omega = np.geomspace(0.05, 50.0, 40)
     kept = np.r_[0 : model.winch.size, model.constants_at.stop : model.size]
-    A, C = np.array(model.A), model.C[:, kept]
-    winch = model.winch
-    A[: winch.size, : winch.size] -= (
-        winch.back * winch.gain * np.outer(model.B[: winch.size, 0], winch.speed)
-    )
-    plant = control.ss(
-        A[np.ix_(kept, kept)], model.B[kept] * winch.gain, C, np.zeros((len(C), 1)), T
-    )
-    law = control.ss(*loop.controller, T)
+    C = model.C[:, kept]
+    plant = control.ss(model.A[np.ix_(kept, kept)], model.B[kept], C, np.zeros((len(C), 1)), T)
+    # From the measurements to the torque: the controller's own command less what the speed takes.
+    Ac, Bc, _, _ = loop.controller
+    row, left = -feedback_row(loop.regulator, model), np.eye(model.size) - loop.gain @ model.C
+    law = control.ss(Ac, Bc, row @ left, row @ loop.gain, T)
     through = plant(np.exp(1j * omega * T))
     back = law(np.exp(1j * omega * T))
     product = np.einsum("ik,ik->k", back[0], through[:, 0])
-    assert loop.sensitivity(omega, at="command") == pytest.approx(1.0 / (1.0 - product), rel=1e-6)
+    assert loop.sensitivity(omega) == pytest.approx(1.0 / (1.0 - product), rel=1e-6)
     assert loop.growth() < 1.0
     assert loop.max_sensitivity() >= np.abs(loop.sensitivity(omega)).max() - 1e-2
 
