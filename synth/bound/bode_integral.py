@@ -96,16 +96,10 @@ class BodeEstimate:
         return f"Bode's integral: {'; '.join(said)}" if said else ""
 
 
-def bode_estimate(assessment: Assessment, *, available: float | None = None) -> BodeEstimate:
-    """Return the estimate for a loop with one input and what shakes it first.
+def bode_estimate(assessment: Assessment) -> BodeEstimate:
+    """Return the estimate for a loop with one input and what shakes it first, in its band.
 
-    Parameters
-    ----------
-    assessment
-        The closed loop; its first disturbance has a band.
-    available
-        Frequency beyond which the loop has nothing to trade [rad/s]; by default where |L| falls
-        below 0.1 for good.
+    The loop has something to trade up to where |L| falls below 0.1 for good.
     """
     sea = assessment.disturbances[0]
     low, high = sea.band or (1e-2, 1e2)
@@ -113,15 +107,12 @@ def bode_estimate(assessment: Assessment, *, available: float | None = None) -> 
     omega, width = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
     cumulated = np.cumsum(sea.density(omega) * width)
     begin, end = np.interp(_QUANTILES, cumulated / cumulated[-1], omega)
-    top = available
-    if top is None:
-        strong = assessment.grid[np.abs(assessment.loop_gain(assessment.grid)) > _GONE]
-        top = float(strong.max(initial=end))
+    strong = assessment.grid[np.abs(assessment.loop_gain(assessment.grid)) > _GONE]
     at = np.linspace(begin, end, 400)
     inside = np.log(np.abs(1.0 / (1.0 + assessment.loop_gain(at))))
     return BodeEstimate(
         band=float(end - begin),
-        available=top,
+        available=float(strong.max(initial=end)),
         max_sensitivity=assessment.max_sensitivity,
         achieved=float(np.exp(np.mean(inside))),
         **_resonance(assessment),

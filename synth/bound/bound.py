@@ -130,7 +130,6 @@ def lqg_bound(
     order: int = 8,
     refits: int = 2,
     assumptions: tuple[str, ...] = (),
-    factors: Mapping[str, SpectralFactor] | None = None,
     begin: Mapping[str, float] | None = None,
 ) -> Bound:
     """Return a lower bound on a weighted variance for every linear controller.
@@ -156,8 +155,6 @@ def lqg_bound(
         How often these are fitted again, to what counts in the loop.
     assumptions
         Further remarks that the bound carries.
-    factors
-        Spectral factors that are known already, by name of the disturbance.
     begin
         Multipliers to begin with, as those of a bound with other sensors.
 
@@ -179,11 +176,8 @@ def lqg_bound(
     sources = disturbances(spectra, plant.independent_disturbances)
     check_range("bound", "pade", pade, low=1, high=6)
     model = plant.without_delays(pade, at="measurements")
-    known = factors or {}
     fitted: dict[str, SpectralFactor | float] = {
-        s.name: value.intensity
-        if isinstance(value, White)
-        else known.get(s.name) or spectral_factor(s, order)
+        s.name: value.intensity if isinstance(value, White) else spectral_factor(s, order)
         for s, value in zip(sources, spectra.values(), strict=True)
     }
     start: FloatArray | None = None

@@ -414,7 +414,7 @@ def _high_order(
     return high_order(design, most, truth, states=states)
 
 
-def exact_sensors(case: Case, measurements: Sequence[str] | None = None) -> tuple[str, ...]:
+def exact_sensors(case: Case, measurements: Sequence[str]) -> tuple[str, ...]:
     """Return the sensors that tell of payload or ship and to which a case gives no noise.
 
     Parameters
@@ -422,13 +422,12 @@ def exact_sensors(case: Case, measurements: Sequence[str] | None = None) -> tupl
     case
         The case.
     measurements
-        What is heard; by default all that is aboard.
+        What is heard.
     """
     payload, mru = case.sensors.payload, case.sensors.mru
     noise = {f"payload.{name}": getattr(payload, f"{name}_noise") for name in _SIGNALS}
     noise |= dict.fromkeys(_MRU, 0.0 if mru is None else mru.noise_floor + mru.noise_fraction)
-    heard = aboard(case) if measurements is None else measurements
-    return tuple(name for name in heard if noise.get(name, 1.0) == 0.0)
+    return tuple(name for name in measurements if noise.get(name, 1.0) == 0.0)
 
 
 def rms_limits(limits: Sequence[Limit], period: float) -> dict[str, float]:

@@ -107,13 +107,13 @@ def roots(design: YoulaDesign) -> tuple[FloatArray, FloatArray]:
 
 
 def truncated(
-    design: YoulaDesign, order: int, found: tuple[FloatArray, FloatArray] | None = None
+    design: YoulaDesign, order: int, found: tuple[FloatArray, FloatArray]
 ) -> LinearController:
     """Return a design's controller on at most `order` states; it need not be stabilising.
 
-    `found` are its `roots`, if they are known already.
+    `found` are its `roots`.
     """
-    left, right = truncation_of_roots(*(found or roots(design)), order)
+    left, right = truncation_of_roots(*found, order)
     given = design.controller
     return replace(given, A=left @ given.A @ right, B=left @ given.B, C=given.C @ right)
 

@@ -63,9 +63,7 @@ class MotorData:
         )
 
 
-def motor_changes(
-    case: Case, scale: float = 1.0, *, exponent: float = INERTIA_EXPONENT
-) -> dict[str, float]:
+def motor_changes(case: Case, scale: float) -> dict[str, float]:
     """Return the changes by dotted path that make a case's motor `scale` times as large.
 
     Parameters
@@ -74,8 +72,6 @@ def motor_changes(
         The case, its motor the one of scale 1.
     scale
         Continuous torque over that of the case's motor.
-    exponent
-        Of the inertia over the torque.
 
     Raises
     ------
@@ -84,7 +80,7 @@ def motor_changes(
     """
     check_range("motor", "scale", scale, low=0.0, open_low=True)
     motor, drive, box = case.winch.motor, case.winch.drive, case.winch.gearbox
-    inertia = scale**exponent
+    inertia = scale**INERTIA_EXPONENT
     changes = {
         "winch.motor.inertia": motor.inertia * inertia,
         "winch.motor.viscous_friction": motor.viscous_friction * scale,
@@ -103,23 +99,9 @@ def motor_changes(
     return changes
 
 
-def with_motor(
-    case: Case,
-    scale: float = 1.0,
-    gear: float | None = None,
-    *,
-    exponent: float = INERTIA_EXPONENT,
-) -> Case:
+def with_motor(case: Case, scale: float, gear: float) -> Case:
     """Return a case with its motor `scale` times as large behind a gear of ratio `gear`.
 
-    Parameters
-    ----------
-    case, scale, exponent
-        See `motor_changes`.
-    gear
-        Turns of the motor per turn of the drum; by default the case's.
+    See `motor_changes`; the ratio is in turns of the motor per turn of the drum.
     """
-    changes: dict[str, float] = motor_changes(case, scale, exponent=exponent)
-    if gear is not None:
-        changes["winch.gearbox.ratio"] = gear
-    return case.variant(changes)
+    return case.variant({**motor_changes(case, scale), "winch.gearbox.ratio": gear})

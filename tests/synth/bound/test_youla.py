@@ -14,7 +14,7 @@ from models.plant import LinearPlant
 from models.sea import SeaSpectrum
 from synth.bound import Bound
 from synth.bound.bound import lqg_bound
-from synth.bound.high_order import high_order, truncated
+from synth.bound.high_order import high_order, roots, truncated
 from synth.bound.youla import Truth, basis, poles_of_functions, realised_basis, youla_design
 from synth.limits import RollOff
 from synth.loop import Assessment, LinearController, closed_loop_poles
@@ -125,7 +125,7 @@ def test_truncation_is_a_controller_of_low_order(bound: Bound) -> None:
     assert dense <= 2.0 * 1.002
     assert found.margins.max_sensitivity == pytest.approx(dense, rel=1e-4)
     # All the states are the controller itself.
-    same = truncated(design, len(design.controller.A))
+    same = truncated(design, len(design.controller.A), roots(design))
     assert weighted_rms(bound, same) == pytest.approx(design.value, rel=1e-3)
 
 

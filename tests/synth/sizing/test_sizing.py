@@ -38,7 +38,7 @@ def sizing(case: sh.Case) -> Sizing:
 def test_a_motor_of_scale_one_is_the_case_itself() -> None:
     for name in ("thesis-1975", "subsea-crane"):
         case = sh.load_case(name)
-        assert with_motor(case) == case
+        assert with_motor(case, 1.0, case.winch.gearbox.ratio) == case
 
 
 @pytest.mark.parametrize("scale", [0.8, 3.0])
