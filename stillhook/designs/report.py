@@ -57,12 +57,12 @@ def design_report(design: Design, *, bound: bool = True) -> Report:
             ],
         ),
     ]
-    if (tried := alternatives_table(design)) is not None:
-        sections.append(ReportSection("Structures", [tried]))
-    if (members := member_table(design)) is not None:
-        sections.append(ReportSection("Members", [members]))
-    if (shares := share_table(design)) is not None:
-        sections.append(ReportSection("", [shares]))
+    tables = (
+        ("Structures", alternatives_table(design)),
+        ("Members", member_table(design)),
+        ("", share_table(design)),
+    )
+    sections += [ReportSection(title, [table]) for title, table in tables if table is not None]
     if has_loop(design):
         law = f"`{command_text(design)}`"
         sections.append(ReportSection("Gains", [law, parameter_table(design)]))

@@ -8,7 +8,7 @@ from models.spread import GAINS
 
 from ...text import Report, ReportSection
 from ..declare import CASE, DESIGN, options, within
-from ..given import case_words, given_case, split_pairs
+from ..given import case_words, given_case, read_pairs
 from ..given_design import given_design, with_design
 from ..working import conclude, working
 
@@ -31,7 +31,7 @@ ARGUMENTS = (
 def run(arguments: argparse.Namespace) -> int:
     """Analyse and show; return 0 if the loop is stable over the ranges, 1 if not."""
     case = given_case(arguments)
-    off = parse_off(arguments.off) or _USUAL
+    off = read_pairs("--off", "PATH=SHARE, as in payload.mass=0.3", arguments.off) or _USUAL
     design = given_design(case, arguments)
     from synth.robust import robustness
 
@@ -56,21 +56,3 @@ def run(arguments: argparse.Namespace) -> int:
         sections=[ReportSection("", rest)],
     )
     return conclude(with_design(report, design, case, arguments), arguments, following=again)
-
-
-def parse_off(texts: list[str]) -> dict[str, float | str]:
-    """Return shares, or widths with a unit, by path.
-
-    Examples
-    --------
-    >>> parse_off(["payload.mass=0.3", "delay = 20 ms"])
-    {'payload.mass': 0.3, 'delay': '20 ms'}
-    """
-    found: dict[str, float | str] = {}
-    form = "PATH=SHARE, as in payload.mass=0.3"
-    for path, width in split_pairs("--off", form, texts).items():
-        try:
-            found[path] = float(width)
-        except ValueError:
-            found[path] = width
-    return found

@@ -12,7 +12,6 @@ import stillhook as sh
 from models import load_case
 from models.basics import InputError
 from stillhook.cli import main
-from stillhook.commands.design.margins import parse_off
 from synth.robust import robustness
 
 GAINS = {"A": 1.0, "a": 4394.0, "a1": 2393.0, "a2": 13691.0}
@@ -171,8 +170,9 @@ def test_margins_command_refuses(
     assert message in capsys.readouterr().err
 
 
-def test_ranges_from_the_command_line() -> None:
-    assert parse_off(["payload.mass=0.3", "delay = 20 ms"]) == {
-        "payload.mass": 0.3,
-        "delay": "20 ms",
-    }
+def test_ranges_from_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
+    off = ["--off", "payload.mass=0.3", "--off", "delay = 20 ms"]
+    assert main(["margins", "thesis-1975", *off, "--draws", "10"]) == 1
+    told = capsys.readouterr().out
+    assert "payload.mass: 25790.8 to 47897.2" in told
+    assert "sensors.telemetry.delay: 0 to 0.02" in told
