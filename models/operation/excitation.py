@@ -159,8 +159,6 @@ class Motion:
         From the first row to the last [s].
     step
         Time from row to row [s].
-    seed
-        The seed that it was drawn with, None if nothing was drawn.
     evaluate
         Gives displacement, velocity and acceleration at `count` rows from row `start` on.
     """
@@ -168,7 +166,6 @@ class Motion:
     source: str
     duration: float
     step: float
-    seed: int | None = None
     evaluate: Callable[[int, int], MotionBlock]
 
     @property
@@ -317,7 +314,6 @@ class SpectrumMotion:
             source=self.description,
             duration=duration,
             step=step,
-            seed=seed,
             evaluate=interpolated(pieces, pieces.last, self.node_step, step),
         )
 
