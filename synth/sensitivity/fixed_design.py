@@ -9,7 +9,6 @@ differs from the one designed for.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 from models.basics import InputError, SolverError
 from models.case import Case
@@ -18,7 +17,7 @@ from models.plant import PlantData
 from models.sensing import sensed_plant
 
 from ..design import Design
-from ..loop import Assessment, Disturbance, DragElement, disturbances
+from ..loop import Assessment, DragElement, disturbances
 from ..question import heard_spectra
 from ..structures import ParametrisedController
 from .fields import numbers_of
@@ -75,28 +74,19 @@ class FixedDesign:
         """The case's own linear drag, if it gives one [N s/m]."""
         return self.case.payload.fixed_drag or 0.0
 
-    @cached_property
-    def disturbances(self) -> tuple[Disturbance, ...]:
-        """What shakes the plant."""
-        return self.disturbances_of(self.case)
-
-    def disturbances_of(self, case: Case) -> tuple[Disturbance, ...]:
-        """Return what shakes the plant of a changed case."""
-        hook = HookMotion.from_case(case, warn=False)
-        spectra = heard_spectra(case, hook, self.design.measurements)
-        return disturbances(spectra, tuple(spectra))
-
     def assessment(self) -> Assessment | None:
         """Return the closed loop; None if it is unstable."""
         stochastic = self.stochastic
         # Where a consistent drag is counted from: that before compensation.
         start = self.design.question.drag_before if stochastic else self.fixed_drag
         plant = sensed_plant(self.case, masses=self.design.masses, drag=start)
+        hook = HookMotion.from_case(self.case, warn=False)
+        spectra = heard_spectra(self.case, hook, self.design.measurements)
         quadratic = PlantData.from_case(self.case).quadratic_drag
         assessment = Assessment(
             plant.select(measurements=self.design.measurements),
             self.law.controller(list(self.values)),
-            self.disturbances,
+            disturbances(spectra, tuple(spectra)),
             drag=DragElement(quadratic=quadratic, reference=start) if stochastic else None,
             coefficient=self.drag,
         )

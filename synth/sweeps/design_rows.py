@@ -144,8 +144,10 @@ class DesignRows:
         self.law = DesignLaw(question, parameters)
         self.lumps = lump_rope(masses or question.masses, case.rope.lumping)
         self.sea = SeaRows(case, spread)
-        self.given = None if nodes is None else SweepNodes.of(nodes, self.sea.density)
         self._nodes: dict[int, SweepNodes] = {}  # by level
+        if nodes is not None:
+            given = SweepNodes.of(nodes, self.sea.density)
+            self._nodes = dict.fromkeys(range(_LEVELS), given)
         self.columns: bool | None = None  # whether column arithmetic suffices
         self.refined = 0  # rows that needed finer nodes
         self.unresolved = 0  # ... and those that none of them resolved
@@ -213,8 +215,6 @@ class DesignRows:
 
     def level_nodes(self, level: int = 0) -> SweepNodes:
         """Return the common nodes of a level."""
-        if self.given is not None:
-            return self.given
         if level not in self._nodes:
             panels = self._panels
             for _ in range(level):

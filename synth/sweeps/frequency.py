@@ -147,31 +147,6 @@ class FrequencyEngine:
         """Return the loop gain L(i omega) of rows, (n, k), at frequencies above zero [rad/s]."""
         return self.rows.loop_gain(np.atleast_2d(rows), np.asarray(omega, dtype=np.float64))
 
-    def dataset(
-        self,
-        rows: FloatArray,
-        *,
-        first: int = 0,
-        notes: dict[str, Any] | None = None,
-        progress: Progress | None = None,
-    ) -> xr.Dataset:
-        """Return the dataset of rows, the first of them being case number `first`."""
-        columns = self.evaluate(rows, progress)
-        return dataset_of(
-            self.design,
-            self.spread,
-            np.asarray(rows, dtype=np.float64),
-            columns,
-            self.metrics,
-            first=first,
-            notes={
-                **(notes or {}),
-                "nodes": len(self.rows.level_nodes()),
-                "refined": self.rows.refined,
-                "unresolved": self.rows.unresolved,
-            },
-        )
-
     def chunks(
         self,
         *,
@@ -203,7 +178,21 @@ class FrequencyEngine:
                 if progress is not None:
                     progress(stage, before + done, total)
 
-            yield self.dataset(rows, first=at, notes=notes, progress=tell)
+            columns = self.evaluate(rows, tell)
+            own = {
+                "nodes": len(self.rows.level_nodes()),
+                "refined": self.rows.refined,
+                "unresolved": self.rows.unresolved,
+            }
+            yield dataset_of(
+                self.design,
+                self.spread,
+                rows,
+                columns,
+                self.metrics,
+                first=at,
+                notes={**notes, **own},
+            )
 
 
 @one_thread()

@@ -148,13 +148,11 @@ def numbers_of(
 
 def _agree(quick: Numbers, spread: Spread, rows: FloatArray) -> bool:
     """Return whether plants by column arithmetic are those of their checked cases."""
-    for k, row in enumerate(rows):
-        exact = PlantData.from_case(_case_at(spread, row))
-        for name in _PLAIN:
-            value, own = getattr(exact, name), float(quick[name][k % quick[name].size])
-            same = value == own or abs(value - own) <= _AGREE * abs(value)
-            if not (same or (math.isnan(value) and math.isnan(own))):
-                return False
+    table = np.stack(np.broadcast_arrays(*quick.values(), np.zeros(len(rows)))[:-1], axis=1)
+    for row, own in zip(rows, table, strict=True):
+        exact = np.concatenate(list(columns_of(_case_at(spread, row)).values()))
+        if not np.allclose(own, exact, rtol=_AGREE, atol=0.0, equal_nan=True):
+            return False
     return True
 
 

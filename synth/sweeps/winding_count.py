@@ -61,8 +61,13 @@ class _Path(NamedTuple):
     after: IndexArray
 
 
-def count_unstable(loops: ChainLoops, rows: IndexArray | None = None) -> IndexArray:
-    """Return how many poles each loop has in the right half plane; -1 where one is on the axis.
+def survey(
+    loops: ChainLoops, rows: IndexArray | None = None, *, peaks: bool = True
+) -> tuple[IndexArray, FloatArray]:
+    """Return how many poles loops have in the right half plane, and their M_s, (m,) each.
+
+    The count is -1 where a pole is on the axis; M_s = max 1/|1 + L| is that of any loop, stable or
+    not.
 
     Parameters
     ----------
@@ -70,16 +75,8 @@ def count_unstable(loops: ChainLoops, rows: IndexArray | None = None) -> IndexAr
         The loops.
     rows
         Which of them; all if left out.
-    """
-    return survey(loops, rows, peaks=False)[0]
-
-
-def survey(
-    loops: ChainLoops, rows: IndexArray | None = None, *, peaks: bool = True
-) -> tuple[IndexArray, FloatArray]:
-    """Return `count_unstable`, and M_s = max 1/|1 + L| of each loop, stable or not, (m,).
-
-    Without `peaks` there is no M_s (NaN), and what stands in its way need not be followed.
+    peaks
+        Whether M_s is wanted: else it is NaN, and what stands in its way need not be followed.
     """
     chosen = np.arange(len(loops)) if rows is None else rows
     count = np.empty(chosen.size, dtype=np.intp)

@@ -23,7 +23,7 @@ from synth.sweeps.kernel import hurwitz
 from synth.sweeps.law_rows import DesignLaw
 from synth.sweeps.numbers import numbers_of
 from synth.sweeps.sweep_nodes import sweep_nodes, sweep_panels
-from synth.sweeps.winding_count import calming_drag, count_unstable, survey
+from synth.sweeps.winding_count import calming_drag, survey
 from synth.verify import LawMatrices
 from synth.verify.winding import count_unstable as wind_one
 
@@ -111,7 +111,7 @@ def test_rouths_array_knows_stable_polynomials(degree: int) -> None:
 def test_winding_number_counts_the_eigenvalues(masses: int) -> None:
     engine, loops = chains(masses, 60, seed=masses, delay=0.0)
     rows = engine.spread.sample(60, seed=masses)
-    counts = count_unstable(loops)
+    counts = survey(loops)[0]
     expected = [int((closed_poles(engine, row).real > 0.0).sum()) for row in rows]
     assert counts.tolist() == expected
     assert 5 < sum(n == 0 for n in expected) < 55
@@ -120,7 +120,7 @@ def test_winding_number_counts_the_eigenvalues(masses: int) -> None:
 def test_winding_number_with_delay_is_that_of_one_loop_followed_alone() -> None:
     engine, loops = chains(8, 10, seed=5, delay=0.25)
     rows = engine.spread.sample(10, seed=5)
-    counts = count_unstable(loops)
+    counts = survey(loops)[0]
     expected = []
     for row in rows:
         question = pose(engine.spread.case_at(row), masses=engine.design.masses)
@@ -176,7 +176,7 @@ def test_spring_and_chain_agree_where_both_are_possible() -> None:
         lumps=lump_rope(1, "thesis"),
     )
     stable = found["stable"].astype(bool)
-    np.testing.assert_array_equal(count_unstable(loops) == 0, stable)
+    np.testing.assert_array_equal(survey(loops)[0] == 0, stable)
     chosen = np.flatnonzero(stable)
     np.testing.assert_allclose(
         survey(loops, chosen)[1], found["max_sensitivity"][chosen], rtol=1e-8
@@ -191,14 +191,14 @@ def test_drag_from_which_a_loop_is_stable_is_where_the_axis_is_crossed() -> None
     assert rows.size > 3
     never = np.flatnonzero(np.isinf(edge))
     assert never.size > 0
-    assert np.all(count_unstable(loops.with_drag(np.array([1e12])), never) == 1)
+    assert np.all(survey(loops.with_drag(np.array([1e12])), never)[0] == 1)
     edge = np.where(np.isinf(edge), 0.0, edge)
     calm = np.setdiff1d(np.arange(12), [*rows, *never])
-    above = count_unstable(loops.with_drag(edge * 1.0001), rows)
-    below = count_unstable(loops.with_drag(edge * 0.9999), rows)
+    above = survey(loops.with_drag(edge * 1.0001), rows)[0]
+    below = survey(loops.with_drag(edge * 0.9999), rows)[0]
     assert np.all(above == 0)
     assert np.all(below > 0)
-    assert np.all(count_unstable(loops.with_drag(np.zeros(1)), calm) == 0)
+    assert np.all(survey(loops.with_drag(np.zeros(1)), calm)[0] == 0)
 
 
 def test_gauss_kronrod_pair_is_exact_to_its_degree() -> None:
