@@ -296,8 +296,7 @@ class DesignRows:
         poles = light_poles(loops, 0)
         marks = [complex(p) for p in poles if p.real < 0.0 and p.imag >= 0.0]
         axis, splits = self._frame
-        panels = sweep_panels(axis, splits, level=2, marks=marks, clearance=0.6)
-        return sweep_nodes(axis, panels, self.sea.density)
+        return sweep_nodes(axis, sweep_panels(axis, splits, marks), self.sea.density)
 
     def _solved(
         self, rows: FloatArray, loops: ChainLoops, nodes: SweepNodes, *, alone: bool = False

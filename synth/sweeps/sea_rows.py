@@ -8,8 +8,6 @@ through its own case.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from models.basics import FloatArray
@@ -23,14 +21,6 @@ _SEA = ("sea.", "vessel.")
 _TRIED = 5
 _AGREE = 1e-10
 _PROBES = np.geomspace(0.05, 50.0, 60)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Scaling:
-    """How the density follows from the case's own: a factor, a stretch, or not at all."""
-
-    height: str | None = None
-    period: str | None = None
 
 
 class SeaRows:
@@ -48,20 +38,16 @@ class SeaRows:
         self._columns = [j for j, p in enumerate(spread.paths) if p.startswith(_SEA)]
         self._known: dict[bytes, HookMotion] = {}
         names = {spread.paths[j] for j in self._columns}
-        self._scaling: _Scaling | None = _Scaling()
-        if names:
-            self._scaling = self._tried(
-                _Scaling(
-                    height=_HEIGHT if _HEIGHT in names else None,
-                    period=next((p for p in _PERIODS if p in names), None),
-                ),
-                names,
-            )
+        # How the density follows from the case's own: a factor, a stretch, or not at all.
+        self._height = _HEIGHT if _HEIGHT in names else None
+        self._period = next((p for p in _PERIODS if p in names), None)
+        self._scales = True
+        self._scales = self._holds(names)
 
     @property
     def varies(self) -> bool:
         """Whether rows differ in more than a factor."""
-        return self._scaling is None or self._scaling.period is not None
+        return not self._scales or self._period is not None
 
     def frame(self) -> tuple[float, float, list[float]]:
         """Return the band that holds all densities, and where they have kinks or end [rad/s]."""
@@ -75,10 +61,10 @@ class SeaRows:
 
     def factors(self, rows: FloatArray) -> FloatArray:
         """Return the factor on the common density of each row, (n,) or (1,)."""
-        if self._scaling is None or self._scaling.height is None or not len(rows):
+        if not self._scales or self._height is None or not len(rows):
             return np.ones(1)
-        j = self.spread.paths.index(self._scaling.height)
-        factor: FloatArray = (rows[:, j] / self.spread.nominal[self._scaling.height]) ** 2
+        j = self.spread.paths.index(self._height)
+        factor: FloatArray = (rows[:, j] / self.spread.nominal[self._height]) ** 2
         return factor
 
     def heave_rms(
@@ -100,32 +86,30 @@ class SeaRows:
         """Return density over factor of each row at the nodes, (n, k); None if it is common."""
         if not self.varies:
             return None
-        if self._scaling is None:
+        if not self._scales or self._period is None:
             return np.stack([np.asarray(self._own(row).density(omega)) for row in rows])
-        assert self._scaling.period is not None
-        j = self.spread.paths.index(self._scaling.period)
-        stretch = rows[:, j] / self.spread.nominal[self._scaling.period]
+        j = self.spread.paths.index(self._period)
+        stretch = rows[:, j] / self.spread.nominal[self._period]
         sea = np.asarray(self.hook.sea.density((stretch[:, None] * omega).ravel()))
         heave = np.abs(self.hook.rao.response(omega)) ** 2
         return np.asarray(sea.reshape(len(rows), -1) * stretch[:, None] * heave)
 
-    def _tried(self, scaling: _Scaling, names: set[str]) -> _Scaling | None:
-        """Return the scaling if it holds on some rows and nothing else of the sea varies."""
-        if names - {scaling.height, scaling.period}:
-            return None
-        self._scaling = scaling
-        if scaling.period is not None:
+    def _holds(self, names: set[str]) -> bool:
+        """Return whether the scaling holds on some rows, and nothing else of the sea varies."""
+        if names - {self._height, self._period}:
+            return False
+        if self._period is not None:
             plain = np.abs(self.hook.rao.response(_PROBES)) ** 2 * self.hook.sea.density(_PROBES)
             if not np.allclose(plain, self.hook.density(_PROBES), rtol=_AGREE, atol=0.0):
-                return None
-        for row in self._some(_TRIED):
+                return False
+        for row in self._some(_TRIED) if names else ():
             own = np.asarray(self._own(row).density(_PROBES))
             common = self.ratios(row[None], _PROBES)
             found = self.density(_PROBES) if common is None else common[0]
             found = found * self.factors(row[None])[0]
             if np.any(np.abs(found - own) > _AGREE * np.maximum(own, 1e-12 * own.max())):
-                return None
-        return scaling
+                return False
+        return True
 
     def _some(self, count: int) -> list[FloatArray]:
         """Return rows at the ends of what varies of the sea, and some in between."""

@@ -32,6 +32,7 @@ Density = Callable[[FloatArray], FloatArray]
 Panel = tuple[float, float]
 
 _PER_DECADE = 1.5
+_CLEARANCE = 0.6  # half of a panel over its distance from each pole of a loop, at most
 _FINE, _FINE_RULE = 0.1, 16  # pieces on which a density itself is integrated, and nodes of each
 
 # Kronrod's extension of the 7-point Gauss rule (Kronrod 1964; QUADPACK's qk15): nodes from the
@@ -84,12 +85,7 @@ class SweepNodes(ReadOnlyArrays):
 
 
 def sweep_panels(
-    axis: FrequencyAxis,
-    splits: Sequence[float],
-    *,
-    level: int = 0,
-    marks: Sequence[complex] = (),
-    clearance: float = 1.5,
+    axis: FrequencyAxis, splits: Sequence[float], marks: Sequence[complex] | None = None
 ) -> list[Panel]:
     """Return panels of an axis, as their ends on it.
 
@@ -99,16 +95,13 @@ def sweep_panels(
         The band.
     splits
         Frequencies where panels end [rad/s].
-    level
-        Panels are shorter by 2 to this power.
     marks
-        Poles s [1/s] that most loops have something like; panels near them are shorter.
-    clearance
-        Half of a panel over its distance from each pole, at most.
+        Poles s [1/s] of the one loop that the panels are for, if they are: then all panels are a
+        quarter as long, and shorter yet near the poles.
     """
-    longest = longest_panel(_PER_DECADE * 2.0**level)
-    near = axis.poles(p for p in marks if p.real != 0.0)
-    return cut_panels(axis, splits, near, longest, clearance)
+    longest = longest_panel(_PER_DECADE * (1.0 if marks is None else 4.0))
+    near = axis.poles(p for p in marks or () if p.real != 0.0)
+    return cut_panels(axis, splits, near, longest, _CLEARANCE)
 
 
 def halved(panels: Sequence[Panel]) -> list[Panel]:
