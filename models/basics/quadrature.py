@@ -173,7 +173,7 @@ def spectral_nodes(
     ratio = away.min(axis=1, initial=0.5 * longest) / half
     rho = ratio + np.hypot(ratio, 1.0)
     counts = np.ceil(per_panel * math.log(_RHO_REFERENCE) / np.log(rho)).astype(np.int64)
-    omega, weights = axis.rules(panels, np.clip(counts, 3, per_panel))
+    omega, weights = axis.rules(panels, np.clip(counts, min(3, per_panel // 2), per_panel))
     return Quadrature(omega=omega, weights=weights)
 
 

@@ -278,6 +278,30 @@ class LinearPlant(ReadOnlyArrays):
             Cz=self.Cz + np.outer(self.Fz[:, f], row),
         )
 
+    def opened(self, output: str, disturbance: str) -> LinearPlant:
+        """Return the plant with an output measured and a disturbance commanded, last of their kind.
+
+        What acts from the one to the other, such as drag, is then a loop around it like any other.
+        Its measurement and its input bear their names with a question mark.
+
+        Raises
+        ------
+        InputError
+            If a name is unknown.
+        """
+        v = pick(_OWNER, "output", self.outputs, [output])
+        f = pick(_OWNER, "disturbance", self.disturbances, [disturbance])
+        return self._with(
+            B=np.hstack([self.B, self.E[:, f]]),
+            C=np.vstack([self.C, self.Cz[v]]),
+            D=np.block([[self.D, self.F[:, f]], [self.Dz[v], self.Fz[np.ix_(v, f)]]]),
+            F=np.vstack([self.F, self.Fz[v]]),
+            Dz=np.hstack([self.Dz, self.Fz[:, f]]),
+            inputs=(*self.inputs, f"{disturbance}?"),
+            measurements=(*self.measurements, f"{output}?"),
+            delays=(*self.delays, 0.0),
+        )
+
     def with_feedback(
         self, A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray
     ) -> LinearPlant:

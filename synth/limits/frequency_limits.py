@@ -14,7 +14,7 @@ from typing_extensions import override
 from models.basics import FloatArray, InputError, check_finite, check_range
 
 from ..loop import joined, log, squared
-from .limits import Limit, Symbols
+from .limits import Limit, Size, Symbols
 
 if TYPE_CHECKING:
     from ..loop import Assessment
@@ -39,6 +39,11 @@ class _AtEveryFrequency(Limit):
         """Return what is to be small at frequencies [rad/s], of 1 + L or of the response."""
         return np.asarray(np.sqrt(self.squared_size(value)) * self.weights(omega))
 
+    @property
+    @override
+    def followed(self) -> tuple[Size, float]:
+        return self.size, (1.0 / self.bound if self.at_least else self.bound) / _FOLLOWED
+
     @override
     def measure(self, loop: Assessment) -> float:
         return loop.largest(self.size, self.weights, self.edges, self.channel)
@@ -46,9 +51,9 @@ class _AtEveryFrequency(Limit):
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
         # The logarithm keeps |L| of 1e6 at low frequency from dwarfing what matters.
-        most, level = (1.0 / self.bound, bound) if self.at_least else (self.bound, 1.0 / bound)
+        level = bound if self.at_least else 1.0 / bound
         rows = []
-        for omega, value in symbols.curves(self.size, most / _FOLLOWED, self.channel):
+        for omega, value in symbols.curves(self):
             weights = self.weights(omega)
             at = np.flatnonzero(weights > 0.0)
             weighted = self.squared_size(value[..., at]) * weights[at] ** 2

@@ -37,24 +37,11 @@ class Symbols(Protocol):
     def differences(self) -> Sequence[Any]:
         """1 + L of every loop at the margin frequencies, (k,) each."""
 
-    def curves(
-        self, size: Size, above: float, channel: tuple[str, str] | None = None
-    ) -> Sequence[tuple[FloatArray, Any]]:
-        """Return curves at the margin frequencies, and where a size has its peaks between them.
+    def curves(self, limit: Limit) -> Sequence[tuple[FloatArray, Any]]:
+        """Return the curves that a limit is on: of its channel, or 1 + L of every loop.
 
-        Parameters
-        ----------
-        size, above
-            Peaks above this are followed, where margins are held as they are measured; none are
-            on a grid.
-        channel
-            Output and disturbance of the closed-loop response that is asked for; 1 + L of every
-            loop without.
-
-        Returns
-        -------
-        sequence
-            Frequencies [rad/s] and values of pieces of the curves, (k,) each.
+        Frequencies [rad/s] and values of pieces of them, (k,) each: at the margin frequencies and,
+        where margins are held as they are measured, at the peaks between that a limit `followed`.
         """
 
     @property
@@ -111,6 +98,11 @@ class Limit(ABC):
     @property
     def channel(self) -> tuple[str, str] | None:
         """Output and disturbance of the closed-loop response that the limit is on, if any."""
+        return None
+
+    @property
+    def followed(self) -> tuple[Size, float] | None:
+        """A size of the curve that the limit is on, and above what its peaks are followed."""
         return None
 
     @property

@@ -9,6 +9,7 @@ return the slopes too.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -26,29 +27,33 @@ class Dual:
         The numbers, (...,).
     slope
         Their derivatives by each of n variables, (n, ...).
+    at
+        Which variables these are, ascending, where there are more of them: a chain of filters need
+        not carry zeros for what others depend on.  Numbers that are added up or multiplied all say
+        it or none does; the result depends on what either does.
     """
 
-    __slots__ = ("slope", "value")
+    __slots__ = ("at", "slope", "value")
     __array_ufunc__ = None  # so that an array on the left leaves the operation to this class
 
-    def __init__(self, value: Array, slope: Array) -> None:
+    def __init__(self, value: Array, slope: Array, at: tuple[int, ...] | None = None) -> None:
         self.value = value
         self.slope = slope
+        self.at = at
 
     def __add__(self, other: Any) -> Dual:
         if isinstance(other, Dual):
-            return Dual(self.value + other.value, self.slope + other.slope)
+            value = self.value + other.value
+            return _together(value, self, self.slope, other, other.slope)
         value = self.value + other
-        return Dual(value, self._spread(value))
+        return Dual(value, self._spread(value), self.at)
 
     __radd__ = __add__
 
     def __neg__(self) -> Dual:
-        return Dual(-self.value, -self.slope)
+        return Dual(-self.value, -self.slope, self.at)
 
     def __sub__(self, other: Any) -> Dual:
-        if isinstance(other, Dual):
-            return Dual(self.value - other.value, self.slope - other.slope)
         return self.__add__(-other)
 
     def __rsub__(self, other: Any) -> Dual:
@@ -56,21 +61,18 @@ class Dual:
 
     def __mul__(self, other: Any) -> Dual:
         if isinstance(other, Dual):
-            slope = self.slope * other.value + other.slope * self.value
-            return Dual(self.value * other.value, slope)
-        return Dual(self.value * other, self.slope * other)
+            value = self.value * other.value
+            return _together(value, self, self.slope * other.value, other, other.slope * self.value)
+        return Dual(self.value * other, self.slope * other, self.at)
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> Dual:
-        if isinstance(other, Dual):
-            value = self.value / other.value
-            return Dual(value, (self.slope - value * other.slope) / other.value)
-        return Dual(self.value / other, self.slope / other)
+        return self.__mul__(1.0 / other)
 
     def __rtruediv__(self, other: Any) -> Dual:
         value = other / self.value
-        return Dual(value, -(value / self.value) * self.slope)
+        return Dual(value, -(value / self.value) * self.slope, self.at)
 
     def __matmul__(self, other: Array) -> Dual:
         """Return sums over the last axis, weighted by columns of plain numbers."""
@@ -80,7 +82,7 @@ class Dual:
         """Return some of the numbers, chosen along the last axis."""
         if isinstance(key, tuple):  # [..., key], as arrays with leading axes have it
             key = key[-1]
-        return Dual(self.value[..., key], self.slope[..., key])
+        return Dual(self.value[..., key], self.slope[..., key], self.at)
 
     def _spread(self, value: Array) -> Array:
         """Return the slopes in the shape of a value that was broadcast."""
@@ -88,21 +90,47 @@ class Dual:
         return self.slope if self.slope.shape == shape else np.broadcast_to(self.slope, shape)
 
 
+def _together(value: Array, one: Dual, by_one: Array, other: Dual, by_other: Array) -> Dual:
+    """Return a number whose slopes are the sum of two, each by what its number depends on."""
+    if one.at == other.at:
+        return Dual(value, by_one + by_other, one.at)
+    assert one.at is not None
+    assert other.at is not None
+    at, rows, others = _union(one.at, other.at)
+    slope = np.zeros((len(at), *value.shape), value.dtype)
+    slope[rows] = by_one
+    slope[others] += by_other
+    return Dual(value, slope, at)
+
+
+@lru_cache(maxsize=1024)
+def _union(one: tuple[int, ...], other: tuple[int, ...]) -> tuple[tuple[int, ...], Any, Any]:
+    """Return which variables either of two numbers depends on, and where each one's are there."""
+    at = tuple(sorted({*one, *other}))
+
+    def rows(own: tuple[int, ...]) -> Any:
+        found = [at.index(i) for i in own]
+        beside = slice(found[0], found[-1] + 1)
+        return beside if found == list(range(len(at)))[beside] else found
+
+    return at, rows(one), rows(other)
+
+
 def real(x: Any) -> Any:
     """Return the real part."""
-    return Dual(x.value.real, x.slope.real) if isinstance(x, Dual) else np.real(x)
+    return Dual(x.value.real, x.slope.real, x.at) if isinstance(x, Dual) else np.real(x)
 
 
 def imag(x: Any) -> Any:
     """Return the imaginary part."""
-    return Dual(x.value.imag, x.slope.imag) if isinstance(x, Dual) else np.imag(x)
+    return Dual(x.value.imag, x.slope.imag, x.at) if isinstance(x, Dual) else np.imag(x)
 
 
 def squared(x: Any) -> Any:
     """Return the squared magnitude."""
     if not isinstance(x, Dual):
         return np.abs(x) ** 2
-    return Dual(np.abs(x.value) ** 2, 2.0 * (np.conj(x.value) * x.slope).real)
+    return Dual(np.abs(x.value) ** 2, 2.0 * (np.conj(x.value) * x.slope).real, x.at)
 
 
 def log(x: Any) -> Any:
@@ -162,4 +190,4 @@ def _mapped(
     if not isinstance(x, Dual):
         return function(x)
     result = function(x.value)
-    return Dual(result, slope(x.value, result) * x.slope)
+    return Dual(result, slope(x.value, result) * x.slope, x.at)

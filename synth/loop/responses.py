@@ -21,7 +21,7 @@ that of the controller alone,
 
 .. math::
 
-    dv = G \, dC \, y, \quad dF = P_{zu} \, dv, \quad dG = G \, dC \, P_{yu} G .
+    dF = P_{zu} G \, dC \, y, \quad dG = G \, dC \, P_{yu} G .
 
 Reports and the optimiser look through the same lines; the verification does not.  Given many laws
 at once and no slopes, they screen candidates.
@@ -29,7 +29,7 @@ at once and no slopes, they screen candidates.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -40,17 +40,15 @@ from models.basics import ComplexArray, FloatArray
 from models.plant import PlantResponse
 
 from .controller import LinearController
-from .drag_element import DragElement
 from .dual import Dual
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoopBlocks:
-    """A plant's blocks, the drag's loop among them, at k points s.
+    """A plant's blocks at k points s.
 
     `zw` (nz, nw, k), `zu` (nz, m, k), `yw` (l, nw, k), `yu` (l, m, k), with m inputs and l
-    measurements of which the last of each is the drag's, if there is drag.  `outputs` and `sources`
-    name z and w.
+    measurements.  `outputs` and `sources` name z and w.
     """
 
     s: ComplexArray
@@ -67,26 +65,19 @@ class LoopBlocks:
         response: PlantResponse,
         outputs: Sequence[str] | None = None,
         sources: Sequence[str] | None = None,
-        drag: DragElement | None = None,
     ) -> LoopBlocks:
         """Return the blocks of a response, by default for all its outputs and disturbances."""
         outputs = response.outputs if outputs is None else tuple(outputs)
         sources = response.disturbances if sources is None else tuple(sources)
-        z = [response.outputs.index(name) for name in outputs]
-        w = [response.disturbances.index(name) for name in sources]
-        zw, yw = response.zw[:, z][:, :, w], response.yw[:, :, w]
-        zu, yu = response.zu[:, z], response.yu
-        if drag is not None:
-            v = response.outputs.index(drag.velocity)
-            f = response.disturbances.index(drag.force)
-            zu = np.concatenate([zu, response.zw[:, z, f : f + 1]], axis=2)
-            yw = np.concatenate([yw, response.zw[:, v : v + 1][:, :, w]], axis=1)
-            own = np.concatenate([response.zu[:, v : v + 1], response.zw[:, v : v + 1, f, None]], 2)
-            yu = np.concatenate(
-                [np.concatenate([yu, response.yw[:, :, f, None]], axis=2), own], axis=1
-            )
+        zw, zu, yw = response.zw, response.zu, response.yw
+        if outputs != response.outputs:
+            z = [response.outputs.index(name) for name in outputs]
+            zw, zu = zw[:, z], zu[:, z]
+        if sources != response.disturbances:
+            w = [response.disturbances.index(name) for name in sources]
+            zw, yw = zw[:, :, w], yw[:, :, w]
         zw, zu, yw, yu = (
-            np.ascontiguousarray(np.moveaxis(block, 0, -1)) for block in (zw, zu, yw, yu)
+            np.ascontiguousarray(block.transpose(1, 2, 0)) for block in (zw, zu, yw, response.yu)
         )
         return cls(s=response.s, zw=zw, zu=zu, yw=yw, yu=yu, outputs=outputs, sources=sources)
 
@@ -104,21 +95,41 @@ class LoopBlocks:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Closing:
-    """What closes a loop: C at k points, (m, l, ..., k), the drag's loop in it, and its slopes.
+    """What closes a loop: C at k points, the drag's loop in it, and its slopes.
 
-    The slopes, if asked for, are those of the entries that depend on a variable, (k,) each, by
-    variable.
+    Attributes
+    ----------
+    entries
+        The entries of C that are not zero, (..., k) each, by row and column.
+    size
+        Rows and columns of C, (m, l).
+    slopes
+        For each entry that depends on a variable which ones, (n,), and its slopes by them, (n, k);
+        None if none are asked for.
+    count
+        How many variables there are.
     """
 
-    law: ComplexArray
-    slopes: list[dict[tuple[int, int], ComplexArray]] | None
+    entries: Mapping[tuple[int, int], ComplexArray]
+    size: tuple[int, int]
+    slopes: Mapping[tuple[int, int], tuple[list[int], ComplexArray]] | None = None
+    count: int = 0
 
     def part(self, which: slice) -> Closing:
         """Return some of the points."""
         slopes = self.slopes
         if slopes is not None:
-            slopes = [{key: slope[which] for key, slope in own.items()} for own in slopes]
-        return Closing(law=self.law[..., which], slopes=slopes)
+            slopes = {key: (at, slope[:, which]) for key, (at, slope) in slopes.items()}
+        entries = {key: entry[..., which] for key, entry in self.entries.items()}
+        return replace(self, entries=entries, slopes=slopes)
+
+    def times(self, b: ComplexArray) -> ComplexArray:
+        """Return C b of a matrix (l, n, ..., k), of which few entries are zero."""
+        many = np.broadcast_shapes(*(entry.shape for entry in self.entries.values()), b.shape[2:])
+        found = np.zeros((self.size[0], b.shape[1], *many), np.complex128)
+        for (i, j), entry in self.entries.items():
+            found[i] += entry * b[j]
+        return found
 
 
 class LoopResponses:
@@ -131,18 +142,16 @@ class LoopResponses:
     """
 
     def __init__(self, blocks: LoopBlocks, closing: Closing) -> None:
-        law, slope = closing.law, closing.slopes
         self.outputs, self.sources = blocks.outputs, blocks.sources
-        self.count = 0 if slope is None else len(slope)
-        yu, yw = blocks.yu, blocks.yw
-        if law.ndim > 3:  # many parameter vectors: an axis for them before that of the points
-            yu, yw = yu[..., None, :], yw[..., None, :]
-            self._zw, self._zu = blocks.zw[..., None, :], blocks.zu[..., None, :]
-        else:
-            self._zw, self._zu = blocks.zw, blocks.zu
-        identity = np.eye(len(law)).reshape(len(law), len(law), *(1,) * (law.ndim - 2))
-        self._matrix = identity - _times(law, yu)
-        self._law, self._law_slope, self._yu, self._yw = law, slope, yu, yw
+        self._closing, self._omega, self.count = closing, np.abs(blocks.s), closing.count
+        parts = blocks.zw, blocks.zu, blocks.yw, blocks.yu
+        if any(entry.ndim > 1 for entry in closing.entries.values()):
+            # Many parameter vectors: an axis for them before that of the points.
+            parts = tuple(part[..., None, :] for part in parts)  # type: ignore[assignment]
+        self._zw, self._zu, self._yw, self._yu = parts
+        through = closing.times(self._yu)
+        m = closing.size[0]
+        self._matrix = np.eye(m).reshape(m, m, *(1,) * (through.ndim - 2)) - through
 
     @classmethod
     def of(
@@ -152,8 +161,10 @@ class LoopResponses:
         sources: Sequence[str] | None = None,
     ) -> LoopResponses:
         """Return the closed loop of a plant's response and a controller of its measurements."""
-        law = np.moveaxis(controller.response_at(response.s), 0, -1)
-        return cls(LoopBlocks.of(response, sources=sources), Closing(law=law, slopes=None))
+        law = controller.response_at(response.s)
+        size = law.shape[1], law.shape[2]
+        entries = {(i, j): law[:, i, j] for i in range(size[0]) for j in range(size[1])}
+        return cls(LoopBlocks.of(response, sources=sources), Closing(entries=entries, size=size))
 
     @cached_property
     def inverse(self) -> ComplexArray:
@@ -172,106 +183,118 @@ class LoopResponses:
     @cached_property
     def _commands(self) -> ComplexArray:
         """The commands that each disturbance causes, (m, nw, ..., k)."""
-        return _times(self.inverse, _times(self._law, self._yw))
+        return _times(self.inverse, self._closing.times(self._yw))
 
     @cached_property
-    def _command_slope(self) -> ComplexArray:
-        """Slopes of the commands by each variable, (n, m, nw, k)."""
-        assert self._law_slope is not None
-        heard = self._yw + _times(self._yu, self._commands)
-        found = np.zeros((self.count, *self._commands.shape), np.complex128)
-        for a, parts in enumerate(self._law_slope):
-            by_command: dict[int, ComplexArray] = {}
-            for (i, j), slope in parts.items():  # most entries depend on few parameters
-                term = slope * heard[j]
-                by_command[i] = by_command[i] + term if i in by_command else term
-            for i, through in by_command.items():
-                found[a] += self.inverse[:, i, None] * through
-        return found
+    def _heard(self) -> ComplexArray:
+        """What the controller hears of each disturbance, (l, nw, ..., k)."""
+        return np.asarray(self._yw + _times(self._yu, self._commands))
+
+    def _through(self, rows: Any) -> ComplexArray:
+        """Return the ways of a change of commands to some outputs, P_zu G, (rows, m, ..., k)."""
+        return _times(self._zu[rows], self.inverse)
 
     def response(self, output: str, source: str) -> Any:
         """Return the response of an output to a disturbance, (k,)."""
         row, column = self.outputs.index(output), self.sources.index(source)
         through = np.einsum("m...,m...->...", self._zu[row], self._commands[:, column])
         value = self._zw[row, column] + through
-        if self._law_slope is None:
+        if self._closing.slopes is None:
             return value
-        slope = np.einsum("rk,nrk->nk", self._zu[row], self._command_slope[:, :, column])
-        return Dual(value, slope)
+        heard = self._yw[:, column] + _times(self._yu, self._commands[:, column, None])[:, 0]
+        return Dual(value, self._turned(self._through([row])[0], heard))
 
     def difference(self, index: int) -> Any:
         """Return 1 + L of the loop broken at one command, all others closed, (k,)."""
-        if self._law_slope is None:
+        if self._closing.slopes is None:
             single = len(self._matrix) == 1
             return self._matrix[0, 0] if single else 1.0 / self.inverse[index, index]
         own = self.inverse[index, index]
         # dG_ii = G_i. dC (P_yu G)_.i
-        back = np.einsum("jmk,mk->jk", self._yu, self.inverse[:, index])
-        return Dual(1.0 / own, -self._turned(self.inverse[index], back) / own**2)
+        back = _times(self._yu, self.inverse[:, index, None])[:, 0]
+        return Dual(1.0 / own, self._turned(self.inverse[index], back) / -(own**2))
 
     def determinant(self) -> Any:
         """Return det(I - C P_yu), (k,)."""
-        whole = np.linalg.det(np.moveaxis(self.inverse, (0, 1), (-2, -1)))
-        if self._law_slope is None:
-            return 1.0 / whole
+        whole = np.linalg.det(np.moveaxis(self._matrix, (0, 1), (-2, -1)))
+        if self._closing.slopes is None:
+            return whole
         # d det M = det M tr(M^-1 dM), M = I - C P_yu
-        turned = np.einsum("jmk,mrk->jrk", self._yu, self.inverse)
-        slope = np.zeros((self.count, turned.shape[-1]), np.complex128)
-        for a, parts in enumerate(self._law_slope):
-            for (i, j), part in parts.items():
-                slope[a] -= part * turned[j, i]
-        return Dual(1.0 / whole, slope / whole)
+        turned = _times(self._yu, self.inverse)
+        slope = np.zeros((self.count, whole.size), np.complex128)
+        for (i, j), (at, part) in self._closing.slopes.items():
+            slope[at] -= part * turned[j, i]
+        return Dual(whole, slope * whole)
 
     def _turned(self, left: ComplexArray, right: ComplexArray) -> ComplexArray:
         """Return left . dC right of vectors (m, k) and (l, k) by each variable, (n, k)."""
-        assert self._law_slope is not None
+        assert self._closing.slopes is not None
         found = np.zeros((self.count, right.shape[-1]), np.complex128)
-        for a, parts in enumerate(self._law_slope):
-            for (i, j), slope in parts.items():
-                found[a] += left[i] * slope * right[j]
+        for (i, j), (at, slope) in self._closing.slopes.items():
+            found[at] += slope * (left[i] * right[j])
         return found
 
-    def moments(self, outputs: Sequence[str], powers: Sequence[FloatArray]) -> Any:
+    def moments(self, outputs: Sequence[str], weights: FloatArray, orders: Sequence[int]) -> Any:
         """Return integrals of |F|^2 over all disturbances.
 
         Parameters
         ----------
-        outputs
-            Output of each integral.
-        powers
-            Its weights, (nw, k) each: quadrature weights times density times a power of omega.
+        outputs, orders
+            Output of each integral, and the power of omega in it.
+        weights
+            Quadrature weights times density of each disturbance, (nw, k).
 
         Returns
         -------
         ndarray or Dual
-            (..., number of integrals).
+            (z, ..., number of orders).
         """
         rows = [self.outputs.index(name) for name in outputs]
-        found = {row: self._all([row])[0] for row in dict.fromkeys(rows)}
-        values = []
-        for row, weights in zip(rows, powers, strict=True):
-            # (nw, ..., k) against (nw, k)
-            spread = weights.reshape(len(weights), *(1,) * (found[row].ndim - 2), -1)
-            values.append(np.sum(np.abs(found[row]) ** 2 * spread, axis=(0, -1)))
-        value = np.stack(values, axis=-1)
-        if self._law_slope is None:
+        found = self._all(rows)
+        spread = weights.reshape(len(weights), *(1,) * (found.ndim - 3), -1)
+        powers = np.array([self._omega**order for order in orders]).T
+        value = np.sum((found.real**2 + found.imag**2) * spread, axis=1) @ powers
+        if self._closing.slopes is None:
             return value
-        adjoint = np.stack(
-            [
-                (np.conj(found[row]) * weights)[None] * self._zu[row][:, None]
-                for row, weights in zip(rows, powers, strict=True)
-            ]
-        )
-        size = len(rows), -1
-        slope = 2.0 * (self._command_slope.reshape(self.count, -1) @ adjoint.reshape(size).T)
-        return Dual(value, slope.real)
+        slope = np.zeros((self.count, len(rows) * len(orders)))
+        adjoint = 2.0 * np.conj(found) * weights
+        through = self._through(rows)
+        for i, at, change in self._changes:
+            back = adjoint * through[:, i, None]
+            each = np.conj([back * power for power in powers.T])  # (orders, z, nw, k)
+            flat = np.swapaxes(each, 0, 1).reshape(slope.shape[1], -1)
+            slope[at] += _real_product(change.reshape(len(at), -1), flat)
+        return Dual(value, slope.reshape(-1, *value.shape))
+
+    @cached_property
+    def _changes(self) -> list[tuple[int, list[int], ComplexArray]]:
+        """What variables change about each command but for the loop, dC y, (n, nw, k).
+
+        With it which command, and which variables, (n,).
+        """
+        assert self._closing.slopes is not None
+        found = []
+        for i in range(self._closing.size[0]):
+            parts = [(j, *part) for (row, j), part in self._closing.slopes.items() if row == i]
+            variables = sorted({a for _, at, _ in parts for a in at})
+            change = np.zeros((len(variables), *self._heard.shape[1:]), np.complex128)
+            for j, at, slope in parts:
+                change[[variables.index(a) for a in at]] += slope[:, None] * self._heard[j]
+            found.append((i, variables, change))
+        return found
 
     def curvature(self, output: str, weights: FloatArray) -> FloatArray:
         """Return half the Gauss-Newton Hessian of an integral of |F|^2, (n, n); see `moments`."""
-        through = self._zu[self.outputs.index(output)]
-        slope = np.einsum("rk,nrwk->nwk", through, self._command_slope) * np.sqrt(weights)
-        flat = slope.reshape(self.count, -1)
-        return np.asarray((flat @ flat.conj().T).real)
+        left = self._through([self.outputs.index(output)])[0]
+        slope = np.zeros((self.count, weights.size), np.complex128)
+        for i, at, change in self._changes:
+            slope[at] += (change * (left[i] * np.sqrt(weights))).reshape(len(at), -1)
+        return _real_product(slope, slope)
+
+
+def _real_product(a: ComplexArray, b: ComplexArray) -> FloatArray:
+    """Return Re a b^H of matrices whose rows are long."""
+    return np.asarray(a.view(np.float64) @ b.view(np.float64).T)
 
 
 def _times(a: ComplexArray, b: ComplexArray) -> ComplexArray:

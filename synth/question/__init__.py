@@ -18,7 +18,7 @@ if TYPE_CHECKING:
         difference_text,
         pose_family,
     )
-    from .loop_numbers import LoopNumbers, Moments, Point, moment_weights
+    from .loop_numbers import LoopNumbers, Point, moment_weights
     from .problem import Goal, Problem, Values
     from .question import (
         GAINS,

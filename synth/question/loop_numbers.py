@@ -9,16 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
+from itertools import pairwise
 from operator import methodcaller
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import eig
 
 from models.basics import BoolArray, ComplexArray, FloatArray, Quadrature
 
-from ..limits import Size
+from ..limits import DelayMargin, GainMargin, GainMarginDown, Limit, Size
 from ..loop import (
     Closing,
     Dual,
@@ -35,12 +36,14 @@ from ..loop import (
     value_of,
 )
 from ..structures import ParametrisedController
-from .places import SHIFT, beside, crossings, peaks
+from .places import SHIFT, Search, beside, crossings, peaks, together
 from .problem import Goal, Problem
 
 _FAINT = 1e-3  # loop gains whose crossings of the axis no gain margin is about
 _SMALL = 1e-3  # of its typical size: a parameter below it is shifted as if it were that
 _SINGLE, _NUDGE = 1e-9, 1e-15  # product of unit eigenvectors below which poles are pulled apart
+_AXIS, _CIRCLE = "real axis", "unit circle"
+_ORDERS = (0, 2)  # of the spectral moments
 _LEAST_CYCLES = float(np.exp(0.5))  # of a peak: a factor of one, below which the log turns negative
 
 
@@ -67,45 +70,57 @@ class Point:
         law: ParametrisedController = problem.law
         count, drag = len(self.values), problem.drag
         values: list[Any] = list(self.values)
-        slopes: list[dict[tuple[int, int], ComplexArray]] | None = None
         if self.slopes:
-            unit = np.eye(count)
-            values = [Dual(np.array([v]), unit[:, i : i + 1]) for i, v in enumerate(values)]
-            slopes = [{} for _ in range(count + (drag is not None))]
-        entries = law.response(values, s)
-        m, length = len(entries) + (drag is not None), len(entries[0]) + (drag is not None)
-        many = np.shape(self.values[0])[:-1] if count else ()
-        C = np.zeros((m, length, *many, s.size), dtype=np.complex128)
-        for i, line in enumerate(entries):
+            values = [Dual(np.array([v]), np.ones((1, 1)), (i,)) for i, v in enumerate(values)]
+        law_entries = law.response(values, s)
+        entries: dict[tuple[int, int], ComplexArray] = {}
+        slopes: dict[tuple[int, int], tuple[list[int], ComplexArray]] = {}
+        for i, line in enumerate(law_entries):
             for j, entry in enumerate(line):
+                if isinstance(entry, float) and entry == 0.0:
+                    continue
+                value = np.asarray(value_of(entry), dtype=np.complex128)
+                if value.shape[-1:] != s.shape:
+                    value = np.broadcast_to(value, (*value.shape[:-1], s.size))
+                entries[i, j] = value
                 if isinstance(entry, Dual):
-                    assert slopes is not None
-                    C[i, j] = entry.value
-                    for a in np.flatnonzero(np.any(entry.slope, axis=1)):
-                        slopes[a][i, j] = np.broadcast_to(entry.slope[a], s.shape)
-                else:
-                    C[i, j] = entry
+                    assert entry.at is not None
+                    slope = np.broadcast_to(entry.slope, (len(entry.at), s.size))
+                    slopes[i, j] = list(entry.at), np.asarray(slope, dtype=np.complex128)
+        m, length = len(law_entries), len(law_entries[0])
         if drag is not None:
-            C[-1, -1] = -(self.drag - drag.reference)
-            if slopes is not None:
-                slopes[count][m - 1, length - 1] = np.full(s.shape, -self.drag, np.complex128)
-        return Closing(law=C, slopes=slopes)
+            added = np.asarray(self.drag - drag.reference, dtype=np.complex128)
+            entries[m, length] = np.broadcast_to(-added, (*added.shape[:-1], s.size))
+            if self.slopes:
+                slopes[m, length] = [count], np.full((1, s.size), -self.drag, np.complex128)
+            m, length, count = m + 1, length + 1, count + 1
+        return Closing(
+            entries=entries,
+            size=(m, length),
+            slopes=slopes if self.slopes else None,
+            count=count,
+        )
 
 
-#: Weights of the moments m_0 and m_2 on quadrature nodes, (nw, k) each, by order.
-Moments = Mapping[int, FloatArray]
-
-
-def moment_weights(problem: Problem, nodes: Quadrature) -> Moments:
-    """Return quadrature weights times densities times powers of omega, (nw, k), by order."""
+def moment_weights(problem: Problem, nodes: Quadrature) -> FloatArray:
+    """Return quadrature weights times densities, (nw, k)."""
     densities = [d.density(nodes.omega) * nodes.weights for d in problem.disturbances]
     # What only limits speak of shakes nothing.
     still = np.zeros((len(problem.sources) - len(densities), nodes.omega.size))
-    every = np.vstack([*densities, still])
-    return {order: every * nodes.omega**order for order in (0, 2)}
+    return np.vstack([*densities, still])
 
 
 Fresh = Callable[[FloatArray, bool], LoopResponses]
+Take = Callable[[LoopResponses], Any]
+
+
+class _Sought(NamedTuple):
+    """Places on a curve: whose they are, the curve in a closed loop, its height, and the search."""
+
+    key: tuple[str, int]
+    take: Take
+    height: Size
+    search: Search
 
 
 class LoopNumbers:
@@ -134,7 +149,7 @@ class LoopNumbers:
         problem: Problem,
         cost: LoopResponses,
         margins: LoopResponses,
-        weights: Moments,
+        weights: FloatArray,
         omega: FloatArray,
         point: Point,
         *,
@@ -149,8 +164,9 @@ class LoopNumbers:
         self._goal = goal
         self._amplitude = exp(extra * 2.0) if goal is Goal.SEA else None
         self._fresh: Fresh | None = None
+        self._responses: dict[tuple[str, str], Any] = {}
 
-    def under(self, problem: Problem, weights: Moments) -> LoopNumbers:
+    def under(self, problem: Problem, weights: FloatArray) -> LoopNumbers:
         """Return the same loop shaken by the disturbances of another problem."""
         return LoopNumbers(
             problem,
@@ -186,32 +202,85 @@ class LoopNumbers:
         """
         self._fresh = fresh
 
-    def curves(
-        self, size: Size, above: float, channel: tuple[str, str] | None = None
-    ) -> list[tuple[FloatArray, Any]]:
-        """Return curves at the margin frequencies, and at the refined peaks of a size between them.
+    @cached_property
+    def _followed(self) -> Mapping[tuple[str, int], tuple[FloatArray, Any]]:
+        """Where margins are measured between the margin frequencies, and what curves are there.
 
-        The peaks move with the parameters, but at a peak that changes the size in second order
-        only.  See `synth.limits.Symbols`.
+        By limit, or kind of crossing, and loop.  The places move with the parameters: at a peak
+        that changes a size in second order only, and crossings are known a hair to both sides.
         """
-        takes: list[Callable[[LoopResponses], Any]]
+        assert self._fresh is not None
+        fresh, sought = self._fresh, self._sought()
+
+        def curves(at: FloatArray, sizes: Sequence[int], slopes: bool) -> list[Any]:
+            loop, ends = fresh(at, slopes), np.cumsum([0, *sizes])
+            return [
+                self._padded(one.take(loop))[..., begin:end] if begin < end else None
+                for one, (begin, end) in zip(sought, pairwise(ends), strict=True)
+            ]
+
+        def heights(at: FloatArray, sizes: Sequence[int]) -> list[FloatArray]:
+            pieces = np.split(at, np.cumsum(sizes)[:-1])
+            every = zip(sought, pieces, curves(at, sizes, False), strict=True)
+            return [one.height(w, curve) if w.size else w for one, w, curve in every]
+
+        found = together([one.search for one in sought], heights)
+        places = [
+            beside(at) if one.key[0] in (_AXIS, _CIRCLE) else at
+            for one, at in zip(sought, found, strict=True)
+        ]
+        sizes = [at.size for at in places]
+        if not sum(sizes):
+            return {}
+        there = curves(np.concatenate(places), sizes, self._point.slopes)
+        every = zip(sought, found, there, strict=True)
+        return {one.key: (at, curve) for one, at, curve in every if at.size}
+
+    def _sought(self) -> list[_Sought]:
+        """Return the places that limits ask for, of each curve."""
+        omega, limits = self.omega, self._problem.limits
+        found = []
+        for i, (take, d) in enumerate(zip(self._takes(None), self.differences, strict=True)):
+            gain = value_of(d) - 1.0
+            if any(isinstance(limit, GainMargin | GainMarginDown) for limit in limits):
+                search = crossings(omega, gain.imag, np.abs(gain) > _FAINT)
+                found.append(_Sought((_AXIS, i), take, _height, search))
+            if any(isinstance(limit, DelayMargin) for limit in limits):
+                search = crossings(omega, np.abs(gain) - 1.0)
+                found.append(_Sought((_CIRCLE, i), take, _excess, search))
+        for limit in limits:
+            if limit.followed is None:
+                continue
+            size, above = limit.followed
+            curves = zip(self._takes(limit.channel), self._on_grid(limit.channel), strict=True)
+            for i, (take, curve) in enumerate(curves):
+                search = peaks(omega, size(omega, value_of(curve)), above)
+                found.append(_Sought((limit.name, i), take, size, search))
+        return found
+
+    def _takes(self, channel: tuple[str, str] | None) -> list[Take]:
+        """Return how to take the curves that a limit is on from a closed loop."""
+        if channel is not None:
+            return [methodcaller("response", *channel)]
+        return [methodcaller("difference", i) for i in range(len(self.differences))]
+
+    def _on_grid(self, channel: tuple[str, str] | None) -> list[Any]:
+        """Return the curves that a limit is on at the margin frequencies."""
         if channel is None:
-            found = [(self.omega, d) for d in self.differences]
-            takes = [methodcaller("difference", i) for i in range(len(found))]
-        else:
-            takes = [methodcaller("response", *channel)]
-            found = [(self.omega, self._padded(takes[0](self._margins)))]
-        fresh = self._fresh
-        if fresh is None:
-            return found
-        for take, (omega, curve) in zip(takes, found[:], strict=True):
+            return self.differences
+        if channel not in self._responses:
+            self._responses[channel] = self._padded(self._margins.response(*channel))
+        return [self._responses[channel]]
 
-            def sized(w: FloatArray, take: Callable[[LoopResponses], Any] = take) -> FloatArray:
-                return size(w, value_of(take(fresh(w, False))))
+    def curves(self, limit: Limit) -> list[tuple[FloatArray, Any]]:
+        """Return the curves that a limit is on, at the margin frequencies and at peaks between.
 
-            at = peaks(sized, omega, size(omega, value_of(curve)), above)
-            if at.size:
-                found.append((at, self._padded(take(fresh(at, isinstance(curve, Dual))))))
+        See `synth.limits.Symbols`.
+        """
+        found = [(self.omega, curve) for curve in self._on_grid(limit.channel)]
+        if self._fresh is not None:
+            keys = [(limit.name, i) for i in range(len(found))]
+            found += [self._followed[key] for key in keys if key in self._followed]
         return found
 
     @cached_property
@@ -264,31 +333,29 @@ class LoopNumbers:
 
         The crossing moves with the parameters: Im L = 0 gives its frequency's slopes.
         """
-        fresh = self._fresh
-        if fresh is None:
+        if self._fresh is None:
             return None
         found = []
         for i, d in enumerate(self.differences):
-            gain = value_of(d) - 1.0
-            at = crossings(partial(_height, fresh, i), self.omega, gain.imag, np.abs(gain) > _FAINT)
-            loop, rate = self._moving(fresh, at, i, isinstance(d, Dual))
-            crossed = real(loop) - imag(loop) * (rate.real / rate.imag)
             ends = (d - 1.0)[..., [0, -1]]
-            for on in (crossed, real(ends)[..., level_ends(gain)]):
-                found.append(on[..., value_of(on) < 0.0])
+            own = [real(ends)[..., level_ends(value_of(d) - 1.0)]]
+            if (_AXIS, i) in self._followed:
+                loop, rate = _moving(*self._followed[_AXIS, i])
+                own.insert(0, real(loop) - imag(loop) * (rate.real / rate.imag))
+            found += [on[..., value_of(on) < 0.0] for on in own]
         return joined(found)
 
     @cached_property
     def turning_delays(self) -> Any | None:
         """Delay at each crossover of all loops that turns L to -1 [s], (c,); None on a grid."""
-        fresh = self._fresh
-        if fresh is None:
+        if self._fresh is None:
             return None
-        found: list[Any] = []
-        for i, d in enumerate(self.differences):
-            size = np.abs(value_of(d) - 1.0) - 1.0
-            at = crossings(partial(_excess, fresh, i), self.omega, size)
-            loop, rate = self._moving(fresh, at, i, isinstance(d, Dual))
+        found: list[Any] = [self.differences[0][..., :0]]
+        for i in range(len(self.differences)):
+            if (_CIRCLE, i) not in self._followed:
+                continue
+            at = self._followed[_CIRCLE, i][0]
+            loop, rate = _moving(*self._followed[_CIRCLE, i])
             gain = value_of(loop)
             turn = np.mod(np.angle(-gain), 2.0 * np.pi)
             if not isinstance(loop, Dual):
@@ -298,33 +365,22 @@ class LoopNumbers:
             shift = -(np.conj(gain) * loop.slope).real / grows  # of the crossover, [rad/s]
             turns = ((loop.slope + rate * shift) / gain).imag
             found.append(Dual(turn / at, turns / at - turn / at**2 * shift))
-        return joined(found)
-
-    def _moving(
-        self, fresh: Fresh, omega: FloatArray, index: int, slopes: bool
-    ) -> tuple[Any, ComplexArray]:
-        """Return L at frequencies [rad/s], and dL/d omega by central differences, (k,) each."""
-        both = self._padded(fresh(beside(omega), slopes).difference(index) - 1.0)
-        above, below = both[..., : omega.size], both[..., omega.size :]
-        rate = (value_of(above) - value_of(below)) / (2.0 * SHIFT * omega)
-        return (above + below) * 0.5, np.asarray(rate)
+        return real(joined(found))
 
     @cached_property
-    def _moments(self) -> Mapping[tuple[str, int], Any]:
-        """Spectral moments m_0 and m_2 of every output."""
-        keys = [(name, order) for name in self._cost.outputs for order in self._weights]
-        names = [name for name, _ in keys]
-        every = self._cost.moments(names, [self._weights[order] for _, order in keys])
-        every = self._padded(every)
-        return {
-            key: every[k : k + 1] if isinstance(every, Dual) else every[..., k : k + 1]
-            for k, key in enumerate(keys)
-        }
+    def _moments(self) -> Any:
+        """Spectral moments m_0 and m_2 of every output, (z, ..., 2)."""
+        return self._padded(self._cost.moments(self._cost.outputs, self._weights, _ORDERS))
 
     def moment(self, output: str, order: int) -> Any:
         """Return the spectral moment m_order of `output`, (1,)."""
-        found = self._moments[output, order]
-        return found if self._amplitude is None else found * self._amplitude
+        row, at = self._cost.outputs.index(output), _ORDERS.index(order)
+        found, every = slice(at, at + 1), self._moments
+        if isinstance(every, Dual):
+            moment: Any = Dual(every.value[row, found], every.slope[:, row, found])
+        else:
+            moment = every[row, ..., found]
+        return moment if self._amplitude is None else moment * self._amplitude
 
     def peak(self, output: str, duration: float) -> Any:
         """Return the most probable maximum of `output` in `duration` [s], (1,)."""
@@ -343,10 +399,12 @@ class LoopNumbers:
         The responses are nearly linear in the parameters where the cost is small, and then it is
         the sum of squares, not its logarithm, that a quadratic model is good for.
         """
-        total, variance = np.zeros((self._cost.count, self._cost.count)), 0.0
+        size = self._cost.count
+        total, variance = np.zeros((size, size)), 0.0
         for name, weight in self._problem.minimise.items():
-            total += weight * self._cost.curvature(name, self._weights[0])
-            variance += weight * float(value_of(self._moments[name, 0]).item())
+            total += weight * self._cost.curvature(name, self._weights)
+            row = self._cost.outputs.index(name)
+            variance += weight * float(value_of(self._moments)[row, 0])
         found = total / variance
         if isinstance(self.extra, Dual):
             found = np.pad(found, (0, 1))
@@ -376,15 +434,21 @@ def _counted(poles: ComplexArray, models: ComplexArray) -> tuple[BoolArray, Bool
     return swinging, own
 
 
-def _gain(loop: LoopResponses, index: int) -> ComplexArray:
-    return np.asarray(value_of(loop.difference(index)) - 1.0)
+def _moving(omega: FloatArray, beside_it: Any) -> tuple[Any, ComplexArray]:
+    """Return L at frequencies [rad/s], and dL/d omega by central differences, (k,) each.
+
+    From 1 + L a hair above and a hair below, (2 k,); see `places.beside`.
+    """
+    above, below = beside_it[..., : omega.size], beside_it[..., omega.size :]
+    rate = (value_of(above) - value_of(below)) / (2.0 * SHIFT * omega)
+    return (above + below) * 0.5 - 1.0, np.asarray(rate)
 
 
-def _height(fresh: Fresh, index: int, omega: FloatArray) -> FloatArray:
+def _height(_: FloatArray, difference: Any) -> FloatArray:
     """Return Im L, (k,)."""
-    return _gain(fresh(omega, False), index).imag
+    return np.asarray(difference.imag)
 
 
-def _excess(fresh: Fresh, index: int, omega: FloatArray) -> FloatArray:
+def _excess(_: FloatArray, difference: Any) -> FloatArray:
     """Return |L| - 1, (k,)."""
-    return np.abs(_gain(fresh(omega, False), index)) - 1.0
+    return np.asarray(np.abs(difference - 1.0) - 1.0)

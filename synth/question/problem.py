@@ -75,9 +75,28 @@ class Problem:
         spoken = [limit.channel[1] for limit in self.limits if limit.channel is not None]
         return tuple(dict.fromkeys([*(d.name for d in self.disturbances), *spoken]))
 
+    @cached_property
+    def _opened(self) -> LinearPlant:
+        """The plant with the drag's loop open, its input and its measurement the last."""
+        if self.drag is None:
+            return self.plant
+        return self.plant.opened(self.drag.velocity, self.drag.force)
+
+    @cached_property
+    def _channels(self) -> tuple[LinearPlant, list[str]]:
+        """What margins need of the plant, and the disturbances that limits on them speak of."""
+        channels = [limit.channel for limit in self.limits if limit.channel is not None]
+        outputs = dict.fromkeys(output for output, _ in channels)
+        return self._opened.select(outputs=[*outputs]), [*dict.fromkeys(w for _, w in channels)]
+
     def blocks(self, s: npt.ArrayLike) -> LoopBlocks:
-        """Return what the plant's loop is closed about at points `s` [1/s]."""
-        return LoopBlocks.of(self.plant.response_at(s), self.outputs, self.sources, self.drag)
+        """Return what the plant's loop is closed about at points `s` [1/s], the drag's loop too."""
+        return LoopBlocks.of(self._opened.response_at(s), self.outputs, self.sources)
+
+    def margin_blocks(self, s: npt.ArrayLike) -> LoopBlocks:
+        """Return as much of `blocks` as the limits on the loop need."""
+        plant, sources = self._channels
+        return LoopBlocks.of(plant.response_at(s), sources=sources)
 
     def loop_poles(self, values: Values, coefficient: float | None = None) -> ComplexArray:
         """Return the closed loop's poles [1/s], delays as Pade models."""

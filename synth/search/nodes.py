@@ -16,10 +16,11 @@ _FAST_SIDE = 24  # ... and above it, where a loop may cross over narrowly with t
 _INSIDE = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)  # nodes about the edge of a limit's band
 _AT_ZERO = 1e-9  # relative size of a pole at zero, which no panel need shrink towards
 _ON_AXIS = 1e-9  # relative distance of a pole from the axis below which no node can resolve it
-_COARSE, _FINE = (6, 3.0), (10, 4.0)  # nodes a panel and panels a decade: 1e-6, 1e-8 of an rms
+_PANELS = {"rough": (4, 2.0), "coarse": (6, 3.0), "fine": (10, 4.0)}
+"""Nodes a panel and panels a decade: 1e-4, 1e-6 and 1e-8 of an rms."""
 
 
-def cost_nodes(problem: Problem, poles: ComplexArray, *, fine: bool = False) -> Quadrature:
+def cost_nodes(problem: Problem, poles: ComplexArray, how: str = "coarse") -> Quadrature:
     """Return nodes that integrate the spectra of loops with some poles [1/s].
 
     Panels shrink towards the poles of plant and loops and break where a spectrum has a kink, so
@@ -28,7 +29,7 @@ def cost_nodes(problem: Problem, poles: ComplexArray, *, fine: bool = False) -> 
     every = np.concatenate([poles, problem.plant.poles()])
     every = every[np.abs(every) > _AT_ZERO * np.abs(every).max(initial=1.0)]
     low, high, half_line = integration_band(problem.disturbances, every)
-    per_panel, per_decade = _FINE if fine else _COARSE
+    per_panel, per_decade = _PANELS[how]
     return spectral_nodes(
         low,
         high,

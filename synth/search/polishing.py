@@ -68,7 +68,7 @@ def stated(
             least = _NEARLY_ZERO * float(found.omega[found.omega > 0.0].min())
             nodes.append(replace(found, omega=np.maximum(found.omega, least)))
         else:
-            nodes.append(cost_nodes(shaken, poles, fine=fine))
+            nodes.append(cost_nodes(shaken, poles, "fine" if fine else "coarse"))
         per_decade = _FINE_PER_DECADE if fine else _PER_DECADE
         omega.append(margin_nodes(scenario.problem, poles, per_decade))
     tolerance = 1e-13 if fine else 1e-4 if rough else 1e-6

@@ -22,7 +22,8 @@ brings twenty.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -283,7 +284,9 @@ class Programme:
             log_drag = None if at is None else float(x[at])
             extra = None if self._extra_at is None else float(x[self._extra_at])
             own = family.scenarios[first].values(values)
-            numbers = loop.at(own, log_drag, extra, self._goal, slopes=slopes, exact=self._exact)
+            numbers, slow = loop.at(
+                own, log_drag, extra, self._goal, slopes=slopes, exact=self._exact
+            )
             for k, i in enumerate(group):
                 problem = family.scenarios[i].problem
                 seen = numbers if i == first else numbers.under(problem, loop.weights[k])
@@ -301,7 +304,7 @@ class Programme:
                 if slopes:
                     curvatures[i] = seen.cost_curvature()
             # No limit of the case: it stops a real pole from creeping to zero, below every node.
-            rows.append(((first, _SLOW), loop.no_slow_pole(own, log_drag, extra, slopes), first))
+            rows.append(((first, _SLOW), slow, first))
             if log_drag is not None:
                 balances.append((numbers.drag_balance(), first))
         every = range(len(family.scenarios))
@@ -429,14 +432,18 @@ class _Loop:
         problem = self.problem = members[0].problem
         self.omega = omega
         self.weights = [moment_weights(member.problem, nodes) for member in members]
-        every = problem.blocks(1j * np.concatenate([nodes.omega, omega]))
-        self._s = every.s
-        self._parts = slice(0, nodes.omega.size), slice(nodes.omega.size, None)
-        self._cost, self._margins = (every.part(part) for part in self._parts)
-        self._slow = problem.blocks([problem.slow_point])
+        self._blocks = (
+            problem.blocks(1j * nodes.omega),
+            problem.margin_blocks(1j * omega),
+            problem.margin_blocks([problem.slow_point]),
+        )
+        self._s = np.concatenate([blocks.s for blocks in self._blocks])
+        ends = [0, nodes.omega.size, nodes.omega.size + omega.size, self._s.size]
+        self._parts = [slice(*pair) for pair in pairwise(ends)]
         drag = None if problem.drag is None else problem.drag.reference
         begin = Point(values=list(members[0].values(reference)), drag=drag)
-        there = LoopResponses(self._slow, begin.closing(problem, self._slow.s)).determinant()
+        slow = self._blocks[-1]
+        there = LoopResponses(slow, begin.closing(problem, slow.s)).determinant()
         self._there = float(np.real(there[0]))
 
     def at(
@@ -448,31 +455,35 @@ class _Loop:
         *,
         slopes: bool,
         exact: bool,
-    ) -> LoopNumbers:
-        closing = _point(values, log_drag, slopes).closing(self.problem, self._s)
+    ) -> tuple[LoopNumbers, Any]:
+        """Return the loop's numbers at a point, and the row that keeps slow poles off."""
+        point = _point(values, log_drag, slopes)
+        closing = point.closing(self.problem, self._s)
+        cost, margins, slow = (
+            LoopResponses(blocks, closing.part(part))
+            for blocks, part in zip(self._blocks, self._parts, strict=True)
+        )
         numbers = LoopNumbers(
             self.problem,
-            LoopResponses(self._cost, closing.part(self._parts[0])),
-            LoopResponses(self._margins, closing.part(self._parts[1])),
+            cost,
+            margins,
             self.weights[0],
             self.omega,
-            _point(values, log_drag, slopes),
+            point,
             log_drag=_variable(log_drag, values.size, values.size, extra, slopes),
             extra=_variable(extra, -1, values.size + (log_drag is not None), extra, slopes),
             goal=goal,
         )
         if exact:
-            numbers.measure(lambda w, d: self._fresh(w, _point(values, log_drag, d)))
-        return numbers
+            numbers.measure(lambda w, d: self._fresh(w, replace(point, slopes=d)))
+        return numbers, self._no_slow_pole(slow, extra)
 
     def _fresh(self, omega: FloatArray, point: Point) -> LoopResponses:
         """Return the closed loop at other frequencies."""
-        blocks = self.problem.blocks(1j * omega)
+        blocks = self.problem.margin_blocks(1j * omega)
         return LoopResponses(blocks, point.closing(self.problem, blocks.s))
 
-    def no_slow_pole(
-        self, values: FloatArray, log_drag: float | None, extra: float | None, slopes: bool
-    ) -> Any:
+    def _no_slow_pole(self, slow: LoopResponses, extra: float | None) -> Any:
         """Return a row that keeps real poles from crossing -decay.
 
         det(I - C yu) at a real point s is the characteristic function over that of the open loop,
@@ -480,8 +491,7 @@ class _Loop:
         through |1 + L| > 0, but a real one may creep up to zero, below every frequency node;
         stability alone would let it crawl there.
         """
-        closing = _point(values, log_drag, slopes).closing(self.problem, self._slow.s)
-        found = LoopResponses(self._slow, closing).determinant()
+        found = slow.determinant()
         if not isinstance(found, Dual):
             return 1e-6 - np.real(found) / self._there
         slope = found.slope.real

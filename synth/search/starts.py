@@ -23,7 +23,6 @@ from ..loop import LoopBlocks, LoopResponses
 from ..question import (
     FamilyProblem,
     LoopNumbers,
-    Moments,
     Point,
     Problem,
     Values,
@@ -223,9 +222,10 @@ def _merits(family: FamilyProblem, points: FloatArray) -> list[FloatArray]:
         first = family.scenarios[group[0]]
         problem = first.problem
         poles = around([problem.loop_poles(first.values(p)) for p in sample])
-        nodes, omega = cost_nodes(problem, poles), margin_nodes(problem, poles, _PER_DECADE)
-        blocks = problem.blocks(1j * np.concatenate([nodes.omega, omega]))
-        parts = blocks.part(slice(0, nodes.omega.size)), blocks.part(slice(nodes.omega.size, None))
+        nodes = cost_nodes(problem, poles, "rough")
+        omega = margin_nodes(problem, poles, _PER_DECADE)
+        parts = problem.blocks(1j * nodes.omega), problem.margin_blocks(1j * omega)
+        every = np.concatenate([part.s for part in parts])
         weights = [moment_weights(family.scenarios[i].problem, nodes) for i in group]
         for begin in range(0, len(points), _AT_ONCE):
             some = slice(begin, begin + _AT_ONCE)
@@ -236,7 +236,7 @@ def _merits(family: FamilyProblem, points: FloatArray) -> list[FloatArray]:
             if problem.drag is not None:
                 drag = _consistent(problem, own, parts[0], weights[0])
             point = Point(values=own, drag=drag)
-            closing = point.closing(problem, blocks.s)
+            closing = point.closing(problem, every)
             cuts = slice(0, nodes.omega.size), slice(nodes.omega.size, None)
             cost, margins = (
                 LoopResponses(part, closing.part(cut))
@@ -260,7 +260,7 @@ def _merits(family: FamilyProblem, points: FloatArray) -> list[FloatArray]:
 
 
 def _consistent(
-    problem: Problem, values: Sequence[FloatArray], blocks: LoopBlocks, weights: Moments
+    problem: Problem, values: Sequence[FloatArray], blocks: LoopBlocks, weights: FloatArray
 ) -> FloatArray:
     """Return the drag coefficients that agree with the motion of many candidates, (b, 1)."""
     element = problem.drag
@@ -268,6 +268,6 @@ def _consistent(
     drag = np.full((len(values[0]), 1), element.reference)
     for _ in range(_DRAGS):
         closing = Point(values=values, drag=drag).closing(problem, blocks.s)
-        variance = LoopResponses(blocks, closing).moments([element.velocity], [weights[0]])
+        variance = LoopResponses(blocks, closing).moments([element.velocity], weights, [0])[0]
         drag = element.slope * np.sqrt(variance)
     return drag

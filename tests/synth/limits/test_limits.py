@@ -455,7 +455,7 @@ def rows(limit: Limit, loop_gains, omega=None, module_margin: float = 0.0) -> np
     omega = np.ones(points.size) if omega is None else np.broadcast_to(omega, points.shape)
     symbols = SimpleNamespace(
         differences=[1.0 + points],
-        curves=lambda size, above, channel: [(np.array(omega, dtype=float), 1.0 + points)],
+        curves=lambda limit: [(np.array(omega, dtype=float), 1.0 + points)],
         on_axis=None,
         turning_delays=None,
         omega=np.array(omega, dtype=float),
