@@ -17,7 +17,7 @@ from models.plant import MAX_MASSES, PlantResponse, masses_for_bandwidth
 from models.sensing import sensed_line_at
 
 from ..limits import MaxSensitivity
-from ..loop import Assessment, LinearController, LoopResponses, refine_minima, with_drag
+from ..loop import Assessment, LinearController, LoopResponses, refine_minima
 from .problem import Values
 from .question import DesignQuestion, with_masses
 
@@ -38,7 +38,7 @@ def masses_for(question: DesignQuestion, loop: Assessment) -> int:
     if data.masses is not None or not crossovers.size:
         return question.masses
     try:
-        wanted = masses_for_bandwidth(data, _MODES * _crossover(question, loop))
+        wanted = masses_for_bandwidth(data, _MODES * _crossover(loop))
     except InputError:
         return MAX_MASSES
     if wanted > question.masses or data.lumping == "thesis":
@@ -94,19 +94,16 @@ def on_enough_masses(
     return question, None, growth
 
 
-def _crossover(question: DesignQuestion, loop: Assessment) -> float:
+def _crossover(loop: Assessment) -> float:
     """Return the highest crossover [rad/s] that is not one of two on the same harmless mode.
 
     A mode with hardly any damping stands out above a gain of one far above the bandwidth.  Its
     place matters where |S| on it is about its peak; else the rope itself is looked at anyhow.
     """
-    found, problem = list(loop.margins.crossovers), question.problem
-    plant = problem.plant
-    if problem.drag is not None and loop.coefficient is not None:
-        plant = with_drag(plant, problem.drag, loop.coefficient)
+    found = list(loop.margins.crossovers)
     while len(found) > 2 and found[-1] < _ONE_MODE * found[-2]:
         mode = np.geomspace(found[-2] / _ONE_MODE, found[-1] * _ONE_MODE, _ON_MODE)
-        nearest = _distance(plant.response_at(1j * mode), loop.controller).min()
+        nearest = _distance(loop.plant.response_at(1j * mode), loop.controller).min()
         if loop.max_sensitivity * nearest < 1.0 + _HARMLESS:
             break
         del found[-2:]
