@@ -23,7 +23,7 @@ from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov
 from scipy.optimize import brentq, differential_evolution, minimize, minimize_scalar
 
 from models.basics import InputError
-from models.plant import LinearPlant
+from models.plant import MEASUREMENTS, LinearPlant
 from synth import (
     DiskMargin,
     LowOrder,
@@ -38,7 +38,6 @@ from synth.loop import LinearController
 from synth.search import search
 from synth.structures import ParametrisedController
 from synth.structures.low_order import LowOrderLaw
-from synth.structures.structure import PAYLOAD_MEASUREMENTS
 
 WHITE = {"f": White(1.0), "n": White(0.01)}
 WEIGHTS = {"x": 1.0, "effort": 0.1}
@@ -754,7 +753,7 @@ def test_payload_feedback_may_hold_a_gain_at_zero() -> None:
         F=[[1.0], [0.0], [0.0]],
         Cz=[[1.0, 0.0], [0.0, 0.0]],
         Dz=[[0.0], [1.0]],
-        measurements=PAYLOAD_MEASUREMENTS,
+        measurements=MEASUREMENTS,
         inputs=("u",),
         disturbances=("f",),
         outputs=("x", "effort"),
