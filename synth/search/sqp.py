@@ -29,7 +29,7 @@ from models.basics import FloatArray
 _SLACK = 1e-8  # curvature of the slack, which the quadratic programme wants positive
 _FLAT = 1e-8  # least curvature of the model
 _FLOOR = 1e-4  # of the model, relative to its mean curvature
-_SHARE = 1e-3  # of the model's curvature that every direction has at least
+_SHARE, _LEAST_SHARE = 1e-3, 1e-9  # of the model's curvature that every direction has, at first
 _LEAST = 0.1  # a variable near zero is given this share of the size that moves something by one
 _ROOM, _LEAST_ROOM = 0.5, 1e-9  # how far, relatively, a variable may move at first and at last
 _MOST_ROOM = 4.0
@@ -41,6 +41,7 @@ _HEAVY = 1e4  # of the penalty: if rows are broken still, nothing near mends the
 _HOPELESS = 0.999  # share of what rows are broken by that is left where nothing near mends them
 INFEASIBLE = "the limits exclude each other"
 UNFINISHED = "maximum of iterations"
+_CREEPS, _CREPT = 20, 1e-6  # steps that together gain less than this have arrived
 _NOTHING = 1e-7  # of the objective, promised where no step helps: slopes and values round
 _KEPT = 1e-8  # row that counts as kept
 _SKIPPED = 1e-6  # an update along less than this share of a step is left out
@@ -141,14 +142,15 @@ def descend(
     if not at.finite:
         return _ended(x, at, np.zeros(at.rows.size), "no number", 0)
     rest = np.zeros((x.size, x.size))  # of the Hessian beside the model of the curvature
-    room, weight, stalled = _ROOM, _FIRST_WEIGHT, 0
+    room, weight, stalled, stiff = _ROOM, _FIRST_WEIGHT, 0, _SHARE
     prices, equation_prices = np.zeros(at.rows.size), np.zeros(at.equations.size)
+    reached: list[float] = []  # objectives since the rows are kept
     for k in range(most):
         size = np.where(logarithmic, 1.0, _sizes(x, at))
         hessian = at.curvature + rest
         reach = room * size
         box = np.maximum(low - x, -reach), np.minimum(high - x, reach)
-        found = _quadratic(at, at.rows, at.equations, hessian, box, weight)
+        found = _quadratic(at, at.rows, at.equations, hessian, box, weight, stiff)
         if found is None:
             return _ended(x, at, prices, "no quadratic programme", k)
         step, slack, new_prices, new_equation_prices = found
@@ -173,12 +175,14 @@ def descend(
                 return _ended(x, at, prices, "", k + 1)
             if weight >= _HEAVY or slack > _KEPT:
                 return _ended(x, at, prices, INFEASIBLE, k)
-        moved, new, share = _tried(evaluate, stable, x, step, weight, promised, at, hessian, box)
+        moved, new, share = _tried(
+            evaluate, stable, x, step, weight, promised, at, hessian, box, stiff
+        )
         length = float(np.max(np.abs(moved - x) / size))
         if new is not None:  # what a step that failed tells of the curvature is worth as much
             rest = _updated(rest, moved - x, at, new, prices, equation_prices)
         if new is None or share < _SOUND:
-            room = _CLOSER * min(room, length)
+            room, stiff = _CLOSER * min(room, length), _SHARE
             stalled += 1
             if room < _LEAST_ROOM or stalled > _STALLED:
                 small = promised <= max(1e2 * tolerance, _NOTHING) and at.broken <= 1e2 * _KEPT
@@ -186,11 +190,16 @@ def descend(
                 return _ended(x, at, prices, done, k + 1)
             continue
         stalled = 0
-        if share > 0.75 and np.any(np.abs(step) >= 0.99 * reach):
-            room = min(_MOST_ROOM, 2.0 * room)
+        if share > 0.75:
+            stiff = max(_LEAST_SHARE, 0.1 * stiff)  # the model errs on the stiff side
+            if np.any(np.abs(step) >= 0.99 * reach):
+                room = min(_MOST_ROOM, 2.0 * room)
         elif share < 0.25:
             room = 0.5 * min(room, length)
         x, at = moved, new
+        reached = [*reached, at.objective] if at.broken <= _KEPT else []
+        if len(reached) > _CREEPS and reached[-_CREEPS - 1] - at.objective < _CREPT:
+            return _ended(x, at, prices, "", k + 1)
         if prices.size != at.rows.size:
             prices = np.zeros(at.rows.size)
     return _ended(x, at, prices, UNFINISHED, most)
@@ -227,6 +236,7 @@ def _quadratic(
     hessian: FloatArray,
     box: tuple[FloatArray, FloatArray],
     weight: float,
+    stiff: float,
 ) -> tuple[FloatArray, float, FloatArray, FloatArray] | None:
     """Return the step, its slack, and the multipliers of rows and equations."""
     n = at.slope.size
@@ -237,7 +247,7 @@ def _quadratic(
     H = np.zeros((n + 1, n + 1))
     # In shares of the reach, so that the sizes of the variables do not matter.
     H[:n, :n], H[n, n] = (
-        _convex(hessian * np.outer(reach, reach), at.curvature * np.outer(reach, reach)),
+        _convex(hessian * np.outer(reach, reach), at.curvature * np.outer(reach, reach), stiff),
         _SLACK,
     )
     f = np.append(at.slope * reach, weight)
@@ -279,6 +289,7 @@ def _tried(
     at: Evaluation,
     hessian: FloatArray,
     box: tuple[FloatArray, FloatArray],
+    stiff: float,
 ) -> tuple[FloatArray, Evaluation | None, float]:
     """Return where a step leads to, what is there, and the share of what it promised that it kept.
 
@@ -300,7 +311,7 @@ def _tried(
         # Rows curve: a second step takes up what the first one left broken.
         rows = new.rows - at.jacobian @ step
         equations = new.equations - at.equation_slopes @ step
-        again = _quadratic(at, rows, equations, hessian, box, weight)
+        again = _quadratic(at, rows, equations, hessian, box, weight, stiff)
         if again is not None and stable(x + again[0]):
             bent = evaluate(x + again[0])
             if bent.finite and kept(bent) > share:
@@ -308,7 +319,7 @@ def _tried(
     return there, new, share
 
 
-def _convex(curvature: FloatArray, model: FloatArray) -> FloatArray:
+def _convex(curvature: FloatArray, model: FloatArray, share: float) -> FloatArray:
     """Return a positive definite matrix: where a curvature is negative a share of the model's.
 
     The shares are taken along the axes that make both matrices diagonal.
@@ -317,7 +328,7 @@ def _convex(curvature: FloatArray, model: FloatArray) -> FloatArray:
     metric = model + floor * np.eye(len(model))
     sizes, axes = eigh(0.5 * (curvature + curvature.T), metric)
     back = metric @ axes
-    return np.asarray((back * np.maximum(sizes, _SHARE)) @ back.T, dtype=np.float64)
+    return np.asarray((back * np.maximum(sizes, share)) @ back.T, dtype=np.float64)
 
 
 def _updated(

@@ -153,3 +153,12 @@ def test_a_limit_that_binds_on_a_rope_mode_is_kept_on_the_distributed_rope() -> 
     assert few.verification is not None
     assert few.verification.failed == ("rope.max_sensitivity",)
     assert "max_sensitivity" in evaluate_gains(case, LATE_ON_7).status
+
+
+def test_a_gain_that_fades_away_along_a_valley_has_arrived() -> None:
+    # A perfect reference unit leaves drum feedback nothing to do: its gain tends to zero, and the
+    # cost is a million times as curved across the valley as along it.
+    case = load_case("thesis-1975").replace(PERFECT_MRU)
+    found = sh.optimise_gains(case, structure="feed-forward", starts=1)
+    assert found.ok
+    assert found.payload_rms < 0.21e-3
