@@ -190,6 +190,15 @@ def test_a_dc_drive_keeps_voltage_current_and_torque_with_and_without_inductance
         assert np.abs(run["motor.speed"]).max() <= case.winch.speed_limit * 1.15
 
 
+def test_the_armatures_voltage_is_cut_to_what_the_supply_has() -> None:
+    for inductance in (0.0, 0.01):
+        changes = {"winch.drive.voltage": 740.0, "winch.motor.inductance": inductance}
+        case = load_case("thesis-1975").replace(changes)
+        run = simulate(case, feedback(case, THESIS, 0.005), duration=40.0, seed=1)
+        assert np.abs(run["drive.command"]).max() > 1000.0  # or the test says nothing
+        assert np.abs(run["motor.voltage"]).max() == pytest.approx(740.0, rel=1e-9)
+
+
 def test_the_brake_holds_the_drum_without_creep() -> None:
     run = simulate(crane(), BrakeOn(crane()), duration=300.0, seed=1)
     assert np.abs(run["drum.haul"]).max() == 0.0

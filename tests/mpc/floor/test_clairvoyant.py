@@ -167,6 +167,31 @@ def test_more_freedom_never_raises_the_floor() -> None:
     assert tight.shares["tension"] > 0.0
 
 
+def test_a_start_with_the_hook_is_that_of_a_simulation() -> None:
+    case = case_at(3.0, "thesis-1975-rope")
+    record = record_of(case, 20.0, 3)
+    heave, rate, _ = record.block(0, 1)
+    floors = {
+        start: clairvoyant(case, record, drag=0.0, masses=2, start=start)  # type: ignore[arg-type]
+        for start in ("free", "hook")
+    }
+    assert abs(float(heave[0])) > 0.05
+    begun = floors["hook"]
+    assert begun.start == "hook"
+    assert begun.haul[0] == pytest.approx(0.0, abs=1e-12)
+    assert begun.speed[0] == pytest.approx(0.0, abs=1e-12)
+    names = begun.problem.plant.states
+    state = dict(zip(names, begun.solution.start, strict=True))
+    moving = {name: value for name, value in state.items() if not name.startswith("motor.")}
+    assert len(moving) == 4  # a rope mass and the payload
+    for name, value in moving.items():
+        expected = float((heave if name.endswith("displacement") else rate)[0])
+        assert value == pytest.approx(expected, abs=1e-12)
+    assert begun.payload[0] == pytest.approx(float(heave[0]), abs=1e-12)
+    # It costs the time that the winch needs to catch up, so what is asked for has been done.
+    assert begun.payload_rms > 1.01 * floors["free"].payload_rms
+
+
 def test_power_is_limited_on_the_outside_of_its_hyperbola() -> None:
     case = case_at(3.75)
     limits = DriveLimits(torque=11880.0, speed=125.0, power=4e5)

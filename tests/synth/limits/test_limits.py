@@ -24,8 +24,9 @@ from loop_numbers import (
 )
 from scipy.linalg import solve_continuous_lyapunov
 
+from models import load_case
 from models.basics import InputError
-from models.plant import LinearPlant
+from models.plant import LinearPlant, PlantData
 from synth import (
     Continuous,
     DelayMargin,
@@ -48,7 +49,7 @@ from synth import (
     White,
     tune,
 )
-from synth.limits import Limit
+from synth.limits import Limit, loop_limits, modelled_bandwidth
 from synth.loop import Assessment, LinearController, disturbances
 
 WHITE = {"f": White(1.0), "n": White(0.01)}
@@ -517,6 +518,15 @@ def test_roll_off_looks_only_above_its_frequency() -> None:
     assert rows(limit, [0.11j], 6.0)[0] > 0.0
     assert rows(limit, [0.09j], 6.0)[0] < 0.0
     assert rows(limit, [0.09j, 9.0], [6.0, 4.0]).max() < 0.0
+
+
+def test_a_cases_roll_off_is_held_above_the_modes_that_its_masses_hold() -> None:
+    case = load_case("subsea-crane").replace({"limits.roll_off": 0.4})
+    data = PlantData.from_case(case)
+    limits = [lim for lim in loop_limits(case, data, 5) if isinstance(lim, RollOff)]
+    assert [(lim.bound, lim.above) for lim in limits] == [(0.4, modelled_bandwidth(data, 5))]
+    without = case.replace({"limits.roll_off": None})
+    assert not any(isinstance(lim, RollOff) for lim in loop_limits(without, data, 5))
 
 
 def test_disk_margin_forbids_a_disc_about_what_is_beyond_minus_one() -> None:

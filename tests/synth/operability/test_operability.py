@@ -16,6 +16,7 @@ from models import Case, InputError, load_case
 from models.basics import Quadrature, peak_factor
 from models.hook import HookMotion
 from models.plant import PlantData
+from models.sensing import MruModel
 from synth import Design, evaluate_gains
 from synth.limits import Limit
 from synth.loop import Assessment
@@ -455,8 +456,8 @@ def test_every_limit_of_the_case_is_among_the_criteria_and_slack_always() -> Non
     assert slack.bound == 0.0
 
 
-@pytest.mark.slow
-def test_errors_of_the_reference_unit_grow_with_the_sea() -> None:
+def combined_design() -> Design:
+    """Feedback and feed-forward together: a loop that hears the reference unit."""
     case = one_heading()
     parameters = {
         "payload.acceleration_gain": 0.971228,
@@ -469,23 +470,30 @@ def test_errors_of_the_reference_unit_grow_with_the_sea() -> None:
         "heave.lead": 0.0263462,
         "heave.bandwidth": 7.56484,
     }
-    design = Design(
-        case=case,
-        structure="combined",
-        ok=True,
-        status="given",
-        parameters=parameters,
-        units={},
-        payload_rms=0.021,
-        payload_rms_before=0.616,
-        hook_rms=0.46,
-        parts={},
-        margins=None,
-        limits={},
-        drag=670.0,
-        drag_before=7800.0,
-        masses=7,
-    )
+    return evaluate_gains(case, parameters, "combined")
+
+
+def test_noise_of_the_reference_unit_grows_with_the_heave_and_has_a_floor() -> None:
+    asked = pose_operability(combined_design(), ())
+    loop, unit = asked.loop, asked.case.sensors.mru
+    assert loop is not None
+    assert unit is not None
+    states = SeaStates(system=loop, column=sea_column(asked.case, 9.0))
+    densities = states.densities(np.array([0.5, 2.0, 6.0, 9.0]), np.zeros(4, dtype=np.intp))
+    weights = states.responses.nodes.weights
+    heave = np.sqrt(densities[0] @ weights)
+    # 5 cm or 5 % of the heave, whichever is greater
+    expected = [MruModel(unit, 0.05, float(rms), 0).error_rms for rms in heave]
+    assert expected[0] == expected[1] == unit.noise_floor < expected[2] < expected[3]
+    at = [noise.name for noise in loop.noises].index("mru.error") + 1
+    found = np.sqrt(densities[at] @ weights)
+    np.testing.assert_allclose(found / found[0], np.divide(expected, expected[0]), rtol=1e-9)
+
+
+@pytest.mark.ci
+def test_errors_of_the_reference_unit_grow_with_the_sea() -> None:
+    design = combined_design()
+    case = design.case
     # Above and below H_s = 4.3 m, where 5 % of the heave is as much as the floor of 5 cm.
     for bound in (0.021, 0.06):
         study = operability(design, periods=[9.0], payload_rms=bound)

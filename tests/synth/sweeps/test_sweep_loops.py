@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -160,6 +162,32 @@ def test_peak_sensitivity_is_that_of_a_dense_search() -> None:
             sizes = np.abs(closed / free)[0]
             centre, width = float(fine[np.argmin(sizes)]), 0.1 * width
         assert peaks[k] == pytest.approx(1.0 / sizes.min(), rel=1e-9)
+
+
+class _Spiked:
+    """One loop with smooth closed poles whose sensitivity has a resonance a hair wide."""
+
+    masses, law = 1, SimpleNamespace(swiftest=0.0)
+    mode_spacing = np.array([7.0])
+
+    def __len__(self) -> int:
+        return 1
+
+    def responses(self, rows: npt.NDArray[np.intp], s: npt.NDArray[np.complex128]):  # type: ignore[no-untyped-def]
+        s = np.atleast_2d(s) + np.zeros((rows.size, 1))
+        closed = (s + 1.0) ** 3
+        return closed, closed * self.sensitivity(s)
+
+    @staticmethod
+    def sensitivity(s: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
+        return np.asarray((s * s + 2.0 * s + 4.0) / (s * s + 2e-5 * s + 3.123**2))
+
+
+def test_a_peak_of_the_sensitivity_between_two_points_is_followed() -> None:
+    count, peak = survey(cast("ChainLoops", _Spiked()))
+    assert count[0] == 0
+    near = 1j * (3.123 + np.linspace(-1e-5, 1e-5, 20001))
+    assert peak[0] == pytest.approx(np.abs(_Spiked.sensitivity(near)).max(), rel=1e-6)
 
 
 def test_spring_and_chain_agree_where_both_are_possible() -> None:

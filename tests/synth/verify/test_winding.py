@@ -180,6 +180,36 @@ def test_trace_follows_a_phase_through_many_turns() -> None:
     assert np.all(np.abs(np.angle(values[1:] / values[:-1])) <= 0.5)
 
 
+def test_trace_follows_a_small_loop_gain_too() -> None:
+    # D = 1 + L never turns by 0.1 rad while L turns by 40; below the floor L may turn unseen.
+    def path(t):  # type: ignore[no-untyped-def]
+        return 1j * t
+
+    for size, turned in ((0.05, True), (0.0005, False)):
+        _, values = trace(
+            lambda s, size=size: 1.0 + size * np.exp(-40.0 * s),
+            path,
+            np.linspace(0.0, 1.0, 5),
+            loop_floor=1e-3,
+        )
+        steps = np.angle((values[1:] - 1.0) / (values[:-1] - 1.0))
+        assert (np.abs(steps).max() <= 0.5) == turned
+        assert (abs(steps.sum() + 40.0) < 1e-9) == turned
+
+
+def test_gain_margin_of_a_small_loop_gain_that_turns_fast() -> None:
+    # Around its peak of 0.3 at 10 rad/s the gain goes round the origin thirty times a decade.
+    def loop(s):  # type: ignore[no-untyped-def]
+        return 0.06 * s * np.exp(-40.0 * s) / (0.1 * s + 1.0) ** 2
+
+    omega = np.linspace(5.0, 20.0, 600001)
+    turned = loop(1j * omega)
+    on_axis = (np.diff(np.sign(turned.imag)) != 0.0) & (turned.real[:-1] < 0.0)
+    expected = 1.0 / np.abs(turned[:-1][on_axis]).max()
+    margins = curve_margins(lambda s: 1.0 + loop(s), np.array([-10.0 + 0j]))
+    assert margins.gain == pytest.approx(expected, rel=1e-6)
+
+
 def test_lively_has_points_inside_every_resonance() -> None:
     omega = lively(0.01, 100.0, [complex(-1e-4, 2.0), complex(-1e-3, -7.0)])
     assert omega[0] == 0.01
