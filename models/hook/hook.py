@@ -36,7 +36,7 @@ from ..basics import (
 )
 from ..case import Case
 from ..sea import SeaSpectrum
-from ..vessel import HeaveRao, hook_rao, speed_remark
+from ..vessel import HeaveRao, heading_remark, hook_rao, speed_remark
 from .encounter import Encounter, MetSpectrum
 
 ORDERS = np.arange(9.0)[:, np.newaxis]
@@ -125,9 +125,12 @@ class HookMotion:
             encounter=Encounter.from_case(case),
         )
         if warn and not case.quiet:
-            remark = speed_remark(case.vessel, case.label)
-            if remark is not None:
-                warnings.warn(f"{case.label}: {remark}", PhysicsWarning, stacklevel=2)
+            for remark in (
+                speed_remark(case.vessel, case.label),
+                heading_remark(case.vessel, sea, case.label),
+            ):
+                if remark is not None:
+                    warnings.warn(f"{case.label}: {remark}", PhysicsWarning, stacklevel=2)
             motion.warn_if_outside()
         return motion
 

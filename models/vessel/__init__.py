@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .crane import Point, across, place_text, side_of
     from .hook_operator import (
         equivalent,
+        heading_remark,
         heave_operators,
         hook_operators,
         hook_rao,

@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..basics import ComplexArray, FloatArray, InputError, file_stamp, read_only
-from ..sea import Spreading
+from ..sea import SeaSpectrum, Spreading
 from .crane import Point
 from .raos import VesselRaos
 from .vessel import HeaveRao
@@ -25,6 +25,9 @@ from .vessel_section import Vessel
 
 _ALIKE = 3.0
 """Difference of speeds that hardly matters to the motions [m/s]: a Froude number of 0.1 on 80 m."""
+
+_HEADING_ERROR = 0.01
+"""Share of the hook's rms above which lines between coarse headings are told [-]."""
 
 
 def vessel_raos(vessel: Vessel, owner: str = "case") -> VesselRaos:
@@ -71,6 +74,37 @@ def speed_remark(vessel: Vessel, owner: str = "case") -> str | None:
     )
 
 
+def heading_remark(vessel: Vessel, sea: SeaSpectrum, owner: str = "case") -> str | None:
+    """Return a sentence if the hook's motion hangs on straight lines between coarse headings.
+
+    Lines between headings that are uneven, or more than 30 degrees apart, are held against a
+    smooth curve through the same headings: the hook's rms in this sea by both.  The curve knows no
+    more of what lies between the headings than the lines do: on the bundled vessel at 45 degrees
+    it tells two thirds of their error where that is large.
+    """
+    if vessel.raos is None or vessel.hook_point is None or vessel.heading is None:
+        return None
+    raos = vessel_raos(vessel, owner)
+    if raos.even:
+        return None
+    omega, lines, headings, weights = hook_operators(vessel, sea.spreading, owner)
+    curve = heave_operators(raos, vessel.hook_point, headings, smooth=True)
+    by_lines, by_curve = (
+        np.sqrt(np.trapezoid(sea.density(omega) * (np.abs(found) ** 2 @ weights), omega))
+        for found in (lines, curve)
+    )
+    error = by_lines / by_curve - 1.0 if by_curve > 0.0 else 0.0
+    if abs(error) < _HEADING_ERROR:
+        return None
+    widest = float(np.max(np.diff(raos.heading_deg, append=raos.heading_deg[0] + 360.0)))
+    return (
+        f"vessel.raos: the headings of {vessel.raos} are uneven or coarse, up to {widest:.4g} deg "
+        f"apart, and lines between them are {abs(error):.1%} {'low' if error < 0.0 else 'high'} in "
+        "the hook's rms against a curve, which itself may be as far off; equal steps of at most "
+        "30 deg round the circle make a Fourier series"
+    )
+
+
 @lru_cache(maxsize=256)
 def sea_directions(heading: float, spreading: Spreading | None) -> tuple[FloatArray, FloatArray]:
     """Return the headings of a sea and their shares; one heading if it is long-crested.
@@ -93,7 +127,9 @@ def sea_directions(heading: float, spreading: Spreading | None) -> tuple[FloatAr
     return read_only(headings), read_only(weights)
 
 
-def heave_operators(raos: VesselRaos, point: Point, headings: FloatArray) -> ComplexArray:
+def heave_operators(
+    raos: VesselRaos, point: Point, headings: FloatArray, *, smooth: bool = False
+) -> ComplexArray:
     """Return the heave of a point per wave elevation at that point.
 
     Between two headings of the table the six motions are interpolated about the table's own
@@ -108,6 +144,8 @@ def heave_operators(raos: VesselRaos, point: Point, headings: FloatArray) -> Com
         The point, in the frame of `raos` (3,) [m].
     headings
         Where the waves travel to (n,) [rad].
+    smooth
+        Whether a spline joins the headings where lines do, see :meth:`VesselRaos.response`.
 
     Returns
     -------
@@ -119,7 +157,7 @@ def heave_operators(raos: VesselRaos, point: Point, headings: FloatArray) -> Com
     InputError
         If the vessel has not been computed near a heading.
     """
-    motions = raos.response(raos.omega[:, None], headings)
+    motions = raos.response(raos.omega[:, None], headings, smooth=smooth)
     x, y = point[0] - raos.origin[0], point[1] - raos.origin[1]
     heave, roll, pitch = motions[..., 2], motions[..., 3], motions[..., 4]
     ahead, abeam = point[0] - raos.phase_origin[0], point[1] - raos.phase_origin[1]

@@ -43,6 +43,9 @@ MIRRORED = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 WIDEST_GAP = math.pi / 2.0
 """Widest gap between two headings of a table that is filled by interpolation [rad]."""
 
+WIDEST_STEP = math.pi / 6.0
+"""Widest step of evenly spaced headings that are read as a Fourier series [rad]."""
+
 _HEAVE = 2
 _ANGLES = (3, 4, 5)
 
@@ -164,16 +167,29 @@ class VesselRaos(ReadOnlyArrays):
         """Return the wave number at the water depth of the table, same shape [rad/m]."""
         return wave_number(omega, self.depth)
 
-    def response(self, omega: npt.ArrayLike, heading: npt.ArrayLike) -> ComplexArray:
+    @property
+    def even(self) -> bool:
+        """Whether the headings go round the circle in equal steps of at most 30 degrees."""
+        count = self.heading.size
+        steps = np.diff(self.heading, append=self.heading[0] + 2.0 * math.pi)
+        step = 2.0 * math.pi / count
+        return step <= WIDEST_STEP * (1.0 + 1e-9) and bool(np.all(np.abs(steps - step) < 1e-6))
+
+    def response(
+        self, omega: npt.ArrayLike, heading: npt.ArrayLike, *, smooth: bool = False
+    ) -> ComplexArray:
         """Return the six operators at any frequency and heading.
 
         Between two frequencies amplitude and unwrapped phase are each linear, as in
         :class:`models.vessel.vessel.HeaveRao` and for its reasons.  Between two headings the
-        complex number is linear, round the circle: in heading a motion such as roll passes
+        complex number is interpolated, round the circle: in heading a motion such as roll passes
         *through* zero, where amplitude and phase have a cusp and a jump and the complex number is
-        smooth. What does turn the complex number with heading is the wave's own phase between the
-        point of zero phase and the origin, k d cos(b - b0); it is taken out before and put back
-        after. At the rows the table comes back exactly.
+        smooth.  Evenly spaced headings are the samples of a Fourier series (:attr:`even`), in
+        which a symmetric vessel has cosines of heave and sines of roll alone; others are joined
+        by straight lines, which are low where the motion is largest.  What turns the complex
+        number with heading is the wave's own phase between the point of zero phase and the
+        origin, k d cos(b - b0); it is taken out before and put back after. At the rows the table
+        comes back exactly.
 
         Below the table heave tends linearly to 1 with zero phase, the angles keep their ratio to
         the wave slope, the other motions their first value; above, amplitudes fall with omega^-2.
@@ -182,6 +198,9 @@ class VesselRaos(ReadOnlyArrays):
         ----------
         omega, heading
             Frequencies, at least zero [rad/s], and headings [rad]; they are broadcast.
+        smooth
+            Whether headings that straight lines join are joined by a periodic cubic spline
+            instead: the difference tells how far the lines are off.
 
         Returns
         -------
@@ -205,7 +224,9 @@ class VesselRaos(ReadOnlyArrays):
         centred = self.values / self._wave_phase(self.omega[:, None], self.heading)[..., None]
         rows, back = np.unique(frequency, return_inverse=True)
         table = _between_rows(self.omega, centred, rows, self.wave_number)
-        found = _between_headings(owner, self.heading, table, back, direction)
+        headings, column = np.unique(np.mod(direction, 2.0 * math.pi), return_inverse=True)
+        weights = self._heading_weights(owner, headings, smooth)
+        found = _between_headings(table, back, weights, column)
         found = found * self._wave_phase(frequency, direction)[:, None]
         return found.reshape(*shape, len(MODES))
 
@@ -328,6 +349,22 @@ class VesselRaos(ReadOnlyArrays):
             source="waveresponse",
         )  # fmt: skip
 
+    def _heading_weights(self, owner: str, wanted: FloatArray, smooth: bool) -> FloatArray:
+        """Return what each heading of the table counts for at headings in [0, 2 pi) (u, h)."""
+        away = np.abs(wanted[:, None] - self.heading)
+        # Rounding (180 deg in radians, 359.9999..) must not ask for a neighbour far away.
+        same = np.minimum(away, 2.0 * math.pi - away) < 1e-9
+        between = ~same.any(axis=1)
+        weights = same.astype(np.float64)
+        if self.even:
+            weights[between] = _fourier_weights(self.heading, wanted[between])
+        else:
+            # Lines first in any case: they refuse the gaps.
+            weights[between] = _linear_weights(owner, self.heading, wanted[between])
+            if smooth:
+                weights[between] = _spline_weights(self.heading, wanted[between])
+        return weights
+
     def _wave_phase(self, omega: FloatArray, heading: FloatArray) -> ComplexArray:
         """Return the elevation at the origin over that at the phase origin (...,)."""
         dx = self.origin[0] - self.phase_origin[0]
@@ -391,27 +428,59 @@ def _between_rows(
 
 
 def _between_headings(
-    owner: str, heading: FloatArray, table: ComplexArray, row: npt.NDArray[np.intp], b: FloatArray
+    table: ComplexArray,
+    row: npt.NDArray[np.intp],
+    weights: FloatArray,
+    column: npt.NDArray[np.intp],
 ) -> ComplexArray:
-    """Interpolate along the headings, round the circle.
+    """Return weighted sums of a table's headings.
 
     Parameters
     ----------
-    owner
-        Whose table it is, for messages.
-    heading
-        The table's headings (h,) [rad].
     table
         Operators (n, h, 6).
     row
         Which of the n frequencies each point has (m,).
-    b
-        Heading of each point (m,) [rad].
+    weights
+        Of the table's headings at each of u headings (u, h).
+    column
+        Which of the u headings each point has (m,).
 
     Returns
     -------
     ComplexArray
         Operators (m, 6).
+    """
+    found = np.empty((row.size, len(MODES)), dtype=np.complex128)
+    for i, share in enumerate(weights):
+        points = np.flatnonzero(column == i)
+        used = np.flatnonzero(share)
+        chosen = table[row[points][:, None], used]
+        found[points] = np.einsum("h,mhc->mc", share[used], chosen)
+    return found
+
+
+def _fourier_weights(heading: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Return the weights (u, h) of evenly spaced headings in their Fourier series (Dirichlet)."""
+    n = heading.size
+    half = 0.5 * (wanted[:, None] - heading)
+    below = np.tan(half) if n % 2 == 0 else np.sin(half)
+    weights: FloatArray = np.sin(n * half) / (n * np.where(below == 0.0, 1.0, below))
+    return weights
+
+
+def _spline_weights(heading: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Return the weights (u, h) of headings in a periodic cubic spline through them."""
+    from scipy.interpolate import CubicSpline
+
+    knots = np.append(heading, heading[0] + 2.0 * math.pi)
+    unit = np.eye(heading.size)
+    curve = CubicSpline(knots, np.vstack([unit, unit[:1]]), bc_type="periodic")
+    return np.asarray(curve(heading[0] + np.mod(wanted - heading[0], 2.0 * math.pi)))
+
+
+def _linear_weights(owner: str, heading: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Return the weights (u, h) of the two headings beside each, round the circle.
 
     Raises
     ------
@@ -419,32 +488,23 @@ def _between_headings(
         If a heading lies in a gap wider than :data:`WIDEST_GAP`.
     """
     turn = 2.0 * math.pi
-    wrapped = np.mod(b, turn)
-    left = np.searchsorted(heading, wrapped, side="right") - 1  # -1: between the last and the first
+    left = np.searchsorted(heading, wanted, side="right") - 1  # -1: between the last and the first
     right = np.mod(left + 1, heading.size)
     start = heading[left] - np.where(left < 0, turn, 0.0)
     gap = np.mod(heading[right] - heading[left], turn)
     gap = np.where(gap == 0.0, turn, gap)
-    part = (wrapped - start) / gap
-    # Rounding (180 deg in radians, 359.9999..) must not ask for a neighbour far away.
-    part = np.where(part * gap < 1e-9, 0.0, np.where((1.0 - part) * gap < 1e-9, 1.0, part))
-    lost = (gap > WIDEST_GAP * (1.0 + 1e-9)) & (part > 0.0) & (part < 1.0)
+    lost = gap > WIDEST_GAP * (1.0 + 1e-9)
     if np.any(lost):
         i = int(np.argmax(lost))
         raise InputError(
-            f"{owner}: no RAO for waves towards {math.degrees(wrapped[i]):.4g} deg: the table has "
+            f"{owner}: no RAO for waves towards {math.degrees(wanted[i]):.4g} deg: the table has "
             f"no heading between {math.degrees(heading[left[i]]):.4g} and "
             f"{math.degrees(heading[right[i]]):.4g} deg, a gap wider than "
             f"{math.degrees(WIDEST_GAP):g} deg"
         )
-    share = part[:, None]
-    found: ComplexArray = np.where(
-        share == 0.0,
-        table[row, left],
-        np.where(
-            share == 1.0,
-            table[row, right],
-            (1.0 - share) * table[row, left] + share * table[row, right],
-        ),
-    )
-    return found
+    part = (wanted - start) / gap
+    weights = np.zeros((wanted.size, heading.size))
+    each = np.arange(wanted.size)
+    weights[each, left] = 1.0 - part
+    weights[each, right] += part
+    return weights

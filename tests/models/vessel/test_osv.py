@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from vessel_tables import mirrored
 
+from models.vessel import heave_operators
 from models.vessel.readers import bundled_vessels, check_long_waves, read_raos
 
 DATA = Path(__file__).parents[4] / "shared" / "data" / "mss" / "supply.mat"
@@ -53,6 +55,36 @@ def test_port_and_starboard_are_mirror_images() -> None:
     assert np.allclose(mirrored(raos).values, raos.values, atol=1e-12)
 
 
+def jonswap(omega: np.ndarray, period: float) -> np.ndarray:
+    """The shape of a JONSWAP sea with gamma 3.3, without its height."""
+    peak = 2.0 * math.pi / period
+    width = np.where(omega < peak, 0.07, 0.09)
+    sea = omega**-5.0 * np.exp(-1.25 * (peak / omega) ** 4)
+    return sea * 3.3 ** np.exp(-0.5 * ((omega - peak) / width / peak) ** 2)
+
+
+@pytest.mark.parametrize(("period", "lines"), [(7.0, 0.22), (9.0, 0.13), (12.0, 0.07)])
+def test_from_every_second_row_the_fourier_series_finds_the_others(
+    period: float, lines: float
+) -> None:
+    raos = read_raos("osv-83m")
+    half = replace(raos, heading=raos.heading[::2], values=raos.values[:, ::2])
+    hook, weight = (-32.0, 12.0, 20.0), jonswap(raos.omega, period)[:, None]
+
+    def rms(heave: np.ndarray) -> np.ndarray:
+        return np.sqrt(np.trapezoid(weight * np.abs(heave) ** 2, raos.omega, axis=0))
+
+    between = raos.heading[1::2]
+    true = heave_operators(raos, hook, raos.heading)
+    exact = rms(true[:, 1::2])
+    assert np.max(np.abs(rms(heave_operators(half, hook, between)) / exact - 1.0)) < 0.03
+    # The lines of before, by hand: the six motions halfway, which are then taken to the hook.
+    values = 0.5 * (half.values + np.roll(half.values, -1, axis=1))
+    halfway = replace(half, heading=between, values=values)
+    worst = np.min(rms(heave_operators(halfway, hook, between)) / exact - 1.0)
+    assert worst == pytest.approx(-lines, abs=0.005)
+
+
 @pytest.mark.skipif(not DATA.is_file(), reason="the shared example files are not here")
 def test_heave_and_pitch_are_those_of_another_ship_of_the_same_dimensions() -> None:
     # Other lines, another program (strip theory), the same length, beam and draught.  Roll is not
@@ -81,10 +113,7 @@ def test_a_hook_moves_as_far_as_on_that_ship(
 ) -> None:
     other, ours = read_raos(DATA, speed=0.0), read_raos("osv-83m")
     omega = np.linspace(0.2, 1.9, 600)
-    peak = 2.0 * math.pi / period
-    width = np.where(omega < peak, 0.07, 0.09)
-    sea = omega**-5.0 * np.exp(-1.25 * (peak / omega) ** 4)
-    sea *= 3.3 ** np.exp(-0.5 * ((omega - peak) / width / peak) ** 2)
+    sea = jonswap(omega, period)
     theirs, found = (
         float(np.sqrt(np.trapezoid(sea * np.abs(heave) ** 2, omega)))
         for heave in (

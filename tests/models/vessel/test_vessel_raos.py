@@ -14,6 +14,7 @@ from vessel_tables import mirrored, swinging
 
 from models.basics import InputError, wave_number
 from models.vessel import MODES, VesselRaos
+from models.vessel.raos import MIRRORED
 from models.vessel.symmetry import completed, looks_symmetric
 
 RAOS = swinging()
@@ -48,10 +49,58 @@ def test_between_frequencies_amplitude_and_phase_are_linear() -> None:
     assert np.allclose(middle / np.abs(middle), half / np.abs(half), atol=1e-12)
 
 
-def test_between_headings_the_complex_number_is_linear_round_the_circle() -> None:
-    last, first = RAOS.values[4, -1], RAOS.values[4, 0]
-    between = RAOS.response(0.7, math.radians(345.0))
+def waving(headings: np.ndarray, order: int) -> VesselRaos:
+    """Motions that are trigonometric polynomials of the heading, heave even and roll odd."""
+    values = np.zeros((2, headings.size, 6), dtype=np.complex128)
+    for row, factor in enumerate((1.0, 0.4 - 0.2j)):
+        values[row, :, 2] = factor * (1.0 + np.cos(headings) - 0.7j * np.cos(order * headings))
+        values[row, :, 3] = factor * (np.sin(headings) + 0.3j * np.sin(order * headings))
+    return VesselRaos(name="waves", omega=[0.5, 1.0], heading=headings, values=values)
+
+
+@pytest.mark.parametrize(("count", "first"), [(12, 0.0), (13, 0.0), (24, 0.0), (36, 0.07)])
+def test_even_headings_are_the_samples_of_a_fourier_series(count: int, first: float) -> None:
+    order = (count - 1) // 2
+    raos = waving(first + 2.0 * math.pi * np.arange(count) / count, order)
+    assert raos.even
+    between = np.linspace(-7.0, 7.0, 101)
+    found = raos.response(np.array([[0.5], [1.0]]), between)
+    wanted = waving(np.linspace(0.0, 6.2, 63), order)
+    wanted_values = waving(np.sort(np.mod(between, 2.0 * math.pi)), order).values
+    there = np.argsort(np.mod(between, 2.0 * math.pi))
+    assert np.allclose(found[:, there], wanted_values, rtol=0.0, atol=1e-12)
+    assert not np.allclose(raos.response(0.5, wanted.heading)[:, 2].real, 1.0)
+
+
+def test_a_symmetric_vessel_stays_symmetric_between_the_headings() -> None:
+    ship = swinging(symmetric=True)
+    port = ship.response(0.65, np.radians([7.0, 100.0, 171.0]))
+    starboard = ship.response(0.65, -np.radians([7.0, 100.0, 171.0]))
+    assert np.allclose(port, starboard * MIRRORED, rtol=0.0, atol=1e-14)
+    # From dead ahead there is no roll: the sines of the series are zero there.
+    assert np.all(np.abs(ship.response(0.65, [0.0, math.pi])[:, [1, 3, 5]]) < 1e-14)
+
+
+def test_between_coarse_and_uneven_headings_the_complex_number_is_linear_round_the_circle() -> None:
+    coarse = swinging(8)
+    last, first = coarse.values[4, -1], coarse.values[4, 0]
+    between = coarse.response(0.7, math.radians(337.5))
     assert np.allclose(between, 0.5 * (last + first), rtol=1e-12)
+    keep = np.delete(np.arange(12), 5)
+    uneven = replace(RAOS, heading=RAOS.heading[keep], values=RAOS.values[:, keep])
+    assert not coarse.even
+    assert not uneven.even
+    between = uneven.response(0.7, math.radians(140.0))
+    assert np.allclose(between, (2.0 * RAOS.values[4, 4] + RAOS.values[4, 6]) / 3.0, rtol=1e-12)
+
+
+def test_a_curve_instead_of_lines_is_nearer_to_a_smooth_vessel() -> None:
+    coarse = waving(2.0 * math.pi * np.arange(8) / 8, 2)
+    b = np.radians(np.arange(10.0, 350.0, 7.0))
+    exact = waving(b, 2).values[1]
+    lines, curve = (np.abs(coarse.response(1.0, b, smooth=s) - exact).max() for s in (False, True))
+    assert curve < 0.4 * lines
+    assert np.array_equal(coarse.response(1.0, coarse.heading, smooth=True), coarse.values[1])
 
 
 def test_a_distant_phase_origin_changes_nothing_but_the_phase_between_headings() -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ from models.hook import HookMotion
 from models.operation.contact_scenarios import boat_motion, surface_motion
 from models.sea import Spreading
 from models.vessel import heave_operators, hook_rao, vessel_raos
-from models.vessel.readers import write_raos
+from models.vessel.readers import read_raos, write_raos
 
 VESSEL = """\
 vessel:
@@ -220,3 +222,22 @@ def test_much_outside_the_table_is_told_with_the_right_field(tmp_path):
     case = barge_case(tmp_path, sea__peak_period=3.2, sea__significant_height=0.4)
     with pytest.warns(PhysicsWarning, match=r"vessel\.raos: .* lies outside the table"):
         HookMotion.from_case(case)
+
+
+def test_lines_between_coarse_headings_are_told_with_their_error(write, tmp_path):
+    ship = read_raos("osv-83m")
+    coarse = replace(ship, heading=ship.heading[::3], values=ship.values[:, ::3])
+    write_raos(tmp_path / "coarse.csv", coarse)
+    vessel = "vessel:\n  raos: coarse.csv\n  hook: {x: -32, y: 12, z: 20}\n  heading: 105 deg\n"
+    case = load_case(write(vessel))
+    with pytest.warns(PhysicsWarning, match="up to 45 deg apart") as told:
+        found = HookMotion.from_case(case).displacement.rms
+    (words,) = (str(w.message) for w in told)
+    full = load_case(write(vessel.replace("coarse.csv", "osv-83m")))
+    true = HookMotion.from_case(full).displacement.rms
+    error = float(re.search(r"are ([\d.]+)% low", words)[1]) / 100.0
+    assert 0.2 < 1.0 - found / true < 0.24
+    assert 0.13 < error < 0.17
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        HookMotion.from_case(load_case(write(vessel.replace("105", "180"))))  # a row of the table
