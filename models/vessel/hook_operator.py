@@ -90,7 +90,7 @@ def heading_remark(vessel: Vessel, sea: SeaSpectrum, owner: str = "case") -> str
     omega, lines, headings, weights = hook_operators(vessel, sea.spreading, owner)
     curve = heave_operators(raos, vessel.hook_point, headings, smooth=True)
     by_lines, by_curve = (
-        np.sqrt(np.trapezoid(sea.density(omega) * (np.abs(found) ** 2 @ weights), omega))
+        float(np.sqrt(np.trapezoid(sea.density(omega) * (np.abs(found) ** 2 @ weights), omega)))
         for found in (lines, curve)
     )
     error = by_lines / by_curve - 1.0 if by_curve > 0.0 else 0.0
