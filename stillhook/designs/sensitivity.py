@@ -72,7 +72,7 @@ def tornado_figure(study: Sensitivity, *, bars: int = _BARS) -> Figure:
     ):
         values = [getattr(entry, name) for entry in shown]
         axes.barh(place + offset, values, height=0.4, color=colour, label=typeset(label))
-    axes.set_yticks(place, [entry.path for entry in shown])
+    axes.set_yticks(place, [entry.label for entry in shown])
     axes.axvline(0.0, color="#666666", linewidth=0.8)
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("change for one per cent more [%]")
@@ -135,7 +135,10 @@ def sensitivity_report(study: Sensitivity, moved: Sequence[Moved], wide: Wide | 
     moves = ("payload_rms", "max_sensitivity", "torque_rms", "speed_rms")
     heads = map(Column, moves, ("payload rms", "M_s", "torque", "speed"))
     rows = [
-        (entry.path, *(Written(v, f"{v:+.3f} %") for v in (getattr(entry, name) for name in moves)))
+        (
+            entry.label,
+            *(Written(v, f"{v:+.3f} %") for v in (getattr(entry, name) for name in moves)),
+        )
         for entry in study.elasticities[:_ROWS]
     ]
     elasticities = Table(

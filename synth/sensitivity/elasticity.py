@@ -89,27 +89,28 @@ def _first(
         raise InputError("sensitivity: the loop must be stable; an unstable one has no rms")
     drag = assessment.coefficient or fixed.fixed_drag
     outputs = {**_OUTPUTS, "velocity": "payload.velocity"}
-    slopes = LoopSlopes(fixed, drag, assessment.quadrature(list(outputs.values())))
-    known: list[tuple[str, float, str]] = []  # paths, values, units
+    signals = tuple(outputs.values())
+    slopes = LoopSlopes(fixed, drag, signals, assessment.quadrature(signals))
+    known: list[tuple[str, float, str, str]] = []  # paths, values, units, sides
     steps: list[str] = []
     numbers = [n for n in numbers_of(fixed.case) if only is None or n.path == only]
     for k, number in enumerate(numbers):
         if progress is not None:
             progress("numbers of the case", k, len(numbers))
         try:
-            slopes.add_number(number)
+            sides = slopes.add_number(number)
         except StepError:
             steps.append(number.path)
         else:
-            known.append((number.path, number.value, number.unit))
+            known += [(number.path, number.value, number.unit, side) for side in sides]
     for k, (name, value) in enumerate(zip(fixed.names, fixed.values, strict=True)):
         if value != 0.0 and only in (None, f"gains.{name}"):
             slopes.add_gain(k)
-            known.append((f"gains.{name}", value, fixed.design.units.get(name, "")))
+            known.append((f"gains.{name}", value, fixed.design.units.get(name, ""), ""))
     if not known:
         return {}, [], [], steps
     peaks = assessment.sensitivity_peaks(_TIE * assessment.max_sensitivity)
-    sigmas, heights = slopes.figures(list(outputs.values()), peaks)
+    sigmas, heights = slopes.figures(peaks)
     figures = {name: float(np.exp(sigmas[output].value[0])) for name, output in _OUTPUTS.items()}
     figures["max_sensitivity"] = assessment.max_sensitivity
     # By every variable, and last by the drag; then with the drag that moves along.
@@ -118,23 +119,28 @@ def _first(
     if fixed.stochastic:
         velocity, of_drag = own["velocity"][:-1], own["velocity"][-1]
         moved = drag * (velocity + slopes.quadratic_drag()) / (1.0 - drag * of_drag)
-    scale = np.array([value for _, value, _ in known])
+    scale = np.array([value for _, value, _, _ in known])
     whole = {name: scale * (own[name][:-1] + own[name][-1] * moved) for name in _OUTPUTS}
     of_peaks = scale * (heights.slope[:-1, 0].T + heights.slope[-1, 0][:, None] * moved)
     most = np.abs(of_peaks).argmax(axis=0)
     whole["max_sensitivity"] = of_peaks[most, np.arange(len(known))]
     found, idle = [], []
-    for k, (path, value, unit) in enumerate(known):
+    for k, (path, value, unit, side) in enumerate(known):
         entry = {name: float(column[k]) for name, column in whole.items()}
         if any(entry.values()):
-            found.append(Elasticity(path=path, value=value, unit=unit, **entry))
-        else:
+            found.append(Elasticity(path=path, value=value, unit=unit, side=side, **entry))
+        elif path not in idle:
             idle.append(path)
     return figures, found, idle, steps
 
 
 def _with_curvature(fixed: FixedDesign, entry: Elasticity) -> Elasticity:
-    """Return the elasticity with its own slope, by differences of exact first derivatives."""
+    """Return the elasticity with its own slope, by differences of first derivatives.
+
+    At a corner it has none.
+    """
+    if entry.side:
+        return entry
     ends = []
     for sign in (1.0, -1.0):
         other = fixed.with_number(entry.path, np.exp(sign * _SECOND))

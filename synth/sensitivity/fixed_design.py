@@ -9,11 +9,12 @@ differs from the one designed for.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from models.basics import InputError, SolverError
 from models.case import Case
 from models.hook import HookMotion
-from models.plant import PlantData
+from models.plant import LinearPlant, PlantData
 from models.sensing import sensed_plant
 
 from ..design import Design
@@ -74,26 +75,40 @@ class FixedDesign:
         """The case's own linear drag, if it gives one [N s/m]."""
         return self.case.payload.fixed_drag or 0.0
 
-    def assessment(self) -> Assessment | None:
-        """Return the closed loop; None if it is unstable."""
-        stochastic = self.stochastic
-        # Where a consistent drag is counted from: that before compensation.
-        start = self.design.question.drag_before if stochastic else self.fixed_drag
-        plant = sensed_plant(self.case, masses=self.design.masses, drag=start)
-        hook = HookMotion.from_case(self.case, warn=False)
-        spectra = heard_spectra(self.case, hook, self.design.measurements)
-        quadratic = PlantData.from_case(self.case).quadratic_drag
+    def assessment(self, shaken: Case | None = None) -> Assessment | None:
+        """Return the closed loop; None if it is unstable.
+
+        Parameters
+        ----------
+        shaken
+            The case whose sea and vessel shake it; its own by default.
+        """
+        shaken = shaken or self.case
+        hook = HookMotion.from_case(shaken, warn=False)
+        spectra = heard_spectra(shaken, hook, self.design.measurements)
+        plant, drag = self._plant
         assessment = Assessment(
-            plant.select(measurements=self.design.measurements),
+            plant,
             self.law.controller(list(self.values)),
             disturbances(spectra, tuple(spectra)),
-            drag=DragElement(quadratic=quadratic, reference=start) if stochastic else None,
+            drag=drag,
             coefficient=self.drag,
         )
         try:
             return assessment if assessment.stable else None
         except SolverError:
             return None  # no drag agrees: unstable with any
+
+    @cached_property
+    def _plant(self) -> tuple[LinearPlant, DragElement | None]:
+        """The plant, and its quadratic drag where that is linearised with the response."""
+        stochastic = self.stochastic
+        # Where a consistent drag is counted from: that before compensation.
+        start = self.design.question.drag_before if stochastic else self.fixed_drag
+        plant = sensed_plant(self.case, masses=self.design.masses, drag=start)
+        quadratic = PlantData.from_case(self.case).quadratic_drag
+        drag = DragElement(quadratic=quadratic, reference=start) if stochastic else None
+        return plant.select(measurements=self.design.measurements), drag
 
     def with_number(self, path: str, factor: float) -> FixedDesign | None:
         """Return the same design with a number of its case, or a gain, times a factor.

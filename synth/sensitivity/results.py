@@ -36,6 +36,9 @@ class Elasticity:
         limit; then M_s has a kink, and the slope is that of the peak which moves most.
     curvature
         d2 ln(payload_rms) / d ln(number)2 [-]; None where it was not asked for.
+    side
+        ``below`` or ``above`` where the number stands at the corner of a table, as a heading at a
+        row of the vessel's operators: what a smaller or a larger value does; else empty.
     """
 
     path: str
@@ -46,6 +49,12 @@ class Elasticity:
     torque_rms: float
     speed_rms: float
     curvature: float | None = None
+    side: str = ""
+
+    @property
+    def label(self) -> str:
+        """The path, with the side where there are two."""
+        return f"{self.path} ({self.side} its corner)" if self.side else self.path
 
     def predicted(self, share: float) -> float:
         """Return the factor on the payload's rms if the number grows by a share [-]."""
@@ -84,8 +93,8 @@ class Sensitivity:
     payload_rms, max_sensitivity, torque_rms, speed_rms
         Its figures [m], [-], [N m], [rad/s].
     elasticities
-        One for every number that has any effect, that with the largest effect on the payload's
-        rms first.
+        One for every number that has any effect (two at a corner, one for each side), that with
+        the largest effect on the payload's rms first.
     without_effect
         Paths of the numbers that do nothing to these figures.
     stepping
@@ -103,7 +112,7 @@ class Sensitivity:
     stepping: tuple[str, ...] = ()
 
     def __getitem__(self, path: str) -> Elasticity:
-        """Return the elasticity of a number by its path.
+        """Return the elasticity of a number by its path; at a corner the larger of the two.
 
         Raises
         ------
@@ -154,7 +163,8 @@ class Sensitivity:
         for e in self.elasticities:
             cells = [repr(float(getattr(e, name))) for name in ("value", *FIGURES)]
             curvature = "" if e.curvature is None else repr(e.curvature)
-            lines.append(",".join([e.path, cells[0], e.unit, *cells[1:], curvature, ""]))
+            note = f"corner: {e.side} its value" if e.side else ""
+            lines.append(",".join([e.path, cells[0], e.unit, *cells[1:], curvature, note]))
         lines += [f"{path},,,0,0,0,0,,no effect" for path in self.without_effect]
         lines += [f"{path},,,,,,,,steps at its value" for path in self.stepping]
         return "\n".join(lines) + "\n"
@@ -166,7 +176,7 @@ class Sensitivity:
             f" M_s {self.max_sensitivity:.3g}"
         ]
         shown = [e for e in self.elasticities if abs(e.payload_rms) >= 0.01][:12]
-        lines += [f"├ {e.path}: {e.payload_rms:+.3f} % per cent" for e in shown]
+        lines += [f"├ {e.label}: {e.payload_rms:+.3f} % per cent" for e in shown]
         rest = len(self.elasticities) - len(shown)
         lines += [f"├ {path}: steps here, no elasticity" for path in self.stepping]
         lines.append(f"└ {rest} more with less, {len(self.without_effect)} without any")

@@ -2,16 +2,21 @@ r"""How the figures of a fixed design move with all that its loop is made of: `L
 
 ::
 
-    number of the case -> the loop's numbers, density of the sea    differences of fourth order
-    these, gains, drag -> figures                                   dual numbers, exact
+    number of the case -> the loop's numbers    differences of fourth order
+    these, gains, drag -> figures               dual numbers, exact
+    number of the sea, the vessel -> figures    differences of the integrals, of fourth order
 
-What stands before the loop are short formulas; the loop itself, its rope's recursion and the
-integral over the spectrum are differentiated automatically (`synth.sweeps.dual_figures`).
+What stands before the loop are short formulas; the loop itself and its rope's recursion are
+differentiated automatically (`synth.sweeps.dual_figures`).  What moves the hook is not: a density
+has kinks that move with a number (the peak of JONSWAP's, where its width changes; the fold of a
+following sea), and its integral has none.  So the integral is differentiated, each time over nodes
+of its own that begin new panels at the kinks, with the loop and its drag as they are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +28,7 @@ from models.plant import lump_rope
 
 from ..loop import Dual
 from ..sweeps import columns_of, dual_figures
-from .differences import derivative
+from .differences import derivative, sided_derivatives
 from .fields import Number
 from .fixed_design import FixedDesign
 
@@ -39,21 +44,32 @@ class LoopSlopes:
         The design on its case.
     drag
         The linear drag coefficient in its loop [N s/m].
+    outputs
+        The signals whose standard deviations are figures.
     nodes
         Nodes of all integrals.
     """
 
-    def __init__(self, fixed: FixedDesign, drag: float, nodes: Quadrature) -> None:
-        self._fixed, self._drag, self._nodes = fixed, drag, nodes
+    def __init__(
+        self, fixed: FixedDesign, drag: float, outputs: Sequence[str], nodes: Quadrature
+    ) -> None:
+        self._fixed, self._drag, self._outputs, self._nodes = fixed, drag, tuple(outputs), nodes
         self._numbers = columns_of(fixed.case)
         self._there = [name for name, value in self._numbers.items() if np.isfinite(value[0])]
+        self._still = replace(fixed, drag=drag)  # the loop, in whatever sea
         # One row for every variable.
         self._of_numbers: list[FloatArray] = []
-        self._of_density: list[FloatArray] = []
+        self._of_motion: list[FloatArray] = []  # of ln sigma of the outputs
         self._of_gains: list[FloatArray] = []
 
-    def add_number(self, number: Number) -> None:
+    def add_number(self, number: Number) -> tuple[str, ...]:
         """Add a number of the case.
+
+        Returns
+        -------
+        tuple of str
+            The sides of its value that have been added, one variable each: ``("",)``, or ``below``
+            and ``above`` where it stands at the corner of a table.
 
         Raises
         ------
@@ -66,23 +82,29 @@ class LoopSlopes:
             columns = columns_of(changed(case, number, value))
             return np.concatenate([columns[name] for name in self._there])
 
-        def density(value: float) -> FloatArray:
-            return self._density(changed(case, number, value))
-
         own = np.asarray(derivative(numbers, number.value), dtype=np.float64)
-        shaken = np.zeros(self._nodes.omega.size)
-        if number.path.startswith(_SHAKING):
-            shaken = np.asarray(derivative(density, number.value, common=True), dtype=np.float64)
-        self._add(own, shaken, np.zeros(len(self._fixed.values)))
+        no_gain = np.zeros(len(self._fixed.values))
+        if not number.path.startswith(_SHAKING):
+            self._add(own, np.zeros(len(self._outputs)), no_gain)
+            return ("",)
+        below, above = sided_derivatives(
+            lambda value: self._motion(changed(case, number, value)), number.value
+        )
+        if np.array_equal(below, above):
+            self._add(own, below, no_gain)
+            return ("",)
+        self._add(own, below, no_gain)
+        self._add(own, above, no_gain)
+        return ("below", "above")
 
     def add_gain(self, index: int) -> None:
         """Add a parameter of the controller."""
         unit = np.zeros(len(self._fixed.values))
         unit[index] = 1.0
-        self._add(np.zeros(len(self._there)), np.zeros(self._nodes.omega.size), unit)
+        self._add(np.zeros(len(self._there)), np.zeros(len(self._outputs)), unit)
 
-    def figures(self, outputs: Sequence[str], peaks: FloatArray) -> tuple[Mapping[str, Dual], Dual]:
-        """Return ln sigma of outputs, (1,), and ln |S| at frequencies [rad/s], (1, p).
+    def figures(self, peaks: FloatArray) -> tuple[Mapping[str, Dual], Dual]:
+        """Return ln sigma of the outputs, (1,), and ln |S| at frequencies [rad/s], (1, p).
 
         Their slopes are by the variables added, in that order, and by the drag coefficient where
         nothing else moves.
@@ -95,8 +117,8 @@ class LoopSlopes:
         }
         drag_slope = by_name.get("fixed_drag", np.zeros(len(self._of_numbers)))
         gains = np.array(self._of_gains).T
-        density = np.array([*self._of_density, np.zeros(self._nodes.omega.size)])
-        return dual_figures(
+        hook = HookMotion.from_case(fixed.case, warn=False)
+        sigmas, heights = dual_figures(
             numbers,
             fixed.law,
             fixed.design.measurements,
@@ -104,23 +126,31 @@ class LoopSlopes:
             Dual(np.array([self._drag]), np.append(drag_slope, 1.0)[:, None]),
             lumps=lump_rope(fixed.design.masses, fixed.case.rope.lumping),
             nodes=self._nodes,
-            density=Dual(self._density(fixed.case)[None], density[:, None]),
-            outputs=outputs,
+            density=hook.density(self._nodes.omega)[None],
+            outputs=self._outputs,
             peaks=peaks,
         )
+        moved = np.vstack([*self._of_motion, np.zeros(len(self._outputs))])[:, :, None]
+        return {
+            name: Dual(sigmas[name].value, sigmas[name].slope + moved[:, k])
+            for k, name in enumerate(self._outputs)
+        }, heights
 
     def quadratic_drag(self) -> FloatArray:
         """Return the slopes of ln q, q of the drag force q |v| v, by the variables added, (n,)."""
         at = self._there.index("quadratic_drag")
         return np.array([own[at] for own in self._of_numbers]) / self._numbers["quadratic_drag"]
 
-    def _add(self, numbers: FloatArray, density: FloatArray, gains: FloatArray) -> None:
+    def _add(self, numbers: FloatArray, motion: FloatArray, gains: FloatArray) -> None:
         self._of_numbers.append(numbers)
-        self._of_density.append(density)
+        self._of_motion.append(motion)
         self._of_gains.append(gains)
 
-    def _density(self, case: Case) -> FloatArray:
-        return np.asarray(HookMotion.from_case(case, warn=False).density(self._nodes.omega))
+    def _motion(self, shaken: Case) -> FloatArray:
+        """Return ln sigma of the outputs in the sea of a case, the loop and its drag unmoved."""
+        loop = self._still.assessment(shaken)
+        assert loop is not None  # it is stable as it is
+        return np.log([loop.sigma(output) for output in self._outputs])
 
 
 def changed(case: Case, number: Number, value: float) -> Case:
