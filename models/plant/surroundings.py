@@ -16,13 +16,17 @@ s in [0, 1] the submerged share, w', w'' the water's vertical velocity and accel
 speed at which the surface comes up at the payload:
 
     -(1 - s) B                   buoyancy that is missing (the plant's weight is the submerged one)
-    s (rho V + A33) w''          Froude-Krylov, and the added mass with the water's acceleration
-    -(1 - s) A33                 added mass that is missing, taken from the plant's virtual mass
+    (s rho V + A33(h)) w''       Froude-Krylov, and the added mass with the water's acceleration
+    A33(h) - A33                 added mass that is missing, from the plant's virtual mass
     s, P' - w'                   factor on the plant's quadratic drag, and the velocity it acts on
-    rho C_s A v^2 / 2            slamming, while entering: v > 0 and 0 < s < 1
+    (dA33/dh) v^2                slamming, while entering: v > 0
 
-The slamming force stands for the term with ds/dt of the added mass's momentum; leaving the water
-has none.  The water's motion is that of the surface, decaying with depth as exp(-k depth).
+The added mass A33(h) of a prism immersed by h grows by rho A C_s / 2 for each metre until all of it
+is there, so that a slam has the strength rho C_s A v^2 / 2 of the rule and ends when the water that
+moves with the payload has its speed: force and added mass are one momentum.  Where C_s A is so
+small that it would not be there at full immersion, it grows evenly over the height.  Leaving the
+water has no such term.  The water's motion is that of the surface, decaying with depth as
+exp(-k depth).
 """
 
 from __future__ import annotations
@@ -115,7 +119,7 @@ class SplashZone:
     added_mass
         Added mass A33 when submerged [kg], as it is in the plant's virtual mass.
     slamming_area, slamming_coefficient
-        A [m2] and C_s [-] of the slamming force.
+        A [m2] and C_s [-] of the slamming force: how fast the added mass grows.
     water_density
         rho [kg/m3].
     wave_number
@@ -284,13 +288,12 @@ class Surroundings:
             middle = height * (_rounded_ramp(depth) - 0.5 * share)  # of the submerged part
             decay = ca.exp(-p["water.wave_number"] * middle)
             relative = velocity - decay * surface_rate
-            mass_change, drag_factor = -(1.0 - share) * p["water.added_mass"], share
+            added, growth = _entering_mass(depth, p)
+            mass_change, drag_factor = added - p["water.added_mass"], share
             missing = -(1.0 - share) * p["water.buoyancy"]
-            moved = p["water.buoyancy"] / GRAVITY + p["water.added_mass"]
-            waves = share * moved * decay * surface_acceleration
-            strength = 0.5 * p["water.water_density"] * p["water.slamming_coefficient"]
-            slam_area = _crossing(share) * p["water.slamming_area"]
-            slamming = strength * slam_area * ca.fmax(0.0, surface_rate - velocity) ** 2
+            moved = share * p["water.buoyancy"] / GRAVITY + added
+            waves = moved * decay * surface_acceleration
+            slamming = growth * ca.fmax(0.0, surface_rate - velocity) ** 2
             force = force + missing + waves + slamming
             outputs |= {
                 "water.force": p["water.buoyancy"] + missing + waves + slamming,
@@ -319,10 +322,20 @@ def _rounded_ramp(x: ca.SX) -> ca.SX:
     return (within + _ROUNDING) ** 2 / (4.0 * _ROUNDING) + ca.fmax(0.0, x - _ROUNDING)
 
 
-def _crossing(share: ca.SX) -> ca.SX:
-    """Return 1 while the prism crosses the surface, falling smoothly to 0 at s = 0 and s = 1.
+def _ramp_slope(x: ca.SX) -> ca.SX:
+    """Return the slope of :func:`_rounded_ramp`."""
+    return ca.fmin(ca.fmax((x + _ROUNDING) / (2.0 * _ROUNDING), 0.0), 1.0)
 
-    It is above 0.8 from s = 0.1 to 0.9, so that a slam is at full strength over most of the
-    height and yet has no jump at first contact, where the formula's v^2 would come at once.
+
+def _entering_mass(depth: ca.SX, p: Mapping[str, ca.SX]) -> tuple[ca.SX, ca.SX]:
+    """Return the added mass A33(h) [kg] and dA33/dh [kg/m] of a prism that enters the water.
+
+    `depth` is h over the prism's height.  The growth begins and ends over the same rounded corners
+    as the submerged share, of which it is the exact slope.
     """
-    return 1.0 - (1.0 - 2.0 * share) ** 8
+    whole, height = p["water.added_mass"], p["water.height"]
+    area = p["water.slamming_coefficient"] * p["water.slamming_area"]
+    rate = ca.fmax(0.5 * p["water.water_density"] * area, whole / height)
+    until = whole / ca.fmax(rate * height, 1e-9)  # no mass and no area: nothing grows
+    added = rate * height * (_rounded_ramp(depth) - _rounded_ramp(depth - until))
+    return added, rate * (_ramp_slope(depth) - _ramp_slope(depth - until))
