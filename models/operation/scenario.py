@@ -48,6 +48,10 @@ class Scenario:
         When the controller begins to ramp out, after which the brake is set [s]; None: never.
     brake_trips
         Periods in which the brake is on although nobody asked for it [s].
+    worst_trip
+        (start, end, lasting) [s]: the brake is on for so long from the moment between start and
+        end at which the drum turns fastest, which each run finds in the same run without the
+        trip; None: never.
     telemetry_outages, sensor_failures, mru_outages
         Periods without messages from the payload, with a payload sensor that gives no numbers,
         and without the motion reference unit [s].
@@ -85,6 +89,7 @@ class Scenario:
     settle: float = 0.0
     disengage_at: float | None = None
     brake_trips: tuple[Interval, ...] = ()
+    worst_trip: tuple[float, float, float] | None = None
     telemetry_outages: tuple[Interval, ...] = ()
     sensor_failures: tuple[Interval, ...] = ()
     mru_outages: tuple[Interval, ...] = ()
@@ -109,6 +114,11 @@ class Scenario:
             periods = getattr(self, name)
             checked = check_intervals(owner, name.replace("_", " "), periods, apart=True)
             object.__setattr__(self, name, checked)
+        if self.worst_trip is not None:
+            start, end, lasting = self.worst_trip
+            check_range(owner, "start of worst_trip", start, low=0.0, unit="s")
+            check_range(owner, "end of worst_trip", end, low=start, unit="s", open_low=True)
+            check_range(owner, "lasting of worst_trip", lasting, low=0.0, unit="s", open_low=True)
         late = check_intervals(owner, "telemetry delays", self.telemetry_delays, LATE)
         object.__setattr__(self, "telemetry_delays", late)
         biases = check_intervals(owner, "MRU biases", self.mru_biases, BIAS)

@@ -58,8 +58,13 @@ def _steps(_: Case, values: Values) -> dict[str, Any]:
 
 
 def _brake_trip(_: Case, values: Values) -> dict[str, Any]:
-    period = _failure(values)
-    return {"duration": period[1] + _AFTER, "brake_trips": (period,)}
+    begun, (at, until) = begin(values) - values["wait"], _failure(values)
+    worst = values["moment"] == "worst" and values["wait"] > 0.0
+    return {
+        "duration": until + _AFTER,
+        "brake_trips": () if worst else ((at, until),),
+        "worst_trip": (begun, at, until - at) if worst else None,
+    }
 
 
 def _sensor_loss(_: Case, values: Values) -> dict[str, Any]:
@@ -126,7 +131,14 @@ _RECIPES: Mapping[str, ScenarioRecipe] = {
     "brake-trip": ScenarioRecipe(
         description="the brake trips, and opens again",
         build=_brake_trip,
-        options={"lasting": _lasting(30.0, "how long the brake is on"), "wait": _WAIT},
+        options={
+            "moment": WordOption(
+                words=("worst", "stated"),
+                text="at the drum's largest speed during the wait, or at its end",
+            ),
+            "lasting": _lasting(30.0, "how long the brake is on"),
+            "wait": time_option(600.0, "time in which the worst moment is sought, or before it"),
+        },
         ramp=10.0,
     ),
     "sensor-loss": ScenarioRecipe(

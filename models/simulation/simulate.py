@@ -66,6 +66,11 @@ def run_simulation(
         If the controller's recursion fails.
     """
     began = clock.perf_counter()
+    if simulation.scenario.worst_trip is not None:
+        whole = run_simulation(simulation.with_trip(None), seed=seed)
+        if whole.status != "completed":
+            return whole
+        simulation = simulation.with_trip(whole)
     loop, scenario, case = simulation.loop, simulation.scenario, simulation.case
     options, wanted, settle = simulation.options, simulation.duration, simulation.options.settle
     owner, dt = "simulation", loop.sample_time

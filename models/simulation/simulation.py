@@ -29,6 +29,7 @@ from ..plant import (
     build_plant,
     displacement_names,
 )
+from ..run import Run
 from ..sensing import (
     Controller,
     MruModel,
@@ -158,6 +159,27 @@ class Simulation:
     def with_options(self, **changes: Any) -> Simulation:
         """Return it with other options of its runs: those of the plant were used to prepare it."""
         return replace(self, options=replace(self.options, **changes))
+
+    def with_trip(self, whole: Run | None) -> Simulation:
+        """Return it with the scenario's `worst_trip` at its moment, in a run without it.
+
+        Parameters
+        ----------
+        whole
+            That run, with every sample; None: leave the trip out, to find the moment by.
+        """
+        trips = self.scenario.brake_trips
+        if whole is not None and self.scenario.worst_trip is not None:
+            start, end, lasting = self.scenario.worst_trip
+            among = np.flatnonzero((whole.time >= start) & (whole.time < end))
+            if among.size:
+                fastest = np.argmax(np.abs(whole["motor.speed"][among]))
+                at = float(whole.time[among[fastest]])
+                trips = (*trips, (at, at + lasting))
+        scenario = replace(self.scenario, worst_trip=None, brake_trips=trips)
+        step = self.options.store_step if whole is not None else self.loop.sample_time
+        schedule = Schedule(scenario=scenario, sample_time=self.loop.sample_time)
+        return replace(self.with_options(store_step=step), scenario=scenario, schedule=schedule)
 
     def rows(self, seed: int, duration: float) -> RowMaker:
         """Return what makes the rows of one run of a duration [s]."""

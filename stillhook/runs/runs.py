@@ -230,6 +230,7 @@ def stays(scenario: Scenario) -> bool:
         or scenario.disengage_at is not None
         or scenario.parameter_changes
         or scenario.brake_trips
+        or scenario.worst_trip is not None
         or scenario.telemetry_outages
         or scenario.sensor_failures
         or scenario.mru_outages

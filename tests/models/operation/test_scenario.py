@@ -358,6 +358,17 @@ class TestLibrary:
         with pytest.raises(InputError, match="lost must be one of telemetry, sensor, mru, got 'x'"):
             scenario_named("sensor-loss", crane, lost="x")
 
+    def test_the_brake_trips_at_the_worst_moment_or_at_a_stated_one(self, crane):
+        found = scenario_named("brake-trip", crane)
+        assert (found.worst_trip, found.brake_trips) == ((10.0, 610.0, 30.0), ())
+        stated = scenario_named("brake-trip", crane, moment="stated", wait="2 min", lasting=20)
+        assert (stated.worst_trip, stated.brake_trips) == (None, ((130.0, 150.0),))
+        assert stated.duration == 390.0
+        # No time to look for a worst moment in.
+        assert scenario_named("brake-trip", crane, wait=0).brake_trips == ((10.0, 40.0),)
+        with pytest.raises(InputError, match=r"end of worst_trip must be above 5 s, got 5.0"):
+            Scenario(name="x", description="", duration=9.0, worst_trip=(5.0, 5.0, 1.0))
+
     def test_power_falls_and_comes_back(self, crane):
         found = scenario_named("power-limit", crane, power="50 %")
         assert found.parameter_changes == {

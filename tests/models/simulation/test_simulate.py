@@ -16,7 +16,7 @@ from one_run import simulate
 from still_motion import StillMotion
 
 from models import Case, InputError, PhysicsWarning, build_plant, load_case
-from models.operation import Scenario, SineMotion
+from models.operation import Scenario, SineMotion, scenario_named
 from models.operation.profile import Move, Profile
 from models.plant import DriveLimits, fixed_top_modes
 from models.run import Run
@@ -253,6 +253,30 @@ def test_a_slipping_brake_stops_a_moving_drum_in_the_time_of_its_torque() -> Non
     b = motor.torque_constant * motor.back_emf_constant / motor.resistance + motor.viscous_friction
     expected = case.winch.inertia / b * math.log1p(-b * speed[begin] / brake)
     assert (stopped - begin) * 0.005 == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.parametrize("python", [False, True])
+def test_the_brake_trips_where_the_drum_is_fastest(python: bool) -> None:
+    case = thesis()
+    scenario = scenario_named("brake-trip", case, wait=60.0, lasting=5.0)
+    control = feedback(case, THESIS, 0.005)
+    if python:
+        control = InPython(control)
+    whole, tripped = (
+        simulate(case, control, scenario=s, duration=90.0, seed=3, store_step=0.005)
+        for s in (replace(scenario, worst_trip=None), scenario)
+    )
+    sought = (whole.time >= 10.0) & (whole.time < 70.0)
+    speed = np.where(sought, np.abs(whole["motor.speed"]), 0.0)
+    worst = int(np.argmax(speed))
+    (trip,) = (event.time for event in tripped.events if event.kind == "brake")
+    assert trip == pytest.approx(whole.time[worst], abs=1e-9)
+    # Up to there it is the same run; then the drum stands until the brake opens.
+    for name in ("motor.speed", "payload.displacement"):
+        assert np.array_equal(tripped[name][: worst + 1], whole[name][: worst + 1])
+    closed = (tripped.time > trip + 1.0) & (tripped.time < trip + 5.0)
+    assert (tripped["motor.speed"][closed] == 0.0).all()
+    assert np.abs(tripped["motor.speed"][tripped.time > trip + 16.0]).max() > 0.1 * speed[worst]
 
 
 def test_lowering_stretches_the_rope_by_its_own_law() -> None:
