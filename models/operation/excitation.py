@@ -37,7 +37,7 @@ from .hermite import MotionBlock, interpolated
 HOOK = None
 """Purpose of a random motion that is drawn with the run's own seed."""
 SECOND_BODY, SURFACE = 4, 5
-"""Purposes of motions in waves of their own; `models.sensing.draws` has 1 to 3."""
+"""Purposes of motions in waves of their own; `models.sensing.draws` has 1 to 3 and 7 to 9."""
 
 # What the interpolation may add to a random motion, as a standard deviation.  A hundredth of it
 # would take nodes twice as close, and of a motion held to 60 rad/s millions of them.

@@ -8,7 +8,12 @@ payload feedback does not use those, feed-forward and constant tension do.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import math
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import model_validator
 
 from ..casefile import Quantity, Section
 
@@ -64,19 +69,66 @@ class Telemetry(Section):
 
 
 class MRU(Section):
-    """The motion reference unit at the crane; payload feedback does not use it."""
+    """The motion reference unit at the crane; payload feedback does not use it.
+
+    Its error is stated in one of two ways: as makers do (`gain_error`, `phase_error`, `drift`,
+    `noise`), or as one noise in the band of the waves (`noise_floor`, `noise_fraction`).
+    """
 
     heave_filter_period: Annotated[float, Quantity("time", 1.0, 1000.0)] | None = None
-    """Cut-off period of the high-pass filter on heave."""
-    noise_floor: Annotated[float, Quantity("length", 0.0, 1.0)] = 0.05
-    """Heave accuracy for small motions (one standard deviation)."""
-    noise_fraction: Annotated[float, Quantity("ratio", 0.0, 1.0)] = 0.05
-    """Heave accuracy as a fraction of the motion, for large motions."""
-    noise_bandwidth: Annotated[float, Quantity("frequency", 0.001, 1000.0)] = 1.0
-    """Frequency up to which the error of the heave reaches (second-order Butterworth
+    """Cut-off period of the high-pass filter on heave, whose gain and phase are known."""
+    gain_error: Annotated[float, Quantity("ratio", 0.0, 0.5)] = 0.0
+    """Gain error of the heave, of either sign and the same throughout a run; beside what the heave
+    filter does."""
+    phase_error: Annotated[float, Quantity("angle", 0.0, 0.5)] = 0.0
+    """Phase error of the heave, of either sign and the same throughout a run; beside what the heave
+    filter and the delay do."""
+    drift: Annotated[float, Quantity("length", 0.0, 10.0)] = 0.0
+    """Slow error of the heave (one standard deviation)."""
+    drift_period: Annotated[float, Quantity("time", 10.0, 1000.0)] = 200.0
+    """Period above which the drift lies (second-order Butterworth low-pass)."""
+    noise: Annotated[float, Quantity("displacement noise", 0.0, 1.0)] = 0.0
+    """Noise of the heave (one-sided amplitude density, white up to `bandwidth`)."""
+    bandwidth: Annotated[float, Quantity("frequency", 1.0, 1000.0)] = 20.0 * math.pi
+    """Bandwidth of the unit's output, which its noise passes (second-order Butterworth
     low-pass)."""
+    noise_floor: Annotated[float, Quantity("length", 0.0, 1.0)] = 0.05
+    """Heave accuracy for small motions (one standard deviation), read as noise in the band of the
+    waves; 0 where the error is stated as makers do."""
+    noise_fraction: Annotated[float, Quantity("ratio", 0.0, 1.0)] = 0.05
+    """Heave accuracy as a fraction of the motion, for large motions, read like `noise_floor`; 0
+    where the error is stated as makers do."""
+    noise_bandwidth: Annotated[float, Quantity("frequency", 0.001, 1000.0)] = 1.0
+    """Frequency up to which the error of `noise_floor` and `noise_fraction` reaches (second-order
+    Butterworth low-pass)."""
     delay: Annotated[float, Quantity("time", 0.0, 10.0)] = 0.0
     """Delay from the motion to the signal."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_kind(cls, data: Any) -> Any:
+        """Take the error for zero that is not given, where the other kind is."""
+        if isinstance(data, dict) and any(name in data for name in _STATED):
+            return {"noise_floor": 0.0, "noise_fraction": 0.0, **data}
+        return data
+
+    def _faults(self) -> Iterator[tuple[str, str]]:
+        stated = [name for name in _STATED if getattr(self, name) > 0.0]
+        in_band = [name for name in ("noise_floor", "noise_fraction") if getattr(self, name) > 0.0]
+        if stated and in_band:
+            text = (
+                f"must be 0 where {' or '.join(in_band)} is above 0: the error is stated either as "
+                f"makers do or as noise in the band of the waves, got both"
+            )
+            yield (stated[0], text)
+
+    @property
+    def coherent(self) -> float:
+        """Root mean square of gain and phase error over their signs, a share of the heave."""
+        return float(np.hypot(self.gain_error, self.phase_error))
+
+
+_STATED = ("gain_error", "phase_error", "drift", "noise")
 
 
 class Encoder(Section):

@@ -11,12 +11,22 @@ from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .control import HEARD, Controller, Measurement, Recursion, holds_brake, recursion_of
-    from .mru import BIAS, Bias, MruModel, MruState, low_pass_noise, unit_response
+    from .mru import (
+        BIAS,
+        Bias,
+        MruModel,
+        MruState,
+        error_density,
+        low_pass_noise,
+        unit_response,
+    )
     from .plant import (
+        DRIFT_BAND,
         ENCODER,
         MEASURED,
         SAMPLE_TIME,
         SENSORS,
+        UnitError,
         aboard,
         sensed_line_at,
         sensed_plant,

@@ -17,6 +17,7 @@ from ..basics import FloatArray
 _Law = Literal["normal", "uniform"]
 
 SENSOR_NOISE, TELEMETRY, MRU_ERROR = 1, 2, 3  # purposes: second entry of the seed
+MRU_SIGNS, MRU_DRIFT, MRU_NOISE = 7, 8, 9  # 4 to 6 are of motions
 
 _BLOCK = 65536
 

@@ -3,10 +3,16 @@
 Nothing that the winch does comes back to the hook, so what the unit shows is computed before the
 run, a chunk after the other, from the true motion of the hook:
 
-    heave Z --> high-pass --> + error --> delay --> reported heave and heave rate
+    heave Z --> (1 + e) --> high-pass --> delay --> + error --> reported heave and heave rate
 
 The high-pass takes the drift out of an integrated acceleration and puts a phase lead into slow
-heave; the error is what data sheets state as 5 cm or 5 %, whichever is greater.
+heave.  Makers state what is left as a gain error dg and a phase error dphi, a slow drift and white
+noise.  Gain and phase error are coherent: the unit hears (1 + e) Z with e = +-dg +- i dphi, of
+signs that nobody knows but that stay as they are.  With F0 + e F1 from heave to any signal, the
+mean over both signs of both is |F0|^2 + (dg^2 + dphi^2) |F1|^2: for moments the coherent error is
+one more disturbance, of density (dg^2 + dphi^2) S_Z (`error_density`).  "5 cm or 5 %, whichever is
+greater" may instead be read as one noise in the band of the waves, the drift's law with its own
+bandwidth.
 
 Its low-passes, of the second order after Butterworth, are one complex number each.  The filter
 q'' + sqrt(2) w q' + w^2 q = input has the poles w (-1 +- i)/sqrt(2).  Its two real states are the
@@ -18,7 +24,7 @@ can be cut anywhere.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -33,7 +39,7 @@ from ..basics import (
 )
 from ..plant import hermite_hold, noisy_hold
 from ..rig import MRU
-from .draws import MRU_ERROR, draw
+from .draws import MRU_DRIFT, MRU_ERROR, MRU_NOISE, MRU_SIGNS, draw
 from .telemetry import Interval, Size, during
 
 PERFECT = MRU(noise_floor=0.0, noise_fraction=0.0)
@@ -43,6 +49,10 @@ Bias = tuple[float, float, float, float]
 
 BIAS: tuple[Size, ...] = (("heave", -100.0, 100.0, "m"), ("heave rate", -100.0, 100.0, "m/s"))
 """What stands behind start and end of an interval in which the unit shows too much."""
+
+Read = Callable[[int, int], tuple[FloatArray, FloatArray]]
+
+_HILBERT = 60.0  # reach of the kernel that turns the phase, either way [s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,8 +82,8 @@ class MruState:
         Number of the next sample.
     last
         Displacement and velocity at the sample before [m], [m/s], (2,).
-    filter, error
-        Modes of the high-pass and of the error, complex.
+    filter, errors
+        Modes of the high-pass and of the errors, complex.
     past
         Earlier heave and heave rate, oldest first, that are still on their way (lag, 2).
     held
@@ -83,9 +93,75 @@ class MruState:
     sample: int
     last: FloatArray
     filter: complex
-    error: complex
+    errors: tuple[complex, ...]
     past: FloatArray
     held: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorProcess:
+    """One error of the heave: white noise behind a second-order Butterworth low-pass.
+
+    Attributes
+    ----------
+    rms
+        Standard deviation [m].
+    corner
+        Corner frequency of the low-pass [rad/s].
+    purpose
+        Its table of draws.
+
+    Notes
+    -----
+    What a unit shows as the error of its rate is the derivative of the error of the heave, but
+    white noise reaches so far that samples of its derivative would fold: there it is the mean
+    over a sample, the difference of the heave's errors.
+    """
+
+    rms: float
+    corner: float
+    purpose: int
+
+    @property
+    def white(self) -> bool:
+        """Whether it reaches far beyond the waves."""
+        return self.purpose == MRU_NOISE
+
+    def start(self, seed: int) -> complex:
+        """Return the mode at sample 0."""
+        # The first row of the table of draws begins the process; the others drive it.
+        n, rate = draw(seed, self.purpose, 0, 1, 2)[0] * self.rms
+        return complex(to_mode(n, self.corner * rate, low_pass_pole(self.corner)))
+
+    def block(
+        self, mode: complex, seed: int, step: float, start: int, n: int
+    ) -> tuple[FloatArray, complex]:
+        """Return the errors of heave and rate at n samples (n, 2), and the mode at the last.
+
+        Parameters
+        ----------
+        mode
+            That at the sample before, or at sample 0.
+        seed
+            Seed of the run.
+        step
+            Time between samples [s].
+        start, n
+            First sample, and how many.
+        """
+        pole = low_pass_pole(self.corner)
+        _, added = low_pass_noise(self.corner, step)
+        root = self.rms * np.linalg.cholesky(added)
+        # Sample 0 is the beginning itself, so that row k of the draws drives sample k.
+        first = max(start, 1)
+        pushes = draw(seed, self.purpose, first, start + n - first, 2) @ root.T
+        drive = to_mode(pushes[:, 0], pushes[:, 1], pole)
+        modes = mode_recursion(complex(np.exp(pole * step)), mode, drive)
+        value, rate = from_mode(modes, pole)
+        if self.white:
+            rate[1:] = np.diff(value) / step
+        errors = np.column_stack((value, rate))
+        return errors if start == 0 else errors[1:], complex(modes[-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,8 +193,12 @@ class MruModel:
     samples with the given displacements and velocities (Hermite), so that the reported rate is
     the derivative of the reported heave.
 
-    Error: a stationary Gaussian process, white noise behind a second-order Butterworth low-pass,
+    Error: stationary Gaussian processes, white noise behind a second-order Butterworth low-pass,
     whose derivative exists and is the error of the rate; sampled exactly (Van Loan 1978).
+
+    Gain and phase error: the signs are drawn once in a run, each by itself (`signs`).  The heave
+    turned by 90 degrees, that of a motion which is known to its end, is its Hilbert transform over
+    a minute either way (`heard`).
 
     Delay: linear interpolation between samples, so that it is exact on average.
 
@@ -142,20 +222,64 @@ class MruModel:
         """Delay from the motion to the signal [s]."""
         return self._unit.delay
 
+    @cached_property
+    def processes(self) -> tuple[ErrorProcess, ...]:
+        """The errors besides those of gain and phase."""
+        purposes = MRU_ERROR, MRU_DRIFT, MRU_NOISE
+        found = zip(_independent(self._unit, self.heave_rms), purposes, strict=True)
+        return tuple(
+            ErrorProcess(rms=float(rms), corner=corner, purpose=purpose)
+            for (rms, corner), purpose in found
+            if rms > 0.0
+        )
+
     @property
     def error_rms(self) -> float:
-        """Standard deviation of the error of the heave [m]."""
-        return max(self._unit.noise_floor, self._unit.noise_fraction * self.heave_rms)
+        """Standard deviation of the error of the heave, but for gain and phase [m]."""
+        return math.hypot(*(process.rms for process in self.processes))
+
+    @property
+    def coherent(self) -> bool:
+        """Whether there is a gain or phase error, so that the unit takes in what is `heard`."""
+        return self._unit.coherent > 0.0
+
+    @property
+    def signs(self) -> tuple[float, float]:
+        """Signs of gain and phase error in this run."""
+        gain, phase = draw(self.seed, MRU_SIGNS, 0, 1, 2)[0]
+        return math.copysign(1.0, gain), math.copysign(1.0, phase)
 
     def noise_density(self, omega: npt.ArrayLike) -> FloatArray:
-        """Return the one-sided variance density of the heave's error [m2 s/rad].
+        """Return the one-sided variance density of that error [m2 s/rad].
 
         That of the heave rate's error is `omega` squared times as large.
         """
         frequency = np.asarray(omega, dtype=np.float64)
-        w = self._unit.noise_bandwidth
-        shape = 2.0 * math.sqrt(2.0) / math.pi * w**3 / (frequency**4 + w**4)
-        return np.asarray(self.error_rms**2 * shape)
+        return error_density(self.mru, frequency, np.zeros(frequency.shape), self.heave_rms)
+
+    def heard(self, read: Read, start: int, count: int) -> tuple[FloatArray, FloatArray]:
+        """Return heave and heave rate with gain and phase error, (count,) each.
+
+        Parameters
+        ----------
+        read
+            Gives heave [m] and heave rate [m/s] at so many samples from one on; what lies before
+            the run or after it is not known, and 0.
+        start, count
+            First sample, and how many.
+        """
+        gain, phase = (sign * e for sign, e in zip(self.signs, self._stated, strict=True))
+        if phase == 0.0:
+            z, v = read(start, count)
+            return ((1.0 + gain) * z, (1.0 + gain) * v) if gain else (z, v)
+        from scipy.signal import fftconvolve
+
+        reach = len(self._quarter) // 2
+        wide = read(start - reach, count + 2 * reach)
+        turned = (fftconvolve(values, self._quarter, mode="valid") for values in wide)
+        pairs = zip(wide, turned, strict=True)
+        z, v = ((1.0 + gain) * x[reach : reach + count] + phase * y for x, y in pairs)
+        return z, v
 
     def initial(self, displacement: float, velocity: float) -> MruState:
         """Return the state before sample 0, given the hook's motion at it [m], [m/s]."""
@@ -168,12 +292,6 @@ class MruModel:
             s, pole = 1j * omega, low_pass_pole(self._corner)
             low = wave / (s**2 + math.sqrt(2.0) * self._corner * s + self._corner**2)
             mode = complex(to_mode(low.real, (s * low).real, pole))
-        error = 0.0 + 0.0j
-        if self.error_rms > 0.0:
-            # The first row of the table of draws begins the process; the others drive it.
-            n, rate = draw(self.seed, MRU_ERROR, 0, 1, 2)[0] * self.error_rms
-            width = self._unit.noise_bandwidth
-            error = complex(to_mode(n, width * rate, low_pass_pole(width)))
         heave, rate = self._filtered(
             np.array([mode]), np.array([displacement]), np.array([velocity])
         ).T
@@ -190,7 +308,7 @@ class MruModel:
             sample=0,
             last=read_only([displacement, velocity]),
             filter=mode,
-            error=error,
+            errors=tuple(process.start(self.seed) for process in self.processes),
             past=read_only(past),
             held=read_only([0.0, 0.0]),
         )
@@ -209,7 +327,7 @@ class MruModel:
         """
         true = np.column_stack((displacement, velocity))
         n, start = len(true), state.sample
-        mode, error_mode = state.filter, state.error
+        mode, modes_after = state.filter, []
         shown = true
         if self._corner is not None:
             path = true if start == 0 else np.vstack((state.last, true))
@@ -217,11 +335,10 @@ class MruModel:
             mode = complex(modes[-1])
             shown = self._filtered(modes[-n:], *true.T)
         delayed, past = self._delayed(np.vstack((state.past, shown)), n)
-        if self.error_rms > 0.0:
-            pole = low_pass_pole(self._unit.noise_bandwidth)
-            errors = self._errors(error_mode, start, n)
-            error_mode = complex(errors[-1])
-            delayed = delayed + np.column_stack(from_mode(errors, pole))
+        for process, before in zip(self.processes, state.errors, strict=True):
+            errors, reached = process.block(before, self.seed, self.sample_time, start, n)
+            modes_after.append(reached)
+            delayed = delayed + errors
         for since, until, *offset in self.biases:
             inside = during([(since, until)], start + np.arange(n), self.sample_time)
             delayed = delayed + inside[:, np.newaxis] * np.array(offset)
@@ -232,7 +349,7 @@ class MruModel:
             sample=start + n,
             last=read_only(true[-1]),
             filter=mode,
-            error=error_mode,
+            errors=tuple(modes_after),
             past=read_only(past),
             held=read_only(reported[-1]),
         )
@@ -291,23 +408,62 @@ class MruModel:
         drive = path[:-1] @ gains[:2] + path[1:] @ gains[2:]
         return mode_recursion(factor, mode, drive)
 
-    @cached_property
-    def _error_step(self) -> tuple[complex, FloatArray]:
-        """Factor of the error's mode over a sample, and the root of what a sample adds (2, 2)."""
-        width = self._unit.noise_bandwidth
-        factor = complex(np.exp(low_pass_pole(width) * self.sample_time))
-        _, added = low_pass_noise(width, self.sample_time)
-        return factor, np.asarray(self.error_rms * np.linalg.cholesky(added), dtype=np.float64)
+    @property
+    def _stated(self) -> tuple[float, float]:
+        return self._unit.gain_error, self._unit.phase_error
 
-    def _errors(self, mode: complex, start: int, n: int) -> ComplexArray:
-        """Return the error's mode at n samples; `mode` is that at the sample before."""
-        factor, root = self._error_step
-        pole = low_pass_pole(self._unit.noise_bandwidth)
-        # Sample 0 is the beginning itself, so that row k of the draws drives sample k.
-        first = max(start, 1)
-        pushes = draw(self.seed, MRU_ERROR, first, start + n - first, 2) @ root.T
-        modes = mode_recursion(factor, mode, to_mode(pushes[:, 0], pushes[:, 1], pole))
-        return modes if start == 0 else modes[1:]
+    @cached_property
+    def _quarter(self) -> FloatArray:
+        """Kernel (odd length) that turns every harmonic ahead by 90 degrees.
+
+        -1/(pi t), the odd samples doubled and the even ones zero as for sampled signals, under a
+        Blackman window.
+        """
+        reach = math.ceil(_HILBERT / self.sample_time)
+        k = np.arange(-reach, reach + 1)
+        odd = k % 2 != 0
+        kernel = np.zeros(k.size)
+        kernel[odd] = -2.0 / (np.pi * k[odd])
+        return read_only(kernel * np.blackman(k.size))
+
+
+def error_density(
+    unit: MRU | None, omega: FloatArray, heave: FloatArray, heave_rms: FloatArray | float
+) -> FloatArray:
+    """Return the one-sided density of the heave's error [m2 s/rad] before the unit's delay.
+
+    Gain and phase error are in it with their root mean square over both signs.
+
+    Parameters
+    ----------
+    unit
+        The unit; None for a perfect one.
+    omega
+        Frequencies [rad/s], (n,).
+    heave
+        Density of the hook's heave there [m2 s/rad], (.., n).
+    heave_rms
+        Standard deviation of the heave [m], (.., 1) or a number.
+    """
+    unit = unit or PERFECT
+    found = np.zeros_like(heave)
+    if unit.coherent > 0.0:
+        found = unit.coherent**2 * np.abs(unit_response(unit, 1j * omega)) ** 2 * heave
+    for rms, w in _independent(unit, heave_rms):
+        shape = 2.0 * math.sqrt(2.0) / math.pi * w**3 / (omega**4 + w**4)
+        found = found + rms**2 * shape
+    return found
+
+
+def _independent(
+    unit: MRU, heave_rms: FloatArray | float
+) -> tuple[tuple[FloatArray | float, float], ...]:
+    """Return rms [m] and corner [rad/s] of what the unit shows too much: in band, drift, noise."""
+    in_band = np.maximum(unit.noise_floor, unit.noise_fraction * heave_rms)
+    # White noise N a root hertz behind the low-pass has the variance N^2 w/(4 sqrt(2)).
+    white = unit.noise * math.sqrt(unit.bandwidth / (4.0 * math.sqrt(2.0)))
+    slow = 2.0 * math.pi / unit.drift_period
+    return (in_band, unit.noise_bandwidth), (unit.drift, slow), (white, unit.bandwidth)
 
 
 def unit_response(unit: MRU | None, s: npt.ArrayLike) -> ComplexArray:

@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import White
+from ..basics import FloatArray, White
 from ..case import Case
 from ..hook import HookMotion
 from ..plant import (
@@ -30,8 +30,8 @@ from ..plant import (
     build_plant,
     line_response,
 )
-from ..rig import Sensors
-from .mru import PERFECT, MruModel, unit_response
+from ..rig import MRU, Sensors
+from .mru import PERFECT, error_density, unit_response
 
 #: What is measured, in the order of the plant's measurements.
 MEASURED = (
@@ -55,7 +55,46 @@ NOISES = (
 )
 _ABOARD = (*ENCODER, "rope.tension")  # measured outputs of the plant
 _OF_PLANT = [MEASURED.index(name) for name in (*MEASUREMENTS, *_ABOARD)]
+DRIFT_BAND = 1e-6  # lower end of the band in which a drift is looked at [rad/s]
 SAMPLE_TIME = 0.01  # of the load cell's noise, which a data sheet gives per sample [s]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class UnitError:
+    """What a reference unit shows too much of a hook's heave, as a spectrum.
+
+    Attributes
+    ----------
+    unit
+        The unit.
+    hook
+        Motion of the hook, which gain and phase error are of.
+    """
+
+    unit: MRU
+    hook: HookMotion
+
+    @property
+    def there(self) -> bool:
+        """Whether there is an error at all."""
+        unit = self.unit
+        return max(unit.coherent, unit.drift, unit.noise, unit.noise_floor, unit.noise_fraction) > 0
+
+    @property
+    def lowest(self) -> float:
+        """Frequency below which there is nothing of it [rad/s]; infinite without a drift."""
+        return DRIFT_BAND if self.unit.drift > 0.0 else math.inf
+
+    @property
+    def splits(self) -> tuple[float, ...]:
+        """Kinks of the density [rad/s]."""
+        return tuple(self.hook.splits) if self.unit.coherent > 0.0 else ()
+
+    def __call__(self, omega: npt.ArrayLike) -> FloatArray:
+        """Return the one-sided density [m2 s/rad] at `omega` [rad/s]."""
+        frequency = np.asarray(omega, dtype=np.float64)
+        heave = np.asarray(self.hook.density(frequency))
+        return error_density(self.unit, frequency, heave, float(self.hook.displacement.rms))
 
 
 def sensed_plant(
@@ -259,21 +298,16 @@ def sensed_spectra(
     Returns
     -------
     Mapping
-        The hook's motion, the error of the reference unit (`models.sensing.mru.MruModel`) and the
+        The hook's motion, the error of the reference unit (`UnitError`) and the
         white noises, for `synth.design.tuning`; those that are zero are left out.  A one-sided
         amplitude density N per root hertz is white noise of intensity N^2/2; an independent error
         of rms s at every sample is one of intensity s^2 times the sample time.
     """
     sensors = case.sensors
     found: dict[str, Any] = {"hook.heave": hook}
-    unit = MruModel(
-        mru=sensors.mru,
-        sample_time=sample_time,
-        heave_rms=float(hook.displacement.rms),
-        seed=0,
-    )
-    if unit.error_rms > 0.0:
-        found["mru.error"] = unit.noise_density
+    error = UnitError(unit=sensors.mru or PERFECT, hook=hook)
+    if error.there:
+        found["mru.error"] = error
     for name in MEASUREMENTS:
         density = float(getattr(sensors.payload, f"{name.removeprefix('payload.')}_noise"))
         if density > 0.0:

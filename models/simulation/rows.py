@@ -55,7 +55,7 @@ class RowMaker:
 
     def start(self) -> MruState:
         """Return the state of the reference unit before the first row."""
-        z, v, _ = self.motions[0].block(0, 1)
+        z, v = self.mru.heard(self._hook, 0, 1)
         return self.mru.initial(float(z[0]), float(v[0]))
 
     def block(self, start: int, count: int, mru: MruState) -> tuple[FloatArray, MruState]:
@@ -69,8 +69,10 @@ class RowMaker:
                 for k, values in enumerate(ends):
                     column = 3 * (len(moved) * j + i) + k
                     rows[:, column] = values[j : j + (count - 1) * n + 1 : n]
-        heave, rate, _ = moved[0]
-        shown, mru = self.mru.block(mru, heave[: count * n : n], rate[: count * n : n])
+        heave, rate = (values[: count * n : n] for values in moved[0][:2])
+        if self.mru.coherent:
+            heave, rate = self.mru.heard(self._hook, start, count)
+        shown, mru = self.mru.block(mru, heave, rate)
         planned = self.schedule.block(start, count)
         noise = np.zeros((count, len(NOISE)))
         if self.sensors.noisy:  # numbers that nobody reads are not drawn
@@ -81,6 +83,15 @@ class RowMaker:
         rows[:, -2] = planned.engage
         rows[:, -1] = self._brake(planned.brake, start)
         return rows, mru
+
+    def _hook(self, start: int, count: int) -> tuple[FloatArray, FloatArray]:
+        """Return the hook's displacement and velocity at samples; 0 before and after the run."""
+        n, motion = self.substeps, self.motions[0]
+        found = np.zeros((2, count))
+        low, high = max(start, 0), min(start + count, (motion.rows - 1) // n + 1)
+        moved = motion.block(low * n, (high - low - 1) * n + 1)
+        found[:, low - start : high - start] = [values[::n] for values in moved[:2]]
+        return found[0], found[1]
 
     def trip(self, rows: FloatArray, first: int, since: float) -> None:
         """Write into rows that the brake closes at a time [s] and the controller is let go.

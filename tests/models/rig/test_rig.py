@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from models import InputError
 from models.basics import GRAVITY
-from models.rig import ACMotor, GainBounds, Gains, Payload, Rope, Sensors, Winch
+from models.rig import MRU, ACMotor, GainBounds, Gains, Payload, Rope, Sensors, Winch
 from models.rig.payload import StochasticDrag
 from models.rig.tables import (
     ADDED_MASS_PRISM,
@@ -374,3 +374,43 @@ class TestOtherSections:
             numbers = [value for value in dict(section).values() if isinstance(value, float)]
             assert len(numbers) >= 4
             assert set(numbers) == {0.0}
+
+
+class TestReferenceUnit:
+    def test_an_error_in_the_band_of_the_waves_keeps_its_meaning(self):
+        assert (MRU().noise_floor, MRU().noise_fraction, MRU().coherent) == (0.05, 0.05, 0.0)
+        assert MRU(noise_floor=0.02).noise_fraction == 0.05
+
+    @given(
+        gain=st.floats(0.0, 0.5),
+        phase=st.floats(0.0, 0.5),
+        drift=st.floats(0.0, 10.0),
+        noise=st.floats(0.0, 1.0),
+    )
+    def test_a_stated_error_takes_the_place_of_the_other(self, gain, phase, drift, noise):
+        given = {"gain_error": gain, "phase_error": phase, "drift": drift, "noise": noise}
+        unit = MRU(**given)
+        assert (unit.noise_floor, unit.noise_fraction) == (0.0, 0.0)
+        assert unit.coherent == pytest.approx(abs(complex(gain, phase)))
+        for name, value in given.items():
+            assert MRU(**{name: value}).noise_floor == 0.0
+            if value > 0.0:
+                with pytest.raises(InputError, match=r"stated either .* got both$"):
+                    MRU(**{name: value, "noise_floor": 0.05})
+
+    @pytest.mark.parametrize(
+        ("field", "value", "text"),
+        [
+            ("gain_error", "60 %", r"MRU: gain_error: must be a ratio in \[0, 0.5\], got '60 %'"),
+            ("phase_error", "30 deg", r"must be an angle in \[0, 0.5\] rad, got '30 deg'"),
+            ("phase_error", -0.01, r"must be an angle in \[0, 0.5\] rad, got -0.01"),
+            ("drift", "11 m", r"must be a length in \[0, 10\] m, got '11 m'"),
+            ("drift_period", 5, r"must be a time in \[10, 1000\] s, got 5"),
+            ("noise", "1 m", r"must be a displacement noise density in \[0, 1\] m/sqrt\(Hz\)"),
+            ("bandwidth", 0.5, r"must be a frequency in \[1, 1000\] rad/s, got 0.5"),
+        ],
+    )
+    def test_refuses_in_one_sentence(self, field, value, text):
+        with pytest.raises(InputError, match=text) as error:
+            MRU(**{field: value})
+        assert len(str(error.value).splitlines()) == 1

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from models.rig import MRU
-from models.sensing import MruModel, unit_response
+from models.sensing import MruModel, error_density, unit_response
 
 TS = 0.05
 QUIET = MRU(heave_filter_period=30.0, noise_floor=0.0, noise_fraction=0.0)
@@ -316,3 +316,116 @@ def variance_spread(series, variance):
     spectrum = np.abs(np.fft.rfft(series, 2 * n)) ** 2
     correlation = np.fft.irfft(spectrum)[: n // 100] / n / variance
     return variance * math.sqrt(2.0 / n * (1.0 + 2.0 * np.sum(correlation[1:] ** 2)))
+
+
+STATED = MRU(
+    heave_filter_period=30.0,
+    gain_error=0.03,
+    phase_error=0.04,
+    drift=0.06,
+    drift_period=40.0,
+    noise=0.002,
+    bandwidth=20.0,
+    delay=0.1,
+)
+
+
+def heard_sine(unit, omega, n):
+    """Time, what the unit hears of a sine that goes on for ever, and the sine."""
+    reads = []
+
+    def read(start, count):
+        reads.append(count)
+        t = TS * np.arange(start, start + count)
+        return np.cos(omega * t + 0.4), -omega * np.sin(omega * t + 0.4)
+
+    t = TS * np.arange(n)
+    return t, unit.heard(read, 0, n), read(0, n)
+
+
+class TestStatedError:
+    @pytest.mark.parametrize("omega", [0.3, 0.6, 1.5, 4.0])
+    @pytest.mark.parametrize("seed", range(4))
+    def test_gain_and_phase_are_those_of_the_run(self, omega, seed):
+        unit = model(STATED, seed=seed)
+        t, heard, true = heard_sine(unit, omega, 4000)
+        gain, phase = unit.signs
+        expected = 1.0 + gain * 0.03 + 1j * phase * 0.04
+        for one, other in zip(heard, true, strict=True):
+            ratio = phasor(t, one, omega) / phasor(t, other, omega)
+            assert abs(ratio - expected) < 1e-4
+
+    def test_signs_are_as_often_the_one_as_the_other_and_independent(self):
+        signs = np.array([model(STATED, seed=seed).signs for seed in range(400)])
+        assert set(signs.ravel()) == {-1.0, 1.0}
+        for values in (*signs.T, signs.prod(axis=1)):
+            assert abs(values.mean()) < 3.0 / math.sqrt(400)
+
+    def test_what_is_heard_does_not_hang_on_the_chunks(self):
+        unit = model(STATED)
+
+        def read(start, count):
+            t = TS * np.arange(start, start + count)
+            return np.where(t < 0.0, 0.0, np.cos(0.6 * t)), np.where(t < 0.0, 0.0, np.sin(t))
+
+        whole = np.stack(unit.heard(read, 0, 900))
+        parts = [np.stack(unit.heard(read, k, 300)) for k in (0, 300, 600)]
+        np.testing.assert_allclose(np.hstack(parts), whole, atol=1e-12)
+
+    def test_a_unit_without_gain_and_phase_error_hears_the_motion(self):
+        z = np.array([1.0, 2.0])
+        heard = model(NOISY).heard(lambda start, count: (z, 2.0 * z), 0, 2)
+        assert [*map(list, heard)] == [[1.0, 2.0], [2.0, 4.0]]
+
+    def test_drift_and_noise_have_their_spectra(self):
+        unit = model(STATED, seed=8)
+        heave, rate = error_of(unit, 4096 * 400)
+        omega, mean = averaged_periodogram(heave, 4096)
+        _, of_rate = averaged_periodogram(rate, 4096)
+        density = unit.noise_density(omega)
+        for low, high, got, expected in (
+            (0.08, 0.4, mean, density),
+            (2.0, 15.0, mean, density),
+            # The rate is the mean over a sample, a difference.
+            (2.0, 15.0, of_rate, density * (2.0 / TS * np.sin(0.5 * omega * TS)) ** 2),
+        ):
+            use = (omega > low) & (omega < high)
+            ratio = got[use] / expected[use]
+            assert abs(ratio.mean() - 1.0) < 3.0 / math.sqrt(400 * use.sum()) + 0.02
+
+    def test_density_integrates_to_drift_noise_and_share(self):
+        omega = np.geomspace(1e-5, 1e4, 400_001)
+        heave = np.where((omega > 0.5) & (omega < 0.7), 1.0, 0.0)
+
+        def variance(**stated):
+            unit = MRU(heave_filter_period=100.0, **stated)
+            return np.trapezoid(error_density(unit, omega, heave, 0.4), omega)
+
+        assert variance(drift=0.06, drift_period=40.0) == pytest.approx(0.06**2, rel=1e-3)
+        # White noise of N behind a Butterworth low-pass of the second order with w: N^2 w/(4 2^.5).
+        assert variance(noise=0.002, bandwidth=30.0) == pytest.approx(
+            0.002**2 * 30.0 / (4.0 * math.sqrt(2.0)), rel=1e-3
+        )
+        passed = np.abs(unit_response(MRU(heave_filter_period=100.0), 1j * omega)) ** 2
+        of_heave = np.trapezoid(passed * heave, omega)
+        assert variance(gain_error=0.03) == pytest.approx(0.03**2 * of_heave, rel=1e-9)
+        both = variance(gain_error=0.03, phase_error=0.04)
+        assert both == pytest.approx(0.05**2 * of_heave, rel=1e-9)
+
+    def test_noise_at_low_frequency_is_that_of_the_data_sheet(self):
+        # A one-sided density per rad/s is 1/(2 pi) of that per hertz.
+        unit = model(MRU(noise=0.002))
+        assert unit.noise_density(0.1) == pytest.approx(0.002**2 / (2.0 * math.pi), rel=1e-6)
+
+    @settings(max_examples=20)
+    @given(st.lists(st.integers(1, 200), min_size=1, max_size=6))
+    def test_chunks_do_not_matter(self, counts):
+        unit = model(STATED, heave_frequency=0.6)
+        _, z, v = sine(0.7, sum(counts))
+        whole = run(unit, z, v)
+        state, parts, start = unit.initial(z[0], v[0]), [], 0
+        for count in counts:
+            block, state = unit.block(state, z[start : start + count], v[start : start + count])
+            parts.append((block.heave, block.heave_rate))
+            start += count
+        np.testing.assert_allclose(np.hstack(parts), [whole.heave, whole.heave_rate], atol=1e-12)

@@ -20,6 +20,7 @@ from models.plant import DriveLimits
 from models.simulation import SimulationOptions, prepare, run_simulation
 from synth import evaluate_gains
 from synth.controllers import LinearFeedback
+from synth.question import pose
 from synth.structures import sampled_loop
 
 SEEDS, DURATION = 16, 1260.0
@@ -155,3 +156,76 @@ def test_stochastic_drag_predicts_the_rms_that_quadratic_drag_leaves(height: flo
         rms[name] = math.sqrt(np.mean(variances))
     assert rms["quadratic"] == pytest.approx(rms["linear"], rel=0.03)
     assert rms["quadratic"] != pytest.approx(rms["linear"], rel=1e-6)  # it did something
+
+
+MRU = {"heave_filter_period": 200.0, "delay": 0.02}
+STATED = {
+    "gain": {"gain_error": 0.05},
+    "phase": {"phase_error": math.radians(3.0)},
+    "drift": {"drift": 0.05, "drift_period": 60.0},
+    "noise": {"noise": 1e-4},
+}
+FOLLOWING = {
+    "feed-forward": {
+        "drum.position_gain": 0.05,
+        "heave.gain": 0.97845,
+        "heave.lead": 0.65903,
+        "heave.bandwidth": 1.4173,
+    },
+    "combined": {
+        "payload.acceleration_gain": 0.98162,
+        "payload.velocity_gain": 1.6166,
+        "payload.position_gain": 2.8879,
+        "drum.position_gain": 0.65588,
+        "heave.gain": 0.93224,
+        "rolloff.corner": 20.741,
+        "rolloff.damping": 1.0217,
+        "heave.lead": 0.028445,
+        "heave.bandwidth": 7.3838,
+    },
+}
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("structure", FOLLOWING)
+def test_each_error_of_the_reference_unit_leaves_what_the_design_says(structure: str) -> None:
+    drag, seeds, parameters = 5000.0, 6, FOLLOWING[structure]
+    linear = {
+        "payload.quadratic_drag": 0.0,
+        "payload.linear_drag": drag,
+        "winch.gear_switching": 0.0,
+    }
+    exact = load_case("subsea-crane").replace(
+        {
+            **SILENT,
+            "sea.significant_height": 0.5,
+            "payload.drag": {"method": "given", "coefficient": drag},
+            "sensors.mru": {**MRU, "noise_floor": 0.0, "noise_fraction": 0.0},
+        }
+    )
+
+    def series(case: Case) -> list[dict[str, np.ndarray]]:
+        """Payload motion and motor speed of each seed."""
+        law = pose(case, structure).controller(parameters)
+        controller = LinearFeedback(case, law, sample_time=0.01)
+        simulation = prepare(case, controller, options=unlimited(linear))
+        runs = [run_simulation(simulation, seed=seed) for seed in range(seeds)]
+        late = [run.time > 200.0 for run in runs]
+        return [
+            {name: run[name][use] for name in ("payload.displacement", "motor.speed")}
+            for run, use in zip(runs, late, strict=True)
+        ]
+
+    without = series(exact)
+    for kind, stated in STATED.items():
+        case = exact.replace({"sensors.mru": {**MRU, **stated}})
+        view, runs = pose(case, structure).assess(parameters, drag), series(case)
+        for name in ("payload.displacement", "motor.speed"):
+            # On a linear plant the error alone is the difference to the unit without errors.
+            pairs = zip(runs, without, strict=True)
+            found = [np.var(one[name] - other[name]) for one, other in pairs]
+            share = view.shares(name)["mru.error"]
+            distance = np.mean(found) / share**2 - 1.0
+            error = np.std(found, ddof=1) / math.sqrt(seeds) / share**2
+            assert abs(distance) < max(0.06, 3.0 * error), (kind, name)
+            assert error < 0.15, (kind, name)
