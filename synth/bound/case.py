@@ -426,7 +426,8 @@ def exact_sensors(case: Case, measurements: Sequence[str]) -> tuple[str, ...]:
     """
     payload, mru = case.sensors.payload, case.sensors.mru
     noise = {f"payload.{name}": getattr(payload, f"{name}_noise") for name in _SIGNALS}
-    noise |= dict.fromkeys(_MRU, 0.0 if mru is None else mru.noise_floor + mru.noise_fraction)
+    of_unit = ("noise_floor", "noise_fraction", "drift", "noise")
+    noise |= dict.fromkeys(_MRU, max(getattr(mru, name, 0.0) for name in of_unit))
     return tuple(name for name in measurements if noise.get(name, 1.0) == 0.0)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.optimize import elementwise
 
 from models.basics import BoolArray, FloatArray, IndexArray, SolverError
+from models.sensing import error_density
 
 from ..limits import Limit
 from .columns import SeaColumn
@@ -74,12 +75,11 @@ class SeaStates:
         heave = self.heave(heights, index)
         found = [heave]
         for noise in self.system.noises:
-            density = noise.density(omega)[None]
             if noise.name == "mru.error":
                 rms = np.sqrt(heave @ self.responses.nodes.weights)
-                given = self.system.mru_error(np.array(self.system.mru_rms))
-                density = (self.system.mru_error(rms) / given)[:, None] ** 2 * density
-            found.append(density)
+                found.append(error_density(self.system.mru, omega, heave, rms[:, None]))
+            else:
+                found.append(noise.density(omega)[None])
         return found
 
     def coefficients(self, densities: Sequence[FloatArray]) -> FloatArray:

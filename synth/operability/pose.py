@@ -94,7 +94,6 @@ def pose_operability(
             reference=drag.reference if drag is not None else question.drag_before,
             noises=noises,
             mru=reported.sensors.mru if any(n.name == "mru.error" for n in noises) else None,
-            mru_rms=float(question.hook.displacement.rms),
             plant=question.plant,
             controller=question.controller(source.parameters),
             drag=drag,

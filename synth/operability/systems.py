@@ -54,9 +54,8 @@ class System(ABC):
         the size that is to be expected.
     noises
         What disturbs besides the sea.
-    mru, mru_rms
-        The motion reference unit whose error is among the noises, if any, and the rms of the
-        hook's heave that this error is given for [m].
+    mru
+        The motion reference unit whose error, which grows with the sea, is among the noises.
     """
 
     outputs: tuple[str, ...]
@@ -64,15 +63,6 @@ class System(ABC):
     reference: float
     noises: tuple[Disturbance, ...] = field(default=())
     mru: MRU | None = None
-    mru_rms: float = 0.0
-
-    def mru_error(self, rms: FloatArray) -> FloatArray:
-        """Return the rms of the reference unit's error in seas of an rms heave (r,) [m].
-
-        A floor or a share of the heave, whichever is greater, as `MruModel.error_rms`.
-        """
-        assert self.mru is not None
-        return np.maximum(self.mru.noise_floor, self.mru.noise_fraction * rms)
 
     @abstractmethod
     def transfers(self, omega: FloatArray) -> ComplexArray:

@@ -31,7 +31,7 @@ from models.plant import (
     rope_transfers,
     settled_drag,
 )
-from models.sensing import SAMPLE_TIME, sensed_plant, sensed_spectra, with_sensors
+from models.sensing import SAMPLE_TIME, UnitError, sensed_plant, sensed_spectra, with_sensors
 
 from ..limits import (
     HOOK,
@@ -65,20 +65,26 @@ class SampledNoise:
 
     Its variance is that of the samples, so that what a direct gain makes of it has one too, and a
     rate that goes with it.
+
+    Attributes
+    ----------
+    spectrum
+        Density per rad/s.
+    sample_time
+        Time between samples [s].
+    lowest, splits
+        Frequency below which there is nothing of it, if that is low, and kinks [rad/s].
     """
 
     spectrum: Callable[[Any], Any]
     sample_time: float = SAMPLE_TIME
+    lowest: float = math.inf
+    splits: tuple[float, ...] = ()
 
     @property
     def band(self) -> tuple[float, float]:
         """Band that holds the variance [rad/s]."""
-        return 1e-5 / self.sample_time, np.pi / self.sample_time
-
-    @property
-    def splits(self) -> tuple[float, ...]:
-        """No kinks."""
-        return ()
+        return min(1e-5 / self.sample_time, self.lowest), np.pi / self.sample_time
 
     def density(self, omega: Any) -> Any:
         """Return the one-sided density per rad/s at `omega` [rad/s]."""
@@ -305,14 +311,18 @@ def heard_spectra(case: Case, hook: HookMotion, measurements: Sequence[str]) -> 
     """Return the spectra of what shakes a loop that hears some measurements, by disturbance."""
     heard = set(measurements)
     return {
-        source: value
-        if source == HOOK
-        else SampledNoise(spectrum=value.density if isinstance(value, White) else value)
+        source: value if source == HOOK else _sampled(value)
         for source, value in sensed_spectra(case, hook).items()
         if source == HOOK
         or (source == "mru.error" and "mru.heave" in heard)
         or source.removesuffix("_noise") in heard
     }
+
+
+def _sampled(spectrum: Any) -> SampledNoise:
+    if isinstance(spectrum, UnitError):
+        return SampledNoise(spectrum=spectrum, lowest=spectrum.lowest, splits=spectrum.splits)
+    return SampledNoise(spectrum=spectrum.density if isinstance(spectrum, White) else spectrum)
 
 
 def uncompensated(case: Case, data: PlantData, hook: HookMotion) -> tuple[float, float]:

@@ -41,6 +41,10 @@ _PARTS: tuple[tuple[str, str, str, int, float | None, str], ...] = (
         for signal in ("acceleration", "velocity", "displacement")
     ),
     ("MRU error", "mru.noise_floor", "m", -1, 0.01, "mru."),
+    ("MRU gain error", "mru.gain_error", "", -1, 0.01, "mru."),
+    ("MRU phase error", "mru.phase_error", "rad", -1, 0.01, "mru."),
+    ("MRU drift", "mru.drift", "m", -1, 0.01, "mru."),
+    ("MRU noise", "mru.noise", "", -1, None, "mru."),
     ("MRU delay", "mru.delay", "s", -1, 0.01, "mru."),
     ("MRU heave filter", "mru.heave_filter_period", "s", 0, 10.0, "mru."),
     ("load cell noise", "load_cell.noise_fraction", "", -1, 0.01, "rope.tension"),
@@ -157,7 +161,7 @@ def part_items(case: Case, heard: Sequence[str], heave: float) -> list[Item]:
         if mru is not None and name == "MRU error":
             given["sensors.mru.noise_fraction"] = mru.noise_fraction
             value = max(mru.noise_floor, mru.noise_fraction * heave)
-        if value > 0.0 or not name.endswith(("noise", "error")):
+        if value > 0.0 or not name.endswith(("noise", "error", "drift")):
             found.append(
                 Item(
                     name=name,

@@ -28,6 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -267,10 +268,29 @@ class Chain:
         if _there(floor):
             error = self._own("mru_fraction") * at_rows(heave_rms, self.rows)
             error = where(value_of(error) > value_of(floor), error, floor)
-            fourth = w * w * w * w
-            shape = 2.0 * np.sqrt(2.0) / np.pi * (fourth / w) / (self.s.imag**4 + fourth)
-            total = total + abs2(self._follows()) * (error * error * shape)
+            white, output = self._own("mru_noise"), self._own("mru_output")
+            drift, slow = self._own("mru_drift"), 2.0 * np.pi / self._own("mru_drift_period")
+            errors = (
+                (error * error, w),
+                (drift * drift, slow),
+                (white * white * output * (0.25 / np.sqrt(2.0)), output),
+            )
+            for variance, corner in errors:
+                if np.any(value_of(variance)):
+                    fourth = corner * corner * corner * corner
+                    shape = 2.0 * np.sqrt(2.0) / np.pi * (fourth / corner)
+                    shape = shape / (self.s.imag**4 + fourth)
+                    total = total + abs2(self._follows()) * (variance * shape)
         return total
+
+    @cached_property
+    def coherent(self) -> Any:
+        """What gain and phase error of the reference unit make of the command, over the heave."""
+        gain, phase = self._own("mru_gain"), self._own("mru_phase")
+        share = gain * gain + phase * phase
+        if not _there(share) or not np.any(value_of(share)):
+            return None
+        return abs2(self.H) * share
 
     def ends(self, drag: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Return y and f with a drag, (1 or m, 1) [N s/m]."""
@@ -308,6 +328,9 @@ class Chain:
             white = inverse * self.noise(shaken.heave_rms)
             right = _both(nodes.weights, nodes.omega)
             sources.append((white, right, np.ones((1, 1)), self._of_noise()))
+            if self.coherent is not None:
+                density, right, factors, _ = sources[0]
+                sources.append((density * self.coherent, right, factors, self._of_noise()))
         found = {}
         for name in outputs:
             parts = [
@@ -324,11 +347,13 @@ class Chain:
         heave: Any = nodes.sea[0]
         if shaken.ratios is not None:
             heave = part_of(shaken.ratios, self.rows) * nodes.weights[0]
-        driven = abs2(self._of_heave()[VELOCITY][2])
-        total = driven * (heave * at_rows(shaken.factors, self.rows))
+        heave = heave * at_rows(shaken.factors, self.rows)
+        total = abs2(self._of_heave()[VELOCITY][2]) * heave
         if shaken.noisy:
             driven = abs2(self._of_noise()[VELOCITY][2])
             total = total + driven * (self.noise(shaken.heave_rms) * nodes.weights[0])
+            if self.coherent is not None:
+                total = total + driven * (self.coherent * heave)
         shape = self.rows.size, len(nodes)
         return [np.broadcast_to(p, shape) for p in (abs2(fixed), cross, abs2(slope), total)]
 

@@ -25,6 +25,7 @@ from models.basics import (
     White,
 )
 from models.plant import lump_rope
+from models.sensing import DRIFT_BAND
 from models.spread import Spread
 
 from ..question import DesignQuestion, SampledNoise
@@ -267,6 +268,9 @@ class DesignRows:
         if not self._noisy:
             return FrequencyAxis(low, high, half_line=False), splits
         noise = SampledNoise(spectrum=White().density).band
+        numbers = self._loops(self._pilots).numbers
+        if "mru.heave" in self._noisy and np.any(numbers["mru_drift"] > 0.0):
+            low = min(low, DRIFT_BAND)
         return FrequencyAxis(min(low, noise[0]), max(high, noise[1]), half_line=False), splits
 
     def _loops(self, rows: FloatArray) -> ChainLoops:

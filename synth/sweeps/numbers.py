@@ -39,6 +39,12 @@ _SENSED = {
     "velocity_noise": "sensors.payload.velocity_noise",
     "displacement_noise": "sensors.payload.displacement_noise",
     "mru_period": "sensors.mru.heave_filter_period",
+    "mru_gain": "sensors.mru.gain_error",
+    "mru_phase": "sensors.mru.phase_error",
+    "mru_drift": "sensors.mru.drift",
+    "mru_drift_period": "sensors.mru.drift_period",
+    "mru_noise": "sensors.mru.noise",
+    "mru_output": "sensors.mru.bandwidth",
     "mru_floor": "sensors.mru.noise_floor",
     "mru_fraction": "sensors.mru.noise_fraction",
     "mru_bandwidth": "sensors.mru.noise_bandwidth",
@@ -50,7 +56,14 @@ NOISE_OF = {
     "payload.acceleration": ("acceleration_noise",),
     "payload.velocity": ("velocity_noise",),
     "payload.displacement": ("displacement_noise",),
-    "mru.heave": ("mru_floor", "mru_fraction"),
+    "mru.heave": (
+        "mru_floor",
+        "mru_fraction",
+        "mru_gain",
+        "mru_phase",
+        "mru_drift",
+        "mru_noise",
+    ),
     "rope.tension": ("cell_noise",),
 }
 """Numbers of the sensors by what is measured; zero or NaN where it is without noise."""

@@ -28,7 +28,7 @@ from models.plant import (
     fit_shaping_filter,
     fixed_top_modes,
 )
-from models.sensing import SAMPLE_TIME, sensed_line_at, sensed_plant, sensed_spectra
+from models.sensing import SAMPLE_TIME, UnitError, sensed_line_at, sensed_plant, sensed_spectra
 
 from .claims import DesignClaims
 from .demands import HOOK, PAYLOAD, VELOCITY, Demand, case_demands
@@ -121,8 +121,10 @@ class _Winch:
                 continue
             # Noise is that of samples, which carry it up to pi/T.
             density = spectrum.density if isinstance(spectrum, White) else spectrum
-            band = 1e-5 / SAMPLE_TIME, math.pi / SAMPLE_TIME
-            found.append(Source(name=name, density=density, band=band))
+            own = spectrum if isinstance(spectrum, UnitError) else None
+            low = min(1e-5 / SAMPLE_TIME, own.lowest if own is not None else math.inf)
+            source = Source(name=name, density=density, band=(low, math.pi / SAMPLE_TIME))
+            found.append(source if own is None else replace(source, splits=own.splits))
         return found
 
     @property

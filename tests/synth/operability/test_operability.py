@@ -52,6 +52,14 @@ def dragged() -> Design:
     return evaluate_gains(load_case("thesis-1975").replace(changes), MILD)
 
 
+FORWARD = {
+    "drum.position_gain": 0.001,
+    "heave.gain": 0.97845,
+    "heave.lead": 0.65903,
+    "heave.bandwidth": 1.4173,
+}
+
+
 @cache
 def vessel_case() -> Case:
     """The thesis's winch over the starboard side of a supply vessel."""
@@ -532,3 +540,24 @@ def test_what_cannot_be_asked_is_refused() -> None:
         operability(one_heading(), periods=[8.0], depths=[9000.0])
     with pytest.raises(InputError, match="highest must be in"):
         operability(case, highest=80.0)
+
+
+@pytest.mark.parametrize(
+    "unit",
+    [
+        {"noise_floor": 0.01, "noise_fraction": 0.2},
+        {"gain_error": 0.2, "phase_error": 0.1, "drift": 0.02, "noise": 1e-4},
+    ],
+)
+def test_the_error_of_the_reference_unit_grows_as_it_is_stated(unit):
+    case = one_heading().replace({"sensors.mru": unit, "limits.drive": "report"})
+    design = evaluate_gains(case, FORWARD, "feed-forward")
+    study = operability(design, periods=[11.0], payload_rms=0.1)
+    contour = study.depths[0].contours["loop"]
+    at = [c.name for c in contour.criteria].index("payload.rms")
+    sea = {"sea.significant_height": float(contour.heights[at, 0, 0]), "sea.peak_period": 11.0}
+    found = contour.criteria[at].measure(evaluate_in(design, case.replace(sea)))
+    assert found == pytest.approx(0.1, rel=1e-5)
+    # An error that did not grow, or grew with the sea where it is a length, would be another.
+    shares = evaluate_in(design, case.replace(sea)).shares("payload.displacement")
+    assert shares["mru.error"] > 0.01

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -14,6 +15,7 @@ from models import Case, load_case
 from models.basics import InputError
 from models.plant import DriveLimits
 from models.simulation import SimulationOptions, prepare, run_simulation
+from synth import evaluate_gains
 from synth.controllers import LinearFeedback
 from synth.design import Design, optimise_gains
 from synth.loop import closed_loop_matrix
@@ -36,6 +38,13 @@ CRANE = {
     "rolloff.damping": 0.977,
     "heave.lead": 0.0186,
     "heave.bandwidth": 10.8,
+}
+
+FORWARD = {
+    "drum.position_gain": 0.001,
+    "heave.gain": 0.97845,
+    "heave.lead": 0.65903,
+    "heave.bandwidth": 1.4173,
 }
 
 
@@ -277,3 +286,53 @@ def pose_plant(case: Case, drag: float) -> object:
     return sensed_plant(case, drag=drag).select(
         measurements=structure_named("combined", case).measurements
     )
+
+
+@pytest.mark.parametrize(
+    ("structure", "parameters"), [("feed-forward", FORWARD), ("combined", CRANE)]
+)
+def test_coherent_error_of_the_unit_is_the_mean_over_its_signs(
+    structure: str, parameters: dict[str, float], crane: Case
+) -> None:
+    unit = {"heave_filter_period": 100.0, "delay": 0.02, "gain_error": 0.04, "phase_error": 0.03}
+    drag = {"method": "given", "coefficient": 5000.0}
+    quiet = {f"sensors.payload.{name}_noise": 0.0 for name in ("acceleration", "velocity")}
+    quiet |= {"sensors.payload.displacement_noise": 0.0}
+    case = crane.replace({"sensors.mru": unit, "payload.drag": drag, **quiet})
+    posed = pose(case, structure)
+    assert set(posed.spectra) == {"hook.heave", "mru.error"}
+    law = posed.controller(parameters)
+    omega = np.geomspace(*posed.hook.band, 40_001)
+    blocks, s = posed.plant.response(omega), 1j * omega[:, None, None]
+    K = law.C @ np.linalg.solve(s * np.eye(len(law.A)) - law.A, law.B + 0.0 * s) + law.D
+    of_hook = blocks.disturbances.index("hook.heave")
+    heard = [blocks.measurements.index(y) for y in ("mru.heave", "mru.heave_rate")]
+    loop = np.eye(len(blocks.measurements)) - blocks.yu @ K
+    view = posed.assess(parameters, 5000.0)
+    signals = (PAYLOAD, "motor.torque", "motor.speed")
+
+    def variance(name: str, error: complex) -> float:
+        shown = blocks.yw[:, :, [of_hook]].copy()
+        shown[:, heard] *= 1.0 + error
+        command = K @ np.linalg.solve(loop, shown)
+        row = blocks.outputs.index(name)
+        F = blocks.zw[:, row, of_hook] + (blocks.zu[:, [row]] @ command)[:, 0, 0]
+        return float(np.trapezoid(np.abs(F) ** 2 * posed.hook.density(omega), omega))
+
+    errors = [complex(*pair) for pair in itertools.product((-0.04, 0.04), (-0.03, 0.03))]
+    for name in signals:
+        mean = math.fsum(variance(name, error) for error in errors) / len(errors)
+        assert view.sigma(name) == pytest.approx(math.sqrt(mean), rel=1e-4), name
+        share = math.sqrt(mean - variance(name, 0.0))
+        assert view.shares(name)["mru.error"] == pytest.approx(share, rel=1e-3), name
+
+
+def test_a_design_with_stated_errors_is_verified(crane: Case) -> None:
+    unit = {"heave_filter_period": 200.0, "gain_error": "1 %", "phase_error": "1 deg"}
+    unit |= {"drift": "5 cm", "drift_period": "120 s", "noise": "0.1 mm/sqrt(Hz)"}
+    case = crane.replace({"sensors.mru": unit, "limits.drive": "report"})
+    design = evaluate_gains(case, CRANE, "combined")
+    assert design.verification is not None
+    failed = [check.name for check in design.verification.checks if not check.ok]
+    assert not [name for name in failed if name.startswith(("shares", "payload_rms"))], failed
+    assert design.shares[PAYLOAD]["mru.error"] > 0.001

@@ -82,11 +82,26 @@ CRANE: Mapping[str, object] = {
     "sensors.payload.velocity_noise": "50 %",
     "sensors.payload.bandwidth": "20 %",
 }
+STATED: Mapping[str, object] = {
+    **PLANT,
+    "sensors.mru.gain_error": Uniform(0.0, 0.05),
+    "sensors.mru.phase_error": Uniform("0 deg", "3 deg"),
+    "sensors.mru.drift": Uniform("0 cm", "10 cm"),
+    "sensors.mru.drift_period": Uniform("60 s", "300 s"),
+    "sensors.mru.noise": Uniform(0.0, 2e-4),
+    "sensors.mru.bandwidth": Uniform("1 Hz", "10 Hz"),
+}
 SLIGHT = {"payload.mass": "0.5 %"}
 
 
 def crane() -> Case:
     return load_case("subsea-crane").replace({"rope.masses": 5})
+
+
+def stated_crane() -> Case:
+    """The crane with a reference unit as makers state it."""
+    unit = {"heave_filter_period": 200.0, "delay": 0.02, "gain_error": 0.02, "phase_error": 0.02}
+    return crane().replace({"sensors.mru": {**unit, "drift": 0.05, "noise": 1e-4}})
 
 
 def late_thesis() -> Case:
@@ -102,6 +117,7 @@ def late_thesis() -> Case:
 
 QUESTIONS = {
     "crane, combined": (crane, "combined", COMBINED, CRANE, "payload.velocity_gain"),
+    "crane, stated": (stated_crane, "combined", COMBINED, STATED, "payload.velocity_gain"),
     "crane, tension": (crane, "constant-tension", TENSION, CRANE, "tension.gain"),
     "crane, corner": (crane, "combined", COMBINED, SLIGHT, "rolloff.corner"),
     "thesis, integral": (late_thesis, "payload-feedback-integral", INTEGRAL, PLANT, "a1"),
