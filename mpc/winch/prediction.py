@@ -8,8 +8,10 @@ The state chi holds, in this order,
 * the states of the winch and its rope (`mpc.winch.sampled`);
 * those of a filter whose white-noise response has the spectrum of the hook's motion
   (`models.plant.shaping`), so that to predict the state is to predict the sea;
-* the error of the reference unit, a Butterworth low-pass of second order (`models.sensing.mru`),
-  and a slow one, of which the case does not speak (`ProcessNoise.unit`);
+* the error of the reference unit as the case states it (`models.sensing.mru`): drift, or noise in
+  the band of the waves, behind a Butterworth low-pass of second order; gain and phase error as a
+  second sea, independent of the first, so many times as small; white noise is one of the
+  measurement; and a slow one, of which the case does not speak (`ProcessNoise.unit`);
 * constants that are to be estimated: a force on the payload, a torque at the motor, the bias of
   the accelerometer and of the tension.  Without them a load of another weight would be held off
   its place.  (Where the payload's zero is, a heavier load has stretched the rope by more: seen from
@@ -59,7 +61,6 @@ CONSTANTS = (
 #: What comes late, in the order of the first measurements.
 LATE = (*MEASUREMENTS, "mru.heave", "mru.heave_rate")
 _GRAVITY = 9.81
-_ERRORS = 4  # states of the reference unit's error: two of what the case says, two of a slow one
 _SLOW = 0.12  # frequency below which that lies, over the mean one of the hook
 _SPARE = 2  # samples by which the telemetry may be later than the case says
 # How far the constants wander in so many seconds, over `constant_scales`: what is estimated has to
@@ -120,6 +121,8 @@ class PredictionModel(ReadOnlyArrays):
         The shaping filter of the hook's motion.
     waves
         Its rms displacement, velocity and acceleration [m], [m/s], [m/s2].
+    errors
+        How many states the errors of the reference unit have, those of the slow one last.
     A, B, G
         (n, n), (n, 1), (n, ng).
     known
@@ -142,6 +145,7 @@ class PredictionModel(ReadOnlyArrays):
     winch: SampledWinch
     sea: ShapingFilter
     waves: tuple[float, ...]
+    errors: int
     A: FloatArray
     B: FloatArray
     G: FloatArray
@@ -167,7 +171,7 @@ class PredictionModel(ReadOnlyArrays):
     @property
     def constants_at(self) -> slice:
         """Where in chi the constants are."""
-        first = self.winch.size + self.sea.order + _ERRORS
+        first = self.winch.size + self.sea.order + self.errors
         return slice(first, first + len(CONSTANTS))
 
     @cached_property
@@ -201,10 +205,11 @@ def prediction_model(winch: SampledWinch) -> PredictionModel:
     hook, T, n = HookMotion.from_case(case), winch.sample_time, winch.size
     sea = sea_filter(hook)
     sea_A, sea_Q = noisy_hold(sea.A, sea.B, T)
-    error_A, error_Q = _unit_error(case, hook, T)
+    error_A, error_root, error_C = _unit_error(case, hook, T, (sea_A, sea_Q, sea))
+    errors = error_C.shape[1]
     depth = _depths(case, T)
     sea_at = slice(n, n + sea.order)
-    error_at = slice(sea_at.stop, sea_at.stop + _ERRORS)
+    error_at = slice(sea_at.stop, sea_at.stop + errors)
     constants_at = slice(error_at.stop, error_at.stop + len(CONSTANTS))
     first, end = {}, constants_at.stop
     for name in LATE:
@@ -213,14 +218,15 @@ def prediction_model(winch: SampledWinch) -> PredictionModel:
     # Displacement and velocity of the hook are outputs of the sea's state, and so everything that
     # the hook moves is linear in it.
     shown = np.vstack([sea.C, sea.C @ sea.A])
-    now = _present(winch, shown, sea_at, error_at, constants_at, end)
+    now = _present(winch, shown, sea_at, constants_at, end)
+    now[len(MEASUREMENTS) :, error_at] = error_C
     A = np.zeros((end, end))
     A[:n, :n] = winch.A
     # The winch feels the hook at both ends of the sample; that at the end is where the sea's state
     # goes, but for the noise that comes in between (in G).
     A[:n, sea_at] = winch.from_hook[:, :2] @ shown + winch.from_hook[:, 2:] @ shown @ sea_A
     A[sea_at, sea_at] = sea_A
-    A[error_at, error_at] = scipy.linalg.block_diag(error_A, _slow_error(hook, T)[0])
+    A[error_at, error_at] = error_A
     A[:n, constants_at.start : constants_at.start + 2] = winch.from_constants
     A[constants_at, constants_at] = np.eye(len(CONSTANTS))
     # A shift register for each late signal: the present value enters, the others move on.
@@ -240,17 +246,18 @@ def prediction_model(winch: SampledWinch) -> PredictionModel:
     other[:, :n] = winch.plant.C[len(LATE) :]
     other[:, sea_at] = winch.plant.F[len(LATE) :, :2] @ shown
     other[-1, constants_at.start + 3] = 1.0
-    sea_root, error_root = root_of(sea_Q), root_of(error_Q)
+    sea_root = root_of(sea_Q)
     G = np.zeros((end, sea_root.shape[1] + error_root.shape[1]))
     # What a sample adds to the sea moves the hook at its end, and with it the winch.
     G[sea_at, : sea_root.shape[1]] = sea_root
     G[:n, : sea_root.shape[1]] = winch.from_hook[:, 2:] @ shown @ sea_root
-    G[error_at.start : error_at.start + 2, sea_root.shape[1] :] = error_root
+    G[error_at, sea_root.shape[1] :] = error_root
     parts = (hook.displacement, hook.velocity, hook.acceleration)
     model = PredictionModel(
         winch=winch,
         sea=sea,
         waves=tuple(float(part.rms) for part in parts),
+        errors=errors,
         A=A,
         B=np.vstack([winch.B, np.zeros((end - n, 1))]),
         G=G,
@@ -323,6 +330,12 @@ def _variances(model: PredictionModel, share: float) -> FloatArray:
         own = name.removeprefix("payload.")
         step = float(getattr(sensors.payload, f"{own}_resolution"))
         rms[name] = math.hypot(rms[name], sensors.noise_rms(own), step / math.sqrt(12.0))
+    unit = MruModel(case.sensors.mru, T, heave, seed=0)
+    for process in (p for p in unit.processes if p.white):
+        over, _ = low_pass_noise(process.corner, T)
+        change = process.rms * math.sqrt(2.0 * (1.0 - over[0, 0])) / T
+        rms["mru.heave"] = math.hypot(rms["mru.heave"], process.rms)
+        rms["mru.heave_rate"] = math.hypot(rms["mru.heave_rate"], change)
     if case.sensors.encoder is not None:
         count = 2.0 * math.pi / case.sensors.encoder.counts_per_turn / math.sqrt(12.0)
         rms["drum.haul"] = math.hypot(rms["drum.haul"], sensors.haul_per_angle * count)
@@ -362,11 +375,27 @@ def sea_filter(hook: HookMotion) -> ShapingFilter:
     )
 
 
-def _unit_error(case: Case, hook: HookMotion, T: float) -> tuple[FloatArray, FloatArray]:
-    """Return the error (e, e') of the reference unit over a sample, and what is added to it."""
+def _unit_error(
+    case: Case, hook: HookMotion, T: float, sea: tuple[FloatArray, FloatArray, ShapingFilter]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the errors of the reference unit over a sample: A, G, and heave and rate of them.
+
+    The slow one, of which the case does not speak, comes last, without noise.
+    """
     unit = MruModel(case.sensors.mru, T, float(hook.displacement.rms), seed=0)
-    w = 1.0 if case.sensors.mru is None else case.sensors.mru.noise_bandwidth
-    return low_pass_noise(w, T, unit.error_rms)
+    stated = [low_pass_noise(p.corner, T, p.rms) for p in unit.processes if not p.white]
+    if not stated:
+        stated = [low_pass_noise(1.0, T, 0.0)]
+    rows = [np.eye(2)] * len(stated)
+    if unit.coherent and case.sensors.mru is not None:
+        # Of unknown sign it is a sea of its own, but for the heave filter, whose period is long.
+        over, added, shaped = sea
+        stated.append((over, case.sensors.mru.coherent**2 * added))
+        rows.append(np.vstack([shaped.C, shaped.C @ shaped.A]))
+    slow = _slow_error(hook, T)[0]
+    A = scipy.linalg.block_diag(*(over for over, _ in stated), slow)
+    G = scipy.linalg.block_diag(*(root_of(added) for _, added in stated), np.zeros((2, 0)))
+    return A, G, np.hstack([*rows, np.eye(2)])
 
 
 def _slow_error(hook: HookMotion, T: float) -> tuple[FloatArray, FloatArray]:
@@ -386,7 +415,6 @@ def _present(
     winch: SampledWinch,
     shown: FloatArray,
     sea_at: slice,
-    error_at: slice,
     constants_at: slice,
     size: int,
 ) -> FloatArray:
@@ -394,8 +422,6 @@ def _present(
     rows = np.zeros((len(LATE), size))
     rows[:, : winch.size] = winch.plant.C[: len(LATE)]
     rows[:, sea_at] = winch.plant.F[: len(LATE), :2] @ shown
-    rows[3, error_at.start : error_at.stop : 2] = 1.0
-    rows[4, error_at.start + 1 : error_at.stop : 2] = 1.0
     # A force on the payload is felt by its accelerometer at once.
     rows[: len(MEASUREMENTS), constants_at.start] = winch.force_felt
     rows[0, constants_at.start + 2] = 1.0
@@ -426,8 +452,8 @@ def _scales(model: PredictionModel) -> FloatArray:
     for k, name in enumerate(model.winch.plant.states):
         if not model.winch.moved[k].any():
             sizes[k] = by_signal.get(name.rsplit(".", 1)[-1], heave)
-    added = np.sqrt(np.diag(model.G @ model.G.T)[w : w + _ERRORS])
-    sizes[w : w + _ERRORS] = np.where(added > 0.0, added, 1.0)
+    added = np.sqrt(np.diag(model.G @ model.G.T)[w : w + model.errors])
+    sizes[w : w + model.errors] = np.where(added > 0.0, added, 1.0)
     sizes[model.constants_at] = [0.1 * force, 0.1 * torque, 0.1 * _GRAVITY, 0.1 * force]
     for name in LATE:
         at = slice(model.first[name], model.first[name] + model.depth[name])

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.linalg
 from mpc_cases import WEIGHTS, case_of, controller_of
 
 import stillhook as sh
@@ -170,3 +171,40 @@ def test_only_who_knows_the_future_plans_on_the_rope_that_is_there():
     plan, believed = (m.winch.data for m in (causal.model, causal.estimator.model))
     assert plan.axial_stiffness == pytest.approx(STIFF * believed.axial_stiffness)
     assert told.model is told.estimator.model
+
+
+def test_the_model_shows_the_errors_that_a_unit_is_stated_with():
+    stated = {"gain_error": 0.03, "phase_error": 0.04, "drift": 0.06, "drift_period": 50.0}
+    case = case_of("thesis-1975", 1.25)
+    exact, noisy, white = (
+        prediction_model(sampled_winch(case.replace({"sensors.mru": unit})))
+        for unit in ({"noise_floor": 0.0, "noise_fraction": 0.0}, stated, {"noise": 1e-4})
+    )
+    size = noisy.sea_at.stop
+    at = slice(size, size + noisy.errors - 2)  # but for the slow one, of which nothing is said
+    covariance = scipy.linalg.solve_discrete_lyapunov(
+        noisy.A[at, at], (noisy.G[:, : noisy.known] @ noisy.G[:, : noisy.known].T)[at, at]
+    )
+    now = noisy.now[-2:, at]
+    variances = np.diag(now @ covariance @ now.T)
+    heave = 0.05**2 * np.diag(sea_covariance(noisy))
+    slow = 2.0 * np.pi / 50.0
+    assert variances == pytest.approx(heave + 0.06**2 * np.array([1.0, slow**2]), rel=1e-6)
+    assert pytest.approx(exact.R, rel=1e-12) == noisy.R
+    # White noise is one of the samples: N^2 w/(4 2^.5), and its differences over a sample.
+    added = white.R - exact.R
+    variance = 1e-8 * 20.0 * np.pi / (4.0 * np.sqrt(2.0))
+    assert added[MEASURED.index("mru.heave")] == pytest.approx(variance, rel=1e-6)
+    T, w = white.winch.sample_time, 20.0 * np.pi / np.sqrt(2.0)
+    kept = np.exp(-w * T) * (np.cos(w * T) + np.sin(w * T))
+    expected = 2.0 * variance * (1.0 - kept) / T**2
+    assert added[MEASURED.index("mru.heave_rate")] == pytest.approx(expected, rel=1e-6)
+    assert white.errors == exact.errors == 4
+
+
+def sea_covariance(model: PredictionModel) -> np.ndarray:
+    """Covariance of the hook's displacement and velocity in the model, (2, 2)."""
+    at = model.sea_at
+    added = (model.G @ model.G.T)[at, at]
+    covariance = scipy.linalg.solve_discrete_lyapunov(model.A[at, at], added)
+    return np.asarray(model.hook[:, at] @ covariance @ model.hook[:, at].T)
