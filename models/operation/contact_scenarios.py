@@ -11,12 +11,13 @@ the hook's motion is: a spectrum times an RAO, from a seed.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from ..basics import GRAVITY, InputError
+from ..basics import GRAVITY, InputError, PhysicsWarning
 from ..case import Case
 from ..casefile import Quantity
 from ..hook import Encounter, HookMotion
@@ -224,7 +225,8 @@ def surface_motion(case: Case, side: float) -> SpectrumMotion:
 
     Its waves are those that move the hook, whose RAO refers to the wave at the hook.  Long-crested
     waves of wave number k over a side a average to sin(ka/2)/(ka/2); from the first zero on there
-    is nothing left of them.
+    is nothing left of them.  A hook whose RAO has no phases follows the surface without a lag: a
+    warning says so, as nothing else in the toolkit asks for both motions in the same waves.
 
     Parameters
     ----------
@@ -233,6 +235,14 @@ def surface_motion(case: Case, side: float) -> SpectrumMotion:
     side
         Side a of the payload's plan along the waves [m].
     """
+    table = case.vessel.heave_rao
+    if table is not None and table.phase is None and not case.quiet:
+        warnings.warn(
+            f"{case.label}: vessel.heave_rao: phase is missing and taken as zero: the hook moves "
+            "with the water's surface, and their relative motion comes out too small",
+            PhysicsWarning,
+            stacklevel=2,
+        )
     half = np.linspace(0.0, math.pi, 64)[1:]
     omega = np.sqrt(2.0 * GRAVITY * half / side)
     amplitude = np.maximum(np.sinc(half / math.pi), 0.0)

@@ -278,6 +278,7 @@ class TestOtherBodies:
         sea = boat_motion(case).hook.sea.statistics.rms
         assert 0.7 * sea < boat_motion(case).hook.displacement.rms < sea
 
+    @pytest.mark.filterwarnings("ignore:.*phase is missing")
     def test_the_surface_is_that_of_the_waves_that_move_the_hook(self):
         table = {
             "omega": [0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
+import warnings
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from still_motion import StillMotion
 
-from models import InputError, build_plant, load_case
+from models import InputError, PhysicsWarning, build_plant, load_case
 from models.operation import (
     Scenario,
     Schedule,
@@ -269,6 +270,7 @@ class TestScenario:
 
 
 class TestLibrary:
+    @pytest.mark.filterwarnings("ignore:.*phase is missing")
     @pytest.mark.parametrize("name", scenario_names())
     @pytest.mark.parametrize("case_name", CASES)
     def test_every_scenario_fits_every_case(self, case_name, name):
@@ -290,6 +292,7 @@ class TestLibrary:
         fastest = changed.winch.speed_limit * changed.drum_radius / changed.winch.gearbox.ratio
         assert speed <= 0.5 * fastest
 
+    @pytest.mark.filterwarnings("ignore:.*phase is missing")
     @pytest.mark.parametrize("masses", [1, 4])
     @pytest.mark.parametrize("name", ["lift-off", "set-down", "splash", "landing"])
     @pytest.mark.parametrize("case_name", ["subsea-crane", "landing"])
@@ -368,6 +371,20 @@ class TestLibrary:
         assert scenario_named("brake-trip", crane, wait=0).brake_trips == ((10.0, 40.0),)
         with pytest.raises(InputError, match=r"end of worst_trip must be above 5 s, got 5.0"):
             Scenario(name="x", description="", duration=9.0, worst_trip=(5.0, 5.0, 1.0))
+
+    def test_a_heave_rao_without_phases_is_told_where_the_surface_moves_too(self, crane):
+        table = {"omega": [0.3, 1.0], "amplitude": [1.0, 0.5]}
+        changes = {"vessel.raos": None, "vessel.hook": None, "vessel.heading": None}
+        bare = crane.replace({**changes, "vessel.heave_rao": table})
+        with pytest.warns(PhysicsWarning, match=r"heave_rao: phase is missing and taken as zero"):
+            scenario_named("splash", bare)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            scenario_named("landing", bare)
+            scenario_named("set-down", bare)  # the boat has waves of its own
+            scenario_named("splash", crane)
+            phased = {**table, "phase": [0.0, 0.0]}
+            scenario_named("splash", bare.replace({"vessel.heave_rao": phased}))
 
     def test_power_falls_and_comes_back(self, crane):
         found = scenario_named("power-limit", crane, power="50 %")

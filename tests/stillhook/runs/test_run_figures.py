@@ -16,6 +16,7 @@ from hypothesis.extra import numpy as arrays
 from PIL import Image
 
 import stillhook as sh
+from models.basics import PhysicsWarning
 from models.run import Event, NamedQuantity
 from stillhook.runs import runs_report
 from stillhook.runs.figures import comparison, exceedance
@@ -49,7 +50,8 @@ def landing() -> sh.Runs:
 
 @cache
 def splash() -> sh.Runs:
-    return sh.simulate(sh.load_case("thesis-1975"), "feed-forward", scenario="splash")
+    with pytest.warns(PhysicsWarning, match="phase is missing"):
+        return sh.simulate(sh.load_case("thesis-1975"), "feed-forward", scenario="splash")
 
 
 @cache
