@@ -43,6 +43,25 @@ def drum_layer(case: Case) -> tuple[int, int]:
     ), layers
 
 
+@dataclass(frozen=True, kw_only=True)
+class OwnSea:
+    """What the case's own sea says: of its H_s, peak period and heading, between no points.
+
+    Attributes
+    ----------
+    limit
+        The limiting H_s at its period and heading [m].
+    binding
+        Name of the criterion that sets it; empty where none does.
+    broken
+        Names of the criteria that are broken in it, by the rule and the tolerance of designs.
+    """
+
+    limit: float
+    binding: str
+    broken: tuple[str, ...]
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AtDepth:
     """The contours with one length of rope paid out.
@@ -62,9 +81,13 @@ class AtDepth:
         The maker's lines: what the winch can follow in regular heave.
     workable
         Shares of the year by name of the system; empty without a scatter diagram.
+    own
+        The case's own sea, with the design or else with the drum held.
+    masses
+        Rope masses of the design's loop.
     max_sensitivity
-        M_s of the design's loop with this rope, at the drag of the contour nearest the case's own
-        sea; infinite where it is unstable, NaN without a design.
+        M_s of the design's loop with this rope, at the drag in the case's own sea; infinite where
+        it is unstable, NaN without a design.
     """
 
     case: Case
@@ -74,6 +97,8 @@ class AtDepth:
     columns: tuple[SeaColumn, ...]
     capability: Capability
     workable: Mapping[str, Workable]
+    own: OwnSea
+    masses: int
     max_sensitivity: float = math.nan
 
     def __str__(self) -> str:

@@ -1,9 +1,12 @@
 """Limiting H_s: the lowest at which a criterion breaks, in all headings of a column at once.
 
 For each H_s of a coarse grid the drag coefficient that agrees with the motion is found, then the
-variances, then by how much each criterion is broken.  The first step up of a criterion from kept
-to broken is a bracket; in it the limiting H_s is found by Chandrupatla's method (1997), which
-never leaves its bracket.  Nothing is interpolated: every step solves for the drag anew.
+variances, then by how much each criterion is broken.  Between two heights at which it is kept it
+may break and hold again: a cubic through four neighbours tells where that could be, and how well it
+foretells a height left out tells how far to trust it; there the grid is made finer.  The first
+step up of a criterion from kept to broken is a bracket; in it the limiting H_s is found by
+Chandrupatla's method (1997), which never leaves its bracket.  No answer is interpolated: every step
+solves for the drag anew.
 """
 
 from __future__ import annotations
@@ -28,6 +31,8 @@ LOWEST, HIGHEST = 0.01, 30.0  # H_s that are looked at [m]
 _INSIDE = 1e-12  # how far inside the edge of stability, in the logarithm
 _SCAN = 55  # coefficients that are tried where drag can be too much, six a decade
 _STEPS = 25  # of the coarse grid
+_ROUNDS = 10  # of making it finer, each by halves
+_BETWEEN = np.linspace(0.0, 1.0, 11)  # where a cubic is looked at between two heights
 _SPEEDS = (1e-9, 1e3)  # rms speeds of the payload between which the drag's is looked for [m/s]
 _DRAG_RTOL = 1e-13  # of the logarithm's step, so of the drag
 _HEIGHT_TOL = 1e-10  # of the logarithm of H_s
@@ -182,28 +187,96 @@ def limiting_heights(
         If a root is not found in its bracket.
     """
     headings, count = len(states.column.hooks), len(criteria)
-    # All headings and heights are rows of one array: drag, moments and verdicts in a few calls.
-    grid = np.geomspace(LOWEST, highest, _STEPS)
-    row_heading = np.repeat(np.arange(headings), grid.size)
-    moments, C = states.moments_at(np.tile(grid, headings), row_heading)
-    excess = np.array([_excess(limit, moments, np.isfinite(C)) for limit in criteria])
-    excess = excess.reshape(count, headings, grid.size)
-    broken = excess > 0.0
-    first = np.where(broken.any(axis=2), broken.argmax(axis=2), grid.size)  # (c, h)
-    heights = np.where(first == 0, 0.0, np.inf)
-    at = np.argwhere((first > 0) & (first < grid.size))
-    if at.size:
-        which, heading = at[:, 0], at[:, 1]
-        above = first[which, heading]
-        heights[which, heading] = _refined(
-            states, criteria, which, heading, grid[above - 1], grid[above]
-        )
+    heights = np.full((count, headings), np.inf)
+    brackets: list[tuple[int, int, float, float]] = []
+    for h, (sizes, excess) in enumerate(_scanned(states, criteria, highest)):
+        for c in np.flatnonzero((excess > 0.0).any(axis=1)):
+            first = int((excess[c] > 0.0).argmax())
+            if first == 0:
+                heights[c, h] = 0.0
+            else:
+                brackets.append((int(c), h, sizes[first - 1], sizes[first]))
+    if brackets:
+        which, heading = np.array([pair[:2] for pair in brackets], dtype=np.intp).T
+        low, high = np.array([pair[2:] for pair in brackets]).T
+        heights[which, heading] = _refined(states, criteria, which, heading, low, high)
     lowest = heights.min(axis=0)
     drag = np.full(headings, np.nan)
     some = np.flatnonzero((lowest > 0.0) & np.isfinite(lowest))
     if some.size:
         drag[some] = states.moments_at(lowest[some], some)[1]
     return heights, drag
+
+
+def _scanned(
+    states: SeaStates, criteria: Sequence[Limit], highest: float
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Return logarithms of H_s (n,) and the excess of each criterion at them (c, n), by heading."""
+    sizes = [np.log(np.geomspace(LOWEST, highest, _STEPS))] * len(states.column.hooks)
+    found = _excesses(states, criteria, sizes)
+    for _ in range(_ROUNDS):
+        between = [_unsettled(*pair) for pair in zip(sizes, found, strict=True)]
+        if not any(new.size for new in between):
+            break
+        # All headings and heights are rows of one array: drag, moments and verdicts in a few calls.
+        more = _excesses(states, criteria, between)
+        for h, new in enumerate(between):
+            place = np.searchsorted(sizes[h], new)
+            sizes[h] = np.insert(sizes[h], place, new)
+            found[h] = np.insert(found[h], place, more[h], axis=1)
+    return list(zip(sizes, found, strict=True))
+
+
+def _excesses(
+    states: SeaStates, criteria: Sequence[Limit], sizes: Sequence[FloatArray]
+) -> list[FloatArray]:
+    """Return the excess of each criterion at logarithms of H_s in each heading, (c, n) each."""
+    counts = [size.size for size in sizes]
+    index = np.repeat(np.arange(len(sizes)), counts)
+    moments, C = states.moments_at(np.exp(np.concatenate(sizes)), index)
+    excess = np.array([_excess(limit, moments, np.isfinite(C)) for limit in criteria])
+    return np.split(excess, np.cumsum(counts)[:-1], axis=1)
+
+
+def _unsettled(sizes: FloatArray, excess: FloatArray) -> FloatArray:
+    """Return the middles of intervals in which a criterion may break unseen, (m,).
+
+    Parameters
+    ----------
+    sizes, excess
+        Logarithms of H_s (n,), and the excess of each criterion at them (c, n).
+    """
+    n = sizes.size
+    excess = np.minimum(excess, 1.0)
+    broken = excess > 0.0
+    first = np.where(broken.any(axis=1), broken.argmax(axis=1), n)  # of each criterion, (c,)
+    # How well the four neighbours of a height foretell it, over twice the step: sixteen times the
+    # error of a cubic between two heights.
+    error = np.zeros_like(excess)
+    for j in range(2, n - 2):
+        near = [j - 2, j - 1, j + 1, j + 2]
+        told = excess[:, near] @ _cubic(sizes[near], sizes[[j]])
+        error[:, j] = np.abs(told[:, 0] - excess[:, j])
+    error[:, :2], error[:, n - 2 :] = error[:, 2:3], error[:, n - 3 : n - 2]
+    wanted = []
+    for i in range(min(int(first.max()), n - 1)):
+        begin = min(max(i - 1, 0), n - 4)
+        at = sizes[i] + (sizes[i + 1] - sizes[i]) * _BETWEEN
+        curve = excess[:, begin : begin + 4] @ _cubic(sizes[begin : begin + 4], at)
+        doubt = np.maximum(error[:, i], error[:, i + 1])
+        may_break = (i + 1 < first) & (curve.max(axis=1) + doubt > 0.0)
+        turns = (i + 1 == first) & (np.count_nonzero(np.diff(curve > 0.0), axis=1) > 1)
+        if np.any(may_break | turns):
+            wanted.append(0.5 * (sizes[i] + sizes[i + 1]))
+    return np.array(wanted)
+
+
+def _cubic(nodes: FloatArray, at: FloatArray) -> FloatArray:
+    """Return what each of four nodes counts in the cubic through them, (4, m)."""
+    ratios = (at - nodes[:, None, None]) / (nodes[None, :] - nodes[:, None] + np.eye(4))[..., None]
+    # ratios[j, k] = (at - x_j) / (x_k - x_j); its product over j other than k is k's share.
+    ratios[np.arange(4), np.arange(4)] = 1.0
+    return np.asarray(ratios.prod(axis=0))
 
 
 def _refined(
@@ -226,7 +299,7 @@ def _refined(
 
     solved = elementwise.find_root(
         excess,
-        (np.log(low), np.log(high)),
+        (low, high),
         args=(which.astype(np.float64), heading.astype(np.float64)),
         tolerances={"xatol": _HEIGHT_TOL, "xrtol": 0.0, "fatol": 0.0, "frtol": 0.0},
     )

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from models.basics import InputError
+from models.basics import InputError, SolverError
 from models.case import Case
 
 from ..design import Design
 from ..limits import Limit
-from ..question import HOOK, PAYLOAD, pose
+from ..loop import Assessment
+from ..question import HOOK, PAYLOAD, DesignQuestion, Values, on_enough_masses, pose
 from .criteria import Stability, case_criteria, outputs_of
 from .systems import VELOCITY, HeldSystem, LoopSystem, PerfectSystem, System
 
@@ -32,6 +33,11 @@ class OperabilityQuestion:
         The design's loop; None where a case alone was asked about.
     criteria
         By name of the system, ``held``, ``perfect`` and ``loop``: stability first.
+    masses
+        Rope masses of the loop.
+    own
+        The loop in the case's own sea, with this length of rope; None where it has no stationary
+        motion, or where a case alone was asked about.
     """
 
     case: Case
@@ -39,6 +45,8 @@ class OperabilityQuestion:
     perfect: PerfectSystem
     loop: LoopSystem | None
     criteria: dict[str, tuple[Limit, ...]]
+    masses: int = 1
+    own: Assessment | None = None
 
     @property
     def systems(self) -> dict[str, System]:
@@ -60,7 +68,8 @@ def pose_operability(
         Criteria on the payload.
     length
         Another length of rope than the case's [m]: the drum then is on the layer, and the rope as
-        stiff, as it is at that length.
+        stiff, as it is at that length; and the rope has the masses that a design made there asks
+        for, so that a limit is kept here if it is kept there.
 
     Raises
     ------
@@ -72,13 +81,20 @@ def pose_operability(
     if length is not None:
         changes["rope.length"] = length
     reported = case.variant(changes)
-    same = reported.rope.length == case.rope.length
+    own: Assessment | None = None
     if isinstance(source, Case):
         question = pose(reported)
     elif source.margins is None:
         raise InputError("operability: the design has no stabilising controller")
+    elif reported.rope.length == case.rope.length:
+        question = pose(reported, source.structure, source.masses, built_for=source.built_for)
+        own = _stationary(question, source.parameters)
     else:
-        question = pose(reported, source.structure, source.masses if same else None)
+        question, own, _ = on_enough_masses(
+            pose(reported, source.structure, built_for=source.built_for),
+            source.parameters,
+            _loop,
+        )
     of_case = case_criteria(reported, question.plant)
     every = (Stability(), *wanted, *of_case)
     held = tuple(c for c in every if set(c.outputs) <= _HELD)
@@ -111,4 +127,20 @@ def pose_operability(
         ),
         loop=loop,
         criteria={"held": held, "perfect": winch, "loop": every},
+        masses=question.masses,
+        own=None if loop is None or loop.swings else own,
     )
+
+
+def _stationary(question: DesignQuestion, parameters: Mapping[str, float]) -> Assessment | None:
+    """Return the loop in the case's own sea; None where it has no stationary motion."""
+    loop = _loop(question, question.values(parameters))
+    return loop if loop is not None and loop.stable else None
+
+
+def _loop(question: DesignQuestion, values: Values) -> Assessment | None:
+    loop = question.problem.assess(values)
+    try:
+        return loop if loop.coefficient >= 0.0 else None
+    except SolverError:
+        return None  # no drag agrees with the motion

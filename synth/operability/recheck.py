@@ -9,7 +9,6 @@ drag coefficient is taken over, and shown to agree with the motion that it leads
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +19,7 @@ from models.plant import PlantData
 from ..design import Design
 from ..loop import Assessment
 from ..question import pose
-from .columns import SeaColumn
-from .contour import Contour
+from .depths import AtDepth
 
 _TOLERANCE = 1e-6
 
@@ -64,7 +62,9 @@ class ContourCheck:
         return self.difference <= _TOLERANCE
 
 
-def evaluate_in(design: Design, case: Case, drag: float | None = None) -> Assessment:
+def evaluate_in(
+    design: Design, case: Case, drag: float | None = None, masses: int | None = None
+) -> Assessment:
     """Return a design's loop in the sea of a case, in numbers.
 
     Parameters
@@ -75,28 +75,28 @@ def evaluate_in(design: Design, case: Case, drag: float | None = None) -> Assess
         The case: its sea, vessel and rope.
     drag
         Drag coefficient [N s/m] where it is known; else it is solved with the motion.
+    masses
+        Rope masses; by default the design's.
     """
-    case = case.variant({"limits.drive": "report"})
-    masses = design.masses if case.rope.length == design.case.rope.length else None
-    return pose(case, design.structure, masses).assess(design.parameters, drag)
+    case, masses = case.variant({"limits.drive": "report"}), masses or design.masses
+    return pose(case, design.structure, masses, built_for=design.built_for).assess(
+        design.parameters, drag
+    )
 
 
-def recheck(
-    design: Design, contour: Contour, columns: Sequence[SeaColumn], count: int
-) -> tuple[ContourCheck, ...]:
+def recheck(design: Design, at: AtDepth, count: int) -> tuple[ContourCheck, ...]:
     """Return the binding criterion at some points of a contour by single evaluations.
 
     Parameters
     ----------
     design
         The design whose contour it is.
-    contour
-        The contour.
-    columns
-        The seas it is over.
+    at
+        The length of rope that it is for.
     count
         Points to look at, spread over the contour; fewer where fewer have a limit.
     """
+    contour = at.contours["loop"]
     limit = contour.limit
     known = np.argwhere(np.isfinite(limit) & (limit > 0.0) & (contour.binding != "stability"))
     found = []
@@ -105,9 +105,9 @@ def recheck(
         k = int(contour.heights[:, h, p].argmin())
         criterion = contour.criteria[k]
         height = float(limit[h, p])
-        case = columns[p].cases[h].replace({"sea.significant_height": height})
+        case = at.columns[p].cases[h].replace({"sea.significant_height": height})
         drag = float(contour.drag[h, p])
-        assessment = evaluate_in(design, case, drag)
+        assessment = evaluate_in(design, case, drag, at.masses)
         # The velocity's drag; a coefficient that the case fixes agrees with itself.
         fixed = case.payload.fixed_drag is not None
         slope = PlantData.from_case(case).quadratic_drag * float(np.sqrt(8.0 / np.pi))

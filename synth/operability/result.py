@@ -15,12 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from models.basics import FloatArray, InputError
+from models.basics import FloatArray
 from models.case import Case
 from models.sea import Scatter
 
 from ..design import Design
 from ..limits import Limit
+from ..search import KEPT
 from .contour import Contour
 from .depths import STAGES, AtDepth
 from .recheck import ContourCheck, recheck
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _CHECKS = 3
-_PRESSES = 1e-4  # of a limit: a design that was made to press against it is within
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,27 +72,23 @@ class Operability:
 
     @property
     def ok(self) -> bool:
-        """Whether the case's own sea lies below the contour, at the case's own length of rope.
+        """Whether every criterion is kept in the case's own sea, at its own length of rope.
 
-        The nearest length that was asked for stands for it, and the nearest heading.
+        The nearest length that was asked for stands for it.  A design is asked as it was made, by
+        the same rule and tolerance, so that what is `ok` there is so here.
         """
-        limit = self._own_limit(self.own_depth.main)
-        return bool(self.case.sea.significant_height <= limit * (1.0 + _PRESSES))
+        return not self.own_depth.own.broken
 
     @property
     def status(self) -> str:
         """The sentence for the user."""
         at = self.own_depth
-        own, limit = self.case.sea.significant_height, self._own_limit(at.main)
-        period = self.case.sea.spectral_peak_period
-        sea = f"H_s {own:.3g} m, T_p {period:.3g} s"
-        if math.isnan(limit):
-            return f"the case's own sea, {sea}, lies outside the contour"
-        if limit >= at.main.highest:
+        own, limit, period = at.own, at.own.limit, self.case.sea.spectral_peak_period
+        sea = f"H_s {self.case.sea.significant_height:.3g} m, T_p {period:.3g} s"
+        if self.ok and limit >= at.main.highest:
             return f"nothing binds in the case's own sea, {sea}, nor in any looked at"
-        p = int(np.abs(at.main.periods - period).argmin())
-        name = str(at.main.binding[self.own_heading(at.main), p]) or "nothing"
         verdict = "lies within the limit" if self.ok else "is beyond the limit"
+        name = own.binding or ", ".join(own.broken)
         return f"the case's own sea, {sea}, {verdict}, H_s {limit:.3g} m, set by {name}"
 
     @cached_property
@@ -151,7 +147,7 @@ class Operability:
         bound = self.case.limits.max_sensitivity
         if not math.isfinite(at.max_sensitivity):
             return "the loop is unstable with this rope, at least in small motion"
-        over = at.max_sensitivity > bound * (1.0 + 1e-3)
+        over = at.max_sensitivity > bound * (1.0 + KEPT)
         return f"M_s {at.max_sensitivity:.3g}, {'above' if over else 'within'} its limit {bound:g}"
 
     def verify(self, count: int = _CHECKS) -> tuple[ContourCheck, ...]:
@@ -171,7 +167,7 @@ class Operability:
             return ()
         found: list[ContourCheck] = []
         for at in self.depths:
-            found += recheck(self.design, at.contours["loop"], at.columns, count)
+            found += recheck(self.design, at, count)
         return tuple(found)
 
     def to_csv(self) -> str:
@@ -218,21 +214,6 @@ class Operability:
                 lines.append(f"  workable {STAGES[name]}: {100.0 * share.share:.1f} %{turned}")
         marks = ["", *["├ "] * (len(lines) - 2), "└ "]
         return "\n".join(mark + line for mark, line in zip(marks, lines, strict=True))
-
-    def _own_limit(self, contour: Contour) -> float:
-        """Return the limit in the case's own sea and heading [m]; NaN off the contour."""
-        period = self.case.sea.spectral_peak_period
-        if contour.periods.size == 1:
-            period = float(contour.periods[0])  # a sea without a period to change has its own
-        heading = getattr(self.case.vessel, "heading", None)
-        if contour.headings is None or heading is None:
-            return float(contour.at([period])[0])
-        if contour.headings.size == 1:
-            heading = float(contour.headings[0])
-        try:
-            return float(contour.at([period], [heading])[0])
-        except InputError:
-            return math.nan
 
 
 def _range_text(contour: Contour) -> str:

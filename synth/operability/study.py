@@ -32,16 +32,15 @@ from models.basics import (
 from models.case import Case
 from models.sea import Scatter, read_scatter
 
-from ..design import Design, shortfall, tuning_of
+from ..design import Design, limit_uses, shortfall, tuning_of
 from ..limits import Limit
-from ..loop import Assessment
 from ..question import pose
 from ..search import Progress, search
 from .capability import capability
 from .columns import SeaColumn, has_headings, has_period, sea_column
 from .contour import Contour, assembled, contour_of
 from .criteria import payload_criteria
-from .depths import AtDepth, drum_layer
+from .depths import AtDepth, OwnSea, drum_layer
 from .limiting import HIGHEST, SeaStates, limiting_heights
 from .pose import OperabilityQuestion, pose_operability
 from .result import Operability
@@ -176,7 +175,7 @@ def operability(
         }
         if reoptimise and not isinstance(design, Case):
             contours["reoptimised"] = _reoptimised(design, stage, seas, highest, seed, step)
-        found.append(_at_depth(stage, contours, seas, diagram))
+        found.append(_at_depth(stage, contours, seas, diagram, highest))
     return Operability(
         case=case,
         design=None if isinstance(design, Case) else design,
@@ -241,6 +240,7 @@ def _at_depth(
     contours: dict[str, Contour],
     columns: Sequence[SeaColumn],
     scatter: Scatter | None,
+    highest: float,
 ) -> AtDepth:
     vessel = question.case.vessel
     heading = getattr(vessel, "heading", None) if has_headings(question.case) else None
@@ -262,22 +262,35 @@ def _at_depth(
         columns=tuple(columns),
         capability=capability(question.perfect, question.criteria["perfect"], lines),
         workable=shares,
-        max_sensitivity=_sensitivity(question, contours.get("loop")),
+        own=_own_sea(question, highest),
+        masses=question.masses,
+        max_sensitivity=_sensitivity(question),
     )
 
 
-def _sensitivity(question: OperabilityQuestion, contour: Contour | None) -> float:
-    """Return M_s of the loop at the drag of the contour nearest the case's own sea."""
-    if question.loop is None or contour is None:
+def _own_sea(question: OperabilityQuestion, highest: float) -> OwnSea:
+    """Return the verdict on the case's own sea, in which a design is looked at as it was made."""
+    name = "held" if question.loop is None else "loop"
+    column, criteria = sea_column(question.case, None), question.criteria[name]
+    contour = contour_of(question.systems[name], criteria, [column], highest=highest)
+    limit, binding = float(contour.limit[0, 0]), str(contour.binding[0, 0])
+    broken: tuple[str, ...]
+    if question.loop is None:
+        broken = (binding,) if limit < question.case.sea.significant_height else ()
+    elif question.own is None:
+        broken = ("stability",)
+    else:
+        felt = [criterion for criterion in criteria if criterion.outputs]
+        uses = limit_uses(felt, question.own, {})
+        broken = tuple(use.name for use in uses.values() if not use.kept)
+    return OwnSea(limit=limit, binding=binding, broken=broken)
+
+
+def _sensitivity(question: OperabilityQuestion) -> float:
+    """Return M_s of the loop at the drag in the case's own sea; see `AtDepth`."""
+    if question.loop is None:
         return math.nan
-    loop = question.loop
-    if loop.stable_range[0] > loop.stable_range[1] or loop.swings:
-        return math.inf
-    order = np.abs(contour.periods - question.case.sea.spectral_peak_period).argsort()
-    known = [c for p in order for c in contour.drag[:, p] if np.isfinite(c)]
-    drag = float(known[0]) if known and loop.drag is not None else loop.reference
-    assessment = Assessment(loop.plant, loop.controller, (), drag=loop.drag, coefficient=drag)
-    return assessment.max_sensitivity if assessment.stable else math.inf
+    return math.inf if question.own is None else question.own.max_sensitivity
 
 
 def example_scatter() -> Scatter:

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 from designs import THESIS_GAINS, thesis_design, unstable_design
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 from models import Case, InputError, load_case
 from models.basics import Quadrature, peak_factor
 from models.hook import HookMotion
 from models.plant import PlantData
 from models.sensing import MruModel
-from synth import Design, evaluate_gains
+from synth import Design, evaluate_gains, optimise_gains
+from synth.design.optimise import NESTED
 from synth.limits import Limit
 from synth.loop import Assessment
 from synth.operability import operability
@@ -29,7 +32,8 @@ from synth.operability.limiting import SeaStates, limiting_heights
 from synth.operability.pose import pose_operability
 from synth.operability.recheck import evaluate_in
 from synth.operability.responses import SeaMoments
-from synth.question import pose, uncompensated
+from synth.question import PAYLOAD, pose, uncompensated
+from synth.structures import structures_aboard
 
 pytestmark = pytest.mark.filterwarnings("ignore::models.basics.checks.PhysicsWarning")
 
@@ -373,9 +377,104 @@ def test_gains_stay_when_the_rope_gets_longer() -> None:
         )
         view = evaluate_in(dragged(), case)
         assert view.sigma("payload.displacement") == pytest.approx(0.2, rel=1e-7)
-        drag = float(at.contours["loop"].drag[0, 0])
-        view = evaluate_in(dragged(), case, drag)
+        view = evaluate_in(dragged(), dragged().case.replace({"rope.length": at.length}))
         assert at.max_sensitivity == pytest.approx(view.margins.max_sensitivity, rel=1e-6)
+
+
+def agreed(case: Case, structure: str) -> None:
+    """Assert that operability says of a design's limits what `optimise_gains` says of them."""
+    design = optimise_gains(case, structure, starts=2)
+    assert design.margins is not None
+    heading = getattr(case.vessel, "heading", None)
+    headings = [heading] if getattr(case.vessel, "raos", None) else None
+    study = operability(design, periods=[case.sea.spectral_peak_period], headings=headings)
+    (at,) = study.depths
+    assert at.masses == design.masses
+    if design.feasible:
+        assert at.max_sensitivity == pytest.approx(design.margins.max_sensitivity, rel=1e-7)
+        for name, use in design.limits.items():
+            if name in {criterion.name for criterion in at.contours["loop"].criteria}:
+                assert (name in at.own.broken) == (not use.kept), (structure, name)
+    if design.ok:
+        assert "within its limit" in study.margin_text(at)
+        assert study.ok or case.limits.drive == "report", (structure, study.status)
+
+
+@pytest.mark.ci
+def test_what_is_ok_is_workable_in_its_own_sea() -> None:
+    # At the limiting sea, 6.7 m, the drag is another and M_s 2.015; the own sea counts.
+    agreed(load_case("subsea-crane").replace({"rope.length": 1000.0}), "payload-feedback")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "length"),
+    [
+        ("thesis-1975", None),
+        ("landing", None),
+        ("subsea-crane", 100.0),
+        ("subsea-crane", 300.0),
+        ("subsea-crane", 1000.0),
+    ],
+)
+def test_what_is_ok_is_workable_for_every_case_structure_and_depth(
+    name: str, length: float | None
+) -> None:
+    case = load_case(name)
+    for structure in structures_aboard(case, NESTED):
+        agreed(case if length is None else case.replace({"rope.length": length}), structure)
+
+
+@pytest.mark.ci
+def test_at_another_depth_the_loop_is_that_of_an_evaluation_there() -> None:
+    gains = {"A": 1.0, "a": 16.02, "a1": 44.36, "a2": 6.416}
+    design = evaluate_gains(load_case("subsea-crane"), gains)
+    study = operability(design, periods=[9.0], headings=[2.9], depths=[700.0])
+    there = evaluate_gains(design.case.replace({"rope.length": 700.0}), design.parameters)
+    assert study.depths[0].masses == there.masses
+    assert there.margins is not None
+    assert study.depths[0].max_sensitivity == pytest.approx(there.margins.max_sensitivity, rel=1e-9)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bumpy(Limit):
+    """Broken about one height, and for good above another: the excess as a function of ln H_s."""
+
+    at: float
+    width: float
+    drive: ClassVar[bool] = True
+    output: str = "payload.displacement"
+
+    def rows(self, symbols: Any, bound: float) -> Any:
+        size = 0.5 * np.log(np.asarray(symbols.moment(self.output, 0)))
+        bump = 0.45 * np.exp(-0.5 * ((size - np.log(self.at)) / self.width) ** 2)
+        return -0.2 + bump + np.clip(0.05 * (size - np.log(self.bound)), -0.1, np.inf)
+
+    def measure(self, loop: Assessment) -> float:
+        raise NotImplementedError
+
+
+@pytest.mark.parametrize("at", [1.05, 1.1, 1.2, 1.3, 1.42])
+def test_a_limit_that_breaks_and_holds_again_between_two_heights_is_found(at: float) -> None:
+    # With fixed drag sigma is H_s times a constant; the coarse grid's heights are 40 % apart.
+    case = one_heading().variant({"payload.drag": {"method": "given", "coefficient": 2e4}})
+    question = pose_operability(case, ())
+    states = SeaStates(system=question.held, column=sea_column(case, 9.0))
+    unit = np.sqrt(states.moments_at(np.ones(1), np.zeros(1, dtype=int))[0].moment(PAYLOAD, 0))[0]
+    bumpy = Bumpy(bound=20.0 * unit, at=at * unit, width=0.1, name="bumpy")
+    found = float(limiting_heights(states, [bumpy])[0][0, 0])
+
+    def excess(height: float) -> float:
+        return (
+            -0.2
+            + 0.45 * math.exp(-0.5 * (math.log(height / at) / 0.1) ** 2)
+            + max(0.05 * math.log(height / 20.0), -0.1)
+        )
+
+    grid = np.geomspace(0.01, at, 4000)
+    first = next(h for h in grid if excess(h) > 0.0)
+    assert found == pytest.approx(brentq(excess, 0.97 * first, first), rel=1e-8)
+    assert excess(1.5 * found) < 0.0
 
 
 @pytest.mark.ci
