@@ -27,6 +27,8 @@ from typing import IO, Any
 
 from typing_extensions import override
 
+from models.basics import InputError
+
 from .pool import Bench, Died, Pool, Task, usable_cores
 
 _START = (
@@ -40,10 +42,10 @@ _LENGTH = struct.Struct(">Q")
 class _Process:
     """A process and the thread that talks to it."""
 
-    def __init__(self, bench: Bench, answers: queue.Queue[tuple[_Process, Task, Any]]) -> None:
+    def __init__(self, bench: bytes, answers: queue.Queue[tuple[_Process, Task, Any]]) -> None:
         self.last: Hashable = None
         self._answers = answers
-        self._tasks: queue.Queue[Task | None] = queue.Queue()
+        self._tasks: queue.Queue[tuple[Task, bytes] | None] = queue.Queue()
         self._said = tempfile.TemporaryFile()  # noqa: SIM115
         self._process = subprocess.Popen(
             [sys.executable, "-c", _START, json.dumps(sys.path)],
@@ -61,9 +63,9 @@ class _Process:
     def pid(self) -> int:
         return self._process.pid
 
-    def give(self, task: Task) -> None:
+    def give(self, task: Task, packed: bytes) -> None:
         self.last = task.group
-        self._tasks.put(task)
+        self._tasks.put((task, packed))
 
     def end(self) -> None:
         """End the process now, whatever it does."""
@@ -82,12 +84,13 @@ class _Process:
         assert into is not None
         assert out is not None
         fresh = True
-        while (task := self._tasks.get()) is not None:
+        while (given := self._tasks.get()) is not None:
+            task, packed = given
             try:
                 if fresh:
                     _send(into, self._bench)
                     fresh = False
-                _send(into, task)
+                _send(into, packed)
                 answer = _receive(out)
             except (EOFError, OSError, ValueError):
                 answer = Died(reason=self._obituary())
@@ -146,12 +149,19 @@ class Processes(Pool):
 
     @override
     def submit(self, task: Task) -> None:
-        """Give a task to an idle process, best to one that has prepared its group already."""
+        """Give a task to an idle process, best to one that has prepared its group already.
+
+        Raises
+        ------
+        InputError
+            If the task cannot be sent to another process.
+        """
+        packed = _packed(task)
         best = next((p for p in self._idle if p.last == task.group), None)
         process = best or next((p for p in self._idle if p.last is None), self._idle[0])
         self._idle.remove(process)
         self._busy.add(process)
-        process.give(task)
+        process.give(task, packed)
 
     @override
     def end(self) -> None:
@@ -161,8 +171,8 @@ class Processes(Pool):
 
     @override
     def _start(self, bench: Bench, count: int) -> None:
-        self._bench, self._answers = bench, queue.Queue()
-        self._idle = [_Process(bench, self._answers) for _ in range(min(self.jobs, count))]
+        self._bench, self._answers = _packed(bench), queue.Queue()
+        self._idle = [_Process(self._bench, self._answers) for _ in range(min(self.jobs, count))]
 
     @override
     def _answer(self, timeout: float) -> tuple[Any, Any] | None:
@@ -187,17 +197,32 @@ def serve() -> None:
     with contextlib.suppress(EOFError, BrokenPipeError):
         bench = _receive(tasks)
         while True:
-            _send(answers, bench.do(_receive(tasks)))
+            _send(answers, pickle.dumps(bench.do(_receive(tasks))))
 
 
-def _send(stream: IO[bytes], content: object) -> None:
-    data = pickle.dumps(content)
+def _packed(content: object) -> bytes:
+    """Return what is sent to a process; here, as nobody would hear of a thread that fails.
+
+    Raises
+    ------
+    InputError
+        If it cannot be pickled: a function of a script or a notebook, an open file.
+    """
+    try:
+        return pickle.dumps(content)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise InputError(
+            f"jobs: the work cannot be sent to other processes, take one job: {error}"
+        ) from error
+
+
+def _send(stream: IO[bytes], data: bytes) -> None:
     stream.write(_LENGTH.pack(len(data)) + data)
     stream.flush()
 
 
 def _receive(stream: IO[bytes]) -> Any:
-    """Read what was written with `_send`.
+    """Read what was pickled and written with `_send`.
 
     Raises
     ------
