@@ -61,8 +61,6 @@ class OperatingPoint:
         Motor torque [N m].
     tension
         Rope tension at the drum [N].
-    elongations
-        Static elongation of each piece of rope from the drum down [m], (N,).
     outputs
         Every performance output by name.
     residual
@@ -75,7 +73,6 @@ class OperatingPoint:
     command: float
     torque: float
     tension: float
-    elongations: FloatArray
     outputs: Mapping[str, float]
     residual: float
 
@@ -159,8 +156,6 @@ class Plant(Equations):
                 f"(allowed {RESIDUAL_TOLERANCE:g})"
             )
         outputs = dict(zip(self.outputs, (float(v) for v in z), strict=True))
-        at = [self.states.index(name) for name in displacement_names(self.masses)]
-        moved = -np.diff(np.append(0.0, state[at]))
         return OperatingPoint(
             x=read_only(state),
             u=read_only(u),
@@ -168,7 +163,6 @@ class Plant(Equations):
             command=float(u[0]),
             torque=outputs["motor.torque"],
             tension=outputs["rope.tension"],
-            elongations=read_only(stretch + moved),
             outputs=outputs,
             residual=residual,
         )

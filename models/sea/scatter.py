@@ -8,7 +8,6 @@ and writes the files; operability studies and families of cases use the list.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -104,12 +103,6 @@ class Scatter:
     def __len__(self) -> int:
         """Return the number of sea states."""
         return int(self.significant_height.size)
-
-    def __iter__(self) -> Iterator[tuple[float, float, float]]:
-        """Yield H_s [m], T_p [s] and occurrence [-] of each state."""
-        columns = (self.significant_height, self.peak_period, self.occurrence)
-        for height, period, share in zip(*columns, strict=True):
-            yield float(height), float(period), float(share)
 
     @property
     def mean_significant_height(self) -> float:
