@@ -40,9 +40,11 @@ if TYPE_CHECKING:
     from .metrics import (
         THREE_HOURS,
         SpectrumStatistics,
+        attenuation,
         fractile_factor,
         most_probable_maximum,
         peak_factor,
+        residual_text,
         spectrum_statistics,
         zero_crossing_period,
     )

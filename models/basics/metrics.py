@@ -26,6 +26,40 @@ Density = Callable[[FloatArray], npt.ArrayLike]
 THREE_HOURS = 10800.0
 """The usual exposure of a sea state [s]."""
 
+_HOOK, _HELD = "the hook's motion", "the payload's with the drum held"
+
+
+def attenuation(residual: float) -> float:
+    """Return a residual, one motion over another, as a loss [dB]: -20 log10.
+
+    Examples
+    --------
+    >>> attenuation(0.1), attenuation(0.0)
+    (20.0, inf)
+    """
+    return -20.0 * math.log10(residual) if residual > 0.0 else math.inf
+
+
+def residual_text(residual: float, held: float = math.nan) -> str:
+    """Return what is left of a motion: of the hook's, and of the payload's with the drum held.
+
+    Every command tells compensation in these words.
+
+    Examples
+    --------
+    >>> residual_text(0.0432)
+    "residual 4.3 % of the hook's motion (27.3 dB)"
+    >>> residual_text(0.809, 0.615)[47:]
+    "61.5 % of the payload's with the drum held (4.2 dB)"
+    """
+
+    def told(share: float, whose: str) -> str:
+        size = f"{100.0 * share:.1f}" if 100.0 * share < 99.95 else f"{100.0 * share:.0f}"
+        return f"{size} % of {whose} ({attenuation(share):.1f} dB)"
+
+    text = f"residual {told(residual, _HOOK)}"
+    return text if math.isnan(held) else f"{text}, {told(held, _HELD)}"
+
 
 def moments(
     quadrature: Quadrature, density: Density | npt.ArrayLike, orders: Sequence[float] = (0, 1, 2, 4)

@@ -19,6 +19,7 @@ from ..basics import (
     InputError,
     Interval,
     Share,
+    attenuation,
     fall_time,
     mean_interval,
     share,
@@ -62,7 +63,7 @@ class Summary:
         cls,
         runs: Sequence[Run | Statistics],
         *,
-        uncompensated: Sequence[Run | Statistics] | None = None,
+        held: Sequence[Run | Statistics] | None = None,
         confidence: float = 0.95,
     ) -> Summary:
         """Return the summary of runs that differ in their seed alone.
@@ -71,15 +72,15 @@ class Summary:
         ----------
         runs
             The runs, or their statistics; at least one.
-        uncompensated
-            The same seeds without compensation, in the same order: adds the residual against them.
+        held
+            The same seeds with the drum held, in the same order: adds the residual against them.
         confidence
             Of the intervals, between 0 and 1.
 
         Raises
         ------
         InputError
-            If there is no run, or the uncompensated ones are not as many.
+            If there is no run, or those with the drum held are not as many.
         """
         if not runs:
             raise InputError("summary of runs: at least one run is wanted, got none")
@@ -90,19 +91,19 @@ class Summary:
             for name, value, unit in statistics.table():
                 columns.setdefault(name, []).append(value)
                 units[name] = unit
-        if uncompensated is not None:
-            if len(uncompensated) != len(found):
+        if held is not None:
+            if len(held) != len(found):
                 raise InputError(
-                    f"summary of runs: there must be as many uncompensated runs as runs, "
-                    f"{len(found)}, got {len(uncompensated)}"
+                    f"summary of runs: there must be as many with the drum held as runs, "
+                    f"{len(found)}, got {len(held)}"
                 )
             ratios = [
                 after.value("payload rms") / _statistics(before).value("payload rms")
-                for after, before in zip(found, uncompensated, strict=True)
+                for after, before in zip(found, held, strict=True)
             ]
-            columns["residual of uncompensated"] = [100.0 * ratio for ratio in ratios]
-            columns["attenuation of uncompensated"] = [-20.0 * math.log10(r) for r in ratios]
-            units |= {"residual of uncompensated": "%", "attenuation of uncompensated": "dB"}
+            columns["residual held"] = [100.0 * ratio for ratio in ratios]
+            columns["attenuation held"] = [attenuation(ratio) for ratio in ratios]
+            units |= {"residual held": "%", "attenuation held": "dB"}
         happened = {
             "lost lock": _happened(found, "lost lock at"),
             "slack": _happened(found, "first slack at"),

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, InputError
+from ..basics import FloatArray, InputError, residual_text
 from ..casefile import suggestion
 from .summary import Statistics
 
@@ -211,5 +211,5 @@ def _said(statistics: Statistics) -> Sequence[str]:
     if "hook rms" in found:
         parts.append(f"hook {1e3 * found['hook rms']:.4g} mm rms")
     if "residual" in found:
-        parts.append(f"residual {found['residual']:.3g} % ({found['attenuation']:.1f} dB)")
+        parts.append(residual_text(0.01 * found["residual"]))
     return [", ".join(parts)] if parts else []

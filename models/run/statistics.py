@@ -17,12 +17,13 @@ from __future__ import annotations
 
 import copy
 import math
+import sys
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, check_range
+from ..basics import FloatArray, attenuation, check_range
 from .online import BlockExtremes, Cycles, Moments, Slack, Touchdown
 from .summary import ERROR, Blocks, NamedQuantity, SignalStatistics, Statistics
 
@@ -278,7 +279,9 @@ class Accumulator:
         found, samples = dict[str, NamedQuantity](), self._moments.samples
 
         def put(name: str, value: float, unit: str) -> None:
-            found[name] = NamedQuantity(value=float(value), unit=unit)
+            # A drive that is off decays down to the least number there is, and is at nought.
+            nought = abs(value) < sys.float_info.min
+            found[name] = NamedQuantity(value=0.0 if nought else float(value), unit=unit)
 
         hook, payload = signals.get("hook.heave"), signals.get("payload.displacement")
         if hook:
@@ -293,7 +296,7 @@ class Accumulator:
             if hook and hook.standard_deviation > 0.0:
                 ratio = error.standard_deviation / hook.standard_deviation
                 put("residual", 100.0 * ratio, "%")
-                put("attenuation", -20.0 * math.log10(ratio) if ratio > 0.0 else math.inf, "dB")
+                put("attenuation", attenuation(ratio), "dB")
         if self._lock_limit is not None:
             put("lost lock at", self._time(self._lost_at), "s")
         if "rope.tension" in signals:

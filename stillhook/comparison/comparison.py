@@ -30,6 +30,8 @@ COLUMNS: Mapping[str, str] = {
     "payload rms low": "m",
     "payload rms high": "m",
     "pooled rms": "m",
+    "residual": "% of the hook's motion, both pooled over seeds",
+    "residual held": "% of the payload's with the drum held, where `none` takes part",
     "of the floor": "mean square over that of the floor, both pooled over seeds",
     "worst seed": "",
     "worst seed rms": "m",
@@ -222,7 +224,12 @@ class Comparison:
             "payload rms low": mean.low,
             "payload rms high": mean.high,
         }
-        row |= {"pooled rms": self.pooled(name, height), "of the floor": self._ratio(name, height)}
+        row |= {
+            "pooled rms": self.pooled(name, height),
+            "residual": 100.0 * self._of_hook(name, height),
+            "residual held": 100.0 * self._ratio(name, height, "none"),
+            "of the floor": self._ratio(name, height, self.floor.name if self.floor else "") ** 2,
+        }
         known = [cell for cell in cells if not math.isnan(cell.rms)]
         if known:
             worst = max(known, key=lambda cell: cell.rms)
@@ -248,15 +255,26 @@ class Comparison:
         row["step max"] = max(steps, default=math.nan)
         return row
 
-    def _ratio(self, name: str, height: float) -> float:
-        """Return the mean square over that of the floor, on the seeds that both have."""
-        if self.floor is None:
-            return math.nan
+    def _ratio(self, name: str, height: float, other: str) -> float:
+        """Return the pooled rms over that of another, on the seeds that both have."""
         own = {c.seed for c in self.of(name, height) if not math.isnan(c.rms)}
-        low = {c.seed for c in self.of(self.floor.name, height) if not math.isnan(c.rms)}
+        low = {c.seed for c in self.of(other, height) if not math.isnan(c.rms)}
         both = sorted(own & low)
-        floor = self.pooled(self.floor.name, height, both)
-        return (self.pooled(name, height, both) / floor) ** 2 if floor > 0.0 else math.nan
+        rms = self.pooled(other, height, both)
+        return self.pooled(name, height, both) / rms if rms > 0.0 else math.nan
+
+    def _of_hook(self, name: str, height: float) -> float:
+        """Return the pooled rms over the hook's, which is the same for all in a sea."""
+        hook = {
+            cell.seed: cell.quantities["hook rms"]
+            for cell in self.cells
+            if cell.height == height and "hook rms" in cell.quantities
+        }
+        both = [c.seed for c in self.of(name, height) if not math.isnan(c.rms) and c.seed in hook]
+        if not both:
+            return math.nan
+        moved = math.sqrt(float(np.mean([hook[seed] ** 2 for seed in both])))
+        return self.pooled(name, height, both) / moved if moved > 0.0 else math.nan
 
     def __str__(self) -> str:
         """Return the pooled rms of every contender as a small tree."""

@@ -14,13 +14,24 @@ from collections.abc import Sequence
 
 from models.basics import Interval, mean_interval
 
-from ..text import Column, Table, Written, columns, count, duration, listed, number, quantity, scale
+from ..text import (
+    Column,
+    Table,
+    Written,
+    count,
+    duration,
+    listed,
+    number,
+    percent,
+    quantity,
+    scale,
+)
 from .comparison import Comparison
 
 LEGEND = (
     "sat.: of the time at the drive's limits; lost: runs in which the payload left its place by "
-    "more than the hook's significant height, or the brake stepped in; / floor: mean square over "
-    "the clairvoyant's"
+    "more than the hook's significant height, or the brake stepped in; residual: of the hook's "
+    "motion; / floor: mean square over the clairvoyant's"
 )
 """What the headings of the table mean."""
 
@@ -62,6 +73,7 @@ def table_at(found: Comparison, height: float) -> Table:
                 between,
                 *figures,
                 Written(lost, f"{lost}/{len(cells)}"),
+                0.01 * float(row["residual"]),
                 float(row["of the floor"]),
             )
         )
@@ -71,7 +83,9 @@ def table_at(found: Comparison, height: float) -> Table:
         Column("interval", "95 % interval"),
         Column("largest", write=lambda value: number(value / factor)),
         Column("saturated", "sat.", write=lambda share: f"{share:.3g} %"),
-        *columns("lost; of_the_floor=/ floor"),
+        Column("lost"),
+        Column("residual", write=percent),
+        Column("of_the_floor", "/ floor"),
     )
     return Table(columns=heads, rows=rows)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from models.basics import residual_text
 from models.rig import DCMotor
 from synth.design import Design, LimitUse, few_starts
 from synth.question import HOOK, PAYLOAD, difference_text
@@ -89,17 +90,9 @@ def effect(design: Design) -> str:
     """Return what the gains do to the payload, in a sentence."""
     if design.margins is None:
         return "no stable loop: the payload's motion has no standard deviation"
-    before, after = design.payload_rms_before, design.payload_rms
-    if math.isinf(before):
-        return f"the payload moves {quantity(after, 'm')} rms; with the drum held it resonates"
-    told = []
-    for name, other in (("the hook", design.hook_rms), ("the payload with the drum held", before)):
-        loss = decibels(other / after)
-        if after > other:
-            told.append(f"{percent(after / other - 1.0)} more than {name} ({loss})")
-        else:
-            told.append(f"{percent(1.0 - after / other)} less than {name} ({loss})")
-    return f"the payload moves {' and '.join(told)}"
+    if math.isinf(design.payload_rms_before):
+        return f"{residual_text(design.residual)}; with the drum held the payload resonates"
+    return residual_text(design.residual, design.residual_held)
 
 
 def alternatives_table(design: Design) -> Table | None:

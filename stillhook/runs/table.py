@@ -235,10 +235,12 @@ def _against_none(compared: Sequence[Runs]) -> list[QuantityRow]:
         if runs is held or not pairs:
             figures.append(_NONE)
             continue
-        both = Summary.of([run for run, _ in pairs], uncompensated=[other for _, other in pairs])
-        figures.append(_estimate(both.means["residual of uncompensated"]))
-    name, note = "residual of uncompensated", "of the payload's motion with the brake on"
-    return [QuantityRow("payload", name, "of the drum held", "%", tuple(figures), note)]
+        both = Summary.of([run for run, _ in pairs], held=[other for _, other in pairs])
+        figures.append(_estimate(both.means["residual held"]))
+    note = "of the payload's with the drum held"
+    return [
+        QuantityRow("payload", "residual held", "residual, drum held", "%", tuple(figures), note)
+    ]
 
 
 def _shares(

@@ -12,7 +12,7 @@ from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 
-from models.basics import BoolArray, FloatArray, InputError
+from models.basics import BoolArray, FloatArray, InputError, residual_text
 from models.run import ERROR, Event, Run
 
 from ..text import (
@@ -28,7 +28,6 @@ from ..text import (
     duration,
     headline,
     new_figure,
-    percent,
     quantity,
     scale,
 )
@@ -256,7 +255,7 @@ def _finding(run: Run) -> str:
     text = f"The payload is off by at most {quantity(largest, 'm')}"
     if not math.isnan(residual):
         rms = quantity(found["hook rms"] * residual / 100.0, "m")
-        text += f", {rms} rms: {percent(residual / 100.0)} of the hook's motion"
+        text += f", {rms} rms: {residual_text(0.01 * residual)}"
     return text
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics import InputError
+from models.basics import InputError, attenuation, residual_text
 from models.case import Case
 
 from ..loop import Assessment, LinearController, Margins
@@ -142,14 +142,14 @@ class Design:
         return self.payload_rms / self.payload_rms_before
 
     @property
-    def compensation_db(self) -> float:
+    def attenuation(self) -> float:
         """Hook's motion over the payload's [dB]."""
-        return float(-20.0 * np.log10(self.residual))
+        return attenuation(self.residual)
 
     @property
-    def compensation_held_db(self) -> float:
+    def attenuation_held(self) -> float:
         """Payload's motion with the drum held over that with this controller [dB]."""
-        return float(-20.0 * np.log10(self.residual_held))
+        return attenuation(self.residual_held)
 
     @property
     def gains(self) -> Mapping[str, float]:
@@ -246,8 +246,9 @@ class Design:
         lines = [
             f"Design {self.structure} for {self.case.name}: {self.status}",
             f"├ H_s {self.significant_height:.3g} m: payload {1e3 * self.payload_rms:.4g} mm rms, "
-            f"hook {1e3 * self.hook_rms:.4g} mm ({self.compensation_db:.1f} dB), with the drum "
-            f"held {1e3 * self.payload_rms_before:.4g} mm ({self.compensation_held_db:.1f} dB)",
+            f"hook {1e3 * self.hook_rms:.4g} mm, with the drum held "
+            f"{1e3 * self.payload_rms_before:.4g} mm",
+            f"├ {residual_text(self.residual, self.residual_held)}",
         ]
         lines += [f"├ {k} = {v:.6g} {self.units.get(k, '')}" for k, v in self.parameters.items()]
         if self.margins is not None:

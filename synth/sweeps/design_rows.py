@@ -63,6 +63,8 @@ class SolvedRows:
         What hauling the load at rest takes, by output, (n,) or (1,).
     drag
         Linear drag coefficient, (n,) [N s/m].
+    heave
+        Standard deviation of the hook's heave, (n,) [m].
     stable
         Whether each is stable, (n,).
     peak
@@ -74,7 +76,7 @@ class SolvedRows:
 
     def __init__(self, loops: ChainLoops, orders: Mapping[str, int], rules: int = 1) -> None:
         count, self.at_rest = len(loops), at_rest(loops.numbers)
-        self.drag = np.full(count, np.nan)
+        self.drag, self.heave = np.full(count, np.nan), np.full(count, np.nan)
         self.stable = np.zeros(count, dtype=bool)
         self.peak = np.full(count, np.nan)
         self.moments = {name: np.full((count, k, rules), np.nan) for name, k in orders.items()}
@@ -92,7 +94,8 @@ class SolvedRows:
 
     def put(self, at: IndexArray, other: SolvedRows) -> None:
         """Take over some rows' numbers, of the rule that counts."""
-        self.drag[at], self.stable[at], self.peak[at] = other.drag, other.stable, other.peak
+        self.drag[at], self.heave[at] = other.drag, other.heave
+        self.stable[at], self.peak[at] = other.stable, other.peak
         for name, column in other.moments.items():
             self.moments[name][at] = column[:, :, :1]
 
@@ -317,7 +320,7 @@ class DesignRows:
             heave_rms=self.sea.heave_rms(rows, ratios, nodes.weights[0]),
             noisy=bool(self._noisy),
         )
-        found.drag[:] = loops.drag
+        found.drag[:], found.heave[:] = loops.drag, shaken.heave_rms
         if self.spring:
             springs = SpringLoops(loops, amplifier=self.law.amplifier, reference=_REFERENCE)
             found.stable[:] = springs.stable

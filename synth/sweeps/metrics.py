@@ -12,7 +12,7 @@ from models.casefile import suggestion
 
 from .design_rows import SolvedRows
 
-DEFAULT = ("payload_rms", "torque_rms", "speed_rms", "max_sensitivity")
+DEFAULT = ("payload_rms", "residual", "torque_rms", "speed_rms", "max_sensitivity")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,8 +26,8 @@ class FrequencyMetric:
     output
         The plant's output it is about, if any.
     kind
-        ``rms``, ``peak`` (most probable in the exposure time, static value included), ``least``,
-        ``period`` (mean zero-crossing), ``loop`` or ``static``.
+        ``rms``, ``residual`` (over the hook's rms), ``peak`` (most probable in the exposure time,
+        static value included), ``least``, ``period`` (mean zero-crossing), ``loop`` or ``static``.
     """
 
     name: str
@@ -41,6 +41,8 @@ class FrequencyMetric:
 _ROWS = (
     ("payload_rms", "m", "payload.displacement", "rms",
      "standard deviation of the payload's motion"),
+    ("residual", "1", "payload.displacement", "residual",
+     "standard deviation of the payload's motion over that of the hook's"),
     ("velocity_rms", "m/s", "payload.velocity", "rms",
      "standard deviation of the payload's velocity"),
     ("torque_rms", "N m", "motor.torque", "rms", "standard deviation of the motor's torque"),
@@ -120,6 +122,8 @@ def finished(
             value = loops.period(metric.output)
         else:
             value = loops.sigma(metric.output)
+        if metric.kind == "residual":
+            value = value / loops.heave
         if metric.kind in ("peak", "least"):
             rest = static.get(metric.output, np.zeros(1))
             # The most probable maximum of a Gaussian signal (Rice 1945), as

@@ -153,7 +153,7 @@ def test_means_over_seeds_have_student_s_interval():
 
 def test_the_residual_is_against_the_hook_and_against_the_uncompensated_run():
     after, before = [run(s, payload=0.1) for s in (1, 2)], [run(s, payload=1.5) for s in (1, 2)]
-    found = Summary.of(after, uncompensated=before)
+    found = Summary.of(after, held=before)
     deviation = [[r[name].std() for r in after] for name in ("payload.displacement", "hook.heave")]
     ratio = np.divide(*deviation).mean()
     assert found["residual"].mean == pytest.approx(100.0 * ratio, rel=2e-3)
@@ -162,10 +162,8 @@ def test_the_residual_is_against_the_hook_and_against_the_uncompensated_run():
         a.statistics.value("payload rms") / b.statistics.value("payload rms")
         for a, b in zip(after, before, strict=True)
     ]
-    assert found["residual of uncompensated"].mean == pytest.approx(100.0 * np.mean(against))
-    assert found["attenuation of uncompensated"].mean == pytest.approx(
-        np.mean(-20.0 * np.log10(against))
-    )
+    assert found["residual held"].mean == pytest.approx(100.0 * np.mean(against))
+    assert found["attenuation held"].mean == pytest.approx(np.mean(-20.0 * np.log10(against)))
 
 
 def test_mishaps_have_shares_and_falls_a_rate():
@@ -196,8 +194,8 @@ def test_a_single_run_has_no_interval():
 def test_what_cannot_be_summed_up_is_refused():
     with pytest.raises(InputError, match=r"at least one run is wanted, got none"):
         Summary.of([])
-    with pytest.raises(InputError, match=r"as many uncompensated runs as runs, 2, got 1"):
-        Summary.of([run(1), run(2)], uncompensated=[run(1)])
+    with pytest.raises(InputError, match=r"as many with the drum held as runs, 2, got 1"):
+        Summary.of([run(1), run(2)], held=[run(1)])
     with pytest.raises(InputError, match=r"times must be at least 0 s"):
         fall_time([], [])
     with pytest.raises(InputError, match=r"times must be at least 0 s"):

@@ -204,6 +204,8 @@ def test_the_brake_holds_the_drum_without_creep() -> None:
     assert np.abs(run["drum.haul"]).max() == 0.0
     assert np.abs(run["motor.speed"]).max() == 0.0
     assert run["payload.displacement"].std() > 0.2
+    for name in ("motor torque rms", "motor torque largest"):
+        assert run.statistics.value(name) == 0.0
 
 
 def test_a_weak_brake_slips_and_a_strong_one_does_not() -> None:

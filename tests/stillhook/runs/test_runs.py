@@ -239,7 +239,7 @@ def test_the_drum_held_is_what_others_are_measured_by():
     held = sh.simulate(calm(), "none", seeds=3, duration="1 min", settle=20.0)
     rows = {row.name: row for row in rows_of([three(), held])}
     ratios = [100.0 * a / b for a, b in zip(rms(three()), rms(held), strict=True)]
-    figures = rows["residual of uncompensated"].figures
+    figures = rows["residual held"].figures
     assert figures[0].mean == pytest.approx(np.mean(ratios), rel=1e-12)
     assert math.isnan(figures[1].mean)
 

@@ -34,8 +34,8 @@ def test_compensation_is_told_against_the_hook_and_the_drum_held() -> None:
     design = thesis_design()
     assert design.residual == design.payload_rms / design.hook_rms
     assert design.residual_held == design.payload_rms / design.payload_rms_before
-    assert design.compensation_db == pytest.approx(-20.0 * np.log10(design.residual))
-    assert design.compensation_held_db == pytest.approx(-20.0 * np.log10(design.residual_held))
+    assert design.attenuation == pytest.approx(-20.0 * np.log10(design.residual))
+    assert design.attenuation_held == pytest.approx(-20.0 * np.log10(design.residual_held))
 
 
 def test_an_amplifier_of_its_own_multiplies_the_gains() -> None:
