@@ -42,7 +42,7 @@ class Horizon:
 
     def __init__(self, controller: LinearMPC) -> None:
         p, model = controller.programme, controller.model
-        if controller.window.power < math.inf:
+        if controller.window.limits.power < math.inf:
             raise ValueError("peers know no limit on the power")
         self.controller, self.N, self.n = controller, p.steps, model.winch.size
         winch, products = model.winch, controller.products

@@ -7,8 +7,10 @@ prediction are made with them.  Every limit stands where the physics has it:
 
 * the armature voltage is cut to what the supply has;
 * torque and current are held inside a window.  Above the base speed the window narrows as
-  1/speed (constant power), and near the highest speed the side that would speed the motor up
-  closes, so that an overspeeding motor is braked (a droop over 2 % of the speed);
+  1/speed (constant power) and, of an induction motor, as 1/speed^2 where its breakdown torque is
+  the less (Leonhard, Control of Electrical Drives, 2001), and near the highest speed the side
+  that would speed the motor up closes, so that an overspeeding motor is braked (a droop over 2 %
+  of the speed);
 * with an armature inductance the drive keeps the current inside by cutting the voltage to
   E = K_omega omega + R i_limit, from which a first-order current cannot overshoot;
 * with a torque loop of finite bandwidth the demand is cut, and the torque follows it.
@@ -24,8 +26,10 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import casadi as ca
+import numpy as np
+import numpy.typing as npt
 
-from ..basics import check_range
+from ..basics import FloatArray, check_range
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -39,6 +43,7 @@ _UNITS = {
     "voltage": "V",
     "speed": "rad/s",
     "power": "W",
+    "breakdown": "N m rad2/s2",
 }
 
 
@@ -58,6 +63,8 @@ class DriveLimits:
         Highest speed [rad/s].
     power
         Highest shaft power, motoring or braking [W].
+    breakdown
+        Breakdown torque times speed squared [N m rad2/s2].
 
     Raises
     ------
@@ -70,6 +77,7 @@ class DriveLimits:
     voltage: float = math.inf
     speed: float = math.inf
     power: float = math.inf
+    breakdown: float = math.inf
 
     def __post_init__(self) -> None:
         for name, unit in _UNITS.items():
@@ -87,7 +95,13 @@ class DriveLimits:
             voltage=math.inf if drive.voltage is None else drive.voltage,
             speed=case.winch.speed_limit,
             power=case.winch.power_limit,
+            breakdown=case.winch.breakdown_limit,
         )
+
+    def top(self, speed: npt.ArrayLike, peak: float) -> FloatArray:
+        """Return the highest torque at motor speeds [rad/s], at most `peak` [N m]."""
+        fast = np.maximum(np.abs(speed), 1e-9)
+        return np.minimum(peak, np.minimum(self.power / fast, self.breakdown / (fast * fast)))
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -178,6 +192,9 @@ def _torque_window(p: Mapping[str, ca.SX], speed: ca.SX) -> tuple[ca.SX, ca.SX] 
         # min(peak, power/|speed|), written so that nothing divides by a speed of zero
         power = p["drive.power_limit"]
         peak = power / ca.fmax(ca.fabs(speed), power / peak)
+    if "drive.breakdown_limit" in p:
+        breakdown = p["drive.breakdown_limit"]
+        peak = breakdown / ca.fmax(speed * speed, breakdown / peak)
     if "drive.speed_limit" not in p:
         return -peak, peak
     top = p["drive.speed_limit"]

@@ -89,6 +89,11 @@ class ACMotor(_Motor):
     """Speed above which the torque falls as 1/speed (constant power)."""
     maximum_speed: Annotated[float, Quantity("angular speed", 0.0, 5000.0, open_low=True)]
     """Highest speed of the motor."""
+    kind: Literal["induction", "permanent-magnet"] | None = None
+    """What limits the motor above its base speed besides constant power. `induction`: the breakdown
+    torque, 2.5 times the continuous torque at the base speed and falling as 1/speed^2.
+    `permanent-magnet`: nothing. Of both the continuous torque falls as 1/speed. Not given: nothing,
+    and the continuous torque is that of every speed."""
 
     def _faults(self) -> Iterator[tuple[str, str]]:
         if self.maximum_speed < self.base_speed:
@@ -98,6 +103,9 @@ class ACMotor(_Motor):
             )
             yield ("maximum_speed", text)
 
+
+BREAKDOWN = 2.5
+"""Breakdown torque of an induction motor over its continuous torque, at the base speed."""
 
 Motor = Annotated[DCMotor | ACMotor, Field(discriminator="type")]
 
@@ -356,6 +364,20 @@ class Winch(Section):
             return self.drive.power
         if isinstance(self.motor, ACMotor):
             return self.drive.torque_peak * self.motor.base_speed
+        return math.inf
+
+    @property
+    def breakdown_limit(self) -> float:
+        """Breakdown torque times speed squared [N m rad2/s2]; infinite but for induction motors."""
+        if isinstance(self.motor, ACMotor) and self.motor.kind == "induction":
+            return BREAKDOWN * self.drive.torque_continuous * self.motor.base_speed**2
+        return math.inf
+
+    @property
+    def cooled_speed(self) -> float:
+        """Speed above which the continuous torque falls as 1/speed [rad/s]; infinite for none."""
+        if isinstance(self.motor, ACMotor) and self.motor.kind is not None:
+            return self.motor.base_speed
         return math.inf
 
     @property

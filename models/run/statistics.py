@@ -76,6 +76,8 @@ class Accumulator:
         Time constant of the motor's heating [s], ten samples or more, for the thermally
         equivalent torque: the steady one that would heat the motor as far as it got, warm from
         its static torque.  None: not wanted.
+    cooled_speed
+        Motor speed above which that torque falls as 1/speed [rad/s].
     cycle_capacity
         Largest number of cycles kept of a signal.
 
@@ -111,6 +113,7 @@ class Accumulator:
         block: float = 1200.0,
         block_signals: Sequence[str] | None = None,
         thermal_time: float | None = None,
+        cooled_speed: float = math.inf,
         cycle_capacity: int = 100_000,
     ) -> None:
         owner = "run statistics"
@@ -148,6 +151,7 @@ class Accumulator:
         self._lost_at = -1
         self._touch = Touchdown() if {"contact.gap", "contact.force"} & set(self._at) else None
         self._thermal_time = thermal_time if "motor.torque" in self._at else None
+        self._cooled_speed = cooled_speed
         self._heat = self._hottest = static_torque**2
 
     def update(self, block: npt.ArrayLike) -> None:
@@ -210,7 +214,11 @@ class Accumulator:
             tension = values[[self._at[name] for name in ends]].max(axis=0) if ends else smallest
             self._slack.add(smallest, tension, first)
         if self._thermal_time is not None:
-            self._heat_up(values[self._at["motor.torque"]], self._thermal_time)
+            torque = values[self._at["motor.torque"]]
+            if self._cooled_speed < math.inf and "motor.speed" in self._at:
+                fast = np.abs(values[self._at["motor.speed"]]) / self._cooled_speed
+                torque = torque * np.maximum(1.0, fast)
+            self._heat_up(torque, self._thermal_time)
 
     def _heat_up(self, torque: FloatArray, thermal_time: float) -> None:
         """Take the square of the torque through a first-order lag, as the winding's heat goes."""

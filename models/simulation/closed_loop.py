@@ -33,7 +33,15 @@ from .rows import FLAGS
 
 HOOK = "hook"
 _SATURATED = 1e-9  # relative difference of asked and applied command that is no rounding [-]
-_OWN = ("drive.hold", "brake.torque", "motor.continuous_torque", "motor.rated_rise", "motor.share")
+_OWN = (
+    "drive.hold",
+    "brake.torque",
+    "motor.continuous_torque",
+    "motor.cooled_speed",
+    "motor.rated_rise",
+    "motor.share",
+)
+_NEVER = 1e12  # a speed that no motor reaches [rad/s]
 _FROM_ROW = {
     "payload.age": "telemetry.age",
     "payload.valid": "telemetry.fresh",
@@ -219,7 +227,9 @@ def _log(
     u = p_of["drive.hold"] + flag["engaged"] * (asked - p_of["drive.hold"])
     _, _, z = plant.function(x, u, disturbances(moved), p[: len(plant.parameters)])
     now = _named(plant.outputs, z)
-    loss = (now["motor.torque"] / p_of["motor.continuous_torque"]) ** 2
+    # The continuous torque falls as 1/speed above the speed up to which it holds.
+    fast = ca.fmax(1.0, ca.fabs(now["motor.speed"]) / p_of["motor.cooled_speed"])
+    loss = (fast * now["motor.torque"] / p_of["motor.continuous_torque"]) ** 2
     warmer = rise + p_of["motor.share"] * (p_of["motor.rated_rise"] * loss - rise)
     cut = ca.fabs(u - now["drive.applied"])
     log = {
@@ -257,6 +267,7 @@ def _own_parameters(case: Case, sample_time: float, hold: float) -> dict[str, fl
         hold,
         10.0 * strongest if capacity is None else capacity,
         case.winch.drive.torque_continuous,
+        min(case.winch.cooled_speed, _NEVER),
         motor.temperature_rise,
         -np.expm1(-sample_time / motor.thermal_time_constant),
     )

@@ -92,6 +92,7 @@ def run_simulation(
         levels=levels,
         lock_limit=options.lock_limit,
         thermal_time=case.winch.motor.thermal_time_constant,
+        cooled_speed=case.winch.cooled_speed,
     )
     store = _Store(dt, samples, options.store_step)
     rows = simulation.rows(check_seed(owner, seed), wanted)

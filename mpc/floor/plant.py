@@ -75,7 +75,8 @@ class RecordPlant(ReadOnlyArrays):
     torque
         (coefficient of the demand, row of states (n,)) of the motor's torque in peak torques.
     windows, window_names
-        Rows (on demand, on motor speed) with \|.\| <= 1, (nwin, 2): torque, speed, power, voltage.
+        Rows (on demand, on motor speed) with \|.\| <= 1, (nwin, 2): torque, speed, power,
+        breakdown, voltage.
     tensions, tension_feed
         Rows of the tensions that must not vanish, (nt, n), and of (z, z'), (nt, 2) [N].
     static_tensions
@@ -298,10 +299,13 @@ def _windows(
         # |d + speed/band| <= top/band: the driving side closes over the band
         rows.append(("speed", (band / limits.speed, 1.0 / limits.speed)))
         end, base = limits.speed + band, limits.power / peak
-        if base < end:
-            slope = (1.0 - limits.power / (end * peak)) / (end - base)
-            reach = 1.0 + slope * base  # |d| + slope |speed| <= reach
-            rows += [("power", (1.0 / reach, sign * slope / reach)) for sign in (1.0, -1.0)]
+        chords = [("power", base, limits.power / end)]
+        chords.append(("breakdown", math.sqrt(limits.breakdown / peak), limits.breakdown / end**2))
+        for name, start, least in chords:
+            if start < end:  # the curve from `start` on is convex, so it lies below its chord
+                slope = (1.0 - least / peak) / (end - start)
+                reach = 1.0 + slope * start  # |d| + slope |speed| <= reach
+                rows += [(name, (1.0 / reach, sign * slope / reach)) for sign in (1.0, -1.0)]
     if data.motor == "dc" and math.isfinite(limits.voltage):
         drop = data.resistance / data.torque_constant * peak
         row = (drop / limits.voltage, data.back_emf_constant / limits.voltage)

@@ -359,7 +359,8 @@ class DriveWindow:
         constant = winch.data.torque_constant if winch.dc else 1.0
         self.peak = min(limits.torque, constant * limits.current)
         self.voltage = limits.voltage if winch.dc else math.inf
-        self.power = limits.power
+        self.limits = limits
+        self.narrows = min(limits.power, limits.breakdown) < math.inf
         #: What the torque of a held command falls by for each rad/s that the motor gets faster.
         self.fall = winch.gain * winch.back
         self._low = np.full(moves, (-self.peak - winch.rest_torque) / unit)
@@ -395,10 +396,10 @@ class DriveWindow:
         if cap < self.peak:
             low = np.maximum(low, (-cap - rest) / unit)
             high = np.minimum(high, (cap - rest) / unit)
-        if self.power < math.inf:
+        if self.narrows:
             there = np.abs(speeds)
             there[0] = abs(speed)
-            top = self.power / np.maximum(there, self.power / self.peak)
+            top = self.limits.top(there, self.peak)
             low, high = np.maximum(low, (-top - rest) / unit), np.minimum(high, (top - rest) / unit)
         if changes is not None:
             most = _MOST * self.peak

@@ -141,7 +141,7 @@ class NonlinearMPC(WinchMPC):
             self._sea_covariance,
             self.estimator.model,
         )
-        powers = len(p.blocks) - 1 if self.window.power < math.inf else 0
+        powers = len(p.blocks) - 1 if self.window.narrows else 0
         self._low = np.concatenate([products.low, -np.ones(powers)])
         self._high = np.concatenate([products.high, np.ones(powers)])
         self._ends = path_of_sea(self.model, 1)
@@ -259,7 +259,7 @@ class NonlinearMPC(WinchMPC):
         if over == 0.0 or not math.isfinite(over):
             return winch.command(torque, speed)
         window, rest = self.window, winch.rest_torque
-        peak = min(window.peak, window.power / max(abs(speed), 1e-9))
+        peak = float(window.limits.top(speed, window.peak))
         # A held command lets the torque fall with the speed; where it starts beyond the peak, the
         # drive cuts it, and what it then does is no longer linear in the command.
         asked = winch.command(start_torque(torque + rest, over, peak) - rest, speed)
@@ -267,6 +267,11 @@ class NonlinearMPC(WinchMPC):
         if asked != same:
             self._cut = (asked, same, 3.0 * abs(over / winch.gain))
         return asked
+
+    def _power(self) -> FloatArray:
+        """Return the highest power of later moves at the plan's speeds, breakdown included [W]."""
+        limits, fast = self.window.limits, np.maximum(np.abs(self._speeds[1:]), 1e-9)
+        return np.minimum(limits.power, limits.breakdown / fast)
 
     def _gain_of_speed(self, chi: FloatArray, ends: FloatArray) -> float:
         """Return the mean motor speed of the sample over that at its start, as planned [rad/s]."""
@@ -315,9 +320,9 @@ class NonlinearMPC(WinchMPC):
         if len(rows) > count:
             # (tau_0 + d) omega is a product of two things that the moves change: linearised at the
             # plan's torques and speeds, over the power.
-            power = self.window.power
+            power = self._power()
             torque = self.model.winch.rest_torque + p.unit * self._moves
-            rows[count:] = (torque[1:, None] / power) * S[self.shooting.speeds][1:]
+            rows[count:] = (torque[1:] / power)[:, None] * S[self.shooting.speeds][1:]
             later = np.arange(1, len(p.blocks))
             rows[count + later - 1, later] += p.unit / power * self._speeds[1:]
         return self.qp.change(self._prepared.H, rows)
@@ -331,7 +336,7 @@ class NonlinearMPC(WinchMPC):
         free = o[shooting.rows]
         if len(self._low) > len(free):
             # (tau0 + d) omega, linearised, over the power
-            rest, power = self.model.winch.rest_torque, self.window.power
+            rest, power = self.model.winch.rest_torque, self._power()
             moves, speeds = p.unit * self._moves[1:], self._speeds[1:]
             value = (rest + moves) * o[shooting.speeds][1:] - moves * speeds
             free = np.concatenate([free, value / power])

@@ -42,6 +42,7 @@ _LINES: dict[str, tuple[str, Any]] = {
     "motor.voltage.peak": ("#56b4e9", "-"),
     "motor.current.peak": ("#b8860b", (0, (1, 1.2))),
     "motor.current.continuous": ("#b8860b", (0, (5, 2, 1, 2))),
+    "motor.torque.breakdown": ("#d55e00", (0, (1, 1))),
     "motor.power.peak": ("#cc79a7", "-"),
     "rope.tension.peak": ("#444444", "-"),
     "rope.tension.least": ("#444444", (0, (5, 2))),

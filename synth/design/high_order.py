@@ -15,7 +15,7 @@ from models.case import Case
 from models.plant import MAX_MASSES
 
 from ..bound import high_order_for
-from ..limits import Continuous, Minimum, Peak, Power
+from ..limits import Breakdown, Continuous, Minimum, Peak, Power
 from ..loop import Assessment
 from ..question import DesignQuestion, pose
 from ..search import Progress
@@ -83,6 +83,8 @@ def _rooms(question: DesignQuestion, view: Assessment) -> dict[str, float]:
         if isinstance(limit, Power):
             # The speed is that of the hook, so it is the torque that has to give.
             fast = view.peak(limit.speed, limit.duration)
+            if isinstance(limit, Breakdown):
+                fast = (fast / limit.base_speed) ** 2
             name, share = limit.torque, (limit.bound / fast - static) / (value / fast - static)
         elif isinstance(limit, Continuous):
             name = limit.output

@@ -20,6 +20,6 @@ if TYPE_CHECKING:
     from .limits import Limit, Size, Symbols
     from .margin_limits import DelayMargin, GainMargin, GainMarginDown
     from .pole_limits import HighestFrequency, LeastDamping, LeastDecay
-    from .signal_limits import Continuous, Minimum, Peak, Power, Rms
+    from .signal_limits import Breakdown, Continuous, Minimum, Peak, Power, Rms, Thermal
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -14,7 +14,7 @@ from models.plant import LinearPlant, PlantData, fixed_top_modes, lump_rope, lum
 from .frequency_limits import LowFrequency, MaxSensitivity, RollOff
 from .limits import Limit
 from .margin_limits import DelayMargin, GainMargin, GainMarginDown
-from .signal_limits import Continuous, Minimum, Peak, Power
+from .signal_limits import Breakdown, Continuous, Minimum, Peak, Power, Thermal
 
 PAYLOAD = "payload.displacement"
 HOOK = "hook.heave"
@@ -66,7 +66,11 @@ def drive_limits(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
             )
 
     add(Peak, "motor.torque", drive.torque_peak, duration=time)
-    add(Continuous, "motor.torque", drive.torque_continuous)
+    if math.isinf(case.winch.cooled_speed):
+        add(Continuous, "motor.torque", drive.torque_continuous)
+    else:
+        cooled = case.winch.cooled_speed
+        add(Thermal, "motor.torque", drive.torque_continuous, base_speed=cooled)
     add(Peak, "motor.speed", case.winch.speed_limit, duration=time)
     if case.winch.motor.type == "dc":
         add(Peak, "motor.voltage", drive.voltage, duration=time)
@@ -76,6 +80,18 @@ def drive_limits(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
         limits.append(
             Power(
                 bound=case.winch.power_limit,
+                torque="motor.torque",
+                speed="motor.speed",
+                static=static["motor.torque"],
+                duration=time,
+            )
+        )
+    if math.isfinite(case.winch.breakdown_limit):
+        base = case.winch.cooled_speed
+        limits.append(
+            Breakdown(
+                bound=case.winch.breakdown_limit / base**2,
+                base_speed=base,
                 torque="motor.torque",
                 speed="motor.speed",
                 static=static["motor.torque"],

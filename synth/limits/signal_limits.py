@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from scipy.special import ndtr
 from typing_extensions import override
 
 from models.basics import check_range
 
+from ..loop import mapped
 from .limits import Limit, Symbols
 
 if TYPE_CHECKING:
@@ -67,6 +69,76 @@ class Continuous(_OfOneSignal):
     @override
     def measure(self, loop: Assessment) -> float:
         return float(np.hypot(self.static, loop.sigma(self.output)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thermal(Continuous):
+    """E[(T/T_c)^2] at most one, for a continuous torque T_c that falls above a speed.
+
+    T_c is `bound` up to the motor speed `base_speed` [rad/s] and falls as 1/speed above (constant
+    power).  Of Gaussian torque, of standard deviation sigma about its mean, and speed, of standard
+    deviation base_speed/x,
+
+        E[max(1, u^2/x^2)]     = 1 + 2 (f/x + Q (1/x^2 - 1)),
+        E[u^2 max(1, u^2/x^2)] = 1 + 2 (3 f/x + Q (3/x^2 - 1))
+
+    with u of standard deviation one, f its density and Q its tail beyond x.  The first is the
+    factor on the mean square, the second that on the variance where torque and speed go together:
+    the most that it can be whatever their correlation, as `Power` is.  Where the speed hardly ever
+    passes the base speed both are one.
+    """
+
+    speed: str = "motor.speed"
+    base_speed: float
+
+    @property
+    @override
+    def outputs(self) -> tuple[str, ...]:
+        return (self.output, self.speed)
+
+    @override
+    def rows(self, symbols: Symbols, bound: Any) -> Any:
+        share = symbols.moment(self.speed, 0) / self.base_speed**2
+        dynamic = symbols.moment(self.output, 0) * mapped(share, *_MOVING)
+        steady = self.static**2 * mapped(share, *_STEADY)
+        return (steady + dynamic) / (bound * bound) - 1.0
+
+    @override
+    def measure(self, loop: Assessment) -> float:
+        share = np.array((loop.sigma(self.speed) / self.base_speed) ** 2)
+        dynamic = loop.sigma(self.output) ** 2 * _MOVING[0](share)
+        return float(np.sqrt(self.static**2 * _STEADY[0](share) + dynamic))
+
+
+def _tail(share: Any) -> tuple[Any, Any, Any]:
+    """Return x, density and tail beyond it of a speed's variance over the base speed squared."""
+    x = 1.0 / np.sqrt(np.maximum(share, 1e-12))
+    return x, np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi), ndtr(-x)
+
+
+def _steady(share: Any) -> Any:
+    x, f, Q = _tail(share)
+    return 1.0 + 2.0 * (f / x + Q * (share - 1.0))
+
+
+def _steady_slope(share: Any, _: Any) -> Any:
+    x, f, Q = _tail(share)
+    return 2.0 * (x * f + Q)
+
+
+def _moving(share: Any) -> Any:
+    x, f, Q = _tail(share)
+    return 1.0 + 2.0 * (3.0 * f / x + Q * (3.0 * share - 1.0))
+
+
+def _moving_slope(share: Any, _: Any) -> Any:
+    x, f, Q = _tail(share)
+    return 2.0 * ((x**3 + 3.0 * x) * f + 3.0 * Q)
+
+
+# Factors on the mean square and on the variance, and their slopes, over the speed's variance in
+# units of the base speed squared.
+_STEADY, _MOVING = (_steady, _steady_slope), (_moving, _moving_slope)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,3 +215,21 @@ class Power(Limit):
     def measure(self, loop: Assessment | Symbols) -> Any:
         torque = abs(self.static) + loop.peak(self.torque, self.duration)
         return torque * loop.peak(self.speed, self.duration)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Breakdown(Power):
+    """(|static| + k_T sigma_T) (k_Omega sigma_Omega/base_speed)^2 at most `bound` [N m].
+
+    The breakdown torque of an induction motor, `bound` at `base_speed` [rad/s], falls as 1/speed^2:
+    like the power it is held at the corner of the k-sigma box of torque and speed.
+    """
+
+    base_speed: float
+    name: str = "motor.torque.breakdown"
+    unit: str = "N m"
+
+    @override
+    def measure(self, loop: Assessment | Symbols) -> Any:
+        fast = loop.peak(self.speed, self.duration) / self.base_speed
+        return super().measure(loop) / self.base_speed * fast

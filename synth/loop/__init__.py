@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         imag,
         joined,
         log,
+        mapped,
         real,
         sqrt,
         squared,

@@ -135,17 +135,17 @@ def squared(x: Any) -> Any:
 
 def log(x: Any) -> Any:
     """Return the natural logarithm."""
-    return _mapped(x, np.log, lambda value, _: 1.0 / value)
+    return mapped(x, np.log, lambda value, _: 1.0 / value)
 
 
 def exp(x: Any) -> Any:
     """Return the exponential."""
-    return _mapped(x, np.exp, lambda _, result: result)
+    return mapped(x, np.exp, lambda _, result: result)
 
 
 def sqrt(x: Any) -> Any:
     """Return the square root."""
-    return _mapped(x, np.sqrt, lambda _, result: 0.5 / result)
+    return mapped(x, np.sqrt, lambda _, result: 0.5 / result)
 
 
 def where(condition: Array, x: Any, y: Any) -> Any:
@@ -184,9 +184,10 @@ def value_of(x: Any) -> Any:
     return x.value if isinstance(x, Dual) else x
 
 
-def _mapped(
+def mapped(
     x: Any, function: Callable[[Array], Array], slope: Callable[[Array, Array], Array]
 ) -> Any:
+    """Return a function of x, whose slope is a function of x and the function's value."""
     if not isinstance(x, Dual):
         return function(x)
     result = function(x.value)

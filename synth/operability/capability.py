@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from models.basics import FloatArray, Quadrature, ReadOnlyArrays
 
-from ..limits import Continuous, Limit, Peak, Power
+from ..limits import Breakdown, Continuous, Limit, Peak, Power, Thermal
 from .systems import PerfectSystem
 
 
@@ -81,8 +81,37 @@ def capability(
     return Capability(periods=given, criteria=tuple(criteria), heights=np.array(rows))
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Sine:
+    """A heave of amplitudes (p,) [m] as the limits see it (`synth.limits.Symbols`)."""
+
+    amplitude: FloatArray
+    sizes: dict[str, FloatArray]
+
+    def moment(self, output: str, order: int) -> FloatArray:
+        """Return the variance of an output."""
+        del order
+        return np.asarray(0.5 * (self.amplitude * self.sizes[output]) ** 2)
+
+    def peak(self, output: str, duration: float) -> FloatArray:
+        """Return the amplitude of an output."""
+        del duration
+        return self.amplitude * self.sizes[output]
+
+
 def _amplitude(limit: Limit, sizes: dict[str, FloatArray]) -> FloatArray:
     """Return the amplitude of the heave at which a limit is reached (p,) [m]."""
+    if isinstance(limit, Breakdown | Thermal):
+
+        def excess(size: FloatArray) -> FloatArray:
+            return np.asarray(limit.rows(_Sine(amplitude=size, sizes=sizes), limit.bound))  # type: ignore[arg-type]
+
+        low, high = np.zeros_like(sizes[limit.speed]), np.full_like(sizes[limit.speed], 1e4)
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            kept = excess(middle) <= 0.0
+            low, high = np.where(kept, middle, low), np.where(kept, high, middle)
+        return low
     if isinstance(limit, Peak):
         return (limit.bound - abs(limit.static)) / sizes[limit.output]
     if isinstance(limit, Continuous):

@@ -35,6 +35,7 @@ RATINGS = (
     "motor.current.peak",
     "motor.current.continuous",
     "motor.power.peak",
+    "motor.torque.breakdown",
 )
 """Limits that grow with the motor; the others (speed, voltage, rope) stay."""
 

@@ -32,7 +32,7 @@ _POWER = "motor.power.peak"
 _MARGINS = ("max_sensitivity", "gain", "gain_down", "delay", "disk")
 _POLES = ("decay", "damping", "frequency")
 _AS_FAST = 0.8  # of the slowest pole of a delay model: it is as good as the delay up to there
-_WITH_PERIOD = ("peak", "least", "power")
+_WITH_PERIOD = ("peak", "least", "power", "breakdown")
 _MODELLED = 0.05  # a lumped mode within this share of the exact one counts as modelled
 _KINDS = {  # by class of `synth.limits.margin_limits` and `synth.limits.signal_limits`
     "MaxSensitivity": "max_sensitivity",
@@ -51,6 +51,8 @@ _KINDS = {  # by class of `synth.limits.margin_limits` and `synth.limits.signal_
     "Peak": "peak",
     "Minimum": "least",
     "Power": "power",
+    "Thermal": "thermal",
+    "Breakdown": "breakdown",
 }
 
 
@@ -66,7 +68,7 @@ class Demand:
         A margin (``max_sensitivity``, ``gain``, ``gain_down``, ``delay``, ``disk``), a gain
         (``low_frequency``, ``roll_off``, ``weighted``), a figure of the poles (``decay``,
         ``damping``, ``frequency``) or a size (``rms``, ``continuous``, ``peak``, ``least``,
-        ``power``).
+        ``power``, ``thermal``, ``breakdown``).
     bound
         The bound.
     enforced
@@ -83,6 +85,8 @@ class Demand:
         Exposure time of a peak [s].
     weights
         Of a ``weighted`` gain, from frequencies [rad/s].
+    base_speed
+        Of ``thermal`` and ``breakdown``, from which the motor's torque falls [rad/s].
     """
 
     name: str
@@ -95,6 +99,7 @@ class Demand:
     frequency: float = math.nan
     duration: float = math.nan
     weights: Callable[[FloatArray], FloatArray] = np.ones_like
+    base_speed: float = math.nan
 
     @property
     def at_least(self) -> bool:
@@ -104,7 +109,7 @@ class Demand:
     @property
     def drive(self) -> bool:
         """Whether it is about motor, drive or rope, and not about the loop."""
-        return self.kind in ("continuous", "peak", "least", "power")
+        return self.kind in ("continuous", "thermal", "peak", "least", "power", "breakdown")
 
     @property
     def orders(self) -> dict[str, tuple[int, ...]]:
@@ -157,6 +162,9 @@ class Demand:
             return sizes[0]
         if self.kind == "continuous":
             return math.hypot(self.static, sizes[0])
+        if self.kind == "thermal":
+            torque, speed = sizes
+            return _heating(self.static, torque, speed, self.base_speed)
         peaks = [
             size * peak_factor(zero_crossing_period(*moments[name]), self.duration)
             if all(map(math.isfinite, moments[name]))
@@ -165,6 +173,8 @@ class Demand:
         ]
         if self.kind == "least":
             return self.static - peaks[0]
+        if self.kind == "breakdown":
+            return (abs(self.static) + peaks[0]) * (peaks[1] / self.base_speed) ** 2
         # Power: the corner of the box that the peaks of torque and speed span.
         return (abs(self.static) + peaks[0]) * (peaks[1] if self.kind == "power" else 1.0)
 
@@ -198,6 +208,7 @@ def limit_demand(limit: StatedLimit, enforced: bool = True) -> Demand:
         frequency=frequency,
         duration=getattr(limit, "duration", math.nan),
         weights=getattr(limit, "weights", np.ones_like),
+        base_speed=getattr(limit, "base_speed", math.nan),
     )
 
 
@@ -239,6 +250,9 @@ def case_demands(case: Case, data: PlantData, plant: LinearPlant, masses: int) -
             Demand(name="roll_off", kind="roll_off", bound=wanted.roll_off, frequency=above)
         )
     dc = winch.motor.type == "dc"
+    thermal = f"{_TORQUE}.continuous" if math.isfinite(winch.cooled_speed) else ""
+    breakdown = f"{_TORQUE}.breakdown"
+    special = {_POWER: "power", thermal: "thermal", breakdown: "breakdown"}
     bounds = {
         f"{_TORQUE}.peak": drive.torque_peak,
         f"{_TORQUE}.continuous": drive.torque_continuous,
@@ -247,6 +261,7 @@ def case_demands(case: Case, data: PlantData, plant: LinearPlant, masses: int) -
         "motor.current.peak": drive.current_peak if dc else None,
         "motor.current.continuous": drive.current_continuous if dc else None,
         _POWER: winch.power_limit,
+        breakdown: winch.breakdown_limit / winch.cooled_speed**2,
         f"{_TENSION}.peak": wanted.rope_tension_peak,
         f"{_TENSION}.least": wanted.minimum_tension,
     }
@@ -254,19 +269,33 @@ def case_demands(case: Case, data: PlantData, plant: LinearPlant, masses: int) -
         if bound is None or not math.isfinite(bound):
             continue
         signal, _, kind = name.rpartition(".")
-        outputs = (_TORQUE, _SPEED) if name == _POWER else (signal,)
+        outputs = (_TORQUE, _SPEED) if name in special else (signal,)
         found.append(
             Demand(
                 name=name,
-                kind="power" if name == _POWER else kind,
+                kind=special.get(name, kind),
                 bound=bound,
                 enforced=wanted.drive == "enforce",
                 outputs=outputs,
                 static=float(plant.static[outputs[0]]),
                 duration=wanted.exposure_time,
+                base_speed=winch.cooled_speed,
             )
         )
     return {demand.name: demand for demand in found}
+
+
+def _heating(static: float, torque: float, speed: float, base: float) -> float:
+    """Return the root mean square of a torque over what holds for hours at each speed [N m].
+
+    Torque and speed are taken as going together, the worst that they can do; by a sum over the
+    Gaussian speed in steps of a thousandth of its standard deviation.
+    """
+    u = np.linspace(-12.0, 12.0, 24001)
+    chance = np.exp(-0.5 * u * u)
+    chance /= chance.sum()
+    heat = np.maximum(1.0, (u * speed / base) ** 2)
+    return math.sqrt(float(((static**2 + (torque * u) ** 2) * heat * chance).sum()))
 
 
 def _pole_figure(kind: str, poles: ComplexArray, models: ComplexArray) -> float:

@@ -547,3 +547,18 @@ def test_the_names_of_what_it_hears_are_those_of_the_simulator():
 def test_bad_arguments_get_one_clear_sentence(options, text):
     with pytest.raises(sh.InputError, match=text):
         controller_of("thesis-1975", **options)
+
+
+def test_moves_stay_below_the_breakdown_torque_at_the_planned_speeds() -> None:
+    base = 60.0
+    case = sh.load_case("subsea-crane").variant(
+        {"winch.motor.kind": "induction", "winch.motor.base_speed": base}
+    )
+    controller = LinearMPC(case, weights=WEIGHTS["subsea-crane"])
+    speeds = np.full(len(controller.programme.blocks), 2.0 * base)
+    low, high = controller.window.bounds(2.0 * base, speeds, math.inf)
+    unit, rest = controller.programme.unit, controller.model.winch.rest_torque
+    most = 2.5 * case.winch.drive.torque_continuous / 4.0
+    assert most < case.winch.power_limit / (2.0 * base)
+    assert high * unit + rest == pytest.approx(most, rel=1e-9)
+    assert low * unit + rest == pytest.approx(-most, rel=1e-9)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from types import SimpleNamespace
 
@@ -25,7 +26,7 @@ from loop_numbers import (
 from scipy.linalg import solve_continuous_lyapunov
 
 from models import load_case
-from models.basics import InputError
+from models.basics import InputError, peak_factor
 from models.plant import LinearPlant, PlantData
 from synth import (
     Continuous,
@@ -49,8 +50,9 @@ from synth import (
     White,
     tune,
 )
-from synth.limits import Limit, loop_limits, modelled_bandwidth
-from synth.loop import Assessment, LinearController, disturbances
+from synth.limits import Breakdown, Limit, Thermal, loop_limits, modelled_bandwidth
+from synth.loop import Assessment, Dual, LinearController, disturbances
+from synth.verify.demands import limit_demand
 
 WHITE = {"f": White(1.0), "n": White(0.01)}
 WEIGHTS = {"x": 1.0, "effort": 0.05}
@@ -707,3 +709,98 @@ def test_least_and_peak_are_mirror_images() -> None:
 def test_bounds_out_of_range_are_refused(make, message: str) -> None:
     with pytest.raises(InputError, match=message):
         make()
+
+
+class _Known:
+    """A Gaussian torque and speed, as limits see them."""
+
+    def __init__(self, torque: float, speed: float) -> None:
+        self.sizes = {"motor.torque": torque, "motor.speed": speed}
+
+    def sigma(self, output: str) -> float:
+        return self.sizes[output]
+
+    def peak(self, output: str, duration: float) -> float:
+        return 3.7 * self.sizes[output]
+
+    def moment(self, output: str, order: int) -> np.ndarray:
+        assert order == 0
+        return np.array([self.sizes[output] ** 2])
+
+
+@pytest.mark.parametrize("speed", [20.0, 45.0, 80.0, 130.0])
+def test_thermal_rule_is_the_mean_heat_of_a_motor_that_cools_less_above_base_speed(
+    speed: float,
+) -> None:
+    mean, torque, base, rating = 600.0, 500.0, 100.0, 1000.0
+    limit = Thermal(output="motor.torque", bound=rating, static=mean, base_speed=base)
+    value = limit.measure(_Known(torque, speed))
+    rng = np.random.default_rng(7)
+    u, other = rng.standard_normal((2, 4_000_000))
+
+    def heat(correlation: float) -> float:
+        moved = correlation * u + math.sqrt(1.0 - correlation**2) * other
+        held = rating * np.minimum(1.0, base / np.maximum(np.abs(speed * u), 1e-9))
+        return float(np.mean(((mean + torque * moved) / held) ** 2))
+
+    # Exact where torque and speed go together, and on the safe side of all else.
+    assert (value / rating) ** 2 == pytest.approx(heat(1.0), rel=4e-3)
+    assert (value / rating) ** 2 == pytest.approx(heat(-1.0), rel=4e-3)
+    assert (value / rating) ** 2 > heat(0.4) * (1.0 - 2e-3)
+    row = limit.rows(_Known(torque, speed), rating)  # type: ignore[arg-type]
+    assert row[0] == pytest.approx((value / rating) ** 2 - 1.0, rel=1e-12)
+    demand = limit_demand(limit)
+    moments = {"motor.torque": (torque**2,), "motor.speed": (speed**2,)}
+    found = demand.measured(None, None, None, moments)  # type: ignore[arg-type]
+    assert found == pytest.approx(value, rel=1e-6)
+
+
+def test_thermal_rule_is_the_plain_one_where_the_speed_stays_below_the_base_speed() -> None:
+    plain = Continuous(output="motor.torque", bound=1000.0, static=600.0)
+    limit = Thermal(output="motor.torque", bound=1000.0, static=600.0, base_speed=100.0)
+    slow = _Known(500.0, 12.0)
+    assert limit.measure(slow) == pytest.approx(plain.measure(slow), rel=1e-12)
+    still = _Known(500.0, 0.0)
+    assert limit.measure(still) == pytest.approx(plain.measure(still), rel=1e-15)
+
+
+@pytest.mark.parametrize("size", [0.0, 0.05, 0.4, 1.0, 3.0])
+def test_slopes_of_the_thermal_rule_are_those_of_its_values(size: float) -> None:
+    limit = Thermal(output="motor.torque", bound=1000.0, static=600.0, base_speed=100.0)
+
+    class Moving:
+        def __init__(self, share: object) -> None:
+            self.share = share
+
+        def moment(self, output: str, order: int) -> object:
+            return self.share * 1e4 if output == "motor.speed" else np.array([250e3])  # type: ignore[operator]
+
+    def row(share: float) -> float:
+        return float(limit.rows(Moving(np.array([share])), 1000.0)[0])  # type: ignore[arg-type]
+
+    dual = limit.rows(Moving(Dual(np.array([size]), np.ones((1, 1)), (0,))), 1000.0)  # type: ignore[arg-type]
+    step = 1e-6
+    low = max(size - step, 0.0)
+    expected = (row(size + step) - row(low)) / (size + step - low)
+    assert dual.value[0] == pytest.approx(row(size), rel=1e-15)
+    assert dual.slope[0, 0] == pytest.approx(expected, rel=1e-4, abs=1e-9)
+
+
+def test_breakdown_torque_is_held_at_the_corner_of_the_box() -> None:
+    limit = Breakdown(
+        bound=2500.0,
+        torque="motor.torque",
+        speed="motor.speed",
+        static=-600.0,
+        base_speed=100.0,
+        unit="N m",
+    )
+    loop = _Known(100.0, 50.0)
+    # 970 N m at 185 rad/s, where 2500 (100/185)^2 = 730 N m are left
+    expected = 970.0 * 1.85**2
+    assert limit.measure(loop) == pytest.approx(expected, rel=1e-12)  # type: ignore[arg-type]
+    moments = {"motor.torque": (1e4, 1e4), "motor.speed": (2500.0, 2500.0)}
+    found = limit_demand(limit).measured(None, None, None, moments)  # type: ignore[arg-type]
+    period = 2.0 * math.pi
+    k = peak_factor(period, limit.duration)
+    assert found == pytest.approx((600.0 + 100.0 * k) * (0.5 * k) ** 2, rel=1e-12)
