@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         check_finite,
         check_range,
         check_seed,
+        digits_apart,
         range_text,
         read_only,
     )

@@ -186,6 +186,29 @@ class ReadOnlyArrays:
 _KINDS = {"FloatArray": np.float64, "ComplexArray": np.complex128}
 
 
+def digits_apart(value: float, bound: float, least: int = 3) -> int:
+    """Return how many significant digits tell a value from its bound; `least` of equal ones.
+
+    Equal are those that part by less than 1e-5 of the bound, to which limits are kept.
+
+    Examples
+    --------
+    >>> digits_apart(2.0005, 2.0), digits_apart(1.8, 2.0), digits_apart(2.0 + 1e-9, 2.0)
+    (5, 3, 3)
+    """
+    if not abs(value - bound) > 1e-5 * abs(bound) or math.isinf(value) or math.isinf(bound):
+        return least
+    apart, digits = value - bound, least
+    # Parted by about as much as they are, not by what rounding adds.
+    while abs(_rounded(value, digits) - _rounded(bound, digits) - apart) > 0.5 * abs(apart):
+        digits += 1
+    return digits
+
+
+def _rounded(value: float, digits: int) -> float:
+    return float(f"{value:.{digits - 1}e}")
+
+
 def range_text(
     low: float, high: float, unit: str, open_low: bool = False, open_high: bool = False
 ) -> str:

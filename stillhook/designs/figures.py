@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import ComplexArray, FloatArray, InputError
+from models.basics import ComplexArray, FloatArray, InputError, digits_apart
 from synth.design import Design
 
 from ..text import (
@@ -431,12 +431,13 @@ def _circles(design: Design, axes: Axes) -> None:
         axes.plot(ring.real, ring.imag, color=colour, linewidth=1.3, linestyle=dots, label=label)
 
     peak = None if design.margins is None else design.margins.max_sensitivity
-    if peak is not None and abs(peak / bound - 1.0) < 1e-3:
+    if peak is not None and abs(peak / bound - 1.0) < 1e-6:
         draw(peak, AFTER, f"$M_s$ = {number(peak)}, at its limit")
         return
-    draw(bound, "#777777", f"$M_s$ = {number(bound)}, the limit")
+    digits = 3 if peak is None else digits_apart(peak, bound)
+    draw(bound, "#777777", f"$M_s$ = {number(bound, digits)}, the limit")
     if peak is not None:
-        draw(peak, BROKEN if peak > bound else AFTER, f"$M_s$ = {number(peak)}")
+        draw(peak, BROKEN if peak > bound else AFTER, f"$M_s$ = {number(peak, digits)}")
 
 
 def _arrows(axes: Axes, gain: ComplexArray, window: PlaneWindow) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from models.basics import residual_text
+from models.basics import digits_apart, residual_text
 from models.rig import DCMotor
 from synth.design import Design, LimitUse, few_starts
 from synth.question import HOOK, PAYLOAD, difference_text
@@ -297,8 +297,9 @@ def required_table(design: Design) -> Table | None:
     rows = []
     for name, value in design.required.items():
         use = design.limits[name]
-        needed = _measured(use, value, size=use.bound)
-        rows.append((label_of(design, name), _measured(use, use.bound), needed))
+        digits = digits_apart(value, use.bound)
+        needed = _measured(use, value, digits, size=use.bound)
+        rows.append((label_of(design, name), _measured(use, use.bound, digits), needed))
     wanted = f"needed in H_s {design.case.sea.significant_height:.3g} m"
     heads = columns(f"limit=limit that breaks; is; needed={wanted}")
     note = f"All figures below are those in H_s {design.significant_height:.3g} m"
@@ -310,21 +311,22 @@ def _limit_row(design: Design, use: LimitUse) -> tuple[str, Written, Written, Ba
     worth = use.price > _PRICED * design.payload_rms and use.enforced
     price = quantity(use.price, "m", 2) if worth else ""
     remark = (price if use.kept else "broken") if use.enforced else "reported"
+    digits = digits_apart(use.value, use.bound)
     return (
         label_of(design, use.name),
-        Written(use.value, _measured(use, use.value, size=use.bound)),
-        Written(use.bound, f"{sign} {_measured(use, use.bound)}"),
+        Written(use.value, _measured(use, use.value, digits, size=use.bound)),
+        Written(use.bound, f"{sign} {_measured(use, use.bound, digits)}"),
         Bar(use.use, use.kept, use.enforced),
         Written(use.price if worth else None, remark),
     )
 
 
-def _measured(use: LimitUse, value: float, *, size: float | None = None) -> str:
+def _measured(use: LimitUse, value: float, digits: int, *, size: float | None = None) -> str:
     unit = "rpm" if use.name.startswith("motor.speed") else use.unit
     if use.name.startswith("gain_margin"):
-        return "no bound" if math.isinf(value) else f"x {number(value)}"
+        return "no bound" if math.isinf(value) else f"x {number(value, digits)}"
     if math.isinf(value):
         return "no bound"
     if size is not None and scale(unit, size)[0] > 1e3 * abs(value):
         size = None  # 3 W is not 0.000003 MW
-    return quantity(value, unit, size=size)
+    return quantity(value, unit, digits, size=size)

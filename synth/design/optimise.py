@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 import numpy as np
 from scipy.optimize import brentq
 
-from models.basics import InputError, check_range, one_thread
+from models.basics import InputError, check_range, digits_apart, one_thread
 from models.case import Case
 from models.plant import MAX_MASSES
 
@@ -417,14 +417,16 @@ def _too_small(posed: PosedFamily, found: Shortfall, height: float) -> str:
         f"H_s {height:.3g} m, for which the gains are"
     )
     needs = [
-        f"{name} {_number(value)} {names[name].unit} instead of {_number(names[name].bound)}"
+        f"{name} {_number(value, names[name].bound)} {names[name].unit} instead of "
+        f"{_number(names[name].bound, value)}"
         for name, value in found.required.items()
     ]
     return f"{text}; H_s {asked:.3g} m would take {' and '.join(needs)}" if needs else text
 
 
-def _number(value: float) -> str:
-    return f"{value:.4g}" if abs(value) < 1e4 else f"{value:,.0f}".replace(",", " ")
+def _number(value: float, other: float) -> str:
+    digits = digits_apart(value, other, 4)
+    return f"{value:.{digits}g}" if abs(value) < 1e4 else f"{value:,.0f}".replace(",", " ")
 
 
 def _family_design(posed: PosedFamily, tuning: Tuning, *, drive_kept: bool = True) -> Design:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import InputError, SolverError, White, check_range, one_thread
+from models.basics import InputError, SolverError, White, check_range, digits_apart, one_thread
 from models.plant import LinearPlant
 
 from ..bound import lqg_bound
@@ -332,6 +332,10 @@ def _of_member(family: FamilyProblem, found: Found, index: int) -> Tuning:
     )
 
 
+def _apart(value: float, other: float) -> str:
+    return f"{value:.{digits_apart(value, other, 4)}g}"
+
+
 def _status(ok: bool, members: Sequence[Tuning], family: FamilyProblem) -> str:
     names = [scenario.name for scenario in family.scenarios]
     several = f" over {len(names)} members" if len(names) > 1 else ""
@@ -345,7 +349,8 @@ def _status(ok: bool, members: Sequence[Tuning], family: FamilyProblem) -> str:
     if not all(member.assessment and member.assessment.stable for member in members):
         return "the search ended at an unstable loop"
     values = [
-        f"{u.name} at {u.value:.4g} instead of {u.bound:.4g}" + (f" ({name})" if several else "")
+        f"{u.name} at {_apart(u.value, u.bound)} instead of {_apart(u.bound, u.value)}"
+        + (f" ({name})" if several else "")
         for name, member in zip(names, members, strict=True)
         for u in member.limits.values()
         if not u.kept

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from models.basics import FloatArray
+from models.basics import FloatArray, digits_apart
 from models.case import Case
 from models.sea import Scatter
 
@@ -148,7 +148,8 @@ class Operability:
         if not math.isfinite(at.max_sensitivity):
             return "the loop is unstable with this rope, at least in small motion"
         over = at.max_sensitivity > bound * (1.0 + KEPT)
-        return f"M_s {at.max_sensitivity:.3g}, {'above' if over else 'within'} its limit {bound:g}"
+        value = f"{at.max_sensitivity:.{digits_apart(at.max_sensitivity, bound)}g}"
+        return f"M_s {value}, {'above' if over else 'within'} its limit {bound:g}"
 
     def verify(self, count: int = _CHECKS) -> tuple[ContourCheck, ...]:
         """Evaluate the design at points of its contour once more, by single evaluations.

@@ -26,6 +26,7 @@ from stillhook.designs.summary import (
     share_table,
 )
 from stillhook.text import json_data, markdown
+from synth.design.tuning import LimitUse
 from synth.search import Start
 
 FIGURES = ("payload_spectrum", "responses", "nyquist", "limits")
@@ -287,3 +288,22 @@ def test_an_answer_that_few_starts_reached_is_remarked_upon(agreed: int, words: 
     )  # fmt: skip
     design = dataclasses.replace(thesis_design(), starts=(start,) * 5, agreed=agreed)
     assert dict(facts(design, bound=False))["search"].startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("value", "texts"),
+    [
+        (2.0005, ["2.0005", "≤ 2.0000"]),
+        (1.96, ["1.96", "≤ 2.00"]),
+        (2.0 * (1.0 + 1e-7), ["2.00", "≤ 2.00"]),
+    ],
+)
+def test_a_value_has_the_digits_that_tell_it_from_its_bound(value: float, texts: list[str]) -> None:
+    design = thesis_design()
+    peak = LimitUse(name="max_sensitivity", value=value, bound=2.0, use=value / 2.0)
+    only = dataclasses.replace(design, limits={"max_sensitivity": peak})
+    assert texts_of(limit_table(only))[0][1:3] == texts
+    needed = dataclasses.replace(only, required={"max_sensitivity": value})
+    table = required_table(needed)
+    assert table is not None
+    assert texts_of(table)[0][1:] == [texts[1].removeprefix("≤ "), texts[0]]
