@@ -42,6 +42,9 @@ MAIN: Mapping[str, str] = {
 }
 """What tells controllers apart, by name: of a payload that stays, that lands, that is moved."""
 
+FINER_SNAP = "snap load on more masses"
+"""Quantity of the run with the largest snap load: that load on as many masses as there may be."""
+
 _EVENTS_SHOWN = 4
 
 
@@ -197,6 +200,7 @@ def tree(runs: Runs) -> list[str]:
     for name, label in (("touch-down speed", "touchdown speed"), ("snap load", "snap load")):
         if told(name):
             lines.append(f"{label} {told(name)}")
+    lines += [event.text for run in runs for event in run.events if event.kind == "snap"]
     if told("motor torque rms"):
         largest = told("motor torque largest")
         lines.append(f"motor torque {told('motor torque rms')} rms, {largest} at most")

@@ -19,8 +19,8 @@ from models.basics import InputError, check_choice, check_range, check_seed, one
 from models.case import Case
 from models.casefile import Quantity
 from models.operation import MotionSource, Scenario, SpectrumMotion, scenario_named
-from models.plant import DriveLimits
-from models.run import NamedQuantity, Run
+from models.plant import MAX_MASSES, DriveLimits
+from models.run import Event, NamedQuantity, Run
 from models.sensing import Controller, holds_brake
 from models.simulation import (
     Progress,
@@ -32,7 +32,8 @@ from models.simulation import (
 from synth.design import Design, Tuning
 
 from ..controllers import controller_of
-from .runs import Runs, keep_worst, stays
+from ..text import number, quantity
+from .runs import FINER_SNAP, Runs, keep_worst, stays
 from .window import error_of
 
 
@@ -75,6 +76,41 @@ class Series:
         run = run_simulation(self.simulation, seed=seed, progress=progress)
         return _with_error_before_touchdown(run)
 
+    def with_finer_snap(self, found: Sequence[Run]) -> list[Run]:
+        """Return the runs, the one with the largest snap load told how sure that is.
+
+        A snap is a wave in the rope, which few masses blunt: the run is repeated with the same
+        seed on as many masses as there may be, and says both loads.  Not where every sample asks
+        a controller in Python, which would take its time again.
+        """
+        runs, simulation = list(found), self.simulation
+        loads = [run.statistics.quantities.get("snap load") for run in runs]
+        sizes = [-math.inf if q is None or math.isnan(q.value) else q.value for q in loads]
+        at = max(range(len(runs)), key=sizes.__getitem__, default=0)
+        ropes = [name for name in simulation.loop.states if name.startswith("plant.rope.")]
+        masses = 1 + sum(name.endswith("velocity") for name in ropes)
+        cut_short = any(run.status == "interrupted" for run in runs)
+        if cut_short or math.isinf(max(sizes, default=-math.inf)):
+            return runs
+        if not simulation.fused or masses >= MAX_MASSES:
+            return runs
+        options = replace(simulation.options, masses=MAX_MASSES, step=None)
+        finer = prepare(simulation.case, simulation.controller, simulation.scenario, options)
+        again = run_simulation(finer, seed=runs[at].seed)
+        if again.status != runs[at].status:
+            return runs
+        found_again = again.statistics.value("snap load")
+        load, size = 0.0 if math.isnan(found_again) else found_again, sizes[at]
+        text = (
+            f"snap load {quantity(size, 'N')} on {masses} masses, {quantity(load, 'N')} on "
+            f"{MAX_MASSES}: uncertain by {number(100.0 * abs(load / size - 1.0), 2)} %"
+        )
+        event = Event(time=runs[at].statistics.value("snap load at"), kind="snap", text=text)
+        events = tuple(sorted((*runs[at].events, event), key=lambda event: event.time))
+        named = {FINER_SNAP: NamedQuantity(value=load, unit="N")}
+        runs[at] = _with_quantities(replace(runs[at], events=events), named)
+        return runs
+
     def runs(self, found: Sequence[Run]) -> Runs:
         """Return runs of this series as one result."""
         simulation = self.simulation
@@ -106,11 +142,16 @@ def _with_error_before_touchdown(run: Run) -> Run:
     rms, largest = math.nan, math.nan
     if error.size:
         rms, largest = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
-    quantities = {
-        **run.statistics.quantities,
+    named = {
         "error before touch-down rms": NamedQuantity(value=rms, unit="m"),
         "error before touch-down largest": NamedQuantity(value=largest, unit="m"),
     }
+    return _with_quantities(run, named)
+
+
+def _with_quantities(run: Run, named: Mapping[str, NamedQuantity]) -> Run:
+    """Return a run that also knows some quantities."""
+    quantities = {**run.statistics.quantities, **named}
     return replace(run, statistics=replace(run.statistics, quantities=quantities))
 
 
@@ -238,7 +279,8 @@ def simulate(
             found = keep_worst(found)
         if found[-1].status == "interrupted":
             break
-    return series.runs(found)
+    with one_thread():
+        return series.runs(series.with_finer_snap(found))
 
 
 def seeds_of(owner: str, seeds: int | Sequence[int]) -> tuple[int, ...]:

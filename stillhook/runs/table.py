@@ -16,7 +16,7 @@ from models.basics import Interval, Share, share
 from models.case import Case
 
 from ..text import Column, Table, Written, columns, duration, number, quantity, scale
-from .runs import Runs, main_quantity
+from .runs import FINER_SNAP, Runs, main_quantity
 
 _KWH = 3.6e6  # [J]
 _UNITS = {"rad/s": "rpm"}  # motors are rated in rpm
@@ -62,6 +62,7 @@ _ROPE: tuple[_Listed, ...] = (
     ("rope tension smallest", "rope tension, least", "least"),
     ("slack share", "rope slack", "of the time"),
     ("snap load", "snap load", "after slack"),
+    (FINER_SNAP, "the largest on 40 masses", "the same seed again"),
     ("drum haul lowest", "drum haul, lowest", "stroke"),
     ("drum haul highest", "drum haul, highest", "stroke"),
 )

@@ -213,6 +213,8 @@ def _simulate(
             write_traces(folder, one, traces, several=len(asked.controllers) > 1)
             found.compared[name] = series.runs(keep_worst([*found.compared.get(name, ()), one]))
             before += asked.duration
+        tick(f"{name}, snap load", before)
+        found.compared[name] = series.runs(series.with_finer_snap(found.compared[name].runs))
 
 
 def _prepared(asked: SimulationRequest, name: str, tune: Callable[[float], None]) -> Series:

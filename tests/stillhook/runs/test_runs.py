@@ -399,3 +399,28 @@ def test_a_file_in_the_way_is_one_sentence(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(sh.InputError, match="the output folder cannot be made: a file is there"):
         sh.write_runs(tmp_path / "file", [three()], figures=False)
+
+
+def test_a_snap_load_is_told_on_more_masses_too() -> None:
+    # A light load under a brake: the rope goes slack, and few masses blunt the snap.
+    light = {
+        "payload.mass": 8e3,
+        "payload.added_mass": 30e3,
+        "payload.submerged_weight": 60e3,
+        "sea.significant_height": 3.2,
+    }
+    case = sh.load_case("subsea-crane").replace(light)
+    runs = sh.simulate(case, "none", seeds=[1, 2], duration=600.0, masses=7)
+    calm, snapped = runs
+    assert "snap load on more masses" not in calm.statistics.quantities
+    coarse = snapped.statistics.value("snap load")
+    finer = snapped.statistics.value("snap load on more masses")
+    again = sh.simulate(case, "none", seeds=[2], duration=600.0, masses=40)
+    assert finer == again[0].statistics.value("snap load") > 1.05 * coarse
+    assert "snap load on more masses" not in again[0].statistics.quantities
+    share = f"uncertain by {100.0 * (finer / coarse - 1.0):.0f} %"
+    (event,) = (event for event in snapped.events if event.kind == "snap")
+    assert event.time == snapped.statistics.value("snap load at")
+    assert "on 7 masses" in event.text
+    assert event.text.endswith(share)
+    assert event.text in str(runs)
