@@ -32,7 +32,7 @@ from ..text import (
     typeset,
 )
 from .bound_text import bound_cell, bound_figure, bounds_note
-from .summary import SHARES, share_of
+from .summary import SHARES, share_of, unit_notes
 
 if TYPE_CHECKING:
     from synth.design import Design
@@ -162,7 +162,7 @@ def structures_report(designs: Sequence[Design], *, bound: bool = True) -> Repor
         status=f"hook {hook} rms; with the drum held the payload moves {held} rms",
         sections=[
             ReportSection("", [table, *([drawing] * stable)]),
-            ReportSection("Limited by", [limits, *failed]),
+            ReportSection("Limited by", [limits, *failed, *unit_notes(designs)]),
         ],
     )
 

@@ -6,7 +6,7 @@ Design -> Tables -> `stillhook.designs.report`
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from models.basics import digits_apart, residual_text
 from models.rig import DCMotor
@@ -107,13 +107,28 @@ def alternatives_table(design: Design) -> Table | None:
     return Table(
         columns=columns("structure; payload_rms=payload [m]; residual=of the hook's [%]; hears <"),
         rows=[(d.structure, d.family_rms, d.family_rms / d.hook_rms, _hears(d)) for d in tried],
-        notes=tuple(
-            f"{other.structure}: {_why_not(design, other)}"
-            for other in tried
-            if other is not design
+        notes=(
+            *(f"{d.structure}: {_why_not(design, d)}" for d in tried if d is not design),
+            *unit_notes(tried),
         ),
         broken=tuple(k for k, other in enumerate(tried) if not other.ok),
     )
+
+
+def unit_notes(designs: Sequence[Design]) -> tuple[str, ...]:
+    """Return what of feed-forward hangs on how the reference unit's error is read, if it does."""
+    found = []
+    for design in designs:
+        unit, parts = design.case.sensors.mru, design.shares.get(PAYLOAD, {})
+        if design.structure != "feed-forward" or unit is None or not design.ok:
+            continue
+        if max(unit.noise_floor, unit.noise_fraction) > 0.0 and "mru.error" in parts:
+            left = math.sqrt(sum(rms**2 for name, rms in parts.items() if name != "mru.error"))
+            found.append(
+                f"{design.structure}: hangs on the MRU's error being read as noise in the band of "
+                f"the waves; without it these gains leave {quantity(left, 'm')}"
+            )
+    return tuple(found)
 
 
 def _hears(design: Design) -> str:

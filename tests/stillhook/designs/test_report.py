@@ -9,7 +9,13 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from designs import infeasible_design, loopless_design, thesis_design, unstable_design
+from designs import (
+    infeasible_design,
+    loopless_design,
+    structure_design,
+    thesis_design,
+    unstable_design,
+)
 
 import stillhook as sh
 from models import InputError, load_case
@@ -24,6 +30,7 @@ from stillhook.designs.summary import (
     parameter_table,
     required_table,
     share_table,
+    unit_notes,
 )
 from stillhook.text import json_data, markdown
 from synth.design.tuning import LimitUse
@@ -307,3 +314,22 @@ def test_a_value_has_the_digits_that_tell_it_from_its_bound(value: float, texts:
     table = required_table(needed)
     assert table is not None
     assert texts_of(table)[0][1:] == [texts[1].removeprefix("≤ "), texts[0]]
+
+
+@pytest.mark.parametrize(
+    ("unit", "said"),
+    [({"noise_floor": 0.05}, True), ({"gain_error": 0.05}, False)],
+)
+def test_feed_forward_says_what_hangs_on_how_the_error_of_its_unit_is_read(unit, said):
+    case = load_case("subsea-crane").replace({"sensors.mru": unit})
+    forward = {"drum.position_gain": 0.001, "heave.gain": 1.0}
+    forward |= {"heave.lead": 0.66, "heave.bandwidth": 1.4}
+    design = structure_design(case, "feed-forward", forward)
+    design = dataclasses.replace(
+        design, shares={"payload.displacement": {"hook.heave": 0.03, "mru.error": 0.1}}
+    )
+    found = unit_notes([design, dataclasses.replace(design, structure="combined")])
+    assert len(found) == said
+    if said:
+        assert "without it these gains leave 30.0 mm" in found[0]
+        assert unit_notes([dataclasses.replace(design, ok=False)]) == ()
