@@ -603,13 +603,14 @@ main_thread = pytest.mark.skipif(
 @main_thread
 def test_ctrl_c_in_the_midst_of_the_search(tmp_path):
     started = subprocess.Popen(
-        [sys.executable, "-m", "stillhook", "optimise", "thesis-1975", *THREE, "--starts", "400"],
+        # every structure of the crane: a search of some twenty seconds
+        [sys.executable, "-m", "stillhook", "optimise", "subsea-crane"],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
-    kept = tmp_path / "out" / "thesis-1975" / "case.yaml"
+    kept = tmp_path / "out" / "subsea-crane" / "case.yaml"
     patience = time.monotonic() + 60.0
     while not kept.exists() and time.monotonic() < patience:
         time.sleep(0.05)
@@ -618,7 +619,7 @@ def test_ctrl_c_in_the_midst_of_the_search(tmp_path):
     out, err = started.communicate(timeout=60)
     assert started.returncode == 130
     assert out == ""
-    assert err.endswith("no design was finished; kept in out/thesis-1975: case.yaml\n")
+    assert err.endswith("no design was finished; kept in out/subsea-crane: case.yaml\n")
     assert "Traceback" not in err
     assert [path.name for path in kept.parent.iterdir()] == ["case.yaml"]
 
