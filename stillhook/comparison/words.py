@@ -31,7 +31,8 @@ from .comparison import Comparison
 LEGEND = (
     "sat.: of the time at the drive's limits; lost: runs in which the payload left its place by "
     "more than the hook's significant height, or the brake stepped in; residual: of the hook's "
-    "motion; / floor: mean square over the clairvoyant's"
+    "motion; drum held: of the payload's with the drum held; / floor: mean square over the "
+    "clairvoyant's"
 )
 """What the headings of the table mean."""
 
@@ -74,6 +75,7 @@ def table_at(found: Comparison, height: float) -> Table:
                 *figures,
                 Written(lost, f"{lost}/{len(cells)}"),
                 0.01 * float(row["residual"]),
+                0.01 * float(row["residual held"]),
                 float(row["of the floor"]),
             )
         )
@@ -85,6 +87,7 @@ def table_at(found: Comparison, height: float) -> Table:
         Column("saturated", "sat.", write=lambda share: f"{share:.3g} %"),
         Column("lost"),
         Column("residual", write=percent),
+        Column("residual_held", "drum held", write=percent),
         Column("of_the_floor", "/ floor"),
     )
     return Table(columns=heads, rows=rows)

@@ -44,7 +44,7 @@ LIMITS: Mapping[str, tuple[str, str]] = {
     "motor.current.peak": ("motor current, peak", "winch.drive.current_peak"),
     "motor.current.continuous": ("motor current, continuous", "winch.drive.current_continuous"),
     "motor.torque.breakdown": (
-        "motor torque, breakdown at base speed",
+        "motor torque, breakdown",
         "winch.drive.torque_continuous",
     ),
     "motor.power.peak": ("motor power, peak", "winch.drive.power"),

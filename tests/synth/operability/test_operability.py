@@ -191,6 +191,27 @@ def test_the_makers_lines_are_those_of_the_sheet() -> None:
     assert power == pytest.approx(np.full(3, case.winch.power_limit), rel=1e-12)
 
 
+def test_the_makers_lines_of_an_induction_motor_are_below_its_breakdown_torque() -> None:
+    changes = {"winch.motor.viscous_friction": 0.0, "winch.motor.base_speed": 60.0}
+    case = one_heading().replace(changes)
+    T = np.array([5.0, 8.0, 14.0])
+    rows = {}
+    for kind in (None, "induction"):
+        asked = pose_operability(case.variant({"winch.motor.kind": kind}), ())
+        lines = capability(asked.perfect, asked.criteria["perfect"], T)
+        names = [c.name for c in lines.criteria]
+        rows[kind] = dict(zip(names, lines.heights, strict=True))
+    static = pose(case).plant.static["motor.torque"]
+    n, r = case.winch.gearbox.ratio, case.drum_radius
+    A, w = 0.5 * rows["induction"]["motor.torque.breakdown"], 2.0 * math.pi / T
+    torque = static + case.winch.inertia * n / r * A * w**2
+    left = 2.5 * case.winch.drive.torque_continuous / (n / r * A * w / 60.0) ** 2
+    assert torque == pytest.approx(left, rel=1e-9)
+    thermal = rows["induction"]["motor.torque.continuous"]
+    assert np.all(thermal < rows[None]["motor.torque.continuous"])
+    assert "motor.torque.breakdown" not in rows[None]
+
+
 def test_a_perfect_winch_follows_the_hooks_own_speed() -> None:
     case = one_heading()
     study = operability(case, periods=[6.0, 12.0])
