@@ -29,6 +29,9 @@ from ..casefile import (
 from .contents import Contents
 from .plausibility import Finding, contradictions, remarks
 
+#: What a stored case meant that lacks a field of a section.
+_BEFORE: Mapping[tuple[str, str], Any] = {("limits", "tension_ends"): "drum"}
+
 
 class Case(Contents):
     """A case: all that a design needs to know, checked and frozen."""
@@ -74,6 +77,25 @@ class Case(Contents):
             raise InputError(describe(error, cls, source=source, lines=lines)) from error
         case._source = source
         return case
+
+    @classmethod
+    def from_stored(
+        cls,
+        data: Mapping[str, Any],
+        *,
+        source: str = "case",
+        lines: Mapping[Path, int] | None = None,
+    ) -> Case:
+        """Make a case from one that was stored with a result; arguments as of :meth:`from_dict`.
+
+        What it lacks, as newer versions brought it, has the meaning that it had when it was
+        stored, so that what the result claims still holds.
+        """
+        tree = dict(data)
+        for (section, field), value in _BEFORE.items():
+            if isinstance(tree.get(section), Mapping):
+                tree[section] = {field: value, **tree[section]}
+        return cls.from_dict(tree, source=source, lines=lines)
 
     def replace(self, changes: Mapping[str, Any]) -> Case:
         """Return a case with some fields changed, checked like a file.

@@ -54,6 +54,14 @@ class Contents(Section):
         return self.payload.submerged_weight + self.rope.submerged_weight
 
     @property
+    def least_tension(self) -> float | None:
+        """Smallest tension that a limit allows in the rope [N]; None if there is none."""
+        given = self.limits.minimum_tension
+        if given is None and self.limits.tension_ends == "both":
+            return self.payload.taut_tension
+        return given
+
+    @property
     def static_torque(self) -> float:
         """Motor torque that holds the static tension, without losses [N m]."""
         return self.static_tension * self.drum_radius / self.winch.gearbox.ratio

@@ -53,6 +53,15 @@ def remarks(case: Contents) -> Iterator[Finding]:
             f"{largest:g} rad is more than a turn: numbers are in radians, write '{largest:g} deg' "
             "for degrees",
         )
+    if case.limits.minimum_tension is not None and "weight_uncertainty" not in (
+        case.payload.model_fields_set
+    ):
+        yield (
+            "limits.minimum_tension",
+            f"{case.limits.minimum_tension / 1e3:.4g} kN holds at both ends of the rope, at the "
+            f"payload with {case.payload.weight_uncertainty:.3g} of its weight less; say "
+            "payload.weight_uncertainty",
+        )
     motor, drive = case.winch.motor, case.winch.drive
     if isinstance(motor, DCMotor):
         back_emf = motor.back_emf_constant * case.winch.speed_limit
@@ -107,10 +116,11 @@ def _static_limits(case: Contents) -> Iterator[Finding]:
             f"got {limits.rope_tension_peak / 1e3:.4g} kN",
         )
     if limits.minimum_tension is not None:
-        lowest = case.payload.submerged_weight / 1e3
+        payload, both = case.payload, limits.tension_ends == "both"
+        lowest = (payload.least_weight if both else payload.submerged_weight) / 1e3
         if limits.minimum_tension / 1e3 > lowest:
             yield (
                 "limits.minimum_tension",
-                f"must be at most the static tension at the payload, {lowest:.4g} kN, "
+                f"must be at most the least static tension at the payload, {lowest:.4g} kN, "
                 f"got {limits.minimum_tension / 1e3:.4g} kN",
             )

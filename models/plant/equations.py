@@ -128,30 +128,32 @@ def build_equations(
         tension.append(ca.fmax(0, whole))  # a rope does not push
     # What no mass carries (two thirds of the rope on one spring) hangs on the drum all the same.
     top = tension[0] + p["rope.submerged_weight_per_length"] * length * lumps.at_drum
-    acceleration = ca.SX(0)
+    acceleration = other = ca.SX(0)
+    load = p["payload.virtual_mass"]
     outside: Mapping[str, ca.SX] = {}
     for j, (shift, move) in enumerate(zip(displacement_names(n), _velocities(n), strict=True)):
         share = length * lumps.masses[j]
         weight = p["rope.submerged_weight_per_length"] * share
         mass = p["rope.mass_per_length"] * share
         below = tension[j + 1] if j + 1 < n else ca.SX(0)
-        other = ca.SX(0)
         if j + 1 == n:
             v, quadratic = velocity[-1], p["payload.quadratic_drag"]
-            mass += p["payload.virtual_mass"]
-            weight += p["payload.submerged_weight"]
             if surroundings is not None:
                 triples = zip(others[0::3], others[1::3], others[2::3], strict=True)
                 motions = dict(zip(moving, triples, strict=True))
                 around = surroundings.build(position[-1], velocity[-1], motions, p)
                 v, quadratic = around.relative_velocity, quadratic * around.drag_factor
-                mass += around.virtual_mass_change
+                load = load + around.virtual_mass_change
                 force, outside = force + around.force, around.outputs
             # Quadratic drag has no slope at rest: a linear plant gets its drag as a parameter.
             other = force - quadratic * ca.fabs(v) * v - p["payload.linear_drag"] * v
+            mass += load
+            weight += p["payload.submerged_weight"]
         acceleration = (tension[j] - below - weight + other) / mass
         xdot[shift] = velocity[j + 1]
         xdot[move] = acceleration
+    # What the payload hangs on: the rope in its mass is above that.
+    lower = ca.fmax(0, load * acceleration + p["payload.submerged_weight"] - other)
 
     motor = motor_equations(data, p, x_of, command)
     xdot |= motor.derivative
@@ -181,15 +183,15 @@ def build_equations(
         "motor.speed": speed,
         "motor.current": motor.current,
         "rope.tension": top,
+        "rope.lower_tension": lower,
     }
     if data.motor == "dc":
         z["motor.voltage"] = motor.applied
     if limits is not None or travel is not None or surroundings is not None:  # a simulation
-        slackest = tension[0]
-        for other_tension in tension[1:]:
+        slackest = lower
+        for other_tension in tension:
             slackest = ca.fmin(slackest, other_tension)
         z |= {
-            "rope.lower_tension": tension[-1],
             "rope.minimum_tension": slackest,
             "rope.length": length,
             "drive.applied": motor.applied,

@@ -84,6 +84,7 @@ def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) ->
         "motor.speed": s * angle,
         "motor.current": torque / data.torque_constant,
         "rope.tension": T_Y * top + T_F * force,
+        "rope.lower_tension": (data.payload_mass * s**2 + drag * s) * payload - force,
     }
     if data.motor == "dc":
         z["motor.voltage"] = command

@@ -40,7 +40,12 @@ class Limits(Section):
     exposure_time: Annotated[float, Quantity("time", 60.0, 1e8)] = 10800.0
     """Time for which most probable maxima are taken."""
     minimum_tension: Annotated[float, Quantity("force", 0.0, 1e9)] | None = None
-    """Smallest rope tension, so that the rope does not go slack."""
+    """Smallest rope tension, so that the rope does not go slack; by default a tenth of the least
+    submerged weight (after the criterion of DNV-RP-N103 for the wave zone, by analogy at the
+    load's end). At the payload the least weight counts."""
+    tension_ends: Literal["both", "drum"] = "both"
+    """Where `minimum_tension` holds: at both ends of the rope, or, as in older designs, at the drum
+    alone, whose share of the rope's weight hides a slack lower end, and only if it is given."""
     rope_tension_peak: Annotated[float, Quantity("force", 0.0, 1e9, open_low=True)] | None = None
     """Largest rope tension, such as the breaking load over a safety factor."""
     stroke: tuple[_Length, _Length] | None = None

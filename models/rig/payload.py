@@ -90,6 +90,9 @@ class Payload(Section):
     """Density of the water."""
     submerged_weight: Annotated[float, Quantity("force", 1.0, 1e9)]
     """Weight in water: what the rope's lower end carries at rest."""
+    weight_uncertainty: Annotated[float, Quantity("ratio", 0.0, 0.5)] = 0.05
+    """By how much of itself the submerged weight may be less than stated: a rope goes slack
+    first at its lower end, and first with the lightest load."""
     drag: Drag = StochasticDrag()
     """How quadratic drag is linearised for the design."""
 
@@ -123,6 +126,19 @@ class Payload(Section):
     def virtual_mass(self) -> float:
         """Mass and added mass [kg]."""
         return self.mass + self.hydrodynamic_mass
+
+    @property
+    def least_weight(self) -> float:
+        """Least submerged weight [N]."""
+        return self.submerged_weight * (1.0 - self.weight_uncertainty)
+
+    @property
+    def taut_tension(self) -> float:
+        """Tension that is to stay in the rope's lower end, a tenth of the least weight [N].
+
+        DNV-RP-N103 asks for it in a lift through the wave zone; here it is taken by analogy.
+        """
+        return 0.1 * self.least_weight
 
     @property
     def c_d(self) -> float:

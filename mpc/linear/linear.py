@@ -53,7 +53,7 @@ class LinearMPC(WinchMPC):
     * p, (N): payload's displacement [m]; r: what the operator asks for [m]
     * z, (N + 1): the hook's predicted displacement [m]
     * c, (2): estimated force on the payload [N], torque at the motor [N m]
-    * omega, F, u: motor speed [rad/s], tension at the drum [N], drive command
+    * omega, F, u: motor speed [rad/s], tension at the payload [N], drive command
     * tau_0, tau(omega): torque at rest; peak torque, or less at the power limit and where the
       motor's thermal budget is used up [N m]
     * rho: weight on the input [m2/(N m)2]; P, N_zeta: value function (`mpc.programme.regulator`)
@@ -83,8 +83,8 @@ class LinearMPC(WinchMPC):
     masses
         Masses along the rope; by default those of the case.
     minimum_tension
-        Least tension at the drum that is aimed at [N]; by default that of the case, else a tenth of
-        the static one.
+        Least tension at the payload that is aimed at [N], with its least weight; by default that of
+        the case, else a tenth of this weight.
     excursion
         Largest displacement of the payload that is aimed at [m]; by default none.
     torque_rate

@@ -59,7 +59,6 @@ _CLEAR = 1.5 * SPEED_BAND  # of the highest speed, kept clear of the drive's own
 _HORIZON, _PREVIEWED = 8.0, 14.0  # [s]
 _PROVED = 1e-6  # residual of the optimality conditions
 _IN_BAND = 3.0  # [rad/s]
-_LEAST = 0.1  # of the static tension, that is to stay in the rope
 _UNIT, _TORQUE = HEARD.index("mru.valid"), HEARD.index("motor.torque")
 _HEAVE, _RATE = HEARD.index("mru.heave"), HEARD.index("mru.heave_rate")
 
@@ -149,9 +148,9 @@ class WinchMPC(ABC):
             raise InputError(
                 f"{_OWNER}: blocking must be whole numbers of at least 1, got {blocks}"
             )
-        least = case.limits.minimum_tension if minimum_tension is None else minimum_tension
+        least = case.least_tension if minimum_tension is None else minimum_tension
         if least is None:
-            least = _LEAST * case.static_tension
+            least = case.payload.taut_tension
         check_range(_OWNER, "minimum_tension", least, low=0.0, unit="N")
         if deadline is not None:
             check_range(_OWNER, "deadline", deadline, low=0.0, unit="s", open_low=True)
@@ -294,7 +293,7 @@ def _soft_limits(
 ) -> dict[str, tuple[float, float]]:
     """Return the soft limits by signal, as deviations from rest: (lowest, highest)."""
     winch = model.winch
-    found = {"tension": (least - winch.rest_tension, math.inf)}
+    found = {"tension": (least - winch.case.payload.least_weight, math.inf)}
     if limits.speed < math.inf:
         top = (1.0 - _CLEAR) * limits.speed
         found["speed"] = (-top, top)

@@ -20,8 +20,8 @@ from models.basics import FloatArray
 from ..programme import Condensed, Horizon, LQRegulator, condense, end_of_record, free_outputs
 from ..winch import PredictionModel
 
-#: What may be limited: motor speed [rad/s], tension at the drum [N], payload [m], and the command's
-#: deviation from rest [unit of the command].
+#: What may be limited: motor speed [rad/s], tension at the payload [N], payload [m], and the
+#: command's deviation from rest [unit of the command].
 WATCHED = ("speed", "tension", "payload", "command")
 _FAINT = 1e-3  # error of the path, over the hook's rms, when the sea's state is told from it
 
@@ -137,6 +137,7 @@ def _rows(
     speed, tension = winch.speed @ S, winch.tension @ S
     here = horizon.ends(j).start
     tension[here : here + 2] += winch.tension_from_hook
+    tension[horizon.constants] += winch.tension_from_constants
     found = [("speed", speed), ("tension", tension), ("payload", winch.payload @ S)]
     if j < horizon.steps:
         command = winch.back * speed

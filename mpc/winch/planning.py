@@ -50,6 +50,7 @@ def plan_model(model: PredictionModel, stiffness: float) -> PredictionModel:
         from_constants=stiff.from_constants + (stiff.A - np.eye(stiff.size)) @ shift,
         tension=here.tension,
         tension_from_hook=here.tension_from_hook,
+        tension_from_constants=here.tension_from_constants,
     )
     A = np.array(other.A)
     at = model.constants_at.start

@@ -56,9 +56,9 @@ class SampledWinch(ReadOnlyArrays):
         (n, n), (n, 1), (n, 4), (n, 2).
     payload, velocity, speed, tension
         Rows of the payload's displacement [m] and velocity [m/s], the motor's speed [rad/s] and the
-        tension at the drum [N], of the state, (n,).
-    tension_from_hook
-        Share of (z, z') in the tension, (2,).
+        tension at the payload [N], of the state, (n,).
+    tension_from_hook, tension_from_constants
+        Shares of (z, z') and of the constants in that tension, (2,) each.
     force_felt
         What the payload's sensors show at once of a force on it, per newton, (3,).
     moved
@@ -90,6 +90,7 @@ class SampledWinch(ReadOnlyArrays):
     speed: FloatArray
     tension: FloatArray
     tension_from_hook: FloatArray
+    tension_from_constants: FloatArray
     force_felt: FloatArray
     moved: FloatArray
     gain: float
@@ -209,7 +210,8 @@ def sampled_winch(
     # Command and constant forces are held over a sample, which is exact; the hook is not.
     held = np.column_stack([plant.B[:, 0], plant.E[:, known["payload.force"]]])
     A, inputs = zero_order_hold(plant.A, held, T)
-    tension = rows["rope.tension"]
+    # A rope goes slack first at its lower end, which does not carry its weight.
+    tension, force = rows["rope.lower_tension"], known["payload.force"]
     return SampledWinch(
         case=case,
         data=data,
@@ -224,7 +226,8 @@ def sampled_winch(
         speed=speed,
         tension=plant.Cz[tension],
         tension_from_hook=plant.Fz[tension, hook],
-        force_felt=plant.F[: len(MEASUREMENTS), known["payload.force"]],
+        tension_from_constants=np.array([plant.Fz[tension, force], 0.0]),
+        force_felt=plant.F[: len(MEASUREMENTS), force],
         moved=_moved(plant, symbolic),
         gain=gain,
         back=back,

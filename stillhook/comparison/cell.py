@@ -359,6 +359,6 @@ def _broken(run: Run, settle: float) -> dict[str, float]:
     return {
         "speed": share("motor.speed", -speed, speed),
         "torque": share("motor.torque", -torque, torque),
-        "tension low": share("rope.minimum_tension", limits.minimum_tension, None),
+        "tension low": share("rope.minimum_tension", run.case.least_tension, None),
         "tension high": share("rope.tension", None, limits.rope_tension_peak),
     }

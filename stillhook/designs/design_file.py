@@ -270,11 +270,11 @@ class _Reader:
         return kind(**values)
 
     def case(self, data: Any, place: Place) -> Case:
-        """Return the case, checked like a case file of its own."""
+        """Return the case, checked like a case file of its own, with the physics that it had."""
         section = self.section(data, place)
         depth = len(place)
         lines = {path[depth:]: line for path, line in self.lines.items() if path[:depth] == place}
-        return Case.from_dict(section, source=self.source, lines=lines)
+        return Case.from_stored(section, source=self.source, lines=lines)
 
     def section(self, data: Any, place: Place) -> Mapping[str, Any]:
         if not isinstance(data, Mapping):

@@ -49,9 +49,10 @@ LIMITS: Mapping[str, tuple[str, str]] = {
     ),
     "motor.power.peak": ("motor power, peak", "winch.drive.power"),
     "rope.tension.peak": ("rope tension, largest", "limits.rope_tension_peak"),
-    "rope.tension.least": ("rope tension, least", "limits.minimum_tension"),
+    "rope.tension.least": ("rope tension at drum, least", "limits.minimum_tension"),
+    "rope.lower_tension.least": ("rope tension at load, least", "limits.minimum_tension"),
 }
-AT_LEAST = ("gain_margin_up", "delay_margin", "rope.tension.least")
+AT_LEAST = ("gain_margin_up", "delay_margin", "rope.tension.least", "rope.lower_tension.least")
 """Limits whose bound is the least value."""
 SHARES: Mapping[str, tuple[str, ...]] = {"sea": (HOOK,), "MRU": ("mru.error",), "noise": ()}
 """Which disturbances make up a share of a signal's variance, by its name; noise is the rest."""

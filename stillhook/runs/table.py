@@ -307,7 +307,7 @@ def _note(key: str, case: Case) -> str:
         "peak": (drive.torque_peak, "N m", "limit"),
         "power": (case.winch.power_limit, "W", "limit"),
         "tension": (limits.rope_tension_peak, "N", "limit"),
-        "least": (limits.minimum_tension, "N", "limit"),
+        "least": (case.least_tension, "N", "limit"),
     }
     if key == "stroke":
         return "" if stroke is None else f"stroke {stroke[0]:g} to {stroke[1]:g} m"

@@ -46,6 +46,7 @@ _LINES: dict[str, tuple[str, Any]] = {
     "motor.power.peak": ("#cc79a7", "-"),
     "rope.tension.peak": ("#444444", "-"),
     "rope.tension.least": ("#444444", (0, (5, 2))),
+    "rope.lower_tension.least": ("#444444", (0, (1, 1.2))),
     "stability": ("#000000", (0, (1, 1))),
 }
 _STEEP = "#9a9a9a"

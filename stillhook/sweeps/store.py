@@ -132,7 +132,7 @@ def stored_question(store: str | Path) -> tuple[TimeQuestion, Draw]:
     path, _ = places_of(store)
     header, source = question_in(path, _WHAT), str(path)
     try:
-        case = Case.from_dict(header["case"], source=source)
+        case = Case.from_stored(header["case"], source=source)
         recipe = recipe_from(header["controller"])
         asked = {name: header[name] for name in _QUESTION}
         spread = Spread.from_dict(header["spread"], source=source).on(case, recipe.gains)

@@ -6,8 +6,9 @@ r"""Best possible for a case, or beside a design on its own terms: `bound_for`.
       -> `youla_design` -> `high_order`: the best found within the M_s
 
 Everything is put on the side that makes the bound lower: peaks become limits on the rms with the
-smallest k = sqrt(2 ln(T/T_z)) that is plausible, limits on power and on the loop's margins are
-left out, and what a case calls an exact sensor has only a faint, stated noise.
+smallest k = sqrt(2 ln(T/T_z)) that is plausible, limits on power, on the tension at the load and
+on the loop's margins are left out, and what a case calls an exact sensor has only a faint, stated
+noise.
 
 A design is above its bound by construction: both live on one plant with one linear drag and are
 shaken by the same spectra.  So that a direct gain on white noise has a variance, the design's law
@@ -41,7 +42,16 @@ from models.hook import HookMotion
 from models.plant import MAX_MASSES, LinearPlant, PlantData
 from models.sensing import ENCODER, MEASURED, aboard, sensed_line_at, sensed_plant, sensed_spectra
 
-from ..limits import Continuous, Limit, LowFrequency, Minimum, Peak, Rms, RollOff
+from ..limits import (
+    LOWER_TENSION,
+    Continuous,
+    Limit,
+    LowFrequency,
+    Minimum,
+    Peak,
+    Rms,
+    RollOff,
+)
 from ..loop import (
     Assessment,
     Disturbance,
@@ -526,7 +536,8 @@ def _terms(question: DesignQuestion, heard: Sequence[str], drag: float, faint: f
         masses=question.masses,
         drag=drag,
         faint=faint,
-        limits=rms_limits(question.limits, period),
+        # A force on the payload is felt there at once, and what is white then has no variance.
+        limits=rms_limits([x for x in question.limits if LOWER_TENSION not in x.outputs], period),
         said=(
             f"heard: {', '.join(name for name in MEASURED if name in heard)}",
             f"drag {drag:.4g} N s/m; {question.masses} rope masses",

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .case_limits import HOOK, PAYLOAD, drive_limits, loop_limits, modelled_bandwidth
+    from .case_limits import (
+        HOOK,
+        LOWER_TENSION,
+        PAYLOAD,
+        drive_limits,
+        loop_limits,
+        modelled_bandwidth,
+    )
     from .frequency_limits import (
         DiskMargin,
         LowFrequency,

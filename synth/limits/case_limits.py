@@ -18,6 +18,7 @@ from .signal_limits import Breakdown, Continuous, Minimum, Peak, Power, Thermal
 
 PAYLOAD = "payload.displacement"
 HOOK = "hook.heave"
+LOWER_TENSION = "rope.lower_tension"
 _HELD = 0.05  # a rope mode within this share of its exact frequency counts as modelled
 
 
@@ -99,7 +100,13 @@ def drive_limits(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
             )
         )
     add(Peak, "rope.tension", wanted.rope_tension_peak, duration=time)
-    add(Minimum, "rope.tension", wanted.minimum_tension, duration=time)
+    least = case.least_tension
+    add(Minimum, "rope.tension", least, duration=time)
+    if least is not None and wanted.tension_ends == "both":
+        lightest = case.payload.least_weight
+        limits.append(
+            Minimum(bound=least, output=LOWER_TENSION, static=lightest, duration=time, unit="N")
+        )
     _check_static(case, limits)
     return tuple(limits)
 

@@ -106,7 +106,8 @@ def payload_criteria(
 def case_criteria(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
     """Return the limits of motor, drive and rope of a case, whether it enforces them or not.
 
-    A rope without a stated least tension must not go slack at the drum: its bound is zero.
+    Where the least tension is no limit (`limits.tension_ends` is ``drum`` and none is given), the
+    rope must not go slack at the drum: its bound is zero.
 
     Parameters
     ----------

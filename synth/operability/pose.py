@@ -9,13 +9,13 @@ from models.basics import InputError, SolverError
 from models.case import Case
 
 from ..design import Design
-from ..limits import Limit
+from ..limits import LOWER_TENSION, Limit
 from ..loop import Assessment
 from ..question import HOOK, PAYLOAD, DesignQuestion, Values, on_enough_masses, pose
 from .criteria import Stability, case_criteria, outputs_of
 from .systems import VELOCITY, HeldSystem, LoopSystem, PerfectSystem, System
 
-_HELD = {PAYLOAD, VELOCITY, "rope.tension"}
+_HELD = {PAYLOAD, VELOCITY, "rope.tension", LOWER_TENSION}
 _WINCH = ("motor.torque", "motor.speed", "motor.current", "motor.voltage")
 
 

@@ -22,6 +22,7 @@ from models.basics import ComplexArray, FloatArray, Quadrature
 from models.plant import LinearPlant, PlantData
 from models.rig import MRU
 
+from ..limits import LOWER_TENSION
 from ..loop import (
     Assessment,
     Disturbance,
@@ -157,7 +158,13 @@ class HeldSystem(System):
     def transfers(self, omega: FloatArray) -> ComplexArray:
         s = 1j * omega.astype(np.complex128)
         P_Y, P_F, T_Y, T_F = held_transfers(self.data, s, self.reference)
-        rows = {PAYLOAD: (P_Y, P_F), VELOCITY: (s * P_Y, s * P_F), "rope.tension": (T_Y, T_F)}
+        D = self.data.payload_mass * s**2 + self.reference * s
+        rows = {
+            PAYLOAD: (P_Y, P_F),
+            VELOCITY: (s * P_Y, s * P_F),
+            "rope.tension": (T_Y, T_F),
+            LOWER_TENSION: (D * P_Y, D * P_F - 1.0),
+        }
         return np.array([rows[z] for z in (*self.outputs, VELOCITY)])
 
     @override

@@ -37,6 +37,7 @@ from models.basics import ComplexArray, FloatArray, IndexArray, White
 from models.plant import RopeLumps
 from models.sensing import SAMPLE_TIME
 
+from ..limits import LOWER_TENSION, PAYLOAD
 from ..loop import Dual, exp, squared, value_of, where
 from .law_rows import LawColumns
 from .numbers import Numbers, at_rows, part_of
@@ -323,6 +324,7 @@ class Chain:
         right = _both(nodes.sea if shaken.ratios is None else nodes.weights, nodes.omega)
         heave = inverse if shaken.ratios is None else inverse * part_of(shaken.ratios, self.rows)
         factors = at_rows(shaken.factors, self.rows)
+        hung = (self._own("payload_mass") * self.s + drag[:, None]) * self.s
         sources = [(heave, right, factors, self._of_heave())]
         if shaken.noisy:
             white = inverse * self.noise(shaken.heave_rms)
@@ -333,8 +335,9 @@ class Chain:
                 sources.append((density * self.coherent, right, factors, self._of_noise()))
         found = {}
         for name in outputs:
+            own, times = (PAYLOAD, abs2(hung)) if name == LOWER_TENSION else (name, 1.0)
             parts = [
-                ((abs2(_sum_of(numerators[name], y, f)) * density) @ weights) * factor
+                ((abs2(_sum_of(numerators[own], y, f)) * (times * density)) @ weights) * factor
                 for density, weights, factor, numerators in sources
             ]
             found[name] = sum(parts[1:], start=parts[0])

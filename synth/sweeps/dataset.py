@@ -95,7 +95,7 @@ def _header(design: Design, spread: Spread) -> dict[str, Any]:
 def spread_of(dataset: xr.Dataset) -> Spread:
     """Return the spread of a dataset, on its case."""
     header = _question(dataset)
-    case = Case.from_dict(header["case"], source="dataset")
+    case = Case.from_stored(header["case"], source="dataset")
     if header["spread"] is not None:
         found = Spread.from_dict(header["spread"], source="dataset")
     else:

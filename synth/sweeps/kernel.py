@@ -84,6 +84,7 @@ class SpringLoops:
             "drive.command": lambda: product(W, heard),
             "motor.voltage": lambda: product(W, heard),
             "rope.tension": lambda: product(D, moved),
+            "rope.lower_tension": lambda: product([zero, loops.drag, n["payload_mass"]], moved),
         }
 
     def __len__(self) -> int:

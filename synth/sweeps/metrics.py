@@ -10,6 +10,7 @@ import numpy as np
 from models.basics import FloatArray, InputError
 from models.casefile import suggestion
 
+from ..limits import LOWER_TENSION
 from .design_rows import SolvedRows
 
 DEFAULT = ("payload_rms", "residual", "torque_rms", "speed_rms", "max_sensitivity")
@@ -62,6 +63,10 @@ _ROWS = (
      "most probable largest tension at the drum in the exposure time"),
     ("tension_least", "N", "rope.tension", "least",
      "most probable smallest tension at the drum in the exposure time"),
+    ("lower_tension_rms", "N", LOWER_TENSION, "rms",
+     "standard deviation of the rope's tension at the payload"),
+    ("lower_tension_least", "N", LOWER_TENSION, "least",
+     "most probable smallest tension at the payload, of its least weight, in the exposure time"),
     ("payload_period", "s", "payload.displacement", "period",
      "mean zero-crossing period of the payload's motion"),
     ("max_sensitivity", "1", "", "loop", "largest sensitivity M_s of the loop"),

@@ -33,7 +33,7 @@ _NEWTON = 30
 
 # Paths that nothing of a case's plant depends on.
 _ELSEWHERE = ("sea.", "vessel.", "limits.", FAULTS, GAINS, DRAG)
-# What the other sensors are made of, by path.
+# What the other sensors are made of, and how sure the weight is, by path.
 _SENSED = {
     "acceleration_noise": "sensors.payload.acceleration_noise",
     "velocity_noise": "sensors.payload.velocity_noise",
@@ -51,6 +51,7 @@ _SENSED = {
     "mru_delay": "sensors.mru.delay",
     "cell_bandwidth": "sensors.load_cell.bandwidth",
     "cell_noise": "sensors.load_cell.noise_fraction",
+    "weight_uncertainty": "payload.weight_uncertainty",
 }
 NOISE_OF = {
     "payload.acceleration": ("acceleration_noise",),
@@ -126,6 +127,7 @@ def at_rest(numbers: Numbers) -> dict[str, FloatArray]:
     current = torque / numbers["torque_constant"]
     return {
         "rope.tension": tension,
+        "rope.lower_tension": numbers["payload_weight"] * (1.0 - numbers["weight_uncertainty"]),
         "motor.torque": torque,
         "motor.current": current,
         "motor.voltage": current * numbers["resistance"],

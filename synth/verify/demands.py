@@ -28,6 +28,8 @@ VELOCITY = "payload.velocity"
 HOOK = "hook.heave"
 
 _TORQUE, _SPEED, _TENSION = "motor.torque", "motor.speed", "rope.tension"
+_AT_LOAD = "rope.lower_tension"
+_TAUT = 0.1  # of the least weight, where no least tension is stated
 _POWER = "motor.power.peak"
 _MARGINS = ("max_sensitivity", "gain", "gain_down", "delay", "disk")
 _POLES = ("decay", "damping", "frequency")
@@ -253,6 +255,10 @@ def case_demands(case: Case, data: PlantData, plant: LinearPlant, masses: int) -
     thermal = f"{_TORQUE}.continuous" if math.isfinite(winch.cooled_speed) else ""
     breakdown = f"{_TORQUE}.breakdown"
     special = {_POWER: "power", thermal: "thermal", breakdown: "breakdown"}
+    least, both = wanted.minimum_tension, wanted.tension_ends == "both"
+    lightest = (1.0 - case.payload.weight_uncertainty) * case.payload.submerged_weight
+    if both and least is None:
+        least = _TAUT * lightest
     bounds = {
         f"{_TORQUE}.peak": drive.torque_peak,
         f"{_TORQUE}.continuous": drive.torque_continuous,
@@ -263,7 +269,8 @@ def case_demands(case: Case, data: PlantData, plant: LinearPlant, masses: int) -
         _POWER: winch.power_limit,
         breakdown: winch.breakdown_limit / winch.cooled_speed**2,
         f"{_TENSION}.peak": wanted.rope_tension_peak,
-        f"{_TENSION}.least": wanted.minimum_tension,
+        f"{_TENSION}.least": least,
+        f"{_AT_LOAD}.least": least if both else None,
     }
     for name, bound in bounds.items():
         if bound is None or not math.isfinite(bound):
@@ -277,7 +284,7 @@ def case_demands(case: Case, data: PlantData, plant: LinearPlant, masses: int) -
                 bound=bound,
                 enforced=wanted.drive == "enforce",
                 outputs=outputs,
-                static=float(plant.static[outputs[0]]),
+                static=lightest if signal == _AT_LOAD else float(plant.static[outputs[0]]),
                 duration=wanted.exposure_time,
                 base_speed=winch.cooled_speed,
             )

@@ -159,10 +159,13 @@ def _winch(case: Case, hook: HookMotion) -> Rows:
     fastest = hook.velocity.most_probable_maximum(case.limits.exposure_time)
     tension = case.limits.rope_tension_peak
     allowed = "" if tension is None else f"{percent(case.static_tension / tension)} of what it may"
+    least = case.least_tension
+    taut = "" if least is None else f"{quantity(least, 'N')} are to stay in the rope"
     kind = "DC" if winch.motor.type == "dc" else "AC"
     return [
         ("drum radius", quantity(case.drum_radius, "m"), "to the rope's centre, rope paid out"),
         ("static rope tension", quantity(case.static_tension, "N"), allowed),
+        ("... at the load, least", quantity(case.payload.least_weight, "N"), taut),
         (
             "static motor torque",
             quantity(torque, "N m"),

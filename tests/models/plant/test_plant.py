@@ -292,6 +292,7 @@ def test_names_are_the_public_ones() -> None:
         "motor.speed",
         "motor.current",
         "rope.tension",
+        "rope.lower_tension",
     )
     assert build_plant(THESIS).outputs[-1] == "motor.voltage"
     np.testing.assert_array_equal(plant.E[:, 3], plant.B[:, 0])

@@ -250,7 +250,7 @@ def test_limits_say_which_way_they_bind_and_what_they_cost():
     assert rows["sensitivity peak M_s"][-1] == "broken"
     assert rows["motor speed, peak"][-1] == "reported"
     assert "|P/Z| up to 0.01 rad/s" in rows
-    assert [row[3].enforced for row in table.rows] == [True] * 2 + [False] * 6
+    assert [row[3].enforced for row in table.rows] == [True] * 2 + [False] * 8
     use = dataclasses.replace(design.limits["max_sensitivity"], use=1.0, value=2.0, price=4.16e-4)
     least = dataclasses.replace(
         use, name="rope.tension.least", value=50e3, bound=42e3, unit="N", use=0.9, price=1e-9
@@ -258,7 +258,7 @@ def test_limits_say_which_way_they_bind_and_what_they_cost():
     both = dataclasses.replace(design, limits={use.name: use, least.name: least})
     dear, tension = texts_of(limit_table(both))
     assert dear[-1] == "0.42 mm"
-    assert tension == ["rope tension, least", "50.0 kN", "≥ 42.0 kN", "90.0 %", ""]
+    assert tension == ["rope tension at drum, least", "50.0 kN", "≥ 42.0 kN", "90.0 %", ""]
     priced = [row["price"] for row in json_data(limit_table(both))["rows"]]
     assert priced == [4.16e-4, None]  # a price of a nanometre is noise
 
