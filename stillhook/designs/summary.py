@@ -63,6 +63,7 @@ _INSTRUMENTS: Mapping[str, set[str]] = {
     "encoder": {"drum", "motor"},
 }
 """Instruments by what their signals' names begin with."""
+_SIGNALS = {"rope.tension": "rope tension at drum", "rope.lower_tension": "rope tension at load"}
 _PRICED = 1e-5  # a price below this share of the payload's rms is noise of the solver
 
 
@@ -205,10 +206,14 @@ def share_table(design: Design) -> Table | None:
         return None
     heads = columns("signal=share of the variance of" + "".join(f"; {n} [%]" for n in SHARES))
     rows = [
-        (signal.replace(".", " ").replace("_", " "), *(share_of(design, n, signal) for n in SHARES))
+        (_signal(signal), *(share_of(design, n, signal) for n in SHARES))
         for signal in design.shares
     ]
     return Table(columns=heads, rows=rows)
+
+
+def _signal(name: str) -> str:
+    return _SIGNALS.get(name, name.replace(".", " ").replace("_", " "))
 
 
 def share_of(design: Design, name: str, signal: str = PAYLOAD) -> float:

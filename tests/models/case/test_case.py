@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from models import InputError, PhysicsWarning, bundled_cases, load_case, write_text_atomically
+from models import Case, InputError, PhysicsWarning, bundled_cases, load_case, write_text_atomically
 from models.casefile import read_yaml, yaml_text
 from models.rig.payload import StochasticDrag
 
@@ -353,3 +353,34 @@ def toml_text(tree, prefix=""):
 def test_a_field_of_the_drum_is_changed_by_its_path():
     crane = load_case("subsea-crane").variant({"winch.drum.geometry.core_diameter": 2.01})
     assert crane.winch.drum.geometry.core_diameter == 2.01
+
+
+def test_a_rope_is_tight_by_a_tenth_of_the_least_weight_unless_told_otherwise():
+    case = load_case("subsea-crane")
+    weight = case.payload.submerged_weight
+    assert case.payload.least_weight == pytest.approx(0.95 * weight)
+    assert case.least_tension == pytest.approx(0.095 * weight)
+    sure = case.replace({"payload.weight_uncertainty": 0.0})
+    assert sure.least_tension == pytest.approx(0.1 * weight)
+    assert case.replace({"limits.minimum_tension": "42 kN"}).least_tension == 42e3
+    assert case.replace({"limits.tension_ends": "drum"}).least_tension is None
+
+
+def test_a_stored_case_keeps_the_meaning_that_it_had():
+    data = load_case("subsea-crane").to_dict()
+    del data["limits"]["tension_ends"], data["payload"]["weight_uncertainty"]
+    assert Case.from_dict(data).limits.tension_ends == "both"
+    assert Case.from_stored(data).limits.tension_ends == "drum"
+    assert Case.from_stored(load_case("subsea-crane").to_dict()).limits.tension_ends == "both"
+
+
+def test_a_file_whose_least_tension_has_a_new_meaning_says_so(tmp_path):
+    data = load_case("subsea-crane").to_dict()
+    data["limits"]["minimum_tension"] = 42e3
+    path = tmp_path / "mine.yaml"
+    path.write_text(Case.from_dict(data).to_yaml(), encoding="utf-8")
+    load_case(path)  # which names the uncertainty
+    del data["payload"]["weight_uncertainty"]
+    path.write_text(yaml_text(data), encoding="utf-8")
+    with pytest.warns(PhysicsWarning, match="42 kN holds at both ends of the rope"):
+        load_case(path)

@@ -259,8 +259,8 @@ WRONG = {
     ),
     "slack limit above the static load": (
         ("sea:", "limits:\n  minimum_tension: 430 kN\nsea:"),
-        "my.yaml:4: limits.minimum_tension: must be at most the least static tension at the payload, "
-        "400.6 kN, got 430 kN",
+        "my.yaml:4: limits.minimum_tension: must be at most the least static tension at the "
+        "payload, 400.6 kN, got 430 kN",
     ),
     "stroke without the place where the load hangs": (
         ("sea:", "limits:\n  stroke: [1 m, 3 m]\nsea:"),

@@ -179,3 +179,28 @@ def test_takes_a_case() -> None:
     wanted = line_response(PlantData.from_case(case), [0.5j, 1.0j], drag=3e3)
     np.testing.assert_array_equal(r.zw, wanted.zw)
     assert r.disturbances == ("hook.heave", "payload.force", "drive.set_point")
+
+
+@every_variant
+def test_the_tension_at_the_payload_is_what_its_inertia_and_drag_ask_for(data: PlantData) -> None:
+    s, drag = 1j * np.linspace(0.05, 15.0, 60), 3e3
+    asked = data.payload_mass * s**2 + drag * s
+    for found, near in (
+        (line_response(data, s, drag=drag), 1e-12),
+        (build_plant(data, masses=1).linearise(drag=drag).response_at(s), 1e-9),
+        (build_plant(data, masses=9).linearise(drag=drag).response_at(s), 1e-8),
+    ):
+        low, moved = (
+            found.outputs.index(n) for n in ("rope.lower_tension", "payload.displacement")
+        )
+        for blocks, names in ((found.zw, found.disturbances), (found.zu, found.inputs)):
+            for k, name in enumerate(names):
+                wanted = asked * blocks[:, moved, k] - (name == "payload.force")
+                np.testing.assert_allclose(blocks[:, low, k], wanted, rtol=near, atol=near)
+
+
+def test_the_tension_at_the_payload_leaves_the_ropes_weight_out() -> None:
+    for masses in (1, 4, 40):
+        static = build_plant(load_case("subsea-crane"), masses=masses).linearise(drag=1e4).static
+        assert static["rope.lower_tension"] == pytest.approx(421.7e3, rel=1e-9)
+        assert static["rope.tension"] > 1.2 * static["rope.lower_tension"]

@@ -53,9 +53,11 @@ def simulated_cost(controller: LinearMPC, chi: np.ndarray, v: np.ndarray) -> tup
     over = model.A[model.sea_at, model.sea_at]
     cost, seen = 0.0, {}
     steady = winch.steady @ c
+    of_force = winch.tension_from_constants @ c
     for j in range(p.steps):
         seen["speed", j] = winch.speed @ x
-        seen["tension", j] = winch.tension @ x + winch.tension_from_hook @ (shown @ sea)
+        feed = winch.tension_from_hook @ (shown @ sea)
+        seen["tension", j] = winch.tension @ x + feed + of_force
         seen["command", j] = winch.back * (winch.speed @ x) + d[j] / winch.gain
         after = over @ sea
         ends = np.concatenate([shown @ sea, shown @ after])
@@ -65,7 +67,9 @@ def simulated_cost(controller: LinearMPC, chi: np.ndarray, v: np.ndarray) -> tup
         if j + 1 < p.steps:
             cost += (winch.payload @ x) ** 2
     seen["speed", p.steps] = winch.speed @ x
-    seen["tension", p.steps] = winch.tension @ x + winch.tension_from_hook @ (shown @ sea)
+    seen["tension", p.steps] = (
+        winch.tension @ x + winch.tension_from_hook @ (shown @ sea) + of_force
+    )
     zeta = np.concatenate([sea, c])
     cost += x @ weights.P @ x + 2.0 * x @ weights.N @ zeta
     return cost / p.cost, seen
@@ -341,6 +345,16 @@ def test_a_load_of_another_weight_is_held_in_its_place(weight):
     # counted from where it hangs at rest, it is the tension that is more than expected
     found = controller.estimator.state[controller.model.constants_at][3]
     assert found == pytest.approx((weight - 1.0) * weight_of, rel=0.05)
+
+
+def test_the_rope_is_to_stay_tight_at_the_payload_with_its_least_weight():
+    controller = controller_of("subsea-crane", 0.5)
+    payload, winch = controller.case.payload, controller.model.winch
+    low, high = controller.soft_limits["tension"]
+    assert low == pytest.approx(-0.9 * 0.95 * payload.submerged_weight)
+    assert high == math.inf
+    # Where all moves together no piece of rope is stretched: the load alone pulls, by its drag.
+    assert abs(winch.tension @ winch.moved[:, 0]) < 1e-3
 
 
 def test_a_load_is_lowered_as_it_is_asked():

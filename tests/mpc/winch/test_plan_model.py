@@ -106,8 +106,9 @@ def test_what_rests_for_the_estimator_rests_for_the_plan(name):
             ahead = winch.A @ state + winch.B[:, 0] * torque + amount * winch.from_constants[:, k]
             assert ahead / size == pytest.approx(state / size, abs=1e-8)
         assert there.steady[k] == pytest.approx(here.steady[k], rel=1e-6)
-    # what pulls at the load pulls at the drum
-    assert abs(float(here.tension @ here.resting[:, 0])) == pytest.approx(1.0, rel=1e-6)
+    # what pulls at the load pulls at the rope's lower end
+    pulled = float(here.tension @ here.resting[:, 0]) + here.tension_from_constants[0]
+    assert pulled == pytest.approx(-1.0, rel=1e-6)
 
 
 def test_a_plan_on_the_rope_that_is_there_is_the_model_itself():

@@ -112,9 +112,11 @@ def test_a_file_of_gains_of_the_first_format_is_read():
     back = sh.load_design(Path(__file__).parent / "format_1_gains.yaml")
     new = thesis_design()
     assert (back.structure, back.parameters) == (new.structure, new.parameters)
-    assert back.case == new.case
+    # It was made when no limit on tension was there but a stated one, at the drum.
+    assert back.case == new.case.replace({"limits.tension_ends": "drum"})
     assert back.payload_rms == pytest.approx(new.payload_rms, rel=1e-9)
-    assert back.limits.keys() == new.limits.keys()
+    since = {"rope.tension.least", "rope.lower_tension.least"}
+    assert back.limits.keys() == new.limits.keys() - since
     assert back.shares == {}
     assert back.verify().ok
 

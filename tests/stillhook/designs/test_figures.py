@@ -145,7 +145,7 @@ def test_bars_are_the_uses_and_say_value_and_bound():
     texts = [text.get_text() for text in axes.texts]
     assert "5.15  (≤ 2.00)   257 % ▸" in texts
     assert "1678 rpm  (≤ 1200 rpm)" in texts
-    assert [bar.get_hatch() for bar in axes.patches] == [None] * 2 + ["///"] * 6
+    assert [bar.get_hatch() for bar in axes.patches] == [None] * 2 + ["///"] * 8
 
 
 def test_findings_of_limits():

@@ -162,3 +162,34 @@ def test_a_gain_that_fades_away_along_a_valley_has_arrived() -> None:
     found = sh.optimise_gains(case, structure="feed-forward", starts=1)
     assert found.ok
     assert found.payload_rms < 0.21e-3
+
+
+LIGHT = {
+    "payload.mass": 8e3,
+    "payload.added_mass": 30e3,
+    "payload.submerged_weight": 60e3,
+    "rope.length": 2000.0,
+    "winch.drum.rope_on_drum_total": 2500.0,
+}
+
+
+@pytest.mark.ci
+def test_a_light_deep_load_hangs_on_a_tight_rope_or_is_not_ok() -> None:
+    # Its drum has 165 kN of rope to carry and more, while the load's end goes slack.
+    case = load_case("subsea-crane").replace({**LIGHT, "sea.significant_height": 2.3})
+    taut = case.replace({"limits.minimum_tension": "15 kN"})
+    design = optimise_gains(taut, "feed-forward", starts=2, seed=0)
+    lower = design.limits["rope.lower_tension.least"]
+    assert design.ok
+    assert lower.use == pytest.approx(1.0, abs=1e-6)
+    assert lower.price > 0.0
+    assert design.limits["rope.tension.least"].use < 0.5
+    assert design.verification is not None
+    assert design.verification.ok
+    checked = {check.name for check in design.verification.checks}
+    assert {"limits.rope.lower_tension.least", "rope.rope.lower_tension.least"} <= checked
+    # The same gains in a higher sea keep the drum's limit alone.
+    for ends, kept in (("both", False), ("drum", True)):
+        higher = taut.replace({"sea.significant_height": 2.6, "limits.tension_ends": ends})
+        found = evaluate_gains(higher, design.parameters, structure="feed-forward")
+        assert found.drive_kept is kept

@@ -165,6 +165,8 @@ def test_the_tension_of_the_held_drum_carries_mass_and_drag_of_the_payload() -> 
     s = 1j * omega
     pulled = (mass * s**2 + asked.held.reference * s) * rows["payload.displacement"]
     assert rows["rope.tension"] == pytest.approx(pulled, rel=1e-9)
+    own = pulled - data.rope_mass * s**2 * rows["payload.displacement"]  # the rope is above it
+    assert rows["rope.lower_tension"] == pytest.approx(own, rel=1e-9)
 
 
 def test_the_makers_lines_are_those_of_the_sheet() -> None:
@@ -580,8 +582,12 @@ def test_every_limit_of_the_case_is_among_the_criteria_and_slack_always() -> Non
     case = load_case("thesis-1975")
     names = {c.name for c in case_criteria(case, pose(case).plant)}
     assert {"motor.torque.peak", "motor.voltage.peak", "rope.tension.least"} <= names
-    slack = next(c for c in case_criteria(case, pose(case).plant) if c.name.endswith("least"))
-    assert slack.bound == 0.0
+    ends = [c for c in case_criteria(case, pose(case).plant) if c.name.endswith("least")]
+    assert [c.outputs for c in ends] == [("rope.tension",), ("rope.lower_tension",)]
+    assert [c.bound for c in ends] == [pytest.approx(0.095 * case.payload.submerged_weight)] * 2
+    old = case.replace({"limits.tension_ends": "drum"})
+    (slack,) = [c for c in case_criteria(old, pose(old).plant) if c.name.endswith("least")]
+    assert (slack.outputs, slack.bound) == (("rope.tension",), 0.0)
 
 
 def combined_design() -> Design:

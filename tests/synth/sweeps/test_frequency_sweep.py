@@ -64,6 +64,7 @@ OUTPUTS = {
     "speed_rms": "motor.speed",
     "haul_rms": "drum.haul",
     "tension_rms": "rope.tension",
+    "lower_tension_rms": "rope.lower_tension",
     "current_rms": "motor.current",
 }
 
