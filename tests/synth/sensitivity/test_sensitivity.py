@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from designs import THESIS_GAINS, thesis_design, unstable_design
+from designs import THESIS_GAINS, structure_design, thesis_design, unstable_design
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -227,3 +227,22 @@ def test_a_corner_has_two_slopes_and_a_step_has_none():
         assert pair[0][1] == pytest.approx(slope, rel=1e-8)
     with pytest.raises(StepError):
         sided_derivatives(lambda x: np.log([x + 0.1 * (x > 2.0)]), 2.0)
+
+
+@pytest.mark.ci
+def test_errors_of_a_reference_unit_have_the_slopes_of_their_differences():
+    stated = {"gain_error": 0.02, "phase_error": 0.03, "drift": 0.03, "drift_period": 150.0}
+    stated |= {"noise": 1e-4, "bandwidth": 40.0}
+    changes = {"limits.drive": "report", "rope.masses": 5, "sensors.mru": stated}
+    case = sh.load_case("subsea-crane").replace(changes)
+    gains = {"drum.position_gain": 0.1, "heave.gain": 0.98, "heave.lead": 0.66}
+    gains["heave.bandwidth"] = 1.4173
+    design = structure_design(case, "feed-forward", gains)
+    found = {e.path: e.payload_rms for e in sensitivity(design).elasticities}
+    for name, value in stated.items():
+        moved = [{f"sensors.mru.{name}": value * factor} for factor in (0.999, 1.001)]
+        low, high = (
+            structure_design(case.replace(own), "feed-forward", gains).payload_rms for own in moved
+        )
+        slope = np.log(high / low) / np.log(1.001 / 0.999)
+        assert found[f"sensors.mru.{name}"] == pytest.approx(slope, rel=1e-3, abs=1e-6), name
