@@ -21,7 +21,7 @@ from ..basics import GRAVITY, InputError, PhysicsWarning
 from ..case import Case
 from ..casefile import Quantity
 from ..hook import Encounter, HookMotion
-from ..plant import Deck, Seabed, SplashZone, Surroundings
+from ..plant import Deck, PlantData, Seabed, SplashZone, Surroundings
 from ..vessel import HeaveRao
 from .excitation import HOOK, SECOND_BODY, MotionSource, SpectrumMotion
 from .options import (
@@ -65,12 +65,17 @@ def _landing(_: Case, values: Values) -> dict[str, Any]:
 def _lift_off(case: Case, values: Values) -> dict[str, Any]:
     weight = weight_in_air(case)
     # The rope carries nothing at the start: the drum has let out its stretch, and the slack.
-    stretch = weight * values["rope"] / case.rope.ea
+    stretch = weight * values["rope"] / _slow_stiffness(case, values)
     return {
         **moving(move(values, values["height"])),
         "initial_haul": -(stretch + values["slack"]),
         **_on_deck(case, values, -weight / values["stiffness"]),
     }
+
+
+def _slow_stiffness(case: Case, values: Values) -> float:
+    """Return EA of the rope of a scenario at rest [N]."""
+    return PlantData.from_case(case.replace({"rope.length": values["rope"]})).slow_stiffness
 
 
 def _set_down(case: Case, values: Values) -> dict[str, Any]:
@@ -116,7 +121,7 @@ def _splash(case: Case, values: Values) -> dict[str, Any]:
         "surroundings": surroundings,
         "motions": {"surface": surface_motion(case, payload_side(case))},
         # Hauled in by what the rope stretches more under the weight in air, so that P is 0.
-        "initial_haul": -surroundings.rest_force * values["rope"] / case.rope.ea,
+        "initial_haul": -surroundings.rest_force * values["rope"] / _slow_stiffness(case, values),
         "case_changes": {"rope.length": values["rope"]},
     }
 

@@ -23,7 +23,15 @@ if TYPE_CHECKING:
     from .plant_data import PlantData, masses_for_bandwidth
     from .resolvent import Resolvent, Transfer
     from .response import PlantResponse
-    from .rope import MAX_MASSES, RopeLumps, fixed_top_modes, lump_rope, lumped_modes
+    from .rope import (
+        MAX_BRANCHES,
+        MAX_MASSES,
+        RopeLumps,
+        fixed_top_modes,
+        lump_rope,
+        lumped_modes,
+        zener_branches,
+    )
     from .shaping import ShapingFilter, controllable_form, fit_shaping_filter, sampled_density
     from .surroundings import Deck, Seabed, SplashZone, Surroundings
 else:

@@ -81,7 +81,7 @@ def build_equations(
 
     The arguments are those of `models.plant.plant.build_plant`.
     """
-    n = len(lumps.masses)
+    n, relaxing = len(lumps.masses), data.branches[1].size
     parameters = parameter_values(data)
     if limits is not None:
         parameters |= limits.parameters
@@ -124,8 +124,21 @@ def build_equations(
         rate = velocity[j] - velocity[j + 1]
         # A rope that has grown has the stretch of the static rope at its new stiffness.
         at_rest = hanging[j] if travel is None else hanging[j] * p["rope.length"] / length
-        whole = at_rest + k * (stretch + p["rope.damping_time"] * rate)
+        if relaxing:
+            # Every branch is a spring behind a damper that has moved by q: what is left of the
+            # stretch pulls too.
+            moved = [x_of[name] for name in _branch_names(j, relaxing)]
+            gains = [p[f"rope.branch_{b + 1}.gain"] for b in range(relaxing)]
+            pulled = [g * (stretch - q) for g, q in zip(gains, moved, strict=True)]
+            whole = at_rest + k * (stretch + sum(pulled[1:], start=pulled[0]))
+        else:
+            whole = at_rest + k * (stretch + p["rope.damping_time"] * rate)
         tension.append(ca.fmax(0, whole))  # a rope does not push
+        if relaxing:
+            # A slack piece is shorter than its ends are apart: by what leaves it no tension.
+            gained = (tension[j] - whole) / (k * (1 + sum(gains[1:], start=gains[0])))
+            for b, (name, q) in enumerate(zip(_branch_names(j, relaxing), moved, strict=True)):
+                xdot[name] = (stretch + gained - q) / p[f"rope.branch_{b + 1}.time"]
     # What no mass carries (two thirds of the rope on one spring) hangs on the drum all the same.
     top = tension[0] + p["rope.submerged_weight_per_length"] * length * lumps.at_drum
     acceleration = other = ca.SX(0)
@@ -241,6 +254,11 @@ def _velocities(n: int) -> list[str]:
     return [*(f"rope.{j + 1}.velocity" for j in range(n - 1)), "payload.velocity"]
 
 
+def _branch_names(piece: int, branches: int) -> list[str]:
+    """Return the states of a piece of hysteretic rope: how far the dampers have moved."""
+    return [f"rope.{piece + 1}.branch_{b + 1}.stretch" for b in range(branches)]
+
+
 def _state_names(data: PlantData, n: int) -> tuple[str, ...]:
     names = ["motor.angle", "motor.speed"]
     if data.motor == "dc" and data.inductance > 0.0:
@@ -248,6 +266,8 @@ def _state_names(data: PlantData, n: int) -> tuple[str, ...]:
     if data.motor == "ac" and not math.isinf(data.torque_bandwidth):
         names.append("motor.torque")
     names += [*displacement_names(n), *_velocities(n)]
+    for piece in range(n):
+        names += _branch_names(piece, data.branches[1].size)
     for stage, bandwidth in (
         ("sensor", data.sensor_bandwidth),
         ("telemetry", data.telemetry_bandwidth),
@@ -258,13 +278,20 @@ def _state_names(data: PlantData, n: int) -> tuple[str, ...]:
 
 
 def parameter_values(data: PlantData) -> dict[str, float]:
-    """Return the plant's parameters p by name, in their order."""
+    """Return the plant's parameters p by name, in their order.
+
+    The axial stiffness is that of a slow pull, EA_0; a hysteretic rope's branches have gains g_j
+    = k_j / k_0 on it (`PlantData.branches`).
+    """
+    slow, gains, times = data.branches
     values = {
-        "rope.axial_stiffness": data.axial_stiffness,
+        "rope.axial_stiffness": data.slow_stiffness,
         "rope.length": data.rope_length,
         "rope.mass_per_length": data.mass_per_length,
         "rope.submerged_weight_per_length": data.rope_weight,
         "rope.damping_time": data.damping_time,
+        **{f"rope.branch_{b + 1}.gain": float(k / slow) for b, k in enumerate(gains)},
+        **{f"rope.branch_{b + 1}.time": float(tau) for b, tau in enumerate(times)},
         "payload.virtual_mass": data.payload_mass,
         "payload.submerged_weight": data.payload_weight,
         "payload.quadratic_drag": data.quadratic_drag,
@@ -308,6 +335,7 @@ def _units(
 ) -> dict[str, str]:
     by_ending = {
         "displacement": "m",
+        "stretch": "m",
         "velocity": "m/s",
         "acceleration": "m/s2",
         "haul": "m",

@@ -1,6 +1,7 @@
 """Exact frequency responses of winch and load on a distributed rope, none of it lumped.
 
-The rope is the wave equation EA (1 + tau d/dt) u'' = m u_tt between the drum and the payload.
+The rope is the wave equation EA(s) u'' = m s^2 u between the drum and the payload, EA(s) being
+EA (1 + tau s) or the hysteretic law's (`PlantData.rope_modulus`).
 Its responses at a point s of the complex plane are closed forms; closed with the winch's own
 equations they give the same blocks, by the same names, as the lumped `LinearPlant`.  They are
 the yardstick for the lumping, and what the final verification evaluates on its contours: a
@@ -8,7 +9,7 @@ design that holds on the lumped rope only is not a design.
 
 For a rope of length L with payload equation D P = T_lower + F, D = M_1 s^2 + C s:
 
-    gamma = s L sqrt(m / (EA (1 + tau s))),   l = L / (EA (1 + tau s)),
+    gamma = s L sqrt(m / EA(s)),   l = L / EA(s),
     P     = (Y + l sinh(gamma)/gamma F) / (cosh(gamma) + D l sinh(gamma)/gamma),
     T_top = ((gamma sinh(gamma)/l + D cosh(gamma)) Y - F) / (the same denominator).
 
@@ -125,7 +126,7 @@ def rope_transfers(
     drag
         Equivalent linear drag coefficient C of the payload [N s/m].
     """
-    stiffness = data.axial_stiffness * (1.0 + s * data.damping_time)
+    stiffness = data.rope_modulus(s)
     compliance = data.rope_length / stiffness
     gamma = s * data.rope_length * np.sqrt(data.mass_per_length / stiffness)
     # All functions are even in gamma: take the root whose exponential does not grow.

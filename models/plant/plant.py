@@ -139,6 +139,11 @@ class Plant(Equations):
         start = np.zeros(nx)
         first = self.states.index(displacement_names(self.masses)[0]) - 1
         start[first : first + self.masses] = 0.5 * np.cumsum(stretch)
+        relaxed = [i for i, name in enumerate(self.states) if name.endswith(".stretch")]
+        # The branches of a hysteretic rope, piece by piece, have followed.
+        start[np.array(relaxed, dtype=np.intp) - 1] = np.repeat(
+            -0.5 * stretch, len(relaxed) // self.masses
+        )
         try:
             found = np.asarray(solver(x0=start, p=p)["x"], dtype=np.float64).ravel()
         except RuntimeError as error:  # whatever CasADi says, ours is the error the user sees

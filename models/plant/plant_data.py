@@ -8,13 +8,14 @@ that the symbolic plant, the exact rope and the tests share one flat list of num
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..basics import InputError, check_range
-from .rope import MAX_MASSES, fixed_top_modes, lump_rope, lumped_modes
+from ..basics import ComplexArray, FloatArray, InputError, check_range
+from .rope import MAX_MASSES, fixed_top_modes, lump_rope, lumped_modes, zener_branches
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 # crosses above 8 rad/s; five times that is what `masses: auto` holds until told better.
 DEFAULT_BANDWIDTH = 40.0  # [rad/s]
 MODE_TOLERANCE = 0.05  # a mode is "in the model" if its frequency is met this well [-]
+# Pieces of rope h meet waves so well up to omega h / c of this, where sin(x/2) / (x/2) = 0.95.
+_PIECE = 1.1
+_ITERATIONS = 4  # each wins the damping ratio's power: 1e-10 for one per cent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,11 +36,15 @@ class PlantData:
     Parameters
     ----------
     axial_stiffness, rope_length, mass_per_length
-        EA [N], length paid out [m], mass per length [kg/m].
+        EA [N], its real part at the first axial mode, length paid out [m], mass per length
+        [kg/m].
     rope_weight
         Submerged weight of the rope per length [N/m].
     damping_ratio
-        Fraction of critical damping of the first axial mode, Kelvin-Voigt [-].
+        Fraction of critical damping of the first axial mode [-].
+    damping_law
+        ``kelvin-voigt``: the fraction rises with a mode's frequency; ``hysteretic``: all modes
+        have the same, see `zener_branches`.
     masses
         Masses along the rope, the payload's included, 1 to 40; None: chosen for 40 rad/s.
     lumping
@@ -76,6 +84,7 @@ class PlantData:
     mass_per_length: float
     rope_weight: float = 0.0
     damping_ratio: float = 0.002
+    damping_law: str = "kelvin-voigt"
     masses: int | None = None
     lumping: str = "distributed"
     payload_mass: float
@@ -115,14 +124,88 @@ class PlantData:
         return self.payload_weight + self.rope_weight * self.rope_length
 
     @property
+    def first_mode(self) -> float:
+        """First exact axial mode, the upper end held [rad/s]."""
+        rope = (self.axial_stiffness, self.rope_length, self.mass_per_length)
+        return float(fixed_top_modes(*rope, self.payload_mass, 1)[0])
+
+    @property
     def damping_time(self) -> float:
         """Kelvin-Voigt time tau of the rope, EA (strain + tau strain rate) [s].
 
         tau = 2 zeta / omega_1, so that the first exact axial mode with the upper end held has
-        the fraction zeta of critical damping; higher modes have zeta omega_j / omega_1.
+        the fraction zeta of critical damping; higher modes have zeta omega_j / omega_1.  Zero for
+        a hysteretic rope, whose damping is all in its `branches`.
         """
-        rope = (self.axial_stiffness, self.rope_length, self.mass_per_length)
-        return 2.0 * self.damping_ratio / float(fixed_top_modes(*rope, self.payload_mass, 1)[0])
+        if self.damping_law == "hysteretic":
+            return 0.0
+        return 2.0 * self.damping_ratio / self.first_mode
+
+    @cached_property
+    def branches(self) -> tuple[float, FloatArray, FloatArray]:
+        """k_0, k_j and tau_j [s] of EA(s) = EA (k_0 + sum_j k_j s tau_j / (1 + s tau_j)).
+
+        Those of `zener_branches` for a hysteretic rope; one, and none, for another.
+        """
+        if self.damping_law != "hysteretic":
+            return 1.0, np.zeros(0), np.zeros(0)
+        first = self.first_mode
+        slow, gains, times = zener_branches(self.damping_ratio, first, self.highest_mode(first))
+        there = gains[:, 0] > 0.0
+        return float(slow[0]), gains[there, 0], times[there, 0]
+
+    def highest_mode(self, first_mode: FloatArray | float) -> FloatArray | float:
+        """Return up to where a hysteretic rope's loss factor must hold [rad/s].
+
+        The modes below 40 rad/s, which `masses: auto` holds, and those that more masses hold
+        where the data give their number; never less than the first mode.  A property of the rope
+        and not of its lumping: a design on other masses has the same rope.
+        """
+        held = 0.0
+        if self.masses is not None and self.lumping != "thesis":
+            pieces = self.masses - 0.5
+            held = (
+                _PIECE
+                * pieces
+                * np.sqrt(self.axial_stiffness / np.maximum(self.mass_per_length, 1e-300))
+                / self.rope_length
+            )
+        return np.maximum(first_mode, np.maximum(held, DEFAULT_BANDWIDTH))
+
+    @property
+    def slow_stiffness(self) -> float:
+        """EA_0 of a slow pull [N]: the rope at rest; that of a Kelvin-Voigt rope is EA."""
+        return self.branches[0] * self.axial_stiffness
+
+    def rope_modulus(self, s: ComplexArray) -> ComplexArray:
+        """Return EA(s) of the rope's damping law [N], as `s` [1/s]."""
+        return self.axial_stiffness * self.modulus_ratio(s)
+
+    def modulus_ratio(self, s: ComplexArray) -> ComplexArray:
+        """Return EA(s)/EA of the rope's damping law, as `s` [1/s]."""
+        slow, gains, times = self.branches
+        found = slow + s * self.damping_time
+        for gain, time in zip(gains, times, strict=True):
+            found = found + gain * (s * time / (1.0 + s * time))
+        return found
+
+    def damped_modes(self, modes: FloatArray) -> ComplexArray:
+        """Return the poles [1/s] that the rope's damping makes of modes without any [rad/s].
+
+        To first order in the damping for Kelvin-Voigt; for a hysteretic rope by iterating s =
+        i omega sqrt(EA(s)/EA), whose stiffness follows the frequency as well.
+        """
+        if self.damping_law != "hysteretic":
+            return np.asarray(-0.5 * self.damping_time * modes**2 + 1j * modes)
+        s = np.asarray(1j * modes)
+        for _ in range(_ITERATIONS):
+            s = 1j * modes * np.sqrt(self.modulus_ratio(s))
+        return np.asarray(s)
+
+    @property
+    def viscous(self) -> PlantData:
+        """The same rope with Kelvin-Voigt damping of the same ratio at the first mode."""
+        return replace(self, damping_law="kelvin-voigt")
 
     @property
     def mean_gear_factor(self) -> float:
@@ -162,6 +245,7 @@ class PlantData:
             mass_per_length=rope.mass_per_length,
             rope_weight=rope.submerged_weight / rope.length,
             damping_ratio=rope.damping_ratio,
+            damping_law=rope.damping_law,
             masses=None if rope.masses == "auto" else rope.masses,
             lumping=rope.lumping,
             payload_mass=payload.virtual_mass,

@@ -26,7 +26,8 @@ class Rope(Section):
     """Young's modulus on the nominal circle of the rope (not on its metal area), or give
     `axial_stiffness`."""
     axial_stiffness: Annotated[float, Quantity("force", 1e4, 1e11)] | None = None
-    """Axial stiffness EA of the rope, or give `modulus`."""
+    """Axial stiffness EA of the rope, or give `modulus`. Under the hysteretic law that at the first
+    axial mode: a slow pull meets a little less."""
     mass_per_length: Annotated[float, Quantity("mass per length", 0.01, 1000.0)]
     """Mass of the rope per length, in air."""
     submerged_weight_per_length: (
@@ -37,7 +38,10 @@ class Rope(Section):
     length: Annotated[float, Quantity("length", 1.0, 12000.0)]
     """Length paid out, from the drum to the payload."""
     damping_ratio: Annotated[float, Quantity("ratio", 0.0, 0.5)] = 0.002
-    """Internal damping as a fraction of critical at the first axial mode (Kelvin-Voigt)."""
+    """Internal damping as a fraction of critical at the first axial mode."""
+    damping_law: Literal["hysteretic", "kelvin-voigt"] = "kelvin-voigt"
+    """How damping depends on frequency: `hysteretic`, about the same fraction in all modes, as of
+    wire rope; or `kelvin-voigt`, a fraction that rises in proportion to a mode's frequency."""
     masses: Annotated[int | Literal["auto"], Quantity("count", 1, 40, word="auto")] = "auto"
     """Number of lumped masses that stand for the rope; `auto` takes as many as the bandwidth
     of the loop needs."""

@@ -34,7 +34,15 @@ import scipy.linalg
 
 from models.basics import FloatArray, InputError, ReadOnlyArrays
 from models.case import Case
-from models.plant import MEAN_LOSSES, SPEED_BAND, DriveLimits, LinearPlant, Plant, build_plant
+from models.plant import (
+    MEAN_LOSSES,
+    SPEED_BAND,
+    DriveLimits,
+    LinearPlant,
+    Plant,
+    PlantData,
+    build_plant,
+)
 
 from ..winch import command_law
 
@@ -173,7 +181,7 @@ def record_plant(
     limits: DriveLimits | None = None,
     hold: Hold = "line",
 ) -> RecordPlant:
-    """Return the sampled plant of a case.
+    """Return the sampled plant of a case, its rope as `PlantData.viscous`.
 
     Parameters
     ----------
@@ -194,7 +202,7 @@ def record_plant(
         If the drive has no finite peak torque or cannot hold the load.
     """
     limits = DriveLimits.from_case(case) if limits is None else limits
-    plant = build_plant(case, masses)
+    plant = build_plant(PlantData.from_case(case).viscous, masses)
     linear, rest, data = plant.linearise(drag=drag), plant.operating_point(MEAN_LOSSES), plant.data
     peak = min(limits.torque, data.torque_constant * limits.current)
     if not math.isfinite(peak):

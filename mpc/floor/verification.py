@@ -16,7 +16,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from models.basics import FloatArray
 from models.case import Case
-from models.plant import build_plant
+from models.plant import PlantData, build_plant
 
 from .problem import RecordProblem, RecordSolution
 
@@ -73,7 +73,7 @@ def verify_record(
     """
     sampled, N, dt = problem.plant, problem.samples, problem.plant.sample_time
     count = sum(name.endswith("displacement") for name in sampled.states)
-    linear = build_plant(case, count).linearise(drag=sampled.drag)
+    linear = build_plant(PlantData.from_case(case).viscous, count).linearise(drag=sampled.drag)
     hook = [linear.disturbances.index(name) for name in ("hook.heave", "hook.heave_rate")]
     at = [linear.states.index(name) for name in sampled.states]
     out = {name: linear.outputs.index(name) for name in ("payload.displacement", "motor.speed")}

@@ -376,9 +376,9 @@ def held_poles(data: PlantData, drag: float, highest: float) -> ComplexArray:
         rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
         spacing = math.pi / data.rope_length * math.sqrt(rope[0] / data.mass_per_length)
         modes = fixed_top_modes(*rope, data.payload_mass, int(highest / spacing) + 1)
-    decay = 0.5 * data.damping_time * modes**2
-    decay[0] += 0.5 * drag / mass
-    return np.asarray(-decay + 1j * modes, dtype=np.complex128)
+    poles = data.damped_modes(modes)
+    poles[0] -= 0.5 * drag / mass
+    return poles
 
 
 def held_transfers(
@@ -387,7 +387,7 @@ def held_transfers(
     """Return P/Y, P/F, T/Y and T/F with the drum held: one spring, or the exact rope."""
     if data.lumping != "thesis":
         return rope_transfers(data, s, drag)
-    spring = data.stiffness * (1.0 + s * data.damping_time)
+    spring = data.stiffness * data.modulus_ratio(s)
     mass = data.payload_mass + data.rope_mass
     P_F = 1.0 / (mass * s**2 + drag * s + spring)
     return spring * P_F, P_F, spring * (1.0 - spring * P_F), -spring * P_F

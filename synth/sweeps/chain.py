@@ -40,7 +40,7 @@ from models.sensing import SAMPLE_TIME
 from ..limits import LOWER_TENSION, PAYLOAD
 from ..loop import Dual, exp, squared, value_of, where
 from .law_rows import LawColumns
-from .numbers import Numbers, at_rows, part_of
+from .numbers import BRANCH_GAINS, BRANCH_TIMES, Numbers, at_rows, part_of
 from .sweep_nodes import SweepNodes
 
 BLOCK = 12_000  # numbers of an array at once: the half dozen in use stay in the cache
@@ -200,7 +200,12 @@ class Chain:
         sinh(n mu)/sinh(mu) and c, from q = 4 sinh^2(mu/2).
         """
         s, springs, masses = self.s, self.loops.lumps.springs, self.loops.lumps.masses
-        spring = self._own("stiffness") * (1.0 + s * self._own("damping_time"))
+        ratio = self._own("slow") + s * self._own("damping_time")
+        for gain, time in zip(BRANCH_GAINS, BRANCH_TIMES, strict=True):
+            if np.any(value_of(self.loops.numbers[gain])):
+                x = s * self._own(time)
+                ratio = ratio + self._own(gain) * (x / (1.0 + x))
+        spring = self._own("stiffness") * ratio
         rope = self._own("rope_mass")
         if masses.size == 1:  # the unit is F/spring
             one = np.ones((1, 1))

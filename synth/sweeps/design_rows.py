@@ -3,9 +3,9 @@
     rows (n, d) -> numbers, controllers, densities -> loops -> drag, variances, stability, M_s
 
 Everything goes through the rope's recursion (`synth.sweeps.chain`) but variances and stability of
-three gains on one spring without delay, noise and quadratic drag, for which polynomials
-(`synth.sweeps.kernel`) are a hundred times faster.  Rows whose variances two rules disagree on
-begin again on finer nodes.
+three gains on one Kelvin-Voigt spring without delay, noise and quadratic drag, for which
+polynomials (`synth.sweeps.kernel`) are a hundred times faster.  Rows whose variances two rules
+disagree on begin again on finer nodes.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ class DesignRows:
         delayed = case.sensors.telemetry.delay > 0.0 or "sensors.telemetry.delay" in spread.paths
         three = question.structure.name == "payload-feedback"
         alone = self.lumps.masses.size == 1 and not (delayed or consistent or self._noisy)
-        self.spring = alone and three
+        self.spring = alone and three and case.rope.damping_law == "kelvin-voigt"
 
     @property
     def block(self) -> int:

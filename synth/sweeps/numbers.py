@@ -18,7 +18,7 @@ import numpy as np
 from models.basics import ComplexArray, FloatArray, IndexArray, InputError
 from models.case import Case
 from models.operation import PREFIX as FAULTS
-from models.plant import PlantData
+from models.plant import MAX_BRANCHES, PlantData, zener_branches
 from models.spread import DRAG, GAINS, Spread, with_payload
 
 from ..loop import Dual
@@ -71,8 +71,12 @@ NOISE_OF = {
 _PLAIN = tuple(
     f.name
     for f in fields(PlantData)
-    if f.name not in ("masses", "lumping", "motor", "coulomb_friction", "friction_speed")
+    if f.name
+    not in ("damping_law", "masses", "lumping", "motor", "coulomb_friction", "friction_speed")
 )
+BRANCH_GAINS = tuple(f"branch_gain_{j}" for j in range(MAX_BRANCHES))
+BRANCH_TIMES = tuple(f"branch_time_{j}" for j in range(MAX_BRANCHES))
+"""Shares k_j and times of a hysteretic rope's branches, zero where there are fewer."""
 
 
 def columns_of(case: Case) -> dict[str, FloatArray]:
@@ -83,7 +87,8 @@ def columns_of(case: Case) -> dict[str, FloatArray]:
     * ``haul``: h = r/n, rope hauled by a turn of the motor [m]; ``load``: h (1/eta + eta)/2 [m];
     * ``phi``, ``beta``, ``lag``: torque per command, torque per speed, and the lag of the motor
       with its drive [s];
-    * ``damping_time``: Kelvin-Voigt time of the rope, 2 zeta over the first exact mode [s];
+    * ``damping_time``, ``slow`` and the gains and times [s] of its branches: the rope's EA(s)/EA,
+      by `PlantData.damping_time` and `PlantData.branches`;
     * ``fixed_drag``: linear drag coefficient [N s/m]; NaN where it agrees with the response;
     * the sensors' numbers; NaN where there is no such sensor.
     """
@@ -101,7 +106,7 @@ def columns_of(case: Case) -> dict[str, FloatArray]:
         # Without a speed regulator the command is the torque itself.
         phi = np.where(np.asarray(beta) > 0.0, beta, 1.0)
     found |= {"phi": phi, "beta": beta, "lag": lag}
-    found |= {"damping_time": _damping_time(data), "fixed_drag": math.nan if drag is None else drag}
+    found |= {**_rope(data), "fixed_drag": math.nan if drag is None else drag}
     for name, path in _SENSED.items():
         value: Any = case
         for key in path.split("."):
@@ -110,14 +115,21 @@ def columns_of(case: Case) -> dict[str, FloatArray]:
     return {name: np.atleast_1d(np.asarray(v, dtype=np.float64)) for name, v in found.items()}
 
 
-def _damping_time(data: PlantData) -> Any:
-    """Return `PlantData.damping_time` of data that may hold columns."""
+def _rope(data: PlantData) -> dict[str, Any]:
+    """Return what the damping law of a rope is made of, its data columns or not."""
     zeta = data.damping_ratio
+    found: dict[str, Any] = {"damping_time": 0.0, "slow": 1.0}
+    found |= dict.fromkeys([*BRANCH_GAINS, *BRANCH_TIMES], 0.0)
     if not np.any(zeta):
-        return 0.0
+        return found
     wave = np.sqrt(data.axial_stiffness / np.maximum(data.mass_per_length, 1e-300))
     nu = _first_root(np.asarray(data.rope_mass / data.payload_mass))
-    return 2.0 * zeta * data.rope_length / (nu * wave)
+    if data.damping_law != "hysteretic":
+        return found | {"damping_time": 2.0 * zeta * data.rope_length / (nu * wave)}
+    first = nu * wave / data.rope_length
+    found["slow"], gains, times = zener_branches(zeta, first, data.highest_mode(first))
+    found |= dict(zip(BRANCH_GAINS, gains, strict=True))
+    return found | dict(zip(BRANCH_TIMES, times, strict=True))
 
 
 def at_rest(numbers: Numbers) -> dict[str, FloatArray]:

@@ -341,13 +341,26 @@ def held_moments(data: PlantData, source: Source, drag: float) -> tuple[float, f
     modes = np.array([math.sqrt(data.stiffness / mass)])
     if not one_spring:
         modes = fixed_top_modes(*rope, data.payload_mass, _HELD_MODES)
-    # The payload hardly moves in the higher modes, so drag only damps the first.
+    slow, gains, times = data.branches
+
+    def stretching(s: ComplexArray) -> ComplexArray:
+        """Return EA(s)/EA: a branch's s tau / (1 + s tau) is one less 1 / (1 + s tau)."""
+        if data.damping_law == "hysteretic":
+            late = (gains / (1.0 + s[:, None] * times)).sum(axis=1)
+            return np.asarray(slow + gains.sum() - late)
+        return 1.0 + s * data.damping_time
+
     decay = 0.5 * data.damping_time * modes**2
+    if data.damping_law == "hysteretic":
+        there = stretching(imaginary(modes))
+        modes = modes * np.sqrt(there.real)
+        decay = 0.5 * modes * there.imag / there.real
+    # The payload hardly moves in the higher modes, so drag only damps the first.
     decay[0] += 0.5 * drag / mass
 
     def densities(omega: FloatArray) -> FloatArray:
         s = imaginary(omega)
-        stretch = 1.0 + s * data.damping_time
+        stretch = stretching(s)
         load = (mass * s**2 + drag * s) / (data.stiffness * stretch)
         if one_spring:
             transfer = 1.0 / (1.0 + load)
