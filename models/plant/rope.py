@@ -23,10 +23,10 @@ from scipy.optimize import brentq, nnls
 from ..basics import FloatArray, InputError, ReadOnlyArrays
 
 MAX_MASSES = 40  # more states cost more in every eigenvalue than they add to any design
-MAX_BRANCHES = 7  # five and a half decades
 
-# n branches hold the loss factor over 1.15 + 0.85 (n - 2) decades within 5 %.
-_TWO_BRANCHES, _ONE_MORE = 1.15, 0.85
+# Decades over which two, three, .. branches hold the loss factor within 5 %.
+_DECADES = (1.1, 2.0, 2.85, 3.7, 4.55, 5.4)
+MAX_BRANCHES = len(_DECADES) + 1
 _LOW_END = 0.5  # where their band begins, in first modes
 _INSIDE = 1.11  # how far the outermost branches lie within it
 _NODES = 300
@@ -152,7 +152,7 @@ def zener_branches(
     """Return the hysteretic law EA(s) = EA (k_0 + sum_j k_j s tau_j / (1 + s tau_j)).
 
     Its loss factor is 2 zeta at the first mode, where its real part is EA, and within 5 % of it
-    from half the first to twice the highest mode (7 % from a zeta of 0.25, 13 % at 0.5).  The law
+    from half the first to twice the highest mode (for a zeta up to 0.1; 13 % at 0.5).  The law
     is EA_0 prod_j (1 + s b_j) / (1 + s a_j) with b_j / a_j = exp(w_j arctan 2 zeta) about fixed
     multiples of the first mode: the w_j are a non-negative least-squares fit of a constant phase,
     the k_j their partial fractions, all positive, as zeros and poles alternate (the product is
@@ -186,8 +186,8 @@ def zener_branches(
     slow, gains = np.ones(ratio.size), np.zeros((MAX_BRANCHES, ratio.size))
     times = np.zeros_like(gains)
     decades = np.log10(2.0 / _LOW_END * np.maximum(top / first, 1.0))
-    counts = 2 + np.ceil((decades - _TWO_BRANCHES) / _ONE_MORE)
-    counts = np.where(ratio > 0.0, np.clip(counts, 2, MAX_BRANCHES), 0).astype(int)
+    counts = np.minimum(2 + np.searchsorted(_DECADES, decades - 1e-9), MAX_BRANCHES)
+    counts = np.where(ratio > 0.0, counts, 0)
     for count in np.unique(counts[counts > 0]):
         at = counts == count
         corners, widths = _branch_shape(int(count))
@@ -211,10 +211,9 @@ def _branch_shape(count: int) -> tuple[FloatArray, FloatArray]:
     To first order in the angle a branch with the corner w_c turns the phase by w x/(1 + x^2), x =
     omega/w_c; the widths make the sum one over the band, and exactly so at the first mode.
     """
-    decades = _TWO_BRANCHES + _ONE_MORE * (count - 2)
-    ends = _LOW_END * _INSIDE, _LOW_END * 10.0**decades / _INSIDE
-    corners = np.geomspace(*ends, count)
-    nodes = np.append(np.geomspace(_LOW_END, _LOW_END * 10.0**decades, _NODES), 1.0)
+    top = _LOW_END * 10.0 ** _DECADES[count - 2]
+    corners = np.geomspace(_LOW_END * _INSIDE, top / _INSIDE, count)
+    nodes = np.append(np.geomspace(_LOW_END, top, _NODES), 1.0)
     weights = np.append(np.ones(_NODES), _EXACT)
     x = nodes[:, None] / corners
     widths, _ = nnls(weights[:, None] * x / (1.0 + x**2), weights)

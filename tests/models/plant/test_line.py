@@ -25,6 +25,8 @@ ROPE = replace(THESIS, lumping="distributed", masses=None, damping_ratio=0.02)
 VARIANTS = {
     "dc": ROPE,
     "dc with inductance": replace(ROPE, inductance=0.004, delay=0.05),
+    # as much damping as its higher modes have under the other law
+    "hysteretic": replace(ROPE, damping_law="hysteretic", damping_ratio=0.15),
     "speed mode": replace(MODERN, rope_length=1500.0),
     "torque mode": replace(MODERN, speed_gain=0.0, telemetry_bandwidth=math.inf),
     "ideal torque": replace(MODERN, speed_gain=0.0, torque_bandwidth=math.inf),

@@ -18,14 +18,18 @@ from still_motion import StillMotion
 from models import Case, InputError, PhysicsWarning, build_plant, load_case
 from models.operation import Scenario, SineMotion, scenario_named
 from models.operation.profile import Move, Profile
-from models.plant import DriveLimits, fixed_top_modes
+from models.plant import MEASUREMENTS, DriveLimits, fixed_top_modes
 from models.run import Run
-from models.sensing import HEARD, Measurement
+from models.sensing import HEARD, Measurement, sensed_plant
 from models.simulation import Simulation, prepare, run_simulation
 from synth.controllers import BrakeOn, LinearFeedback
+from synth.loop import closed_loop_poles
+from synth.structures import PayloadFeedback
 
 THESIS = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
 CRANE = {"A": 1.0, "a": 16.03, "a1": 44.47, "a2": 6.41}
+CALMER = {"A": 1.0, "a": 0.25, "a1": 0.6, "a2": 0.02}
+HYSTERETIC = {"rope.damping_law": "hysteretic"}
 CALM = {"sea.significant_height": 0.5}
 SILENT = {
     f"sensors.payload.{name}_noise": 0.0 for name in ("acceleration", "velocity", "displacement")
@@ -83,7 +87,9 @@ def test_a_controller_in_python_and_the_same_compiled_into_the_loop_agree(
     assert outside.timings.controller_median > 0.0
 
 
-@pytest.mark.parametrize(("case", "gains"), [(thesis(), THESIS), (crane(), CRANE)])
+@pytest.mark.parametrize(
+    ("case", "gains"), [(thesis(), THESIS), (crane(), CRANE), (crane(**HYSTERETIC), CALMER)]
+)
 def test_c_and_the_virtual_machine_give_the_same_trajectory(
     case: Case, gains: dict[str, float]
 ) -> None:
@@ -531,6 +537,47 @@ def test_a_load_left_to_itself_swings_at_the_exact_first_mode(masses: int) -> No
     exact = fixed_top_modes(rope.ea, rope.length, rope.mass_per_length, load, 1)[0]
     # one mass with a third of the rope meets the mode within a per cent (DNV-RP-N103)
     assert 2.0 * math.pi / period == pytest.approx(exact, rel=1e-2 if masses == 1 else 2e-3)
+
+
+def test_a_hysteretic_rope_at_rest_stays_there() -> None:
+    case = crane(**HYSTERETIC, **SILENT)
+    still = Scenario(name="still", description="nothing moves", duration=20.0)
+    run = simulate(case, feedback(case, CALMER), scenario=still, hook=StillMotion())
+    assert np.abs(run["payload.displacement"]).max() < 1e-9
+    assert np.ptp(run["rope.tension"]) < 1.0
+
+
+def test_gains_that_trust_kelvin_voigt_ring_at_a_higher_mode_of_a_hysteretic_rope() -> None:
+    # The demo's gains: M_s 2 under the one law, and under the other a mode grows near 27 rad/s.
+    gains = {"A": 1.0, "a": 16.022725, "a1": 44.360682, "a2": 6.4163101}
+    # Without what switches with the drum's direction, which brakes a motion as small as this.
+    smooth = {"winch.motor.coulomb_friction": 0.0, "winch.gearbox.efficiency": 1.0}
+    nudge = SineMotion(amplitude=1e-3, period=12.0)
+    grown, masses = {}, 8
+    for law in ("kelvin-voigt", "hysteretic"):
+        case = crane(**{"rope.damping_law": law}, **SILENT, **smooth)
+        plant = sensed_plant(case, masses=masses, drag=6.48e3).select(measurements=MEASUREMENTS)
+        bound = PayloadFeedback().bind(plant).controller([gains[g] for g in ("a", "a1", "a2")])
+        poles = closed_loop_poles(plant.without_delays(8), bound)
+        fastest = poles[np.argmax(poles.real)]
+        run = simulate(
+            case,
+            feedback(case, gains, 0.002),
+            duration=100.0,
+            hook=nudge,
+            masses=masses,
+            store_step=0.01,
+            parameters={"payload.quadratic_drag": 0.0, "payload.linear_drag": 6.48e3},
+        )
+        quick = np.diff(run["payload.acceleration"], 2)  # the nudge itself hardly shows
+        early, late = (np.abs(quick[k : k + 300]).max() for k in (8500, 9600))
+        grown[law] = math.log(late / early) / 11.0, fastest
+    assert grown["kelvin-voigt"][0] < 0.01
+    assert grown["kelvin-voigt"][1].real < 0.0
+    rate, pole = grown["hysteretic"]
+    assert abs(pole) == pytest.approx(27.0, abs=0.6)
+    assert pole.real > 0.05
+    assert rate == pytest.approx(pole.real, rel=0.1)
 
 
 def test_energy_is_neither_made_nor_lost_by_a_swinging_load() -> None:

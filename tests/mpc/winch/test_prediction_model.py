@@ -25,6 +25,14 @@ from mpc.winch.weights import OFF, saturates
 NAMES = ("thesis-1975", "thesis-1975-rope", "subsea-crane")
 
 
+def test_prediction_of_a_hysteretic_rope_damps_its_first_mode_alone_as_the_rope_does():
+    case = case_of("subsea-crane")
+    hysteretic = case.replace({"rope.damping_law": "hysteretic"})
+    found, viscous = (sampled_winch(c, sample_time=0.05, masses=4) for c in (hysteretic, case))
+    assert found.data == viscous.data
+    np.testing.assert_array_equal(found.A, viscous.A)
+
+
 def test_cubic_motion_over_a_sample_moves_the_state_as_the_differential_equation_does():
     rng = np.random.default_rng(0)
     A, E, T = rng.normal(size=(5, 5)), rng.normal(size=(5, 2)), 0.3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from functools import cache
 
@@ -31,7 +32,7 @@ from synth.sweeps import (
     spread_of,
 )
 from synth.sweeps.metrics import DEFAULT
-from synth.sweeps.numbers import numbers_of
+from synth.sweeps.numbers import BRANCH_GAINS, BRANCH_TIMES, numbers_of
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -79,6 +80,14 @@ def rope_design() -> Design:
     return replace(evaluate_gains(case, GAINS_ON_ROPE), verification=None)
 
 
+@pytest.fixture(scope="module")
+def hysteretic_design() -> Design:
+    """The same gains with a damping that keeps them stable in every mode."""
+    law = {"rope.damping_law": "hysteretic", "rope.damping_ratio": 0.02}
+    case = load_case("subsea-crane").replace({"rope.masses": 6, **EXACT, **law})
+    return replace(evaluate_gains(case, GAINS_ON_ROPE), verification=None)
+
+
 def few_nodes(case: Case) -> Quadrature:
     hook = HookMotion.from_case(case)
     return spectral_nodes(*hook.band, splits=hook.splits, per_panel=6)
@@ -117,8 +126,9 @@ def test_columns_of_numbers_are_those_of_the_checked_cases() -> None:
         "subsea-crane": {"winch.motor.speed_gain": "9 %", "winch.gearbox.efficiency": "3 %"},
         "landing": {"sensors.payload.bandwidth": "20 %", "winch.motor.torque_bandwidth": "9 %"},
     }
-    for name, more in own.items():
-        case = load_case(name)
+    laws = "kelvin-voigt", "hysteretic"
+    for (name, more), law in itertools.product(own.items(), laws):
+        case = load_case(name).replace({"rope.damping_law": law})
         spread = Spread({**common, **more}).on(case)
         rows = spread.sample(24)
         numbers, columns = numbers_of(case, spread, rows)
@@ -129,6 +139,12 @@ def test_columns_of_numbers_are_those_of_the_checked_cases() -> None:
                 expected, found = getattr(data, field, None), values[k % values.size]
                 if expected is not None:
                     assert found == pytest.approx(expected, rel=1e-12, nan_ok=True), field
+            slow, gains, times = data.branches
+            held = {"slow": slow, **dict(zip(BRANCH_GAINS, gains, strict=False))}
+            held |= dict(zip(BRANCH_TIMES, times, strict=False))
+            for field, expected in held.items():
+                found = numbers[field][k % numbers[field].size]
+                assert found == pytest.approx(expected, rel=1e-12), field
 
 
 def test_path_without_columns_goes_through_its_cases() -> None:
@@ -165,9 +181,13 @@ def test_spring_sweep_is_one_by_one_evaluation_on_the_same_nodes() -> None:
         assert found["payload_period"][k] == pytest.approx(2 * np.pi * np.sqrt(ratio), rel=1e-10)
 
 
-def test_rope_sweep_is_one_by_one_evaluation_on_the_same_nodes(rope_design: Design) -> None:
-    nodes = few_nodes(rope_design.case)
-    engine = FrequencyEngine(rope_design, ROPE, metrics=[*OUTPUTS, "drag"], nodes=nodes)
+@pytest.mark.parametrize("fixture", ["rope_design", "hysteretic_design"])
+def test_rope_sweep_is_one_by_one_evaluation_on_the_same_nodes(
+    fixture: str, request: pytest.FixtureRequest
+) -> None:
+    design: Design = request.getfixturevalue(fixture)
+    nodes = few_nodes(design.case)
+    engine = FrequencyEngine(design, ROPE, metrics=[*OUTPUTS, "drag"], nodes=nodes)
     rows = engine.spread.sample(6)
     found = engine.evaluate(rows)
     assert found["stable"].sum() > 3

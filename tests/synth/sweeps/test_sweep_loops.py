@@ -54,12 +54,15 @@ def closed_poles(engine: FrequencyEngine, row: FloatArray) -> npt.NDArray[np.com
     return closed_loop_poles(plant, law)
 
 
-def chains(masses: int, count: int, seed: int, delay: float) -> tuple[FrequencyEngine, ChainLoops]:
+def chains(
+    masses: int, count: int, seed: int, delay: float, law: str = "kelvin-voigt"
+) -> tuple[FrequencyEngine, ChainLoops]:
     """Loops of random gains of either sign around the crane's rope, lightly damped."""
     case = load_case("subsea-crane").replace(
         {
             "rope.masses": masses,
             "rope.damping_ratio": 0.003,
+            "rope.damping_law": law,
             "payload.drag": {"method": "given", "coefficient": 3000.0},
             "sensors.telemetry.delay": delay,
         }
@@ -71,11 +74,11 @@ def chains(masses: int, count: int, seed: int, delay: float) -> tuple[FrequencyE
     engine = FrequencyEngine(design, Spread({**wide, "payload.mass": "40 %", "depth": "-0 %"}))
     rows = engine.spread.sample(count, seed=seed)
     numbers, _ = numbers_of(case, engine.spread, rows)
-    law = DesignLaw(design.question, design.parameters).columns(engine.spread, rows)
+    columns = DesignLaw(design.question, design.parameters).columns(engine.spread, rows)
     loops = ChainLoops(
         count=count,
         numbers=numbers,
-        law=law,
+        law=columns,
         drag=numbers["fixed_drag"],
         lumps=lump_rope(masses),
     )
@@ -109,14 +112,25 @@ def test_rouths_array_knows_stable_polynomials(degree: int) -> None:
     assert 0.1 < stable.mean() < 0.9
 
 
-@pytest.mark.parametrize("masses", [1, 3, 10])
-def test_winding_number_counts_the_eigenvalues(masses: int) -> None:
-    engine, loops = chains(masses, 60, seed=masses, delay=0.0)
+@pytest.mark.parametrize(
+    ("masses", "law"),
+    [
+        (1, "kelvin-voigt"),
+        (3, "kelvin-voigt"),
+        (10, "kelvin-voigt"),
+        (1, "hysteretic"),
+        (4, "hysteretic"),
+    ],
+)
+def test_winding_number_counts_the_eigenvalues(masses: int, law: str) -> None:
+    engine, loops = chains(masses, 60, seed=masses, delay=0.0, law=law)
     rows = engine.spread.sample(60, seed=masses)
     counts = survey(loops)[0]
     expected = [int((closed_poles(engine, row).real > 0.0).sum()) for row in rows]
     assert counts.tolist() == expected
-    assert 5 < sum(n == 0 for n in expected) < 55
+    # Hysteretic modes that are not damped by their frequency seldom stand such gains.
+    least = 0 if law == "hysteretic" and masses > 1 else 5
+    assert least < sum(n == 0 for n in expected) < 55
 
 
 def test_winding_number_with_delay_is_that_of_one_loop_followed_alone() -> None:

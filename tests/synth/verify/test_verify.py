@@ -127,6 +127,17 @@ def test_rope_design_is_verified_on_the_distributed_rope(shallow: Design) -> Non
     assert found["drag"].found == pytest.approx(shallow.drag, rel=1e-5)
 
 
+def test_hysteretic_rope_is_verified_by_a_law_written_once_more(shallow: Design) -> None:
+    law = {"rope.damping_law": "hysteretic", "rope.damping_ratio": 0.02}
+    design = evaluate_gains(shallow.case.replace(law), shallow.parameters)
+    found = design.verify()
+    assert found.ok, str(found)
+    assert found["payload_rms_before"].found == pytest.approx(design.payload_rms_before, rel=1e-6)
+    # The other law would move the payload otherwise with the drum held.
+    viscous = replace(design, case=design.case.replace({"rope.damping_law": "kelvin-voigt"}))
+    assert not viscous.verify().ok
+
+
 def test_undamped_rope_is_verified_on_twice_the_masses(shallow: Design) -> None:
     case = shallow.case.replace({"rope.damping_ratio": 0.0})
     found = verify_design(replace(shallow, case=case))
