@@ -145,7 +145,7 @@ WRONG = {
         ("type: ac", "type: ac\n    resistance: 3"),
         "my.yaml:32: winch.motor.resistance: unknown key; known here: inertia, "
         "viscous_friction, coulomb_friction, friction_speed, thermal_time_constant, "
-        "temperature_rise, type, torque_bandwidth, speed_gain, base_speed, maximum_speed",
+        "temperature_rise, type, torque_bandwidth, speed_gain, base_speed, maximum_speed, kind",
     ),
     "missing field": (
         ("  length: 1000 m\n", ""),
