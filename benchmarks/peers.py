@@ -337,13 +337,15 @@ def _use(
     if isinstance(limit, LowFrequency):
         return slow / limit.bound
     if isinstance(limit, Peak):
-        return (abs(limit.static) + peak(limit.output, limit.duration)) / limit.bound
+        steady = abs(limit.static) + limit.loss
+        return (steady + peak(limit.output, limit.duration)) / limit.bound
     if isinstance(limit, Continuous):
-        return np.sqrt(limit.static**2 + moments[limit.output][0]) / limit.bound
+        steady = limit.static**2 + limit.loss**2
+        return np.sqrt(steady + moments[limit.output][0]) / limit.bound
     if isinstance(limit, Minimum):
         return peak(limit.output, limit.duration) / (limit.static - limit.bound)
     if isinstance(limit, Power):
-        torque = abs(limit.static) + peak(limit.torque, limit.duration)
+        torque = abs(limit.static) + limit.loss + peak(limit.torque, limit.duration)
         return torque * peak(limit.speed, limit.duration) / limit.bound
     raise TypeError(f"no peer knows the limit {limit.name}")
 

@@ -30,7 +30,10 @@ from .contents import Contents
 from .plausibility import Finding, contradictions, remarks
 
 #: What a stored case meant that lacks a field of a section.
-_BEFORE: Mapping[tuple[str, str], Any] = {("limits", "tension_ends"): "drum"}
+_BEFORE: Mapping[tuple[str, str], Any] = {
+    ("limits", "tension_ends"): "drum",
+    ("winch", "losses"): "hauling",
+}
 
 
 class Case(Contents):

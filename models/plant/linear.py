@@ -72,6 +72,9 @@ class LinearPlant(ReadOnlyArrays):
         Unit of a signal by name, for reports.
     static
         Value of a signal at the operating point by name, in its unit.
+    loss
+        How far a loss that switches with the direction of motion carries a signal to either side
+        of that value, by name, in its unit; nothing for others.
 
     Raises
     ------
@@ -98,6 +101,7 @@ class LinearPlant(ReadOnlyArrays):
     rates: Mapping[str, str]
     units: Mapping[str, str]
     static: Mapping[str, float]
+    loss: Mapping[str, float]
 
     def __init__(
         self,
@@ -120,6 +124,7 @@ class LinearPlant(ReadOnlyArrays):
         rates: Mapping[str, str] | None = None,
         units: Mapping[str, str] | None = None,
         static: Mapping[str, float] | None = None,
+        loss: Mapping[str, float] | None = None,
     ) -> None:
         A, B, E, C = (_matrix(n, v) for n, v in (("A", A), ("B", B), ("E", E), ("C", C)))
         Cz = np.zeros((0, A.shape[0])) if Cz is None else _matrix("Cz", Cz)
@@ -153,11 +158,14 @@ class LinearPlant(ReadOnlyArrays):
         object.__setattr__(self, "rates", signal_rates(_OWNER, self.disturbances, rates or {}))
         known = {*self.states, *self.inputs, *self.disturbances}
         known |= {*self.measurements, *self.outputs}
-        for kind, mapping in (("units", units or {}), ("static", static or {})):
+        named = ("units", units or {}), ("static", static or {}), ("loss", loss or {})
+        for kind, mapping in named:
             pick(_OWNER, f"signal (in {kind})", sorted(known), list(mapping))
         object.__setattr__(self, "units", MappingProxyType(dict(units or {})))
         values = {k: check_range(_OWNER, f"static {k}", v) for k, v in (static or {}).items()}
         object.__setattr__(self, "static", MappingProxyType(values))
+        values = {k: check_range(_OWNER, f"loss {k}", v, low=0.0) for k, v in (loss or {}).items()}
+        object.__setattr__(self, "loss", MappingProxyType(values))
 
     @property
     def independent_disturbances(self) -> tuple[str, ...]:
@@ -369,6 +377,7 @@ class LinearPlant(ReadOnlyArrays):
             delays=tuple(self.delays[i] for i in y),
             units=MappingProxyType({k: v for k, v in self.units.items() if k in known}),
             static=MappingProxyType({k: v for k, v in self.static.items() if k in known}),
+            loss=MappingProxyType({k: v for k, v in self.loss.items() if k in known}),
         )
 
     def without_delays(self, pade_order: int = 6, *, at: str = "auto") -> LinearPlant:

@@ -177,8 +177,10 @@ class Plant(Equations):
     ) -> LinearPlant:
         """Return the plant linearised at rest, sensors and telemetry delay included.
 
-        Derivatives are automatic.  The gear has the mean of its two factors, (1/eta +
-        eta)/2; ``static`` holds the operating point with the motor hauling.
+        Derivatives are automatic.  The gear has the mean of its two factors, (1/eta + eta)/2, and
+        ``static`` is rest with it; ``loss`` is what hauling takes above that, and dry friction.
+        Where the losses do not switch (`PlantData.switching`) ``static`` is rest with the motor
+        hauling and there is no ``loss``.
 
         Parameters
         ----------
@@ -198,6 +200,10 @@ class Plant(Equations):
         changes = {**(parameters or {}), "payload.linear_drag": drag}
         rest = self.operating_point({**changes, **MEAN_LOSSES})
         hauling = self.operating_point(changes)
+        held, loss = hauling, {}
+        if self.data.switching:
+            held, torque = rest, hauling.torque - rest.torque + self.data.coulomb_friction
+            loss = {name: torque * per for name, per in self.data.per_torque.items()}
         w = np.zeros(len(self.disturbances))
         names = ("A", "B", "E", "C", "D", "F", "Cz", "Dz", "Fz")
         blocks = zip(names, self.jacobians(rest.x, rest.u, w, rest.p), strict=True)
@@ -211,7 +217,8 @@ class Plant(Equations):
             delays=(self.data.delay,) * len(self.measurements),
             rates=RATES,
             units=self.units,
-            static={**hauling.outputs, "drive.command": hauling.command},
+            static={**held.outputs, "drive.command": held.command},
+            loss=loss,
         )
 
 

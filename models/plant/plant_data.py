@@ -58,8 +58,11 @@ class PlantData:
     inertia, viscous_friction
         I [kg m2] and B [N m s/rad], everything referred to the motor shaft.
     coulomb_friction, friction_speed
-        Dry friction T_c [N m] at the motor shaft, T_c tanh(speed / friction_speed [rad/s]).  A
-        linear plant leaves it out.
+        Dry friction T_c [N m] at the motor shaft, T_c tanh(speed / friction_speed [rad/s]).  In a
+        linear plant it is part of `LinearPlant.loss` alone.
+    switching
+        Whether the losses switch with the direction in what a linear plant says of rest; else it is
+        hauling, without dry friction.
     motor
         ``dc``: command is the armature voltage.  ``ac``: command is the speed reference
         [rad/s] if `speed_gain` is above zero, else the torque demand [N m].
@@ -97,6 +100,7 @@ class PlantData:
     viscous_friction: float = 0.0
     coulomb_friction: float = 0.0
     friction_speed: float = 1.0
+    switching: bool = True
     motor: str = "dc"
     resistance: float = math.nan
     torque_constant: float = 1.0
@@ -216,6 +220,14 @@ class PlantData:
         """
         return 0.5 * (1.0 / self.gear_efficiency + self.gear_efficiency)
 
+    @property
+    def per_torque(self) -> dict[str, float]:
+        """What a torque at the motor's shaft makes of the signals of the drive at rest, by name."""
+        found = {"motor.torque": 1.0, "motor.current": 1.0 / self.torque_constant}
+        if self.motor == "dc":
+            found["motor.voltage"] = self.resistance / self.torque_constant
+        return found
+
     def chosen_masses(self, masses: int | None = None) -> int:
         """Return `masses`, or the number in the data, or the one that holds 40 rad/s."""
         if masses is not None:
@@ -258,6 +270,7 @@ class PlantData:
             viscous_friction=winch.viscous_friction,
             coulomb_friction=motor.coulomb_friction,
             friction_speed=motor.friction_speed,
+            switching=winch.losses == "switching",
             motor=motor.type,
             **{name: getattr(motor, name) for name in kept},
             sensor_bandwidth=math.inf if isinstance(bandwidth, str) else bandwidth,

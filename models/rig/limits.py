@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from ..casefile import Quantity, Section
+
+MOST_PROBABLE = 1.0 - math.exp(-1.0)
+"""Probability that the largest of many maxima exceeds the most probable one, 0.632."""
 
 _Length = Annotated[float, Quantity("length", -12000.0, 12000.0)]
 
@@ -38,7 +42,12 @@ class Limits(Section):
     """Whether torque, speed, voltage, current and power limits bind the design or are only
     reported."""
     exposure_time: Annotated[float, Quantity("time", 60.0, 1e8)] = 10800.0
-    """Time for which most probable maxima are taken."""
+    """Time for which largest values are taken."""
+    exceedance: Annotated[float, Quantity("ratio", 0.0, 1.0, open_low=True, open_high=True)] = (
+        MOST_PROBABLE
+    )
+    """Probability that a largest value is exceeded in that time; by default that of the most
+    probable maximum, 1 - 1/e = 0.632."""
     minimum_tension: Annotated[float, Quantity("force", 0.0, 1e9)] | None = None
     """Smallest rope tension, so that the rope does not go slack; by default a tenth of the least
     submerged weight (after the criterion of DNV-RP-N103 for the wave zone, by analogy at the
@@ -51,6 +60,16 @@ class Limits(Section):
     stroke: tuple[_Length, _Length] | None = None
     """Lowest and highest haul of the drum while it holds the load; negative is paid out. It is
     for the simulation: a design does not know it."""
+
+    @property
+    def equivalent_exposure(self) -> float:
+        """Time whose most probable maximum is exceeded in `exposure_time` as often as asked [s].
+
+        With Rayleigh maxima the largest of N = T/T_z is above k sigma with the probability
+        p = 1 - exp(-N exp(-k^2/2)), so k = sqrt(2 ln(N / -ln(1 - p))): the most probable maximum
+        of the time T / -ln(1 - p) (DNV-RP-C205 3.3.4).
+        """
+        return self.exposure_time / -math.log1p(-self.exceedance)
 
     def _faults(self) -> Iterator[tuple[str, str]]:
         low, high = self.minimum_tension, self.rope_tension_peak

@@ -44,8 +44,8 @@ class _Motor(Section):
     viscous_friction: Annotated[float, Quantity("rotary damping", 0.0, 1e5)] = 0.0
     """Viscous friction of the drive train at the motor's shaft."""
     coulomb_friction: Annotated[float, Quantity("torque", 0.0, 1e6)] = 0.0
-    """Dry friction of the drive train at the motor's shaft, the same at every speed; for the
-    simulation only."""
+    """Dry friction of the drive train at the motor's shaft, the same at every speed; a loss in the
+    limits, and in the simulation."""
     friction_speed: Annotated[float, Quantity("angular speed", 0.0, 1000.0, open_low=True)] = 1.0
     """Speed over which dry friction changes its sign, as tanh(speed/friction_speed)."""
     thermal_time_constant: Annotated[float, Quantity("time", 0.0, 1e6, open_low=True)] = 1800.0
@@ -322,6 +322,10 @@ class Winch(Section):
     """Limits of motor and inverter."""
     brake: Brake | None = None
     """The holding brake; by default one that holds whatever comes."""
+    losses: Literal["switching", "hauling"] = "switching"
+    """How losses of gear and dry friction count in the limits of the drive: `switching`, to either
+    side of their mean; `hauling`, as if the load were always hauled in and without dry friction,
+    as in designs made before there was a choice."""
 
     def _faults(self) -> Iterator[tuple[str, str]]:
         motor, drive = self.motor, self.drive

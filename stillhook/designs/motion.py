@@ -110,11 +110,11 @@ class MotionView:
     def motions(self) -> list[tuple[str, float, float, float]]:
         """Return hook and payload, before and after: rms, 4 rms, largest [m].
 
-        The largest is the most probable maximum in the exposure time; what resonates without
+        The largest is that of the exposure time and its exceedance; what resonates without
         damping has no end.
         """
         design, hook = self.design, self.hook.displacement
-        time = design.case.limits.exposure_time
+        time = design.case.limits.equivalent_exposure
         found = [("hook", hook.rms, hook.most_probable_maximum(time))]
         held = design.payload_rms_before
         largest = math.inf

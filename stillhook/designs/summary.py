@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 from models.basics import digits_apart, residual_text
 from models.rig import DCMotor
-from synth.design import Design, LimitUse, few_starts
+from synth.design import SWITCHING_LOSS, Design, LimitUse, few_starts
 from synth.question import HOOK, PAYLOAD, difference_text
 
 from ..text import (
@@ -19,7 +19,7 @@ from ..text import (
     Written,
     columns,
     decibels,
-    duration,
+    largest_in,
     number,
     percent,
     quantity,
@@ -56,6 +56,7 @@ AT_LEAST = ("gain_margin_up", "delay_margin", "rope.tension.least", "rope.lower_
 """Limits whose bound is the least value."""
 SHARES: Mapping[str, tuple[str, ...]] = {"sea": (HOOK,), "MRU": ("mru.error",), "noise": ()}
 """Which disturbances make up a share of a signal's variance, by its name; noise is the rest."""
+_LOSSES = "losses"
 _INSTRUMENTS: Mapping[str, set[str]] = {
     "payload": {"payload"},
     "MRU": {"mru"},
@@ -87,7 +88,7 @@ def about_of(design: Design) -> str:
 
 def motion_table(design: Design) -> Table:
     """Return hook and payload motion, before and after."""
-    largest = f"largest in {duration(design.case.limits.exposure_time)}"
+    largest = largest_in(design.case.limits)
     heads = columns(f"motion=; rms [m]; significant height [m]; largest={largest} [m]")
     return Table(columns=heads, rows=MotionView(design).motions())
 
@@ -201,13 +202,14 @@ def command_text(design: Design) -> str:
 
 
 def share_table(design: Design) -> Table | None:
-    """Return what sea, reference unit and noise make of each signal; None for the sea alone."""
+    """Return what sea, reference unit, losses and noise make of signals; None for the sea alone."""
     if all(len(parts) < 2 for parts in design.shares.values()):
         return None
-    heads = columns("signal=share of the variance of" + "".join(f"; {n} [%]" for n in SHARES))
+    lossy = any(SWITCHING_LOSS in parts for parts in design.shares.values())
+    names = (*SHARES, _LOSSES) if lossy else tuple(SHARES)
+    heads = columns("signal=share of the variance of" + "".join(f"; {n} [%]" for n in names))
     rows = [
-        (_signal(signal), *(share_of(design, n, signal) for n in SHARES))
-        for signal in design.shares
+        (_signal(signal), *(share_of(design, n, signal) for n in names)) for signal in design.shares
     ]
     return Table(columns=heads, rows=rows)
 
@@ -217,11 +219,12 @@ def _signal(name: str) -> str:
 
 
 def share_of(design: Design, name: str, signal: str = PAYLOAD) -> float:
-    """Return the share of a signal's variance from ``sea``, ``MRU`` or ``noise``."""
+    """Return the share of a signal's variance from one of `SHARES`, or from ``losses``."""
     squares = {source: rms**2 for source, rms in design.shares.get(signal, {}).items()}
     total = sum(squares.values())
-    known = [source for names in SHARES.values() for source in names]
-    chosen = SHARES[name] or [source for source in squares if source not in known]
+    shares = {**SHARES, _LOSSES: (SWITCHING_LOSS,)}
+    known = [source for names in shares.values() for source in names]
+    chosen = shares[name] or [source for source in squares if source not in known]
     part = sum(squares.get(source, 0.0) for source in chosen)
     return part / total if total > 0.0 else 0.0
 

@@ -207,7 +207,7 @@ def capability_figure(study: Operability) -> Figure:
     for column, limit in zip(at.columns, contour.limit[h], strict=True):
         if 0.0 < limit < contour.highest:
             heave = column.hook(h, float(limit)).displacement
-            time = study.case.limits.exposure_time
+            time = study.case.limits.equivalent_exposure
             asked.append(
                 (heave.zero_crossing_period, 2.0 * heave.most_probable_maximum(time), heave.rms)
             )

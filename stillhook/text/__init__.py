@@ -11,7 +11,17 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .folder import OutputFolder, folder_name, pictures
     from .hook_words import heading_text, heading_words, sea_words, vessel_words
-    from .quantities import count, decibels, duration, listed, number, percent, quantity, scale
+    from .quantities import (
+        count,
+        decibels,
+        duration,
+        largest_in,
+        listed,
+        number,
+        percent,
+        quantity,
+        scale,
+    )
     from .style import (
         AFTER,
         BEFORE,

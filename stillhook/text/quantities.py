@@ -8,6 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from models.rig import Limits
 
 # The largest factor that leaves a figure of at least one is taken; the last entry otherwise.
 _SCALES: dict[str, tuple[tuple[float, str], ...]] = {
@@ -111,6 +115,21 @@ def duration(seconds: float) -> str:
         if seconds >= size and (2.0 * seconds / size).is_integer() and seconds != 90.0:
             return f"{seconds / size:g} {name}"
     return f"{seconds:g} s"
+
+
+def largest_in(limits: Limits, what: str = "largest") -> str:
+    """Return what largest values are of: the exposure time, and how often they are exceeded.
+
+    Examples
+    --------
+    >>> from models.rig import Limits
+    >>> largest_in(Limits()), largest_in(Limits(exceedance=0.1))
+    ('largest in 3 h', 'largest in 3 h (exceeded in 10.0 % of cases)')
+    """
+    text = f"{what} in {duration(limits.exposure_time)}"
+    if limits.exceedance == type(limits).model_fields["exceedance"].default:
+        return text
+    return f"{text} (exceeded in {percent(limits.exceedance)} of cases)"
 
 
 def count(number_of: int, noun: str) -> str:

@@ -444,7 +444,8 @@ def exact_sensors(case: Case, measurements: Sequence[str]) -> tuple[str, ...]:
 def rms_limits(limits: Sequence[Limit], period: float) -> dict[str, float]:
     """Return the limits on signals as limits on their rms by name; others are left out.
 
-    |static| + k sigma <= bound with k = sqrt(2 ln(T/T_z)), and sqrt(static^2 + sigma^2) <= bound.
+    |static| + loss + k sigma <= bound with k = sqrt(2 ln(T/T_z)), and sqrt(static^2 + loss^2 +
+    sigma^2) <= bound.
 
     Parameters
     ----------
@@ -463,11 +464,13 @@ def rms_limits(limits: Sequence[Limit], period: float) -> dict[str, float]:
         if isinstance(limit, Rms):
             room = limit.bound
         elif isinstance(limit, Continuous):
-            room = math.sqrt(max(limit.bound**2 - limit.static**2, 0.0))
+            room = math.sqrt(max(limit.bound**2 - limit.static**2 - limit.loss**2, 0.0))
         elif isinstance(limit, Peak | Minimum):
             k = math.sqrt(2.0 * math.log(max(limit.duration / period, math.e**0.5)))
-            least = isinstance(limit, Minimum)
-            room = (limit.static - limit.bound if least else limit.bound - abs(limit.static)) / k
+            if isinstance(limit, Minimum):
+                room = (limit.static - limit.bound) / k
+            else:
+                room = (limit.bound - abs(limit.static) - limit.loss) / k
         else:
             continue
         if room <= 0.0:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .design import SOURCE_NAMES, Design
+    from .design import SOURCE_NAMES, SWITCHING_LOSS, Design
     from .infeasible import shortfall
     from .nested import gains_in_use
     from .optimise import design_of, evaluate_gains, optimise_gains, verified

@@ -28,6 +28,8 @@ from .tuning import LimitUse, verified_members
 if TYPE_CHECKING:
     from ..bound import BestPossible
 
+#: What shares call the losses of gear and dry friction, which switch with the direction.
+SWITCHING_LOSS = "switching.loss"
 #: What disturbances are called in reports; others by their own names.
 SOURCE_NAMES: Mapping[str, str] = {HOOK: "the sea", "mru.error": "the reference unit"}
 _PRICED = 1e-5  # a price below this share of the payload's rms is noise of the solver
@@ -58,8 +60,9 @@ class Design:
         Standard deviation of the hook's motion [m].
     shares
         By signal (the payload's motion and whatever the limits speak of), by disturbance (the sea
-        ``hook.heave``, the reference unit ``mru.error``, each sensor's ``.._noise``): the standard
-        deviation that this one alone makes; the squares add up to the signal's variance.
+        ``hook.heave``, the reference unit ``mru.error``, each sensor's ``.._noise``, in the drive
+        the ``switching.loss`` of gear and dry friction): the standard deviation that this one alone
+        makes; the squares add up to the signal's variance.
     margins
         Stability margins of the loop broken at the command; None if it is unstable.
     limits

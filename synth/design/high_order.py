@@ -77,9 +77,10 @@ def _rooms(question: DesignQuestion, view: Assessment) -> dict[str, float]:
     for limit in question.limits:
         if not isinstance(limit, Peak | Continuous | Minimum | Power):
             continue
-        value, static = limit.measure(view), abs(limit.static)
+        value = limit.measure(view)
         if limit.use(value) <= 1.0:
             continue
+        static = limit.static if isinstance(limit, Minimum) else abs(limit.static) + limit.loss
         if isinstance(limit, Power):
             # The speed is that of the hook, so it is the torque that has to give.
             fast = view.peak(limit.speed, limit.duration)
@@ -88,8 +89,9 @@ def _rooms(question: DesignQuestion, view: Assessment) -> dict[str, float]:
             name, share = limit.torque, (limit.bound / fast - static) / (value / fast - static)
         elif isinstance(limit, Continuous):
             name = limit.output
-            share = ((limit.bound**2 - static**2) / (value**2 - static**2)) ** 0.5
+            steady = limit.static**2 + limit.loss**2
+            share = ((limit.bound**2 - steady) / (value**2 - steady)) ** 0.5
         else:
-            name, share = limit.output, (limit.bound - limit.static) / (value - limit.static)
+            name, share = limit.output, (limit.bound - static) / (value - static)
         found[name] = min(found.get(name, 1.0), max(share, 0.1))
     return {name: _SPARE * share * view.sigma(name) for name, share in found.items()}

@@ -35,7 +35,7 @@ from ..question import (
 )
 from ..search import KEPT, Found, Progress, polish, search, with_bests
 from ..structures import LowOrderFeedback, structures_aboard
-from .design import Design
+from .design import SWITCHING_LOSS, Design
 from .high_order import high_order_gains
 from .infeasible import Shortfall, shortfall
 from .nested import WITHIN, gains_in_use, nested_starts, no_worse, starts_from
@@ -497,7 +497,12 @@ def recorded(
         drag = question.drag_in(assessment)
         limits = (*question.limits, *question.reported)
         signals = dict.fromkeys([PAYLOAD, *(name for limit in limits for name in limit.outputs)])
-        shares = {name: assessment.shares(name) for name in signals}
+        losses = question.plant.loss
+        shares = {
+            name: assessment.shares(name)
+            | ({SWITCHING_LOSS: losses[name]} if losses.get(name, 0.0) > 0.0 else {})
+            for name in signals
+        }
     return Design(
         case=question.case,
         structure=question.structure.name,

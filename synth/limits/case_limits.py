@@ -55,12 +55,15 @@ def drive_limits(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
     InputError
         If they are to be enforced and the load at rest breaks one already.
     """
-    drive, wanted, static = case.winch.drive, case.limits, plant.static
-    time = wanted.exposure_time
+    drive, wanted = case.winch.drive, case.limits
+    static, loss = plant.static, plant.loss
+    time = wanted.equivalent_exposure
     limits: list[Limit] = []
 
     def add(kind: Callable[..., Limit], output: str, bound: float | None, **more: float) -> None:
         if bound is not None:
+            if kind is not Minimum:
+                more["loss"] = loss.get(output, 0.0)
             unit = plant.units[output]
             limits.append(
                 kind(bound=bound, output=output, static=static[output], unit=unit, **more)
@@ -84,6 +87,7 @@ def drive_limits(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
                 torque="motor.torque",
                 speed="motor.speed",
                 static=static["motor.torque"],
+                loss=loss.get("motor.torque", 0.0),
                 duration=time,
             )
         )
@@ -96,6 +100,7 @@ def drive_limits(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
                 torque="motor.torque",
                 speed="motor.speed",
                 static=static["motor.torque"],
+                loss=loss.get("motor.torque", 0.0),
                 duration=time,
             )
         )
@@ -116,11 +121,15 @@ def _check_static(case: Case, limits: list[Limit]) -> None:
     if case.limits.drive != "enforce":
         return
     for limit in limits:
-        static = getattr(limit, "static", 0.0)
-        if isinstance(limit, Peak | Continuous) and abs(static) >= limit.bound:
+        if not isinstance(limit, Peak | Continuous):
+            continue
+        least = abs(limit.static) + limit.loss
+        if isinstance(limit, Continuous):
+            least = math.hypot(limit.static, limit.loss)
+        if least >= limit.bound:
             raise InputError(
-                f"{case.label}: {limit.name} must be above the static load, "
-                f"{abs(static):.6g} {limit.unit}, got {limit.bound:.6g} {limit.unit}"
+                f"{case.label}: {limit.name} must be above the static load with its losses, "
+                f"{least:.6g} {limit.unit}, got {limit.bound:.6g} {limit.unit}"
             )
 
 

@@ -1,12 +1,17 @@
 """Limits on signals of motor, drive and rope: rms, continuous rating, peak, minimum, power.
 
-Peaks and continuous ratings follow one rule: |static| + k sigma <= bound, with
+Peaks and continuous ratings follow one rule: |static| + loss + k sigma <= bound, with
 k = sqrt(2 ln(T / T_z)), the most probable maximum of a Gaussian signal of mean period T_z in
-the time T (Rice 1945, Longuet-Higgins 1952); sqrt(static^2 + sigma^2) <= rating.
+the time T (Rice 1945, Longuet-Higgins 1952), of a case the time whose most probable maximum is
+exceeded as seldom as it asks (`models.rig.Limits.equivalent_exposure`);
+sqrt(static^2 + loss^2 + sigma^2) <= rating.  The loss is what switches with the direction of
+motion: friction and the gear's losses carry a signal so far to either side of its static value,
+never further, whatever the sea.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -57,18 +62,20 @@ class Rms(_OfOneSignal):
 
 @dataclass(frozen=True, kw_only=True)
 class Continuous(_OfOneSignal):
-    """sqrt(static^2 + sigma^2) of `output` at most the rating `bound`."""
+    """sqrt(static^2 + loss^2 + sigma^2) of `output` at most the rating `bound`."""
 
     static: float = 0.0
+    loss: float = 0.0
     kind: ClassVar[str] = "continuous"
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
-        return (self.static**2 + symbols.moment(self.output, 0)) / (bound * bound) - 1.0
+        steady = self.static**2 + self.loss**2
+        return (steady + symbols.moment(self.output, 0)) / (bound * bound) - 1.0
 
     @override
     def measure(self, loop: Assessment) -> float:
-        return float(np.hypot(self.static, loop.sigma(self.output)))
+        return math.hypot(self.static, self.loss, loop.sigma(self.output))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,14 +107,15 @@ class Thermal(Continuous):
     def rows(self, symbols: Symbols, bound: Any) -> Any:
         share = symbols.moment(self.speed, 0) / self.base_speed**2
         dynamic = symbols.moment(self.output, 0) * mapped(share, *_MOVING)
-        steady = self.static**2 * mapped(share, *_STEADY)
+        steady = (self.static**2 + self.loss**2) * mapped(share, *_STEADY)
         return (steady + dynamic) / (bound * bound) - 1.0
 
     @override
     def measure(self, loop: Assessment) -> float:
         share = np.array((loop.sigma(self.speed) / self.base_speed) ** 2)
         dynamic = loop.sigma(self.output) ** 2 * _MOVING[0](share)
-        return float(np.sqrt(self.static**2 * _STEADY[0](share) + dynamic))
+        steady = (self.static**2 + self.loss**2) * _STEADY[0](share)
+        return float(np.sqrt(steady + dynamic))
 
 
 def _tail(share: Any) -> tuple[Any, Any, Any]:
@@ -143,9 +151,10 @@ _STEADY, _MOVING = (_steady, _steady_slope), (_moving, _moving_slope)
 
 @dataclass(frozen=True, kw_only=True)
 class Peak(_OfOneSignal):
-    """|static| + k sigma of `output` at most `bound` in `duration` [s]."""
+    """|static| + loss + k sigma of `output` at most `bound` in `duration` [s]."""
 
     static: float = 0.0
+    loss: float = 0.0
     duration: float = 10800.0
     kind: ClassVar[str] = "peak"
 
@@ -159,7 +168,7 @@ class Peak(_OfOneSignal):
 
     @override
     def measure(self, loop: Assessment | Symbols) -> Any:
-        return abs(self.static) + loop.peak(self.output, self.duration)
+        return abs(self.static) + self.loss + loop.peak(self.output, self.duration)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,7 +197,7 @@ class Minimum(_OfOneSignal):
 
 @dataclass(frozen=True, kw_only=True)
 class Power(Limit):
-    """(|static| + k_T sigma_T) k_Omega sigma_Omega of torque and speed at most `bound` [W].
+    """(|static| + loss + k_T sigma_T) k_Omega sigma_Omega, torque times speed, at most `bound` [W].
 
     Their peaks need not coincide, so the value is an upper bound of the shaft power on the
     k-sigma box of torque and speed: on the safe side of a drive's constant-power region.
@@ -197,6 +206,7 @@ class Power(Limit):
     torque: str
     speed: str
     static: float = 0.0
+    loss: float = 0.0
     duration: float = 10800.0
     name: str = "motor.power.peak"
     unit: str = "W"
@@ -213,13 +223,13 @@ class Power(Limit):
 
     @override
     def measure(self, loop: Assessment | Symbols) -> Any:
-        torque = abs(self.static) + loop.peak(self.torque, self.duration)
+        torque = abs(self.static) + self.loss + loop.peak(self.torque, self.duration)
         return torque * loop.peak(self.speed, self.duration)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Breakdown(Power):
-    """(|static| + k_T sigma_T) (k_Omega sigma_Omega/base_speed)^2 at most `bound` [N m].
+    """(|static| + loss + k_T sigma_T) (k_Omega sigma_Omega/base_speed)^2 at most `bound` [N m].
 
     The breakdown torque of an induction motor, `bound` at `base_speed` [rad/s], falls as 1/speed^2:
     like the power it is held at the corner of the k-sigma box of torque and speed.

@@ -7,7 +7,7 @@ so up to
 .. math::
 
     H = v T / \pi, \qquad H = a T^2 / (2 \pi^2), \qquad
-    a = (T_{peak} - |T_{static}|)\, r / (n I),
+    a = (T_{peak} - |T_{static}| - T_{loss})\, r / (n I),
 
 and the maker's sheet draws these lines.  Here they come from the same responses as the irregular
 contours (`systems.PerfectSystem`), so friction and, of a DC motor, resistance are in them too.
@@ -113,13 +113,13 @@ def _amplitude(limit: Limit, sizes: dict[str, FloatArray]) -> FloatArray:
             low, high = np.where(kept, middle, low), np.where(kept, high, middle)
         return low
     if isinstance(limit, Peak):
-        return (limit.bound - abs(limit.static)) / sizes[limit.output]
+        return (limit.bound - abs(limit.static) - limit.loss) / sizes[limit.output]
     if isinstance(limit, Continuous):
         # The rms of a sine is its amplitude over sqrt(2).
-        room = max(limit.bound**2 - limit.static**2, 0.0)
+        room = max(limit.bound**2 - limit.static**2 - limit.loss**2, 0.0)
         return math.sqrt(2.0 * room) / sizes[limit.output]
     assert isinstance(limit, Power)
     # (|static| + t A) s A = bound, for the torque t and the speed s of an amplitude of one metre.
-    t, s, static = sizes[limit.torque], sizes[limit.speed], abs(limit.static)
+    t, s, static = sizes[limit.torque], sizes[limit.speed], abs(limit.static) + limit.loss
     root = np.sqrt((static * s) ** 2 + 4.0 * t * s * limit.bound)
     return np.asarray(2.0 * s * limit.bound / (s * (static * s + root)))

@@ -66,20 +66,19 @@ def payload_criteria(
     Parameters
     ----------
     case
-        The case, for its exposure time.
+        The case, for its exposure time and exceedance.
     rms, significant, maximum
-        Largest standard deviation, significant double amplitude (4 sigma) and most probable
-        maximum amplitude of the payload's motion in the case's exposure time: in metres, or text
-        with a unit.
+        Largest standard deviation, significant double amplitude (4 sigma) and largest amplitude
+        of the payload's motion in the case's exposure time: in metres, or text with a unit.
     speed
-        Largest most probable maximum of the payload's velocity, in m/s or text with a unit.
+        Largest velocity of the payload in that time, in m/s or text with a unit.
 
     Raises
     ------
     InputError
         If a value is not above zero, or has another unit.
     """
-    time = case.limits.exposure_time
+    time = case.limits.equivalent_exposure
 
     def read(name: str, value: float | str, kind: str, unit: str) -> float:
         try:
@@ -124,7 +123,7 @@ def case_criteria(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
                 bound=0.0,
                 output="rope.tension",
                 static=plant.static["rope.tension"],
-                duration=case.limits.exposure_time,
+                duration=case.limits.equivalent_exposure,
                 unit="N",
             )
         )

@@ -122,6 +122,7 @@ class Operability:
             "case": self.case.to_yaml(),
             "sea": self.case.sea.spectrum,
             "exposure_time": self.case.limits.exposure_time,
+            "exceedance": self.case.limits.exceedance,
             "highest_height": main.highest,
             "status": self.status,
         }

@@ -79,11 +79,11 @@ def operability(
 ) -> Operability:
     """Return the limiting H_s over peak period and heading, for every limit, and what binds.
 
-    The rule is that of all designs: |static| + k sigma within the bound for peaks, with each
-    signal's own k = sqrt(2 ln(T/T_z)); sqrt(static^2 + sigma^2) for continuous ratings.  The
-    payload's drag agrees with its motion in each sea, so the response is not linear in H_s, and
-    the limit is found as a root; where the spectrum is known at one H_s only it is rebuilt at
-    each step.
+    The rule is that of all designs: |static| + loss + k sigma within the bound for peaks, with
+    each signal's own k = sqrt(2 ln(T/T_z)); sqrt(static^2 + loss^2 + sigma^2) for continuous
+    ratings.  The payload's drag agrees with its motion in each sea, so the response is not linear
+    in H_s, and the limit is found as a root; where the spectrum is known at one H_s only it is
+    rebuilt at each step.
 
     Parameters
     ----------

@@ -122,9 +122,10 @@ def _figures(limits: Sequence[Limit], member: Member, loops: SolvedRows, index: 
     moments = {name: column[index, :, 0] for name, column in loops.moments.items()}
     at_rest = {name: float(v[index % v.size]) for name, v in loops.at_rest.items()}
     assessment = _OneLoop(max_sensitivity=float(loops.peak[index]), moments=moments)
+    losses = {name: float(v[index % v.size]) for name, v in loops.loss.items()}
     use, name = 0.0, ""
     for limit in limits:
-        own = _at_rest(limit, at_rest)
+        own = _at_rest(limit, at_rest, losses)
         used = own.use(own.measure(assessment))  # type: ignore[arg-type]  # all that it asks for
         if used > use:
             use, name = used, limit.name
@@ -274,12 +275,11 @@ def _unstable(member: Member) -> Figures:
     return Figures(member=member, stable=False, limit="stability", **figures)
 
 
-def _at_rest(limit: Limit, values: Mapping[str, float]) -> Limit:
-    """Return a limit with the static value of one plant."""
-    if not hasattr(limit, "static"):
-        return limit
-    static = values.get(limit.outputs[0], 0.0)
-    changed: Limit = replace(limit, static=static)  # type: ignore[call-arg]
+def _at_rest(limit: Limit, values: Mapping[str, float], losses: Mapping[str, float]) -> Limit:
+    """Return a limit with the static value and the loss of one plant."""
+    given = {"static": values, "loss": losses}
+    own = {k: v.get(limit.outputs[0], 0.0) for k, v in given.items() if hasattr(limit, k)}
+    changed: Limit = replace(limit, **own)  # type: ignore[arg-type]
     return changed
 
 

@@ -59,8 +59,9 @@ class SolvedRows:
 
     Attributes
     ----------
-    at_rest
-        What hauling the load at rest takes, by output, (n,) or (1,).
+    at_rest, loss
+        What holding the load takes, and what losses that switch with the direction carry it to
+        either side of that, by output, (n,) or (1,).
     drag
         Linear drag coefficient, (n,) [N s/m].
     heave
@@ -75,7 +76,7 @@ class SolvedRows:
     """
 
     def __init__(self, loops: ChainLoops, orders: Mapping[str, int], rules: int = 1) -> None:
-        count, self.at_rest = len(loops), at_rest(loops.numbers)
+        count, (self.at_rest, self.loss) = len(loops), at_rest(loops.numbers)
         self.drag, self.heave = np.full(count, np.nan), np.full(count, np.nan)
         self.stable = np.zeros(count, dtype=bool)
         self.peak = np.full(count, np.nan)

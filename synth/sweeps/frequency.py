@@ -136,7 +136,7 @@ class FrequencyEngine:
             part = slice(at, min(at + self.rows.block, len(table)))
             solved = self.rows.solve(table[part])
             found["stable"][part] = solved.stable
-            columns = finished(self.metrics, solved, self.case.limits.exposure_time)
+            columns = finished(self.metrics, solved, self.case.limits.equivalent_exposure)
             for name, column in columns.items():
                 found[name][part] = column
             if progress is not None:

@@ -27,8 +27,8 @@ class FrequencyMetric:
     output
         The plant's output it is about, if any.
     kind
-        ``rms``, ``residual`` (over the hook's rms), ``peak`` (most probable in the exposure time,
-        static value included), ``least``, ``period`` (mean zero-crossing), ``loop`` or ``static``.
+        ``rms``, ``residual`` (over the hook's rms), ``peak`` (largest in the exposure time, from
+        rest, with losses), ``least``, ``period`` (mean zero-crossing), ``loop`` or ``static``.
     """
 
     name: str
@@ -46,7 +46,8 @@ _ROWS = (
      "standard deviation of the payload's motion over that of the hook's"),
     ("velocity_rms", "m/s", "payload.velocity", "rms",
      "standard deviation of the payload's velocity"),
-    ("torque_rms", "N m", "motor.torque", "rms", "standard deviation of the motor's torque"),
+    ("torque_rms", "N m", "motor.torque", "rms",
+     "standard deviation of the motor's torque, without the switching loss"),
     ("speed_rms", "rad/s", "motor.speed", "rms", "standard deviation of the motor's speed"),
     ("haul_rms", "m", "drum.haul", "rms", "standard deviation of the drum's haul"),
     ("tension_rms", "N", "rope.tension", "rms",
@@ -56,23 +57,23 @@ _ROWS = (
     ("command_rms", "", "drive.command", "rms", "standard deviation of the drive's command"),
     ("voltage_rms", "V", "motor.voltage", "rms", "standard deviation of the armature's voltage"),
     ("torque_peak", "N m", "motor.torque", "peak",
-     "most probable largest torque in the exposure time, static torque included"),
+     "largest torque in the exposure time, static torque and losses included"),
     ("speed_peak", "rad/s", "motor.speed", "peak",
-     "most probable largest speed of the motor in the exposure time"),
+     "largest speed of the motor in the exposure time"),
     ("tension_peak", "N", "rope.tension", "peak",
-     "most probable largest tension at the drum in the exposure time"),
+     "largest tension at the drum in the exposure time"),
     ("tension_least", "N", "rope.tension", "least",
-     "most probable smallest tension at the drum in the exposure time"),
+     "smallest tension at the drum in the exposure time"),
     ("lower_tension_rms", "N", LOWER_TENSION, "rms",
      "standard deviation of the rope's tension at the payload"),
     ("lower_tension_least", "N", LOWER_TENSION, "least",
-     "most probable smallest tension at the payload, of its least weight, in the exposure time"),
+     "smallest tension at the payload, of its least weight, in the exposure time"),
     ("payload_period", "s", "payload.displacement", "period",
      "mean zero-crossing period of the payload's motion"),
     ("max_sensitivity", "1", "", "loop", "largest sensitivity M_s of the loop"),
     ("drag", "N s/m", "", "static", "linear drag coefficient that agrees with the response"),
     ("static_torque", "N m", "", "static",
-     "motor torque that hauls the load at rest, gear losses included"),
+     "motor torque that hauls the load at rest, losses of gear and friction included"),
     ("static_tension", "N", "", "static", "rope tension at the drum at rest"),
 )  # fmt: skip
 
@@ -110,13 +111,13 @@ def finished(
     metrics, loops
         What is wanted, and what it is made of.
     exposure
-        Time for which most probable extremes are taken [s].
+        Time whose most probable extremes are taken [s], `Limits.equivalent_exposure`.
     """
-    static = loops.at_rest
+    static, loss = loops.at_rest, loops.loss
     alone = {
         "max_sensitivity": loops.peak,
         "drag": loops.drag,
-        "static_torque": static["motor.torque"],
+        "static_torque": static["motor.torque"] + loss["motor.torque"],
         "static_tension": static["rope.tension"],
     }
     found = {}
@@ -136,6 +137,8 @@ def finished(
             with np.errstate(all="ignore"):
                 crossings = np.maximum(exposure / loops.period(metric.output), np.exp(0.5))
             reach = np.sqrt(2.0 * np.log(crossings)) * value
-            value = np.abs(rest) + reach if metric.kind == "peak" else rest - reach
+            value = rest - reach
+            if metric.kind == "peak":
+                value = np.abs(rest) + loss.get(metric.output, np.zeros(1)) + reach
         found[metric.name] = np.where(loops.stable, value, np.nan)
     return found

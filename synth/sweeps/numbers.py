@@ -71,8 +71,7 @@ NOISE_OF = {
 _PLAIN = tuple(
     f.name
     for f in fields(PlantData)
-    if f.name
-    not in ("damping_law", "masses", "lumping", "motor", "coulomb_friction", "friction_speed")
+    if f.name not in ("damping_law", "masses", "lumping", "motor", "friction_speed", "switching")
 )
 BRANCH_GAINS = tuple(f"branch_gain_{j}" for j in range(MAX_BRANCHES))
 BRANCH_TIMES = tuple(f"branch_time_{j}" for j in range(MAX_BRANCHES))
@@ -105,7 +104,7 @@ def columns_of(case: Case) -> dict[str, FloatArray]:
         beta, lag = data.speed_gain, 1.0 / data.torque_bandwidth
         # Without a speed regulator the command is the torque itself.
         phi = np.where(np.asarray(beta) > 0.0, beta, 1.0)
-    found |= {"phi": phi, "beta": beta, "lag": lag}
+    found |= {"phi": phi, "beta": beta, "lag": lag, "switches": float(data.switching)}
     found |= {**_rope(data), "fixed_drag": math.nan if drag is None else drag}
     for name, path in _SENSED.items():
         value: Any = case
@@ -132,18 +131,25 @@ def _rope(data: PlantData) -> dict[str, Any]:
     return found | dict(zip(BRANCH_TIMES, times, strict=True))
 
 
-def at_rest(numbers: Numbers) -> dict[str, FloatArray]:
-    """Return what hauling the load at rest takes, by output, (n,) or (1,)."""
-    tension = numbers["static_tension"]
-    torque = tension * numbers["haul"] / numbers["gear_efficiency"]
-    current = torque / numbers["torque_constant"]
-    return {
-        "rope.tension": tension,
-        "rope.lower_tension": numbers["payload_weight"] * (1.0 - numbers["weight_uncertainty"]),
-        "motor.torque": torque,
-        "motor.current": current,
-        "motor.voltage": current * numbers["resistance"],
-    }
+def at_rest(numbers: Numbers) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Return what holding the load takes, and its loss to both sides, by output, (n,) or (1,).
+
+    As `LinearPlant.static` and `LinearPlant.loss`.
+    """
+    tension, eta = numbers["static_tension"], numbers["gear_efficiency"]
+    mean, hauled = tension * numbers["load"], tension * numbers["haul"] / eta
+    switches = numbers["switches"]
+    held = switches * mean + (1.0 - switches) * hauled
+    loss = switches * (hauled - mean + numbers["coulomb_friction"])
+
+    def drive(torque: FloatArray) -> dict[str, FloatArray]:
+        current = torque / numbers["torque_constant"]
+        voltage = current * numbers["resistance"]
+        return {"motor.torque": torque, "motor.current": current, "motor.voltage": voltage}
+
+    lowest = numbers["payload_weight"] * (1.0 - numbers["weight_uncertainty"])
+    ends = {"rope.tension": tension, "rope.lower_tension": lowest}
+    return {**ends, **drive(held)}, drive(loss)
 
 
 def numbers_of(

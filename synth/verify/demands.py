@@ -79,8 +79,8 @@ class Demand:
         The signals that it is about.
     disturbance
         The other end of a ``low_frequency`` or ``weighted`` gain.
-    static
-        Value at rest of the (first) signal.
+    static, loss
+        Value at rest of the (first) signal, and what losses that switch carry it to either side.
     frequency
         Up to which (``low_frequency``) or from which (``roll_off``) it holds [rad/s].
     duration
@@ -98,6 +98,7 @@ class Demand:
     outputs: tuple[str, ...] = ()
     disturbance: str = ""
     static: float = 0.0
+    loss: float = 0.0
     frequency: float = math.nan
     duration: float = math.nan
     weights: Callable[[FloatArray], FloatArray] = np.ones_like
@@ -163,10 +164,10 @@ class Demand:
         if self.kind == "rms":
             return sizes[0]
         if self.kind == "continuous":
-            return math.hypot(self.static, sizes[0])
+            return math.hypot(self.static, self.loss, sizes[0])
         if self.kind == "thermal":
             torque, speed = sizes
-            return _heating(self.static, torque, speed, self.base_speed)
+            return _heating(math.hypot(self.static, self.loss), torque, speed, self.base_speed)
         peaks = [
             size * peak_factor(zero_crossing_period(*moments[name]), self.duration)
             if all(map(math.isfinite, moments[name]))
@@ -176,9 +177,12 @@ class Demand:
         if self.kind == "least":
             return self.static - peaks[0]
         if self.kind == "breakdown":
-            return (abs(self.static) + peaks[0]) * (peaks[1] / self.base_speed) ** 2
+            corner = abs(self.static) + self.loss + peaks[0]
+            return corner * (peaks[1] / self.base_speed) ** 2
         # Power: the corner of the box that the peaks of torque and speed span.
-        return (abs(self.static) + peaks[0]) * (peaks[1] if self.kind == "power" else 1.0)
+        return (abs(self.static) + self.loss + peaks[0]) * (
+            peaks[1] if self.kind == "power" else 1.0
+        )
 
 
 def limit_demand(limit: StatedLimit, enforced: bool = True) -> Demand:
@@ -207,6 +211,7 @@ def limit_demand(limit: StatedLimit, enforced: bool = True) -> Demand:
         outputs=outputs,
         disturbance=getattr(limit, "disturbance", ""),
         static=getattr(limit, "static", 0.0),
+        loss=getattr(limit, "loss", 0.0),
         frequency=frequency,
         duration=getattr(limit, "duration", math.nan),
         weights=getattr(limit, "weights", np.ones_like),
@@ -272,6 +277,9 @@ def case_demands(case: Case, data: PlantData, plant: LinearPlant, masses: int) -
         f"{_TENSION}.least": least,
         f"{_AT_LOAD}.least": least if both else None,
     }
+    # k = sqrt(2 ln(N / -ln(1 - p))) is the most probable maximum of T / -ln(1 - p).
+    exposure = -wanted.exposure_time / math.log(1.0 - wanted.exceedance)
+    losses = switching_losses(case)
     for name, bound in bounds.items():
         if bound is None or not math.isfinite(bound):
             continue
@@ -285,7 +293,8 @@ def case_demands(case: Case, data: PlantData, plant: LinearPlant, masses: int) -
                 enforced=wanted.drive == "enforce",
                 outputs=outputs,
                 static=lightest if signal == _AT_LOAD else float(plant.static[outputs[0]]),
-                duration=wanted.exposure_time,
+                loss=0.0 if kind == "least" else losses.get(outputs[0], 0.0),
+                duration=exposure,
                 base_speed=winch.cooled_speed,
             )
         )
@@ -303,6 +312,22 @@ def _heating(static: float, torque: float, speed: float, base: float) -> float:
     chance /= chance.sum()
     heat = np.maximum(1.0, (u * speed / base) ** 2)
     return math.sqrt(float(((static**2 + (torque * u) ** 2) * heat * chance).sum()))
+
+
+def switching_losses(case: Case) -> dict[str, float]:
+    """Return how far losses that switch with the direction carry signals to either side, by name.
+
+    Half of what hauling and paying out differ by, T_0 (1/eta - eta)/2, and dry friction.
+    """
+    winch, motor = case.winch, case.winch.motor
+    if winch.losses == "hauling":
+        return {}
+    eta = winch.gearbox.efficiency
+    torque = 0.5 * case.static_torque * (1.0 / eta - eta) + motor.coulomb_friction
+    found = {_TORQUE: torque, "motor.current": torque / winch.torque_constant}
+    if motor.type == "dc":
+        found["motor.voltage"] = found["motor.current"] * motor.resistance
+    return found
 
 
 def _pole_figure(kind: str, poles: ComplexArray, models: ComplexArray) -> float:

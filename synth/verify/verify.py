@@ -31,7 +31,7 @@ from models.plant import (
 from models.sensing import SAMPLE_TIME, UnitError, sensed_line_at, sensed_plant, sensed_spectra
 
 from .claims import DesignClaims
-from .demands import HOOK, PAYLOAD, VELOCITY, Demand, case_demands
+from .demands import HOOK, PAYLOAD, VELOCITY, Demand, case_demands, switching_losses
 from .integrals import integrate, panels
 from .recheck import (
     TIGHT,
@@ -237,10 +237,10 @@ class _Winch:
 
     def shares(self) -> list[Check]:
         """Return the checks that the shares of each signal are all there and add up."""
-        checks = []
+        checks, losses = [], switching_losses(self.design.case)
         for signal, parts in self.design.shares.items():
             claimed = math.sqrt(sum(rms**2 for rms in parts.values()))
-            found = self.coarse.rms(signal)
+            found = math.hypot(self.coarse.rms(signal), losses.get(signal, 0.0))
             note = f"root of the sum of squares of {', '.join(parts)}"
             checks.append(agreement(f"shares.{signal}", claimed, found, TIGHT, note))
         return checks

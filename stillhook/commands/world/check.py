@@ -16,6 +16,7 @@ from ...text import (
     ReportSection,
     duration,
     heading_words,
+    largest_in,
     number,
     percent,
     quantity,
@@ -200,7 +201,7 @@ def _limits(case: Case) -> Rows:
         ("payload sensor", seen, "bandwidth"),
         ("telemetry", quantity(sensors.telemetry.delay, "s"), "delay"),
         ("sensitivity peak M_s", number(limits.max_sensitivity), "at most"),
-        ("drive limits", kept, f"largest values in {duration(limits.exposure_time)}"),
+        ("drive limits", kept, largest_in(limits, "largest values")),
     ]
     if slow is not None:
         remark = f"at most, up to {slow.below:g} rad/s"

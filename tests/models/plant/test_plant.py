@@ -27,6 +27,7 @@ from models import bundled_cases, load_case
 from models.basics import InputError, SolverError
 from models.plant import PlantData, build_plant, fixed_top_modes
 from models.plant.plant_data import as_plant_data
+from models.sensing import with_sensors
 
 OMEGA = np.geomspace(0.05, 30.0, 60)
 ROPE = replace(THESIS, lumping="distributed", masses=5, damping_ratio=0.01)
@@ -114,9 +115,21 @@ def test_gear_direction_can_follow_the_motor() -> None:
 def test_static_values_travel_with_the_linear_plant() -> None:
     plant = build_plant(MODERN).linearise(drag=1e4)
     assert plant.static["rope.tension"] == pytest.approx(MODERN.static_tension)
-    hauling = MODERN.static_tension * MODERN.drum_radius / MODERN.gear_ratio / 0.925
-    assert plant.static["motor.torque"] == pytest.approx(hauling)
-    assert plant.static["drive.command"] == pytest.approx(hauling / MODERN.speed_gain)
+    ideal = MODERN.static_tension * MODERN.drum_radius / MODERN.gear_ratio
+    mean, loss = 0.5 * ideal * (1.0 / 0.925 + 0.925), 0.5 * ideal * (1.0 / 0.925 - 0.925)
+    assert plant.static["motor.torque"] == pytest.approx(mean)
+    assert plant.static["drive.command"] == pytest.approx(mean / MODERN.speed_gain)
+    assert dict(plant.loss) == pytest.approx({"motor.torque": loss, "motor.current": loss})
+    heard = with_sensors(plant, load_case("subsea-crane").sensors)
+    assert heard.select(outputs=["motor.torque"]).loss == {
+        "motor.torque": plant.loss["motor.torque"]
+    }
+    dry = build_plant(replace(MODERN, coulomb_friction=60.0)).linearise(drag=1e4)
+    assert dry.static == pytest.approx(plant.static)
+    assert dry.loss["motor.torque"] == pytest.approx(loss + 60.0)
+    before = build_plant(replace(MODERN, coulomb_friction=60.0, switching=False))
+    assert before.linearise(drag=1e4).static["motor.torque"] == pytest.approx(ideal / 0.925)
+    assert not before.linearise(drag=1e4).loss
     assert plant.units["rope.tension"] == "N"
     assert plant.units["drive.command"] == "rad/s"
     assert set(plant.units) >= {*plant.states, *plant.inputs, *plant.outputs}

@@ -219,9 +219,11 @@ def test_shares_of_every_signal_are_told_where_more_than_the_sea_shakes_it():
     assert [row[0] for row in rows][:2] == ["payload displacement", "motor torque"]
     for row in rows:
         assert sum(row[1:]) == pytest.approx(1.0)
-    torque = rows[1]
-    assert torque[3] > 0.9  # the noise of the payload's velocity, amplified
+    payload, torque = rows[:2]
+    assert torque[3] > 9.0 * torque[1]  # the noise of the payload's velocity, amplified
     assert torque[2] == 0.0  # the reference unit is not heard
+    assert torque[4] > torque[3]  # the gear's loss, which the sea does not make
+    assert payload[4] == 0.0
 
 
 def test_margins_in_words():

@@ -179,16 +179,17 @@ def test_the_makers_lines_are_those_of_the_sheet() -> None:
     r, n = case.drum_radius, case.winch.gearbox.ratio
     v = case.winch.speed_limit * r / n
     assert rows["motor.speed.peak"] == pytest.approx(v * T / math.pi, rel=1e-12)
-    static = pose(case).plant.static["motor.torque"]
-    a = (case.winch.drive.torque_peak - static) * r / (n * case.winch.inertia)
+    plant = pose(case).plant
+    mean, loss = plant.static["motor.torque"], plant.loss["motor.torque"]
+    a = (case.winch.drive.torque_peak - mean - loss) * r / (n * case.winch.inertia)
     assert rows["motor.torque.peak"] == pytest.approx(a * T**2 / (2.0 * math.pi**2), rel=1e-12)
-    b = math.sqrt(2.0 * (case.winch.drive.torque_continuous**2 - static**2)) * r
+    b = math.sqrt(2.0 * (case.winch.drive.torque_continuous**2 - mean**2 - loss**2)) * r
     b /= n * case.winch.inertia
     continuous = rows["motor.torque.continuous"]
     assert continuous == pytest.approx(b * T**2 / (2.0 * math.pi**2), rel=1e-12)
     # At the line of the power, the peaks' product is the power.
     A, w = 0.5 * rows["motor.power.peak"], 2.0 * math.pi / T
-    torque = static + case.winch.inertia * n / r * A * w**2
+    torque = mean + loss + case.winch.inertia * n / r * A * w**2
     power = torque * n / r * A * w
     assert power == pytest.approx(np.full(3, case.winch.power_limit), rel=1e-12)
 
