@@ -204,7 +204,8 @@ def test_the_makers_lines_of_an_induction_motor_are_below_its_breakdown_torque()
         lines = capability(asked.perfect, asked.criteria["perfect"], T)
         names = [c.name for c in lines.criteria]
         rows[kind] = dict(zip(names, lines.heights, strict=True))
-    static = pose(case).plant.static["motor.torque"]
+    plant = pose(case).plant
+    static = plant.static["motor.torque"] + plant.loss["motor.torque"]
     n, r = case.winch.gearbox.ratio, case.drum_radius
     A, w = 0.5 * rows["induction"]["motor.torque.breakdown"], 2.0 * math.pi / T
     torque = static + case.winch.inertia * n / r * A * w**2
