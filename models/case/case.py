@@ -30,9 +30,10 @@ from .contents import Contents
 from .plausibility import Finding, contradictions, remarks
 
 #: What a stored case meant that lacks a field of a section.
-_BEFORE: Mapping[tuple[str, str], Any] = {
+_BEFORE: Mapping[tuple[str, ...], Any] = {
     ("limits", "tension_ends"): "drum",
     ("winch", "losses"): "hauling",
+    ("sensors", "payload", "noise_enters"): "after-filter",
 }
 
 
@@ -95,9 +96,14 @@ class Case(Contents):
         stored, so that what the result claims still holds.
         """
         tree = dict(data)
-        for (section, field), value in _BEFORE.items():
-            if isinstance(tree.get(section), Mapping):
-                tree[section] = {field: value, **tree[section]}
+        for (*sections, field), value in _BEFORE.items():
+            at = tree
+            for section in sections:
+                if not isinstance(at.get(section), Mapping):
+                    break
+                at[section] = at = dict(at[section])
+            else:
+                at.setdefault(field, value)
         return cls.from_dict(tree, source=source, lines=lines)
 
     def replace(self, changes: Mapping[str, Any]) -> Case:

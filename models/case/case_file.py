@@ -19,7 +19,7 @@ from ..basics import InputError, PhysicsWarning, read_text
 from ..casefile import Path as FieldPath
 from ..casefile import line_of, message_line, read_yaml, suggestion
 from .case import Case
-from .plausibility import remarks
+from .plausibility import changed_meanings, remarks
 
 _TEMPLATE = "template"
 
@@ -45,7 +45,7 @@ def load_case(name_or_path: str | Path) -> Case:
     Warns
     -----
     PhysicsWarning
-        For each implausible figure.
+        For each implausible figure, and for what a field that is not given once meant.
 
     Examples
     --------
@@ -70,7 +70,7 @@ def load_case(name_or_path: str | Path) -> Case:
             f"{source}: must hold sections (sea:, vessel:, rope:, ...) at the top, got {what}"
         )
     case = Case.from_dict(data, source=source, lines=lines, folder=folder)
-    for field, text in remarks(case):
+    for field, text in (*changed_meanings(case), *remarks(case)):
         where = tuple(field.split("."))
         message = message_line(source, line_of(where, lines), where, text)
         warnings.warn(message, PhysicsWarning, stacklevel=2)

@@ -83,6 +83,20 @@ def remarks(case: Contents) -> Iterator[Finding]:
             yield at, f"{rating} is below {load}"
 
 
+def changed_meanings(case: Contents) -> Iterator[Finding]:
+    """Yield what a case file says nothing of and once meant otherwise, as `remarks` does."""
+    payload = case.sensors.payload
+    passed = isinstance(payload.bandwidth, float) or case.sensors.telemetry.bandwidth is not None
+    if passed and "noise_enters" not in payload.model_fields_set:
+        noisy = [n for n in ("acceleration", "velocity", "displacement") if payload.noisy(n)]
+        if noisy:
+            yield (
+                "sensors.payload.noise_enters",
+                f"is not given: noise of {', '.join(noisy)} now passes the low-pass of its sensor "
+                "(`before-filter`); it was added behind it (`after-filter`) before",
+            )
+
+
 def _overloads(case: Contents) -> list[tuple[str, str, str]]:
     """Return the drive ratings below the static load: field, the static load, the rating."""
     drive, constant = case.winch.drive, case.winch.torque_constant

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .drive import SPEED_BAND, DriveLimits
     from .equations import MEASUREMENTS, MOTION, displacement_names, parameter_values
     from .line import line_response, rope_transfers
-    from .linear import LinearPlant
+    from .linear import LinearPlant, late_and_held
     from .pade import pade_bank
     from .payout import DrumTravel
     from .plant import MEAN_LOSSES, OperatingPoint, Plant, build_plant

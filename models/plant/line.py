@@ -90,7 +90,7 @@ def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) ->
     if data.motor == "dc":
         z["motor.voltage"] = command
     # Exact delay and low-passes: no Pade model, no states.
-    sensor = np.exp(-s * data.delay)
+    sensor = np.exp(-s * (data.delay + data.command_delay))
     for bandwidth in (data.sensor_bandwidth, data.telemetry_bandwidth):
         if not math.isinf(bandwidth):
             sensor = sensor / (1.0 + math.sqrt(2.0) * (s / bandwidth) + (s / bandwidth) ** 2)

@@ -64,7 +64,13 @@ class LinearPlant(ReadOnlyArrays):
     states, inputs, disturbances, measurements, outputs
         Names, by default x1.., u1.., w1.., y1.., z1..
     delays
-        Delay of each measurement [s], in order or by name; default 0.
+        Delay of each measurement [s], in order or by name; default 0.  Half of what `holds` says
+        is part of it.
+    holds
+        Time for which a reading of each measurement is held [s], in order or by name; default 0,
+        for none.  With T of that time and a delay d a response has the factor
+        exp(-s (d - T/2)) (1 - exp(-s T))/(s T), of phase -omega d: exact below the frequencies
+        that readings fold.
     rates
         Disturbances that are the time derivative of another one, {"rate": "of"}: their
         column times s is added to that of the other one in every response.
@@ -98,6 +104,7 @@ class LinearPlant(ReadOnlyArrays):
     measurements: tuple[str, ...]
     outputs: tuple[str, ...]
     delays: tuple[float, ...]
+    holds: tuple[float, ...]
     rates: Mapping[str, str]
     units: Mapping[str, str]
     static: Mapping[str, float]
@@ -121,6 +128,7 @@ class LinearPlant(ReadOnlyArrays):
         measurements: Sequence[str] = (),
         outputs: Sequence[str] = (),
         delays: Sequence[float] | Mapping[str, float] = (),
+        holds: Sequence[float] | Mapping[str, float] = (),
         rates: Mapping[str, str] | None = None,
         units: Mapping[str, str] | None = None,
         static: Mapping[str, float] | None = None,
@@ -154,7 +162,12 @@ class LinearPlant(ReadOnlyArrays):
                 raise InputError(
                     f"{_OWNER}: names of inputs and disturbances must differ, got {name!r} in both"
                 )
-        object.__setattr__(self, "delays", signal_delays(_OWNER, self.measurements, delays))
+        late = signal_delays(_OWNER, self.measurements, delays)
+        object.__setattr__(self, "delays", late)
+        held = signal_delays(_OWNER, self.measurements, holds)
+        for name, delay, hold in zip(self.measurements, late, held, strict=True):
+            check_range(_OWNER, f"delay of {name}", delay, low=0.5 * hold, unit="s")
+        object.__setattr__(self, "holds", held)
         object.__setattr__(self, "rates", signal_rates(_OWNER, self.disturbances, rates or {}))
         known = {*self.states, *self.inputs, *self.disturbances}
         known |= {*self.measurements, *self.outputs}
@@ -210,7 +223,7 @@ class LinearPlant(ReadOnlyArrays):
         for k, base in enumerate(self.rates.values()):  # the last columns are the ones times s
             column = nu + self.independent_disturbances.index(base)
             rows[:, :, column] += points[:, None] * rows[:, :, width + k]
-        rows[:, :ny] *= np.exp(-points[:, None] * np.array(self.delays))[:, :, None]
+        rows[:, :ny] *= late_and_held(points[:, None], self.delays, self.holds)[:, :, None]
         y, z = rows[:, :ny, :width], rows[:, ny:, :width]
         return PlantResponse(
             s=points,
@@ -308,6 +321,7 @@ class LinearPlant(ReadOnlyArrays):
             inputs=(*self.inputs, f"{disturbance}?"),
             measurements=(*self.measurements, f"{output}?"),
             delays=(*self.delays, 0.0),
+            holds=(*self.holds, 0.0),
         )
 
     def with_feedback(
@@ -375,6 +389,7 @@ class LinearPlant(ReadOnlyArrays):
             outputs=outputs,
             measurements=measurements,
             delays=tuple(self.delays[i] for i in y),
+            holds=tuple(self.holds[i] for i in y),
             units=MappingProxyType({k: v for k, v in self.units.items() if k in known}),
             static=MappingProxyType({k: v for k, v in self.static.items() if k in known}),
             loss=MappingProxyType({k: v for k, v in self.loss.items() if k in known}),
@@ -382,6 +397,10 @@ class LinearPlant(ReadOnlyArrays):
 
     def without_delays(self, pade_order: int = 6, *, at: str = "auto") -> LinearPlant:
         """Return a plant without delays, Pade models in their place.
+
+        A hold becomes (1 + x^2/60)/(1 + x/2 + x^2/10 + x^3/120), x = s T, in which the delay of
+        (1 - exp(-x))/x is its Pade model of order 3: within 0.01 % up to half the rate of the
+        readings in gain, and 0.6 degrees in phase.
 
         Parameters
         ----------
@@ -402,6 +421,8 @@ class LinearPlant(ReadOnlyArrays):
         check_range(_OWNER, "pade_order", pade_order, low=0, high=12)
         check_choice(_OWNER, "at", at, ("auto", "measurements"))
         ny, nu = len(self.measurements), len(self.inputs)
+        if any(self.holds):
+            return self.with_held_states().without_delays(pade_order, at=at)
         plain = self._with(delays=(0.0,) * ny)
         if pade_order == 0 or not any(self.delays):
             return plain
@@ -428,6 +449,33 @@ class LinearPlant(ReadOnlyArrays):
             F=D2 @ self.F,
             Cz=np.hstack([self.Cz, np.zeros((len(self.Cz), len(A2)))]),
             states=(*self.states, *_delay_states(self.measurements, self.delays, pade_order)),
+        )
+
+    def with_held_states(self) -> LinearPlant:
+        """Return the plant with a rational model of its holds, as `without_delays` has it."""
+        ny, held = len(self.measurements), [i for i, T in enumerate(self.holds) if T > 0.0]
+        A2, B2 = np.zeros((3 * len(held),) * 2), np.zeros((3 * len(held), ny))
+        C2, D2 = np.zeros((ny, 3 * len(held))), np.eye(ny)
+        for k, i in enumerate(held):
+            at, T = slice(3 * k, 3 * k + 3), self.holds[i]
+            # 120 + 60 x + 12 x^2 + x^3 below and 120 + 2 x^2 above, in time over T.
+            A2[at, at] = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-120.0, -60.0, -12.0]]) / T
+            B2[3 * k + 2, i], C2[i, at], D2[i, i] = 1.0 / T, [120.0, 0.0, 2.0], 0.0
+        late = zip(self.delays, self.holds, strict=True)
+        return self._with(
+            A=np.block([[self.A, np.zeros((len(self.A), len(A2)))], [B2 @ self.C, A2]]),
+            B=np.vstack([self.B, B2 @ self.D]),
+            E=np.vstack([self.E, B2 @ self.F]),
+            C=np.hstack([D2 @ self.C, C2]),
+            D=D2 @ self.D,
+            F=D2 @ self.F,
+            Cz=np.hstack([self.Cz, np.zeros((len(self.Cz), len(A2)))]),
+            states=(
+                *self.states,
+                *(f"{self.measurements[i]}.hold{j + 1}" for i in held for j in range(3)),
+            ),
+            delays=tuple(max(0.0, delay - 0.5 * hold) for delay, hold in late),
+            holds=(0.0,) * ny,
         )
 
     def discretise(self, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -486,6 +534,25 @@ class LinearPlant(ReadOnlyArrays):
             f"├ measurements: {', '.join(late)}\n"
             f"└ outputs: {', '.join(self.outputs) or 'none'}"
         )
+
+
+def late_and_held(s: ComplexArray, delays: Sequence[float], holds: Sequence[float]) -> ComplexArray:
+    """Return what delays, half the holds in them, and holds make of signals, (k, ny).
+
+    Parameters
+    ----------
+    s
+        Points [1/s], (k, 1).
+    delays, holds
+        As of a `LinearPlant`, (ny,) [s].
+    """
+    late, T = np.array(delays), np.array(holds)
+    factor = np.asarray(np.exp(-s * (late - 0.5 * T)), dtype=np.complex128)
+    if np.any(T):
+        x = s * T
+        safe = np.where(x == 0.0, 1.0, x)
+        factor = factor * np.where(x == 0.0, 1.0, -np.expm1(-safe) / safe)
+    return factor
 
 
 def _matrix(name: str, value: npt.ArrayLike) -> FloatArray:

@@ -175,7 +175,9 @@ class Plant(Equations):
     def linearise(
         self, *, drag: float, parameters: Mapping[str, float] | None = None
     ) -> LinearPlant:
-        """Return the plant linearised at rest, sensors and telemetry delay included.
+        """Return the plant linearised at rest, low-passes and delays included.
+
+        The command's own delay is in those of the measurements: the loop is the same.
 
         Derivatives are automatic.  The gear has the mean of its two factors, (1/eta + eta)/2, and
         ``static`` is rest with it; ``loss`` is what hauling takes above that, and dry friction.
@@ -214,7 +216,7 @@ class Plant(Equations):
             disturbances=self.disturbances,
             measurements=self.measurements,
             outputs=self.outputs,
-            delays=(self.data.delay,) * len(self.measurements),
+            delays=(self.data.delay + self.data.command_delay,) * len(self.measurements),
             rates=RATES,
             units=self.units,
             static={**held.outputs, "drive.command": held.command},

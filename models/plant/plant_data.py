@@ -76,6 +76,8 @@ class PlantData:
         Second-order Butterworth low-passes on the payload's signals [rad/s], inf for none.
     delay
         Delay of the payload's signals [s].
+    command_delay
+        Delay from the command to the drive [s], which a linear plant has in its measurements.
 
     Notes
     -----
@@ -111,6 +113,7 @@ class PlantData:
     sensor_bandwidth: float = math.inf
     telemetry_bandwidth: float = math.inf
     delay: float = 0.0
+    command_delay: float = 0.0
 
     @property
     def stiffness(self) -> float:
@@ -276,6 +279,7 @@ class PlantData:
             sensor_bandwidth=math.inf if isinstance(bandwidth, str) else bandwidth,
             telemetry_bandwidth=math.inf if telemetry.bandwidth is None else telemetry.bandwidth,
             delay=telemetry.delay,
+            command_delay=winch.drive.command_delay,
         )
 
 

@@ -1,8 +1,8 @@
 """Sensors and telemetry, as sections of the case file.
 
 The payload's acceleration, velocity and displacement are measured at the payload and sent up;
-the design sees them through a low-pass filter and a delay.  Noise, bias, resolution, jitter and
-lost messages are for the simulation, as are motion reference unit, motor encoder and load cell:
+the design sees them through a low-pass filter, the hold between readings and a delay, and with
+their noise.  Bias, resolution, jitter and lost messages are for the simulation, as are motion reference unit, motor encoder and load cell:
 payload feedback does not use those, feed-forward and constant tension do.
 """
 
@@ -18,6 +18,8 @@ from pydantic import model_validator
 from ..casefile import Quantity, Section
 
 _BANDWIDTH_LOW, _BANDWIDTH_HIGH = 0.1, 1e5
+_Rate = Annotated[float, Quantity("rate", 0.1, 1e5)]
+_Latency = Annotated[float, Quantity("time", 0.0, 60.0)]
 
 
 class PayloadSensor(Section):
@@ -29,6 +31,10 @@ class PayloadSensor(Section):
     ] = "perfect"
     """Bandwidth of the second-order Butterworth low-pass on all three signals; `perfect` for
     none."""
+    noise_enters: Literal["before-filter", "after-filter"] = "before-filter"
+    """Where the noise enters: `before-filter` for noise of the element, which passes the low-pass
+    of sensor and link as the signal does; `after-filter` for noise of the samples, white up to
+    half the controller's rate whatever that is."""
     acceleration_noise: Annotated[float, Quantity("acceleration noise", 0.0, 10.0)] = 0.0
     """Noise of the acceleration (one-sided amplitude density, white)."""
     velocity_noise: Annotated[float, Quantity("velocity noise", 0.0, 10.0)] = 0.0
@@ -47,6 +53,33 @@ class PayloadSensor(Section):
     """Step in which the velocity is sent; 0 for none."""
     displacement_resolution: Annotated[float, Quantity("length", 0.0, 10.0)] = 0.0
     """Step in which the displacement is sent; 0 for none."""
+    acceleration_rate: _Rate | None = None
+    """Readings of the acceleration per second, each held until the next; not given: as often as
+    the controller listens.  Noise of readings is independent from one to the next."""
+    velocity_rate: _Rate | None = None
+    """Readings of the velocity per second, as those of the acceleration."""
+    displacement_rate: _Rate | None = None
+    """Readings of the displacement per second, as those of the acceleration."""
+    acceleration_latency: _Latency = 0.0
+    """Time from a reading of the acceleration to its being sent, on top of the telemetry's
+    delay."""
+    velocity_latency: _Latency = 0.0
+    """Time from a reading of the velocity to its being sent."""
+    displacement_latency: _Latency = 0.0
+    """Time from a reading of the displacement to its being sent."""
+
+    def noisy(self, name: str) -> bool:
+        """Return whether a signal, `acceleration` or another, has noise."""
+        return float(getattr(self, f"{name}_noise")) > 0.0
+
+    def rate(self, name: str) -> float | None:
+        """Return the readings per second of a signal, `acceleration` or another; None if many."""
+        found: float | None = getattr(self, f"{name}_rate")
+        return found
+
+    def latency(self, name: str) -> float:
+        """Return the time from a reading of a signal to its being sent [s]."""
+        return float(getattr(self, f"{name}_latency"))
 
 
 class Telemetry(Section):

@@ -128,6 +128,9 @@ class Drive(Section):
     power: Annotated[float, Quantity("power", 0.0, 1e9, open_low=True)] | None = None
     """Highest shaft power; by default peak torque times base speed of an AC motor, and none
     for a DC motor."""
+    command_delay: Annotated[float, Quantity("time", 0.0, 10.0)] = 0.0
+    """Delay from the controller's command to the drive that follows it, besides the delays of
+    what it hears."""
 
     def _faults(self) -> Iterator[tuple[str, str]]:
         if self.torque_peak < self.torque_continuous:

@@ -399,7 +399,7 @@ class MruModel:
         """Factor of the mode over a sample, and gains of z, v before and z, v after it."""
         T, corner = self.sample_time, self._corner or 1.0
         pole, driven = low_pass_pole(corner), np.array([[0.0, 0.0], [1.0, 0.0]])
-        (low, rate), _ = hermite_hold(_low_pass(corner), driven, T, T)
+        (low, rate), _ = hermite_hold(low_pass(corner), driven, T, T)
         return complex(np.exp(pole * T)), to_mode(low, rate, pole)
 
     def _advance(self, mode: complex, path: FloatArray) -> ComplexArray:
@@ -519,11 +519,11 @@ def low_pass_noise(corner: float, step: float, rms: float = 1.0) -> tuple[FloatA
         Value and derivative after the step by those before it, (2, 2), and the covariance of what
         they gain, (2, 2).
     """
-    over, added = noisy_hold(_low_pass(corner), np.array([[0.0], [1.0]]), step)
+    over, added = noisy_hold(low_pass(corner), np.array([[0.0], [1.0]]), step)
     # Variance of the value under white noise of intensity one: 1/(2 sqrt(2) corner^3).
     return over, added * rms**2 * 2.0 * math.sqrt(2.0) * corner**3
 
 
-def _low_pass(corner: float) -> FloatArray:
+def low_pass(corner: float) -> FloatArray:
     """Return A of value and derivative of a second-order Butterworth low-pass, (2, 2)."""
     return np.array([[0.0, 1.0], [-(corner**2), -math.sqrt(2.0) * corner]])

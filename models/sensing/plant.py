@@ -27,11 +27,13 @@ from ..plant import (
     LinearPlant,
     PlantData,
     PlantResponse,
+    ShapingFilter,
     build_plant,
+    late_and_held,
     line_response,
 )
-from ..rig import MRU, Sensors
-from .mru import PERFECT, error_density, unit_response
+from ..rig import MRU, PayloadSensor, Sensors
+from .mru import PERFECT, error_density, low_pass, unit_response
 
 #: What is measured, in the order of the plant's measurements.
 MEASURED = (
@@ -121,10 +123,11 @@ def sensed_plant(
     -------
     LinearPlant
         Outputs are those of `models.plant.plant`.  Measurements are `MEASURED`: the payload's
-        motion late by the telemetry, the hook's heave and its rate behind the high-pass of the
+        motion held between readings and late by latency and telemetry, the hook's heave and its rate behind the high-pass of the
         reference unit and late by its delay, haul and motor speed (encoder, taken as exact), and
         the tension behind the load cell's low-pass.  Each of `NOISES` adds to its measurement; the
-        error of the heave rate is the derivative of that of the heave.
+        error of the heave rate is the derivative of that of the heave.  All are late by the
+        command's own delay besides.
 
     Raises
     ------
@@ -133,10 +136,11 @@ def sensed_plant(
     """
     if isinstance(case, Case) and sensors is None:
         sensors = case.sensors
-    return with_sensors(build_plant(case, masses).linearise(drag=drag), sensors)
+    plant = build_plant(case, masses)
+    return with_sensors(plant.linearise(drag=drag), sensors, plant.data.command_delay)
 
 
-def with_sensors(plant: LinearPlant, sensors: Sensors | None) -> LinearPlant:
+def with_sensors(plant: LinearPlant, sensors: Sensors | None, command_delay: float) -> LinearPlant:
     """Return a linear plant of `models.plant.plant` with the sensors besides the payload's own.
 
     Every matrix of the answer is affine in those of `plant`.
@@ -147,6 +151,8 @@ def with_sensors(plant: LinearPlant, sensors: Sensors | None) -> LinearPlant:
         The plant, as `Plant.linearise` gives it.
     sensors
         The sensors of a case; None for exact ones.
+    command_delay
+        Delay from the command to the drive [s], which every measurement carries.
 
     Returns
     -------
@@ -199,8 +205,9 @@ def with_sensors(plant: LinearPlant, sensors: Sensors | None) -> LinearPlant:
     for k, name in enumerate(NOISES):
         F[at[heard_by.get(name, name.removesuffix("_noise"))], nw + k] = 1.0
 
-    delays = dict.fromkeys(MEASUREMENTS, plant.delays[0])
-    delays |= {"mru.heave": unit.delay, "mru.heave_rate": unit.delay}
+    holds = payload_holds(sensors.payload)
+    delays = {name: plant.delays[0] + late for name, late in _payload_delays(sensors).items()}
+    delays |= dict.fromkeys(("mru.heave", "mru.heave_rate"), unit.delay + command_delay)
     units = {"mru.heave": "m", "mru.heave_rate": "m/s", "mru.error": "m", "mru.error_rate": "m/s"}
     units |= {f"{name}_noise": plant.units[name] for name in (*MEASUREMENTS, "rope.tension")}
     return replace(
@@ -216,10 +223,57 @@ def with_sensors(plant: LinearPlant, sensors: Sensors | None) -> LinearPlant:
         states=tuple(states),
         disturbances=(*plant.disturbances, *NOISES),
         measurements=MEASURED,
-        delays=tuple(delays.get(name, 0.0) for name in MEASURED),
+        delays=tuple(delays.get(name, command_delay) for name in MEASURED),
+        holds=tuple(holds.get(name, 0.0) for name in MEASURED),
         rates={**plant.rates, "mru.error_rate": "mru.error"},
         units={**plant.units, **units},
     )
+
+
+def payload_noise(sensors: Sensors, name: str) -> White | ShapingFilter | None:
+    """Return the noise of a payload signal as the telemetry sends it; None without noise.
+
+    Noise of the element passes the low-passes of sensor and link.  That of readings, of which a
+    data sheet says how they scatter, is independent from one to the next and passes no low-pass,
+    but is held with them; so it is as white as they carry it, up to half their rate.
+
+    Parameters
+    ----------
+    sensors
+        The sensors of a case.
+    name
+        ``acceleration``, ``velocity`` or ``displacement``.
+    """
+    payload = sensors.payload
+    intensity = 0.5 * float(getattr(payload, f"{name}_noise")) ** 2
+    if intensity == 0.0:
+        return None
+    corners = (payload.bandwidth, sensors.telemetry.bandwidth)
+    passed = [corner for corner in corners if isinstance(corner, float)]
+    if not passed or payload.noise_enters == "after-filter" or payload.rate(name) is not None:
+        return White(intensity)
+    order = 2 * len(passed)
+    A, B, C = np.zeros((order, order)), np.zeros((order, 1)), np.zeros((1, order))
+    for k, corner in enumerate(passed):  # each is driven by the one before
+        A[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = low_pass(corner)
+        if k:
+            A[2 * k + 1, 2 * k - 2] = corner**2
+    B[1, 0], C[0, order - 2] = passed[0] ** 2 * math.sqrt(intensity), 1.0
+    return ShapingFilter(A=A, B=B, C=C, variance_error=0.0, shape_error=0.0)
+
+
+def payload_holds(payload: PayloadSensor) -> dict[str, float]:
+    """Return for how long a reading of each payload signal is held [s]; 0 for no hold."""
+    rates = {name: payload.rate(name.removeprefix("payload.")) for name in MEASUREMENTS}
+    return {name: 0.0 if rate is None else 1.0 / rate for name, rate in rates.items()}
+
+
+def _payload_delays(sensors: Sensors) -> dict[str, float]:
+    """Return by how much each payload signal is late besides the telemetry [s]."""
+    return {
+        name: sensors.payload.latency(name.removeprefix("payload.")) + 0.5 * hold
+        for name, hold in payload_holds(sensors.payload).items()
+    }
 
 
 def aboard(case: Case) -> tuple[str, ...]:
@@ -249,7 +303,8 @@ def sensed_line_at(
     PlantResponse
         With the names of `sensed_plant`, on the distributed rope (`models.plant.line_response`).
     """
-    line, sensors = line_response(data or case, s, drag=drag), case.sensors
+    data = PlantData.from_case(case) if data is None else data
+    line, sensors = line_response(data, s, drag=drag), case.sensors
     points, nw, at = line.s, len(line.disturbances), MEASURED.index
     noises = tuple(name for name in NOISES if name != "mru.error_rate")
     yw = np.zeros((points.size, len(MEASURED), nw + len(noises)), complex)
@@ -266,10 +321,19 @@ def sensed_line_at(
     for name, rate in (("mru.heave", 1.0), ("mru.heave_rate", points)):
         yw[:, at(name), line.disturbances.index("hook.heave")] = rate * passed
         yw[:, at(name), nw + noises.index("mru.error")] = rate * late
-    sent = np.exp(-points * sensors.telemetry.delay)
+    sent = np.exp(-points * (data.delay + data.command_delay))
     for name in (*MEASUREMENTS, "rope.tension"):
         noise = 1.0 if name == "rope.tension" else sent
         yw[:, at(name), nw + noises.index(f"{name}_noise")] = noise
+    # The payload's rows are late by telemetry and command already, the others by neither.
+    further = _payload_delays(sensors)
+    holds = payload_holds(sensors.payload)
+    turned = late_and_held(
+        points[:, None],
+        [further.get(name, data.command_delay) for name in MEASURED],
+        [holds.get(name, 0.0) for name in MEASURED],
+    )
+    yw, yu = yw * turned[:, :, None], yu * turned[:, :, None]
     still = np.zeros((points.size, len(line.outputs), len(noises)))
     return replace(
         line,
@@ -298,10 +362,11 @@ def sensed_spectra(
     Returns
     -------
     Mapping
-        The hook's motion, the error of the reference unit (`UnitError`) and the
-        white noises, for `synth.design.tuning`; those that are zero are left out.  A one-sided
-        amplitude density N per root hertz is white noise of intensity N^2/2; an independent error
-        of rms s at every sample is one of intensity s^2 times the sample time.
+        The hook's motion, the error of the reference unit (`UnitError`) and the noises, for
+        `synth.design.tuning`; those that are zero are left out.  A one-sided amplitude density N
+        per root hertz is white noise of intensity N^2/2, behind the low-passes that it has to pass
+        (`payload_noise`); an independent error of rms s at every sample is one of intensity s^2
+        times the sample time.
     """
     sensors = case.sensors
     found: dict[str, Any] = {"hook.heave": hook}
@@ -309,9 +374,9 @@ def sensed_spectra(
     if error.there:
         found["mru.error"] = error
     for name in MEASUREMENTS:
-        density = float(getattr(sensors.payload, f"{name.removeprefix('payload.')}_noise"))
-        if density > 0.0:
-            found[f"{name}_noise"] = White(0.5 * density**2)
+        noise = payload_noise(sensors, name.removeprefix("payload."))
+        if noise is not None:
+            found[f"{name}_noise"] = noise
     if sensors.load_cell is not None and sensors.load_cell.noise_fraction > 0.0:
         rms = sensors.load_cell.noise_fraction * case.static_tension
         found["rope.tension_noise"] = White(rms**2 * sample_time)

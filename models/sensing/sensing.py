@@ -14,19 +14,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import solve_continuous_lyapunov
 
 from ..basics import FloatArray, check_seed
 from ..case import Case
+from ..plant import ShapingFilter, noisy_hold
 from ..rig import Encoder, LoadCell, PayloadSensor
 from .control import HEARD
 from .draws import SENSOR_NOISE, draw
 from .mru import MruBlock
+from .plant import payload_noise
 from .telemetry import Late, TelemetryBlock, TelemetrySchedule
 
 #: What the sensors take from the plant, by name; the payload's signals behind its filters.
@@ -50,6 +53,8 @@ NOISE = (
 _SENT = ("acceleration", "velocity", "displacement")
 _MRU = ("mru.heave", "mru.heave_rate", "mru.valid")
 _REFERENCE = ("reference.displacement", "reference.velocity", "reference.acceleration")
+_ROUNDS = 100  # of Riccati's recursion, whose error falls at least to a third in each
+_ROUNDING = 1e-9  # of a sample and of a reading: as many of one make the other, whatever is rounded
 _SPEED_WINDOW = 0.01  # time over which a drive counts pulses for the speed [s]
 
 
@@ -63,6 +68,8 @@ class SensorModel:
         Time between control samples [s].
     payload
         Motion sensors at the payload.
+    filters
+        What the noise of payload signals passes, by the signal's name; white noise has none.
     lags
         Ages in samples that a message may have when it is used (`TelemetrySchedule.lags`).
     encoder, load_cell
@@ -74,9 +81,11 @@ class SensorModel:
 
     Notes
     -----
-    Payload: bias and noise are added, the sum is rounded to the resolution and sent.  White noise
-    of one-sided density N per root hertz, sampled every Ts, has the standard deviation
-    N/sqrt(2 Ts).  The newest `lags.stop` messages are remembered; where something fresh has
+    Payload: the signal of a latency before is interpolated between samples; bias and noise are
+    added, the sum is rounded to the resolution and sent, or held and sent again until the next
+    reading.  White noise of one-sided density N per root hertz, sampled every Ts, has the standard
+    deviation N/sqrt(2 Ts), where Ts is the time between readings if there are such; noise that
+    has passed low-passes is sampled exactly (`_innovations`) and not interpolated.  The newest `lags.stop` messages are remembered; where something fresh has
     arrived their weighted mean is what is known, else the last value is held.  A message of
     weight zero is not touched, so that a broken sensor's NaN stays where it is.
 
@@ -90,6 +99,7 @@ class SensorModel:
 
     sample_time: float
     payload: PayloadSensor
+    filters: Mapping[str, ShapingFilter] = field(default_factory=dict)
     lags: range
     encoder: Encoder | None
     load_cell: LoadCell | None
@@ -100,9 +110,11 @@ class SensorModel:
     def from_case(cls, case: Case, sample_time: float, late: Sequence[Late] = ()) -> SensorModel:
         """Return the sensors of a case at a sample time [s], behind a link that may be late."""
         sensors = case.sensors
+        noises = {name: payload_noise(sensors, name) for name in _SENT}
         return cls(
             sample_time=sample_time,
             payload=sensors.payload,
+            filters={k: v for k, v in noises.items() if isinstance(v, ShapingFilter)},
             # They are the same for every seed.
             lags=TelemetrySchedule(sensors.telemetry, sample_time, seed=0, late=late).lags,
             encoder=sensors.encoder,
@@ -113,10 +125,11 @@ class SensorModel:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Names of the states: messages remembered, values held, the load cell's filter."""
+        """Names of the states: sensors' own, messages remembered, values held, the load cell's."""
+        own = (name for signal in _SENT for name in self._own_states(signal))
         messages = (f"sent.{j}.{name}" for j in range(1, self.lags.stop) for name in _SENT)
         cell = ("load_cell.tension", "load_cell.before") if self.load_cell is not None else ()
-        return (*messages, *(f"held.{name}" for name in _SENT), *cell)
+        return (*own, *messages, *(f"held.{name}" for name in _SENT), *cell)
 
     @property
     def row(self) -> tuple[str, ...]:
@@ -174,11 +187,17 @@ class SensorModel:
         """
         values = np.asarray(raw, dtype=np.float64)
         sent = [
-            float(self._shown(name, ca.SX(values[i]), ca.SX(0))) for i, name in enumerate(_SENT)
+            float(self._rounded(name, values[i] + self._bias(name))) for i, name in enumerate(_SENT)
         ]
+        own: list[float] = []
+        for i, name in enumerate(_SENT):
+            quiet = self._noise_order(name) + (self.lags.stop - 1 if name in self.filters else 0)
+            own += [0.0] * quiet + [values[i]] * self._late(name)[0]
+            if self._holds(name):  # the first sample is a reading
+                own += [1.0 - self.sample_time * (self.payload.rate(name) or 0.0), sent[i]]
         tension = values[RAW.index("rope.tension")]
         cell = [tension, tension] if self.load_cell is not None else []
-        return np.array([*(sent * self.lags.stop), *cell], dtype=np.float64)
+        return np.array([*own, *(sent * self.lags.stop), *cell], dtype=np.float64)
 
     @cached_property
     def function(self) -> ca.Function:
@@ -203,13 +222,21 @@ class SensorModel:
             **{name: given[name] for name in (*_MRU, *_REFERENCE)},
         }
         for name in _SENT:
-            now = self._shown(name, plant[f"measured.{name}"], given[f"noise.{name}"])
+            true, drawn = plant[f"measured.{name}"], given[f"noise.{name}"]
+            now, off, own = self._shown(name, true, drawn, state)
+            after |= own
             messages = [now, *(state[f"sent.{j}.{name}"] for j in range(1, self.lags.stop))]
             after |= {f"sent.{j}.{name}": messages[j - 1] for j in range(1, self.lags.stop)}
             arrived = ca.SX(0)
             for j in self.lags:
                 weight = given[f"telemetry.weight.{j}"]
                 arrived += ca.if_else(weight == 0, 0, weight * messages[j])
+            if name in self.filters:
+                arrived = self._rounded(name, arrived + self._of_newest(name, off, given, state))
+                after |= {
+                    f"sent.{j}.{name}.noise": state[f"sent.{j - 1}.{name}.noise"] if j > 1 else off
+                    for j in range(1, self.lags.stop)
+                }
             known = ca.if_else(given["telemetry.fresh"] == 0, state[f"held.{name}"], arrived)
             after[f"held.{name}"] = seen[f"payload.{name}"] = known
         seen |= self._encoded(plant)
@@ -239,16 +266,87 @@ class SensorModel:
         name
             ``acceleration``, ``velocity`` or ``displacement``.
         """
+        if name in self.filters:
+            return float(math.sqrt(_stationary(self.filters[name])[1]))
         density = float(getattr(self.payload, f"{name}_noise"))
-        return density / math.sqrt(2.0 * self.sample_time)
+        rate = self.payload.rate(name) or math.inf
+        return density * math.sqrt(0.5 * min(rate, 1.0 / self.sample_time))
 
-    def _shown(self, name: str, true: ca.SX, noise: ca.SX) -> ca.SX:
-        """Return what a payload sensor makes of a true value and a standard normal number."""
+    def _noise_order(self, name: str) -> int:
+        return self.filters[name].order if name in self.filters else 0
+
+    def _holds(self, name: str) -> bool:
+        """Return whether a reading outlasts a sample."""
+        rate = self.payload.rate(name)
+        return rate is not None and rate * self.sample_time < 1.0 - _ROUNDING
+
+    def _late(self, name: str) -> tuple[int, float]:
+        """Return how many true values are remembered, and the weight of the oldest of them."""
+        samples = self.payload.latency(name) / self.sample_time
+        count = math.ceil(samples - _ROUNDING)
+        return count, min(1.0, samples - count + 1.0)
+
+    def _own_states(self, name: str) -> list[str]:
+        """Return the names of the states of one payload sensor, in the order of `initial`."""
+        found = [f"noise.{name}.{i}" for i in range(self._noise_order(name))]
+        if name in self.filters:
+            found += [f"sent.{j}.{name}.noise" for j in range(1, self.lags.stop)]
+        found += [f"before.{i + 1}.{name}" for i in range(self._late(name)[0])]
+        return found + ([f"clock.{name}.phase", f"reading.{name}"] if self._holds(name) else [])
+
+    def _shown(
+        self, name: str, true: ca.SX, drawn: ca.SX, state: Mapping[str, ca.SX]
+    ) -> tuple[ca.SX, ca.SX, dict[str, ca.SX]]:
+        """Return what a payload sensor sends, noise that is apart, and its states after the sample.
+
+        `drawn` is a standard normal number.  Noise that has passed a low-pass is sent apart: what
+        is known between two samples is interpolated, which would take away from it.
+        """
+        after: dict[str, ca.SX] = {}
+        off = ca.SX(0)
+        count, share = self._late(name)
+        if count:
+            values = [true, *(state[f"before.{i + 1}.{name}"] for i in range(count))]
+            after |= {f"before.{i + 1}.{name}": values[i] for i in range(count)}
+            true = share * values[-1]
+            if share < 1.0:
+                true += (1.0 - share) * values[-2]
+        value = true + self._bias(name)
+        if name in self.filters:
+            over, gain, row, size = _innovations(self.filters[name], self.sample_time)
+            x = ca.vertcat(*(state[f"noise.{name}.{i}"] for i in range(len(over))))
+            off = ca.mtimes(ca.DM(row), x) + size * drawn
+            following = ca.mtimes(ca.DM(over), x) + ca.DM(gain) * drawn
+            after |= {f"noise.{name}.{i}": following[i] for i in range(len(over))}
+        else:
+            if self.noise_rms(name) > 0.0:
+                value = value + self.noise_rms(name) * drawn
+            value = self._rounded(name, value)
+        if self._holds(name):
+            phase = state[f"clock.{name}.phase"]
+            phase = phase + self.sample_time * (self.payload.rate(name) or 0.0)
+            due = phase > 1.0 - _ROUNDING
+            value = ca.if_else(due, value, state[f"reading.{name}"])
+            after |= {f"clock.{name}.phase": phase - due, f"reading.{name}": value}
+        return value, off, after
+
+    def _of_newest(
+        self, name: str, now: ca.SX, given: Mapping[str, ca.SX], state: Mapping[str, ca.SX]
+    ) -> ca.SX:
+        """Return the noise of the newest of the messages that what has arrived is made of."""
+        found, before = ca.SX(0), ca.SX(0)
+        for j in self.lags:
+            weight = given[f"telemetry.weight.{j}"]
+            first = ca.logic_and(weight != 0, before == 0)
+            found += ca.if_else(first, state[f"sent.{j}.{name}.noise"] if j else now, 0)
+            before = weight
+        return found
+
+    def _bias(self, name: str) -> float:
+        return float(getattr(self.payload, f"{name}_bias"))
+
+    def _rounded(self, name: str, value: ca.SX) -> ca.SX:
         step = float(getattr(self.payload, f"{name}_resolution"))
-        value = true + float(getattr(self.payload, f"{name}_bias"))
-        rms = self.noise_rms(name)
-        if rms > 0.0:
-            value = value + rms * noise
         return _rounded(value, step) if step > 0.0 else value
 
     def _encoded(self, plant: Mapping[str, ca.SX]) -> dict[str, ca.SX]:
@@ -276,3 +374,35 @@ class SensorModel:
 def _rounded(value: ca.SX, step: float) -> ca.SX:
     """Return the nearest multiple of a step."""
     return step * ca.floor(value / step + 0.5)
+
+
+def _stationary(noise: ShapingFilter) -> tuple[FloatArray, float]:
+    """Return the covariance of a filter's state, (n, n), and the variance of its signal."""
+    P = np.asarray(solve_continuous_lyapunov(noise.A, -noise.B @ noise.B.T), dtype=np.float64)
+    return P, float((noise.C @ P @ noise.C.T)[0, 0])
+
+
+def _innovations(
+    noise: ShapingFilter, step: float
+) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Return x' = over x + gain e, n = row x + size e of a sampled noise, e standard normal.
+
+    Its samples have the covariances of the filter's signal at all lags: the innovations of its
+    exact sampling, of which each is one number (B. D. O. Anderson and J. B. Moore, Optimal
+    Filtering, 1979, section 9.2).
+
+    Parameters
+    ----------
+    noise
+        The filter, driven by white noise of intensity one.
+    step
+        Time between samples [s].
+    """
+    over, added = noisy_hold(noise.A, noise.B, step)
+    row, P = noise.C, _stationary(noise)[0]
+    for _ in range(_ROUNDS):  # towards what is left unknown of the state once all before is known
+        variance = float((row @ P @ row.T)[0, 0])
+        gain = over @ P @ row.T / variance
+        P = over @ P @ over.T + added - gain @ gain.T * variance
+    size = math.sqrt(float((row @ P @ row.T)[0, 0]))
+    return over, over @ P @ row.T / size, row, size

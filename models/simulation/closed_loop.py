@@ -17,6 +17,7 @@ The controller either is part of it, or is called in between: then the recursion
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
@@ -32,6 +33,7 @@ from .integrate import StepChoice, braked_step, disturbances
 from .rows import FLAGS
 
 HOOK = "hook"
+_ROUNDING = 1e-9  # of a sample
 _SATURATED = 1e-9  # relative difference of asked and applied command that is no rounding [-]
 _OWN = (
     "drive.hold",
@@ -127,12 +129,14 @@ def build_closed_loop(
     recursion
         The controller, if it is one.
     """
+    waiting, share = _waits(case.winch.drive.command_delay / step.sample_time)
     motions = (HOOK, *dict.fromkeys(name.split(".")[0] for name in plant.disturbances[4:]))
     nx, ns = len(plant.states), len(sensors.states)
     begin = np.zeros(0) if recursion is None else recursion.initial
     names = (
         *(f"plant.{name}" for name in plant.states),
         *(f"sensor.{name}" for name in sensors.states),
+        *(f"drive.command.{j}" for j in range(waiting)),
         "drive.last_command",
         "motor.temperature",
         *(f"controller.{i}" for i in range(begin.size)),
@@ -148,8 +152,9 @@ def build_closed_loop(
     kind = cast("type[ca.SX]", ca.SX if step.substeps <= 2 else ca.MX)
     s, r = kind.sym("s", len(names)), kind.sym("r", columns)
     p, asked = kind.sym("p", len(values)), kind.sym("u")
-    x, of_sensors, of_controller = s[:nx], s[nx : nx + ns], s[nx + ns + 2 :]
-    last, rise = s[nx + ns], s[nx + ns + 1]
+    drive = nx + ns + waiting  # where the last command is that the drive was told
+    x, of_sensors, of_controller = s[:nx], s[nx : nx + ns], s[drive + 2 :]
+    on_the_way, last, rise = s[nx + ns : drive], s[drive], s[drive + 1]
     moved, sensed, flags = r[:width], r[ends : ends + len(sensors.row)], r[-len(FLAGS) :]
 
     look = _look(plant, sensors, tuple(values), len(motions))
@@ -160,12 +165,16 @@ def build_closed_loop(
 
     def sample(command: ca.SX, seen: ca.SX, controller: ca.SX) -> list[ca.SX]:
         """Return the state after the sample and the log at its start."""
-        u, warmer, log = logged(x, command, rise, moved, sensed, flags, p)
+        sent = [command, *(ca.vertsplit(on_the_way) if waiting else ())]
+        told = sent[0]
+        if waiting:  # the mean of what arrives within the sample
+            told = share * sent[waiting] + (1.0 - share) * sent[waiting - 1]
+        u, warmer, log = logged(x, told, rise, moved, sensed, flags, p)
         after = x
         for j in range(step.substeps):
             both = r[j * width : (j + 2) * width]
             after = one_step(after, u, both, flags[FLAGS.index("brake")], p)
-        return [ca.vertcat(after, seen, u, warmer, controller), log]
+        return [ca.vertcat(after, seen, *sent[:waiting], u, warmer, controller), log]
 
     # With the controller inside nothing leaves the recursion in a sample; otherwise it is cut where
     # the measurement goes out and the command comes in.
@@ -193,9 +202,20 @@ def build_closed_loop(
         step=step,
         sample_time=step.sample_time,
         initial=np.concatenate(
-            [start, sensors.initial(np.asarray(at_rest).ravel()), [hold, 0.0], begin]
+            [
+                start,
+                sensors.initial(np.asarray(at_rest).ravel()),
+                [*(hold,) * waiting, hold, 0.0],
+                begin,
+            ]
         ),
     )
+
+
+def _waits(samples: float) -> tuple[int, float]:
+    """Return how many commands are on their way, and the weight of the oldest of them."""
+    count = math.ceil(samples - _ROUNDING)
+    return count, min(1.0, samples - count + 1.0)
 
 
 def _look(plant: Plant, sensors: SensorModel, names: Sequence[str], motions: int) -> ca.Function:

@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import FloatArray, ReadOnlyArrays, check_range, read_only
+from models.basics import FloatArray, InputError, ReadOnlyArrays, check_range, read_only
 from models.case import Case
 from models.plant import (
     MEAN_LOSSES,
@@ -195,10 +195,12 @@ def sampled_winch(
     Raises
     ------
     InputError
-        If a number is out of its range.
+        If a number is out of its range, or commands or readings are late in a way that the
+        prediction does not hold.
     """
     T = check_range(_OWNER, "sample_time", sample_time, low=0.0, unit="s", open_low=True)
     coefficient = (case.payload.fixed_drag or 0.0) if drag is None else drag
+    _refuse(case)
     data = PlantData.from_case(case).viscous
     count = data.chosen_masses(masses)
     changed: dict[str, Any] = {k: v * getattr(data, k) for k, v in (off or {}).items()}
@@ -269,3 +271,18 @@ def _moved(plant: LinearPlant, symbolic: Plant) -> FloatArray:
         by |= {"displacement": (1.0, 0.0), "velocity": (0.0, 1.0)}
         moved[k] = by.get(signal, (0.0, 0.0))
     return moved
+
+
+def _refuse(case: Case) -> None:
+    """Refuse what the prediction does not hold: late commands, held or later readings."""
+    payload = case.sensors.payload
+    late = {"winch.drive.command_delay": case.winch.drive.command_delay}
+    for name in ("acceleration", "velocity", "displacement"):
+        late[f"sensors.payload.{name}_rate"] = payload.rate(name) or 0.0
+        late[f"sensors.payload.{name}_latency"] = payload.latency(name)
+    for path, value in late.items():
+        if value > 0.0:
+            raise InputError(
+                f"{case.label}: {path} must be left out for predictive control, whose prediction "
+                f"does not hold it, got {value:g}"
+            )

@@ -176,10 +176,13 @@ def lqg_bound(
     sources = disturbances(spectra, plant.independent_disturbances)
     check_range("bound", "pade", pade, low=1, high=6)
     model = plant.without_delays(pade, at="measurements")
-    fitted: dict[str, SpectralFactor | float] = {
-        s.name: value.intensity if isinstance(value, White) else spectral_factor(s, order)
-        for s, value in zip(sources, spectra.values(), strict=True)
-    }
+    fitted: dict[str, SpectralFactor | ShapingFilter | float] = {}
+    for s, value in zip(sources, spectra.values(), strict=True):
+        if isinstance(value, White):
+            fitted[s.name] = value.intensity
+        else:  # what is rational already needs no fit
+            known = isinstance(value, ShapingFilter)
+            fitted[s.name] = value if known else spectral_factor(s, order)
     start: FloatArray | None = None
     if begin is not None and all(begin.get(name, 0.0) > 0.0 for name in limits):
         start = np.array([begin[name] for name in limits])

@@ -275,12 +275,12 @@ def truth_of(
 
 
 def refitted(
-    factors: Mapping[str, SpectralFactor | float],
+    factors: Mapping[str, SpectralFactor | ShapingFilter | float],
     sources: tuple[Disturbance, ...],
     truth: TrueProblem,
     X: ComplexArray,
     charge: FloatArray,
-) -> dict[str, SpectralFactor | float]:
+) -> dict[str, SpectralFactor | ShapingFilter | float]:
     """Return the factors fitted to what the bound loses by them."""
     result = dict(factors)
     for k, source in enumerate(sources):

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from models.basics import FloatArray, InputError, White, check_ascending, check_finite
+from models.plant import ShapingFilter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +42,7 @@ def disturbances(spectrum: Mapping[str, Any], known: tuple[str, ...]) -> tuple[D
     Parameters
     ----------
     spectrum
-        By name of the disturbance: a `White`, an object with ``density``, ``band`` and
+        By name of the disturbance: a `White` or a `ShapingFilter`, an object with ``density``, ``band`` and
         ``splits`` (`models.basics.quadrature.SpectralDensity`), a callable of omega [rad/s], or a
         table (omega, density), linear in between and zero outside.
     known
@@ -66,7 +67,7 @@ def disturbances(spectrum: Mapping[str, Any], known: tuple[str, ...]) -> tuple[D
 
 
 def _disturbance(name: str, value: Any) -> Disturbance:
-    if isinstance(value, White):
+    if isinstance(value, White | ShapingFilter):
         return Disturbance(name=name, density=value.density, band=None)
     if hasattr(value, "density") and hasattr(value, "band"):
         return Disturbance(

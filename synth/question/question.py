@@ -12,6 +12,7 @@ are disturbances in one cost, so that no gain grows without a price.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -19,7 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import ComplexArray, FloatArray, White, adaptive_nodes
+from models.basics import (
+    ComplexArray,
+    FloatArray,
+    PhysicsWarning,
+    adaptive_nodes,
+    wave_number,
+)
 from models.case import Case
 from models.hook import HookMotion
 from models.plant import (
@@ -233,6 +240,7 @@ def pose(
         If there is no such structure, or the case lacks what a design needs, such as a sensor.
     """
     named = structure_aboard(structure, built_for or case)
+    _warn_of_waves(case, named.measurements)
     data = PlantData.from_case(case)
     shaken = known if known is not None and _same_sea(case, known.case) else None
     hook = HookMotion.from_case(case) if shaken is None else shaken.hook
@@ -244,7 +252,7 @@ def pose(
         drag_before, rms_before = shaken.drag_before, shaken.payload_rms_before
     else:
         drag_before, rms_before = uncompensated(case, data, hook)
-    sensed = with_sensors(model.linearise(drag=drag_before), case.sensors)
+    sensed = with_sensors(model.linearise(drag=drag_before), case.sensors, data.command_delay)
     plant = sensed.select(measurements=named.measurements)
     stochastic = case.payload.fixed_drag is None and data.quadratic_drag > 0.0
     loop = loop_limits(case, data, model.masses)
@@ -268,6 +276,26 @@ def pose(
         drag_before=drag_before,
         payload_rms_before=rms_before,
     )
+
+
+def _warn_of_waves(case: Case, measurements: Sequence[str]) -> None:
+    """Warn where the payload's displacement is heard so near the surface that waves press on it.
+
+    A pressure gauge takes the pressure of the water for its depth.  Under a wave of number k that
+    has a part of exp(-k d) of the surface's elevation at a depth d (Airy), 4 % at half a wave
+    length: above that the gauge shows the wave beside the payload's motion, of which a design
+    knows nothing.  The depth is at most the length of rope paid out.
+    """
+    period = case.sea.spectral_peak_period
+    half = math.pi / float(wave_number(2.0 * math.pi / period))
+    if "payload.displacement" in measurements and case.rope.length < half and not case.quiet:
+        warnings.warn(
+            f"{case.label}: sensors.payload: with {case.rope.length:g} m of rope the payload hangs "
+            f"less deep than half the length of the waves at the peak, {half:.3g} m: a pressure "
+            "gauge would show the waves as displacement, which the design leaves out",
+            PhysicsWarning,
+            stacklevel=2,
+        )
 
 
 def _same_sea(case: Case, other: Case) -> bool:
@@ -322,7 +350,7 @@ def heard_spectra(case: Case, hook: HookMotion, measurements: Sequence[str]) -> 
 def _sampled(spectrum: Any) -> SampledNoise:
     if isinstance(spectrum, UnitError):
         return SampledNoise(spectrum=spectrum, lowest=spectrum.lowest, splits=spectrum.splits)
-    return SampledNoise(spectrum=spectrum.density if isinstance(spectrum, White) else spectrum)
+    return SampledNoise(spectrum=getattr(spectrum, "density", spectrum))
 
 
 def uncompensated(case: Case, data: PlantData, hook: HookMotion) -> tuple[float, float]:
@@ -402,7 +430,8 @@ def locked_response(case: Case, omega: FloatArray, drag: float) -> ComplexArray:
 def with_masses(question: DesignQuestion, masses: int) -> DesignQuestion:
     """Return the question on another number of rope masses."""
     model = build_plant(question.data, masses)
-    sensed = with_sensors(model.linearise(drag=question.drag_before), question.case.sensors)
+    linear = model.linearise(drag=question.drag_before)
+    sensed = with_sensors(linear, question.case.sensors, question.data.command_delay)
     return replace(
         question,
         model=model,

@@ -25,7 +25,7 @@ its own gain, and Kp is zero.  Ki makes it critically damped, kappa Ki = J omega
 command got wrong, such as the gear's losses.
 
 The bandwidth follows from what delays the loop: the command is held over T, the speed is a mean
-over T, the torque builds up in 1/omega_T (or L/R).  omega_b is a quarter of one over their sum,
+over T, the torque builds up in 1/omega_T (or L/R), the command has a delay of its own.  omega_b is a quarter of one over their sum,
 so that they take a quarter of a radian from the phase margin at omega_b.  Motor speed and motor
 torque belong to the same shaft, hence the loop is passive whatever hangs on the rope: rope
 modes do not limit it, delays do.
@@ -75,6 +75,8 @@ class SteadyMotion:
         Whether the drive has a speed regulator of its own: its command is a speed.
     lag
         Time in which the torque builds up [s].
+    command_delay
+        Delay of the command [s].
     per_rope_speed
         Motor speed per speed of the rope, n/r [rad/m].
     """
@@ -85,6 +87,7 @@ class SteadyMotion:
     own_gain: float
     regulated: bool
     lag: float
+    command_delay: float
     per_rope_speed: float
 
     @classmethod
@@ -107,12 +110,13 @@ class SteadyMotion:
             own_gain=own,
             regulated=regulated,
             lag=lag,
+            command_delay=data.command_delay,
             per_rope_speed=data.gear_ratio / data.drum_radius,
         )
 
     def widest(self, sample_time: float) -> float:
         """Return the bandwidth that sampling and the drive leave a drum loop room for [rad/s]."""
-        return _PHASE / (sample_time + self.lag)
+        return _PHASE / (sample_time + self.lag + self.command_delay)
 
     @property
     def feed(self) -> float:
@@ -243,11 +247,12 @@ class DrumSpeedLoop:
     def delay_at(self, omega: float) -> float:
         """Return by how much the speed is late at a frequency [rad/s], load constant [s].
 
-        The half sample of hold that every command waits is included.
+        The half sample of hold that every command waits is included, and its own delay.
         """
         m, s = self.motor, 1j * omega
         torque = m.torque_gain / (1.0 + s * m.lag)
-        held = torque * np.exp(-0.5 * s * self.sample_time)  # only the command is held
+        # Only the command is held, and late.
+        held = torque * np.exp(-s * (0.5 * self.sample_time + m.command_delay))
         friction = m.damping - m.torque_gain * m.own_gain
         regulated = held * (self.proportional + self.integral / s)
         forward = held * m.feed + regulated

@@ -2,9 +2,9 @@ r"""The sampled loop of a recursive controller on the linear plant: its poles.
 
 ::
 
-    +--> linear plant, load cell --> sampled every T --> recursion --> u, held over T --+
-    |                                                                                   |
-    +-----------------------------------------------------------------------------------+
+    +--> linear plant, load cell --> sampled every T --> recursion --> late u, held over T --+
+    |                                                                                        |
+    +----------------------------------------------------------------------------------------+
 
 The plant moves on between samples, the controller does not.  With plant, delays, the load
 cell's filter and the controller's Jacobian at rest in one matrix, the loop is stable if its
@@ -16,6 +16,7 @@ Controllers are checked with it when they are made.  Noise and limits are for th
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,12 +24,11 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-import scipy.linalg
 
 from models.basics import ComplexArray, FloatArray
 from models.case import Case
 from models.plant import MEAN_LOSSES, MEASUREMENTS, LinearPlant, Plant, zero_order_hold
-from models.sensing import HEARD, Measurement, Recursion
+from models.sensing import HEARD, Measurement, Recursion, with_sensors
 
 from .recursive import at_rest
 
@@ -52,10 +52,12 @@ class SampledLoop:
         T [s].
     load_cell_bandwidth
         First-order bandwidth of the tension signal [rad/s], inf for none.
+    command_delay
+        Delay of the command [s], which the plant has in those of its measurements.
 
     Notes
     -----
-    Delays of the payload's signals are rounded up to whole samples.
+    Delays of the payload's signals and of the command are rounded up to whole samples each.
     """
 
     plant: LinearPlant
@@ -63,6 +65,7 @@ class SampledLoop:
     rest: Measurement
     sample_time: float
     load_cell_bandwidth: float = math.inf
+    command_delay: float = 0.0
 
     @cached_property
     def matrix(self) -> FloatArray:
@@ -108,14 +111,29 @@ class SampledLoop:
             A = np.block([[A, np.zeros((n, 1))], [cell * p.Cz[[tension]], np.array([[-cell]])]])
             B = np.vstack([B, cell * p.Dz[[tension]]])
         Ad, Bd = zero_order_hold(A, B, T)
-        late = math.ceil(max(p.delays, default=0.0) / T - 1e-9)
-        size = len(A) + 3 * late + 1  # states, three signals for each sample of delay, u
+        waits = self._samples(self.command_delay)
+        late = {
+            name: self._samples(delay - self.command_delay)
+            for name, delay in zip(p.measurements, p.delays, strict=True)
+            if name in MEASUREMENTS
+        }
+        # States, as many values of each signal and of the command as are on their way, and u.
+        ends = np.cumsum([len(A), *late.values(), waits, 1]).tolist()
+        size = ends[-1]
         world = World(
             continuous=A,
-            A=scipy.linalg.block_diag(Ad, np.eye(3 * late, k=-3), np.zeros((1, 1))),
-            B=np.vstack([Bd, np.zeros((3 * late, 1)), np.ones((1, 1))]),
+            A=np.zeros((size, size)),
+            B=np.zeros((size, 1)),
             H=np.zeros((len(HEARD), size)),
         )
+        world.A[: len(A), : len(A)] = Ad
+        for start, end in itertools.pairwise(ends[:-1]):
+            world.A[range(start + 1, end), range(start, end - 1)] = 1.0
+        world.B[ends[-3]] = 1.0  # the command enters what is on its way, or is u at once
+        if waits:
+            world.A[-1, size - 2], world.A[: len(A), size - 2] = 1.0, Bd[:, 0]
+        else:
+            world.B[: len(A)] = Bd
         place = {name: HEARD.index(name) for name in HEARD}
         world.H[place["drive.applied"], -1] = 1.0
         for name, row in zip(WINCH, winch, strict=True):
@@ -123,13 +141,16 @@ class SampledLoop:
                 world.H[place[name], n] = 1.0
                 continue
             world.H[place[name], :n], world.H[place[name], -1] = p.Cz[row], p.Dz[row, 0]
-        for i, name in enumerate(MEASUREMENTS):
+        for i, (name, count) in enumerate(late.items()):
             row, into, at = p.measurements.index(name), world.H, place[name]
-            if late:
-                world.H[at, len(A) + 3 * (late - 1) + i] = 1.0
-                into, at = world.A, len(A) + i
+            if count:
+                world.H[at, ends[i + 1] - 1] = 1.0
+                into, at = world.A, ends[i]
             into[at, :n], into[at, -1] = p.C[row], p.D[row, 0]
         return world
+
+    def _samples(self, delay: float) -> int:
+        return math.ceil(delay / self.sample_time - 1e-9)
 
 
 class Jacobians(NamedTuple):
@@ -164,7 +185,7 @@ def sampled_loop(
     Parameters
     ----------
     case
-        For its load cell.
+        For its sensors.
     plant
         Its plant.
     recursion, sample_time
@@ -172,11 +193,13 @@ def sampled_loop(
     drag
         Linear drag of the payload [N s/m]; none is the harder test of stability.
     """
-    cell = case.sensors.load_cell
+    cell, waits = case.sensors.load_cell, case.winch.drive.command_delay
+    sensed = with_sensors(plant.linearise(drag=drag), case.sensors, waits)
     return SampledLoop(
-        plant=plant.linearise(drag=drag),
+        plant=sensed.select(measurements=MEASUREMENTS).with_held_states(),
         recursion=recursion,
         rest=at_rest(plant.operating_point(MEAN_LOSSES)),
         sample_time=sample_time,
         load_cell_bandwidth=cell.bandwidth if cell else math.inf,
+        command_delay=waits,
     )

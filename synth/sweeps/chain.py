@@ -10,9 +10,9 @@ mass and drag. Around it stand the winch's own equations, as in `models.plant.li
 
     u = -(G P + D X + E T) + H Z + N,      X = y P - Z (haul),  T = f P (tension),
 
-of a controller that hears the payload (through its low-passes and delay: G), the drum (haul and
+of a controller that hears the payload (through its low-passes, holds and delays: G), the drum (haul and
 speed: D), the tension (behind the load cell: E) and the hook Z (behind the reference unit's
-high-pass and delay: H); N is what the errors and the noise of all of these make of the command.
+high-pass and delay: H), all of it late by the command's own delay; N is what the errors and the noise of all of these make of the command.
 Then
 
     open = W y + g h e f,    closed = open + h phi (G + D y + E f),
@@ -182,6 +182,9 @@ class Chain:
         self.pull = (self._own("load") * h) * e
         self.drive = h * phi
         heard = self._heard = loops.law.response(rows, s)
+        delay = self._own("command_delay")
+        if np.any(value_of(delay)) or isinstance(delay, Dual):
+            heard = self._heard = {name: row * late(s, delay) for name, row in heard.items()}
         zero = np.zeros((1, 1))
         self.D = -(heard.get("drum.haul", zero) + heard.get("motor.speed", zero) * s / h)
         self.E = -heard.get("rope.tension", zero) * self._load_cell()
@@ -231,13 +234,28 @@ class Chain:
         """Return what the payload's motion makes of the command."""
         s, gain = self.s, np.zeros((1, 1))
         for name in _PAYLOAD:
-            gain = gain * s + self._heard.get(f"payload.{name}", 0.0)
+            row = self._heard.get(f"payload.{name}", 0.0) * self._held(name)
+            gain = gain * s + row * late(s, self._own(f"{name}_latency"))
+        return gain * self._passed * late(s, self._own("delay"))
+
+    @cached_property
+    def _passed(self) -> Any:
+        """Return what the low-passes of sensor and link make of a payload signal."""
+        passed: Any = 1.0
         for name in ("sensor_bandwidth", "telemetry_bandwidth"):
             bandwidth = self._own(name)
             if _there(bandwidth):
-                b = s / bandwidth
-                gain = gain / (1.0 + np.sqrt(2.0) * b + b * b)
-        return gain * late(s, self._own("delay"))
+                b = self.s / bandwidth
+                passed = passed / (1.0 + np.sqrt(2.0) * b + b * b)
+        return passed
+
+    def _held(self, name: str) -> Any:
+        """Return what holding its readings makes of a payload signal."""
+        rate = self._own(f"{name}_rate")
+        if not _there(rate):
+            return 1.0
+        turn = self.s / rate
+        return (1.0 - exp(-turn)) / turn
 
     def _load_cell(self) -> Any:
         bandwidth = self._own("cell_bandwidth")
@@ -261,9 +279,12 @@ class Chain:
     def noise(self, heave_rms: FloatArray) -> Any:
         """Return the density of what errors and noise of the sensors make of the command."""
         total: Any = np.zeros((1, 1))
+        passes = self._own("noise_passes")
         for name in _PAYLOAD:
             # An amplitude density a root hertz is white noise of half its square.
-            size = abs2(self._heard.get(f"payload.{name}", 0.0))
+            size = abs2(self._heard.get(f"payload.{name}", 0.0) * self._held(name))
+            if not _there(self._own(f"{name}_rate")) and np.any(value_of(passes)):
+                size = size * abs2(self._passed)
             total = total + size * (0.5 * _UNIT * abs2(self._own(f"{name}_noise")))
         share = self._own("cell_noise")
         if _there(share):

@@ -25,7 +25,7 @@ from models.basics import (
     White,
 )
 from models.plant import lump_rope
-from models.sensing import DRIFT_BAND
+from models.sensing import DRIFT_BAND, sensed_plant
 from models.spread import Spread
 
 from ..question import DesignQuestion, SampledNoise
@@ -161,7 +161,9 @@ class DesignRows:
         wanted = [*outputs, *([VELOCITY] * consistent)]
         self._orders = {name: 2 if name in second else 1 for name in wanted}
         self._peaks, self._start = peaks, start
-        delayed = case.sensors.telemetry.delay > 0.0 or "sensors.telemetry.delay" in spread.paths
+        delayed = any(sensed_plant(case, masses=1, drag=0.0).delays) or any(
+            path.endswith(("delay", "latency", "rate")) for path in spread.paths
+        )
         three = question.structure.name == "payload-feedback"
         alone = self.lumps.masses.size == 1 and not (delayed or consistent or self._noisy)
         self.spring = alone and three and case.rope.damping_law == "kelvin-voigt"

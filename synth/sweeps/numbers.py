@@ -38,6 +38,11 @@ _SENSED = {
     "acceleration_noise": "sensors.payload.acceleration_noise",
     "velocity_noise": "sensors.payload.velocity_noise",
     "displacement_noise": "sensors.payload.displacement_noise",
+    **{
+        f"{name}_{end}": f"sensors.payload.{name}_{end}"
+        for name in ("acceleration", "velocity", "displacement")
+        for end in ("rate", "latency")
+    },
     "mru_period": "sensors.mru.heave_filter_period",
     "mru_gain": "sensors.mru.gain_error",
     "mru_phase": "sensors.mru.phase_error",
@@ -89,7 +94,8 @@ def columns_of(case: Case) -> dict[str, FloatArray]:
     * ``damping_time``, ``slow`` and the gains and times [s] of its branches: the rope's EA(s)/EA,
       by `PlantData.damping_time` and `PlantData.branches`;
     * ``fixed_drag``: linear drag coefficient [N s/m]; NaN where it agrees with the response;
-    * the sensors' numbers; NaN where there is no such sensor.
+    * the sensors' numbers; NaN where there is no such sensor;
+    * ``noise_passes``: 1 where noise of the payload's signals passes their low-passes, else 0.
     """
     data, drag = PlantData.from_case(case), case.payload.fixed_drag
     found = {name: getattr(data, name) for name in _PLAIN}
@@ -106,6 +112,7 @@ def columns_of(case: Case) -> dict[str, FloatArray]:
         phi = np.where(np.asarray(beta) > 0.0, beta, 1.0)
     found |= {"phi": phi, "beta": beta, "lag": lag, "switches": float(data.switching)}
     found |= {**_rope(data), "fixed_drag": math.nan if drag is None else drag}
+    found["noise_passes"] = float(case.sensors.payload.noise_enters == "before-filter")
     for name, path in _SENSED.items():
         value: Any = case
         for key in path.split("."):

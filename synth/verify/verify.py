@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from models.basics import ComplexArray, FloatArray, SolverError, White, one_thread
+from models.basics import ComplexArray, FloatArray, SolverError, one_thread
 from models.hook import HookMotion
 from models.plant import (
     MAX_MASSES,
@@ -120,7 +120,7 @@ class _Winch:
             if name == HOOK or not (unit or name.removesuffix("_noise") in heard):
                 continue
             # Noise is that of samples, which carry it up to pi/T.
-            density = spectrum.density if isinstance(spectrum, White) else spectrum
+            density = getattr(spectrum, "density", spectrum)
             own = spectrum if isinstance(spectrum, UnitError) else None
             low = min(1e-5 / SAMPLE_TIME, own.lowest if own is not None else math.inf)
             source = Source(name=name, density=density, band=(low, math.pi / SAMPLE_TIME))

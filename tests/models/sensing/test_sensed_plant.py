@@ -133,13 +133,18 @@ def test_spectra_are_those_of_the_sensors() -> None:
         "payload.velocity_noise",
         "rope.tension_noise",
     }
-    # White noise of density N per root hertz, over the band that samples carry, has the
-    # variance that the simulation draws.
-    sensors = SensorModel.from_case(case, 0.02)
-    white = spectra["payload.velocity_noise"]
-    assert isinstance(white, White)
-    variance = white.intensity / np.pi * (np.pi / 0.02)
-    assert variance == pytest.approx(sensors.noise_rms("velocity") ** 2)
+    # White noise of density N per root hertz behind the low-pass has the variance that the
+    # simulation draws, N^2 b/(4 sqrt 2), whatever the sample time.
+    omega = np.geomspace(1e-4, 1e5, 200_001)
+    density = spectra["payload.velocity_noise"].density(omega)
+    corner = 20.0 * np.pi
+    assert density[0] == pytest.approx(0.002**2 / (2.0 * np.pi))
+    assert np.allclose(density, density[0] / (1.0 + (omega / corner) ** 4), rtol=1e-9)
+    variance = 0.002**2 * corner / (4.0 * np.sqrt(2.0))
+    assert np.trapezoid(density, omega) == pytest.approx(variance, rel=1e-3)
+    for sample_time in (0.005, 0.02):
+        sensors = SensorModel.from_case(case, sample_time)
+        assert sensors.noise_rms("velocity") ** 2 == pytest.approx(variance)
     tension = spectra["rope.tension_noise"].intensity / 0.02
     assert tension == pytest.approx((0.01 * case.static_tension) ** 2)
     omega = np.geomspace(1e-4, 1e3, 20_001)
@@ -147,6 +152,15 @@ def test_spectra_are_those_of_the_sensors() -> None:
     assert error == pytest.approx(0.05**2, rel=1e-3)  # 5 cm are more than 5 % of this heave
     plant = sensed_plant(case, drag=DRAG)
     assert len(disturbances(spectra, plant.independent_disturbances)) == 4
+
+
+def test_noise_behind_the_low_pass_is_that_of_samples() -> None:
+    case = load_case("subsea-crane").replace({"sensors.payload.noise_enters": "after-filter"})
+    white = sensed_spectra(case, HookMotion.from_case(case))["payload.velocity_noise"]
+    assert isinstance(white, White)
+    variance = white.intensity / np.pi * (np.pi / 0.02)
+    sensors = SensorModel.from_case(case, 0.02)
+    assert variance == pytest.approx(sensors.noise_rms("velocity") ** 2)
 
 
 def test_perfect_sensors_disturb_nothing() -> None:
