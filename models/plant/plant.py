@@ -217,6 +217,7 @@ class Plant(Equations):
             measurements=self.measurements,
             outputs=self.outputs,
             delays=(self.data.delay + self.data.command_delay,) * len(self.measurements),
+            holds=(),
             rates=RATES,
             units=self.units,
             static={**held.outputs, "drive.command": held.command},

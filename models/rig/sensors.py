@@ -2,8 +2,9 @@
 
 The payload's acceleration, velocity and displacement are measured at the payload and sent up;
 the design sees them through a low-pass filter, the hold between readings and a delay, and with
-their noise.  Bias, resolution, jitter and lost messages are for the simulation, as are motion reference unit, motor encoder and load cell:
-payload feedback does not use those, feed-forward and constant tension do.
+their noise.  Bias, resolution, jitter and lost messages are for the simulation, as are motion
+reference unit, motor encoder and load cell: payload feedback does not use those, feed-forward and
+constant tension do.
 """
 
 from __future__ import annotations

@@ -123,11 +123,11 @@ def sensed_plant(
     -------
     LinearPlant
         Outputs are those of `models.plant.plant`.  Measurements are `MEASURED`: the payload's
-        motion held between readings and late by latency and telemetry, the hook's heave and its rate behind the high-pass of the
-        reference unit and late by its delay, haul and motor speed (encoder, taken as exact), and
-        the tension behind the load cell's low-pass.  Each of `NOISES` adds to its measurement; the
-        error of the heave rate is the derivative of that of the heave.  All are late by the
-        command's own delay besides.
+        motion held between readings and late by latency and telemetry, the hook's heave and its
+        rate behind the high-pass of the reference unit and late by its delay, haul and motor speed
+        (encoder, taken as exact), and the tension behind the load cell's low-pass.  Each of
+        `NOISES` adds to its measurement; the error of the heave rate is the derivative of that of
+        the heave.  All are late by the command's own delay besides.
 
     Raises
     ------

@@ -85,9 +85,10 @@ class SensorModel:
     added, the sum is rounded to the resolution and sent, or held and sent again until the next
     reading.  White noise of one-sided density N per root hertz, sampled every Ts, has the standard
     deviation N/sqrt(2 Ts), where Ts is the time between readings if there are such; noise that
-    has passed low-passes is sampled exactly (`_innovations`) and not interpolated.  The newest `lags.stop` messages are remembered; where something fresh has
-    arrived their weighted mean is what is known, else the last value is held.  A message of
-    weight zero is not touched, so that a broken sensor's NaN stays where it is.
+    has passed low-passes is sampled exactly (`_innovations`) and not interpolated.  The newest
+    `lags.stop` messages are remembered; where something fresh has arrived their weighted mean is
+    what is known, else the last value is held.  A message of weight zero is not touched, so that a
+    broken sensor's NaN stays where it is.
 
     Encoder: the angle is rounded to counts, and the haul is off by as much.  The drive counts
     over 10 ms for the speed, whatever the controller's sample time: the speed is rounded to one

@@ -42,9 +42,9 @@ def disturbances(spectrum: Mapping[str, Any], known: tuple[str, ...]) -> tuple[D
     Parameters
     ----------
     spectrum
-        By name of the disturbance: a `White` or a `ShapingFilter`, an object with ``density``, ``band`` and
-        ``splits`` (`models.basics.quadrature.SpectralDensity`), a callable of omega [rad/s], or a
-        table (omega, density), linear in between and zero outside.
+        By name of the disturbance: a `White` or a `ShapingFilter`, an object with ``density``,
+        ``band`` and ``splits`` (`models.basics.quadrature.SpectralDensity`), a callable of omega
+        [rad/s], or a table (omega, density), linear in between and zero outside.
     known
         Names of the plant's independent disturbances.
 

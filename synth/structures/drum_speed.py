@@ -25,10 +25,10 @@ its own gain, and Kp is zero.  Ki makes it critically damped, kappa Ki = J omega
 command got wrong, such as the gear's losses.
 
 The bandwidth follows from what delays the loop: the command is held over T, the speed is a mean
-over T, the torque builds up in 1/omega_T (or L/R), the command has a delay of its own.  omega_b is a quarter of one over their sum,
-so that they take a quarter of a radian from the phase margin at omega_b.  Motor speed and motor
-torque belong to the same shaft, hence the loop is passive whatever hangs on the rope: rope
-modes do not limit it, delays do.
+over T, the torque builds up in 1/omega_T (or L/R), the command has a delay of its own.  omega_b
+is a quarter of one over their sum, so that they take a quarter of a radian from the phase margin
+at omega_b.  Motor speed and motor torque belong to the same shaft, hence the loop is passive
+whatever hangs on the rope: rope modes do not limit it, delays do.
 
 Anti-windup is by back-calculation (K. J. Astrom and T. Hagglund, PID Controllers, 2nd ed.,
 chapter 3): what the drive did not follow is taken from the integral at a rate of omega_b/2.

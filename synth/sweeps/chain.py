@@ -10,10 +10,10 @@ mass and drag. Around it stand the winch's own equations, as in `models.plant.li
 
     u = -(G P + D X + E T) + H Z + N,      X = y P - Z (haul),  T = f P (tension),
 
-of a controller that hears the payload (through its low-passes, holds and delays: G), the drum (haul and
-speed: D), the tension (behind the load cell: E) and the hook Z (behind the reference unit's
-high-pass and delay: H), all of it late by the command's own delay; N is what the errors and the noise of all of these make of the command.
-Then
+of a controller that hears the payload (through its low-passes, holds and delays: G), the drum
+(haul and speed: D), the tension (behind the load cell: E) and the hook Z (behind the reference
+unit's high-pass and delay: H), all late by the command's own delay; N is what the errors and the
+noise of all of these make of the command. Then
 
     open = W y + g h e f,    closed = open + h phi (G + D y + E f),
     P closed = (W + h phi (D + H)) Z + h phi N.
