@@ -72,14 +72,13 @@ def test_torque_of_noise_does_not_hang_on_the_control_rate() -> None:
 
 
 def growth(case: Case, gains: dict[str, float]) -> float:
-    """Growth rate of a run of a loop from its start, by the size of its payload [1/s]."""
-    run = run_simulation(linear(case, gains, 0.005, 240.0), seed=1)
-    values = run.values[:, run.signals.index("payload.displacement")]
+    """How much larger the motor's speed is late in a run than before: a sea leaves it alike."""
+    run = run_simulation(linear(case, gains, 0.005, 600.0), seed=1)
+    speed = np.abs(run.values[:, run.signals.index("motor.speed")])
     early, late = (
-        np.abs(values[(run.time > start) & (run.time < start + 40.0)]).max()
-        for start in (100.0, 190.0)
+        speed[(run.time > start) & (run.time < start + 200.0)] for start in (60.0, 399.0)
     )
-    return float(math.log(late / early) / 90.0)
+    return math.inf if run.status == "diverged" else float(late.max() / early.max())
 
 
 @pytest.mark.ci
@@ -103,8 +102,9 @@ def test_a_run_is_unstable_from_the_gain_on_that_margins_say(changes: dict[str, 
     )
     limit = evaluate_gains(case, CRANE).margins.gain
     assert 1.1 < limit < 20.0
-    calm, loud = (growth(case, {**CRANE, "A": factor * limit}) for factor in (0.93, 1.07))
-    assert calm < 0.005 < loud
+    calm, loud = (growth(case, {**CRANE, "A": factor * limit}) for factor in (0.9, 1.1))
+    assert calm < 2.0
+    assert loud > 10.0
 
 
 def test_a_late_command_does_what_late_telemetry_does() -> None:
