@@ -72,13 +72,14 @@ def test_torque_of_noise_does_not_hang_on_the_control_rate() -> None:
 
 
 def growth(case: Case, gains: dict[str, float]) -> float:
-    """How much larger the motor's speed is late in a run than before: a sea leaves it alike."""
+    """How much larger the motor's speed is late in a run than before; infinite if that tripped."""
     run = run_simulation(linear(case, gains, 0.005, 600.0), seed=1)
     speed = np.abs(run.values[:, run.signals.index("motor.speed")])
     early, late = (
         speed[(run.time > start) & (run.time < start + 200.0)] for start in (60.0, 399.0)
     )
-    return math.inf if run.status == "diverged" else float(late.max() / early.max())
+    tripped = any(event.kind == "trip" for event in run.events) or late.max() == 0.0
+    return math.inf if tripped else float(late.max() / early.max())
 
 
 @pytest.mark.ci
@@ -102,7 +103,7 @@ def test_a_run_is_unstable_from_the_gain_on_that_margins_say(changes: dict[str, 
     )
     limit = evaluate_gains(case, CRANE).margins.gain
     assert 1.1 < limit < 20.0
-    calm, loud = (growth(case, {**CRANE, "A": factor * limit}) for factor in (0.9, 1.1))
+    calm, loud = (growth(case, {**CRANE, "A": factor * limit}) for factor in (0.95, 1.25))
     assert calm < 2.0
     assert loud > 10.0
 
