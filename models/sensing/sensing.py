@@ -270,8 +270,9 @@ class SensorModel:
         if name in self.filters:
             return float(math.sqrt(_stationary(self.filters[name])[1]))
         density = float(getattr(self.payload, f"{name}_noise"))
-        rate = self.payload.rate(name) or math.inf
-        return density * math.sqrt(0.5 * min(rate, 1.0 / self.sample_time))
+        rate = self.payload.rate(name)
+        between = self.sample_time if rate is None else max(self.sample_time, 1.0 / rate)
+        return density / math.sqrt(2.0 * between)
 
     def _noise_order(self, name: str) -> int:
         return self.filters[name].order if name in self.filters else 0
