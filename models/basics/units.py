@@ -79,7 +79,6 @@ KINDS: Mapping[str, Kind] = {
     "time": _kind("a time", "s", {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}),
     "frequency": _kind("a frequency", "rad/s", {
         "rad/s": 1.0, "Hz": 2.0 * math.pi, "mHz": 2e-3 * math.pi, "kHz": 2e3 * math.pi}),
-    "rate": _kind("a rate", "1/s", {"1/s": 1.0, "Hz": 1.0, "1/min": 1.0 / 60.0}),
     "angular speed": _kind("an angular speed", "rad/s", {
         "rad/s": 1.0, "rpm": _RPM, "r/min": _RPM, "rev/min": _RPM, "deg/s": _DEG}),
     "speed": _kind("a speed", "m/s", {

@@ -19,7 +19,7 @@ from pydantic import model_validator
 from ..casefile import Quantity, Section
 
 _BANDWIDTH_LOW, _BANDWIDTH_HIGH = 0.1, 1e5
-_Rate = Annotated[float, Quantity("rate", 0.1, 1e5)]
+_Rate = Annotated[float, Quantity("frequency", _BANDWIDTH_LOW, _BANDWIDTH_HIGH)]
 _Latency = Annotated[float, Quantity("time", 0.0, 60.0)]
 
 
@@ -55,12 +55,12 @@ class PayloadSensor(Section):
     displacement_resolution: Annotated[float, Quantity("length", 0.0, 10.0)] = 0.0
     """Step in which the displacement is sent; 0 for none."""
     acceleration_rate: _Rate | None = None
-    """Readings of the acceleration per second, each held until the next; not given: as often as
+    """How often the acceleration is read (5 Hz: five readings a second), each held until the next; not given: as often as
     the controller listens.  Noise of readings is independent from one to the next."""
     velocity_rate: _Rate | None = None
-    """Readings of the velocity per second, as those of the acceleration."""
+    """How often the velocity is read, as the acceleration."""
     displacement_rate: _Rate | None = None
-    """Readings of the displacement per second, as those of the acceleration."""
+    """How often the displacement is read, as the acceleration."""
     acceleration_latency: _Latency = 0.0
     """Time from a reading of the acceleration to its being sent, on top of the telemetry's
     delay."""
@@ -76,7 +76,7 @@ class PayloadSensor(Section):
     def rate(self, name: str) -> float | None:
         """Return the readings per second of a signal, `acceleration` or another; None if many."""
         found: float | None = getattr(self, f"{name}_rate")
-        return found
+        return None if found is None else found / (2.0 * math.pi)
 
     def latency(self, name: str) -> float:
         """Return the time from a reading of a signal to its being sent [s]."""

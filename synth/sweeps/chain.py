@@ -254,7 +254,7 @@ class Chain:
         rate = self._own(f"{name}_rate")
         if not _there(rate):
             return 1.0
-        turn = self.s / rate
+        turn = 2.0 * np.pi * self.s / rate
         return (1.0 - exp(-turn)) / turn
 
     def _load_cell(self) -> Any:

@@ -120,7 +120,7 @@ def test_static_values_travel_with_the_linear_plant() -> None:
     assert plant.static["motor.torque"] == pytest.approx(mean)
     assert plant.static["drive.command"] == pytest.approx(mean / MODERN.speed_gain)
     assert dict(plant.loss) == pytest.approx({"motor.torque": loss, "motor.current": loss})
-    heard = with_sensors(plant, load_case("subsea-crane").sensors)
+    heard = with_sensors(plant, load_case("subsea-crane").sensors, 0.0)
     assert heard.select(outputs=["motor.torque"]).loss == {
         "motor.torque": plant.loss["motor.torque"]
     }

@@ -46,12 +46,12 @@ def test_held_readings_are_verified_and_swept_as_they_are_designed() -> None:
     assert found.ok, str(found)
     spread = Spread(
         {
-            "sensors.payload.velocity_rate": Uniform(4.0, 6.0),
+            "sensors.payload.velocity_rate": Uniform(8.0 * np.pi, 12.0 * np.pi),
             "winch.drive.command_delay": Uniform(0.0, 0.02),
         }
     )
     engine = FrequencyEngine(design, spread, metrics=["payload_rms", "max_sensitivity"])
-    rows = np.array([[5.0, 0.01], [4.0, 0.02]])
+    rows = np.array([[10.0 * np.pi, 0.01], [8.0 * np.pi, 0.02]])
     solved = engine.evaluate(rows)
     for k, (rate, delay) in enumerate(rows):
         changes = {"sensors.payload.velocity_rate": rate, "winch.drive.command_delay": delay}
