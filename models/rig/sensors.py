@@ -55,8 +55,9 @@ class PayloadSensor(Section):
     displacement_resolution: Annotated[float, Quantity("length", 0.0, 10.0)] = 0.0
     """Step in which the displacement is sent; 0 for none."""
     acceleration_rate: _Rate | None = None
-    """How often the acceleration is read (5 Hz: five readings a second), each held until the next; not given: as often as
-    the controller listens.  Noise of readings is independent from one to the next."""
+    """How often the acceleration is read (5 Hz: five readings a second), each held until the next;
+    not given: as often as the controller listens.  Noise of readings is independent from one to
+    the next."""
     velocity_rate: _Rate | None = None
     """How often the velocity is read, as the acceleration."""
     displacement_rate: _Rate | None = None

@@ -130,8 +130,13 @@ def _required(
     begins = [*_begins(free), best.values]
     # From the limits as they are to twenty times those.
     tries = [(_drags(free), room) for room in (0.0, 1.0, 3.0)]
-    found = _arrived(problem, begins, tries, Goal.RELAX, binding)
-    if not found:
+    # Where a limit bends that does not bind at the largest sea, all of the drive's may give way.
+    every = [lim.name for lim in problem.scenarios[0].problem.limits if lim.drive]
+    for given in (binding, every):
+        if found := _arrived(problem, begins, tries, Goal.RELAX, given):
+            binding = given
+            break
+    else:
         return {}
     least = min(found, key=lambda s: s.extra)
     reference = briskest(problem, begins)

@@ -295,7 +295,8 @@ class Programme:
                         continue
                     bound: Any = self._bound(i, limit, tighten) * (1.0 + shift)
                     if self._goal is Goal.RELAX and limit.name in self._relaxed:
-                        bound = exp(seen.extra) * bound
+                        wider = exp(seen.extra)
+                        bound = bound / wider if limit.at_least else wider * bound
                     row = limit.rows(seen, bound)
                     if self._goal is Goal.FEASIBLE:
                         row = row - seen.extra

@@ -97,7 +97,8 @@ def test_a_closed_loop_against_python_control():
     run = time_response(closed, {"payload.force": Step(size=1e4)}, duration=30.0, step=0.05)
     # The same loop by python-control: all inputs and disturbances, all measurements and outputs.
     open_loop = plant.to_control()
-    B, C, D = np.zeros((1, 11)), np.zeros((5, 1)), np.zeros((5, 11))
+    heard, led = open_loop.noutputs, open_loop.ninputs
+    B, C, D = np.zeros((1, heard)), np.zeros((led, 1)), np.zeros((led, heard))
     B[:, :3], C[:1], D[:1, :3] = law.B, law.C, law.D
     loop = control.feedback(open_loop, control.ss(law.A, B, C, D), sign=1)
     forced = np.zeros((5, run.time.size))

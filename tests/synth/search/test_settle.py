@@ -97,7 +97,9 @@ def test_an_unstable_start_leads_nowhere(solved):
 
 
 def test_the_largest_sea_of_a_drive_is_where_a_limit_of_it_binds() -> None:
-    problem = pose(load_case("thesis-1975-rope")).problem
+    # At the load the rope would go slack in any sea whose drag holds the loop: not asked here.
+    case = load_case("thesis-1975-rope").replace({"limits.tension_ends": "drum"})
+    problem = pose(case).problem
     with one_thread():
         begin = search(FamilyProblem.of(problem), 2, 0).reference
         assert begin is not None
