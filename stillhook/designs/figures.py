@@ -294,7 +294,7 @@ def _bar_text(axes: Axes, place: int, table: Table, longest: float) -> None:
     shown = min(use.value, longest)
     if use.value > longest:
         text += f"   {100.0 * use.value:.0f} % ▸"
-    inside = shown > 0.62 * longest
+    inside = shown > 0.55 * longest
     plain = use.enforced or not inside
     axes.text(
         100.0 * shown + (-1.2 if inside else 1.2) * longest,
