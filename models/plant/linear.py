@@ -440,16 +440,8 @@ class LinearPlant(ReadOnlyArrays):
                 states=(*self.states, *_delay_states(self.inputs, late, pade_order)),
             )
         A2, B2, C2, D2 = pade_bank(self.delays, pade_order)
-        return plain._with(
-            A=np.block([[self.A, np.zeros((len(self.A), len(A2)))], [B2 @ self.C, A2]]),
-            B=np.vstack([self.B, B2 @ self.D]),
-            E=np.vstack([self.E, B2 @ self.F]),
-            C=np.hstack([D2 @ self.C, C2]),
-            D=D2 @ self.D,
-            F=D2 @ self.F,
-            Cz=np.hstack([self.Cz, np.zeros((len(self.Cz), len(A2)))]),
-            states=(*self.states, *_delay_states(self.measurements, self.delays, pade_order)),
-        )
+        names = _delay_states(self.measurements, self.delays, pade_order)
+        return plain._with_filters(A2, B2, C2, D2, names)
 
     def with_held_states(self) -> LinearPlant:
         """Return the plant with a rational model of its holds, as `without_delays` has it."""
@@ -462,6 +454,17 @@ class LinearPlant(ReadOnlyArrays):
             A2[at, at] = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-120.0, -60.0, -12.0]]) / T
             B2[3 * k + 2, i], C2[i, at], D2[i, i] = 1.0 / T, [120.0, 0.0, 2.0], 0.0
         late = zip(self.delays, self.holds, strict=True)
+        names = [f"{self.measurements[i]}.hold{j + 1}" for i in held for j in range(3)]
+        filtered = self._with_filters(A2, B2, C2, D2, names)
+        return filtered._with(
+            delays=tuple(max(0.0, delay - 0.5 * hold) for delay, hold in late),
+            holds=(0.0,) * ny,
+        )
+
+    def _with_filters(
+        self, A2: FloatArray, B2: FloatArray, C2: FloatArray, D2: FloatArray, names: Sequence[str]
+    ) -> LinearPlant:
+        """Return the plant with filters behind its measurements, and their states' names."""
         return self._with(
             A=np.block([[self.A, np.zeros((len(self.A), len(A2)))], [B2 @ self.C, A2]]),
             B=np.vstack([self.B, B2 @ self.D]),
@@ -470,12 +473,7 @@ class LinearPlant(ReadOnlyArrays):
             D=D2 @ self.D,
             F=D2 @ self.F,
             Cz=np.hstack([self.Cz, np.zeros((len(self.Cz), len(A2)))]),
-            states=(
-                *self.states,
-                *(f"{self.measurements[i]}.hold{j + 1}" for i in held for j in range(3)),
-            ),
-            delays=tuple(max(0.0, delay - 0.5 * hold) for delay, hold in late),
-            holds=(0.0,) * ny,
+            states=(*self.states, *names),
         )
 
     def discretise(self, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
