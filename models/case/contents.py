@@ -50,7 +50,7 @@ class Contents(Section):
 
     @property
     def static_tension(self) -> float:
-        """Rope tension at the winch at rest: payload and rope in water [N]."""
+        """Rope tension at rest above payload and rope in water, below the sheaves [N]."""
         return self.payload.submerged_weight + self.rope.submerged_weight
 
     @property
@@ -68,8 +68,13 @@ class Contents(Section):
 
     @property
     def static_torque_budget(self) -> float:
-        """Motor torque that raises the static tension through the gear's losses [N m]."""
-        return self.static_torque / self.winch.gearbox.efficiency
+        """Motor torque that raises the static tension through losses of gear and sheaves [N m]."""
+        return self.static_torque / (self.winch.gearbox.efficiency * self.rope.sheaves_efficiency)
+
+    @property
+    def static_tension_budget(self) -> float:
+        """Rope tension at the drum that raises the static tension over the sheaves [N]."""
+        return self.static_tension / self.rope.sheaves_efficiency
 
     @property
     def moving_mass(self) -> float:

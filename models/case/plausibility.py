@@ -101,10 +101,16 @@ def _overloads(case: Contents) -> list[tuple[str, str, str]]:
     """Return the drive ratings below the static load: field, the static load, the rating."""
     drive, constant = case.winch.drive, case.winch.torque_constant
     gear, static = case.winch.gearbox, case.static_torque_budget
+    sheaves, lossy = case.rope.sheaves, case.rope.sheaves_efficiency < 1.0
     why = (
         f"rope tension {case.static_tension / 1e3:.4g} kN on a drum radius of "
         f"{case.drum_radius:.4g} m through a gear of {gear.ratio:g}"
         + (f" and efficiency {gear.efficiency:g}" if gear.efficiency < 1.0 else "")
+        + (
+            f" over {sheaves} sheaves of efficiency {case.rope.sheave_efficiency:g}"
+            if lossy
+            else ""
+        )
     )
     found = []
     for name in ("torque_continuous", "torque_peak"):
@@ -122,7 +128,7 @@ def _overloads(case: Contents) -> list[tuple[str, str, str]]:
 
 def _static_limits(case: Contents) -> Iterator[Finding]:
     """Yield the rope tension limits that the tension at rest breaks already."""
-    limits, tension = case.limits, case.static_tension / 1e3
+    limits, tension = case.limits, case.static_tension_budget / 1e3
     if limits.rope_tension_peak is not None and limits.rope_tension_peak / 1e3 < tension:
         yield (
             "limits.rope_tension_peak",

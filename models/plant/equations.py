@@ -13,7 +13,7 @@ the drum (`models.plant.payout`), and what acts on the payload from outside
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -31,6 +31,7 @@ INPUTS = ("drive.command",)
 DISTURBANCES = ("hook.heave", "hook.heave_rate", "payload.force", "drive.set_point")
 MEASUREMENTS: tuple[str, ...] = ("payload.acceleration", "payload.velocity", "payload.displacement")
 RATES = {"hook.heave_rate": "hook.heave"}
+UPPER_TENSION = "rope.upper_tension"  # below the sheaves, where there are any
 MOTION = ("displacement", "velocity", "acceleration")  # of whatever else moves: deck, surface
 
 
@@ -173,8 +174,15 @@ def build_equations(
     # Losses always work against the motion: the motor feels 1/eta of the load that it hauls, and
     # eta of one that drives it.  A simulation switches by the speed, a linear plant takes the mean.
     direction = p["winch.gear_direction"] + ca.tanh(p["winch.gear_switching"] * speed)
-    eta = p["winch.gear_efficiency"]
-    gear = 0.5 * ((1 + direction) / eta + (1 - direction) * eta)
+
+    def lossy(efficiency: ca.SX) -> ca.SX:
+        return 0.5 * ((1 + direction) / efficiency + (1 - direction) * efficiency)
+
+    eta, at_drum = p["winch.gear_efficiency"], top
+    if data.sheaves_efficiency < 1.0:  # they switch with the gear: one efficiency to the motor
+        eta = eta * p["rope.sheaves_efficiency"]
+        at_drum = lossy(p["rope.sheaves_efficiency"]) * top
+    gear = lossy(eta)
     friction = p["winch.viscous_friction"] * speed
     if data.coulomb_friction > 0.0:
         friction += p["winch.coulomb_friction"] * ca.tanh(speed / data.friction_speed)
@@ -195,9 +203,11 @@ def build_equations(
         "motor.torque": motor.torque,
         "motor.speed": speed,
         "motor.current": motor.current,
-        "rope.tension": top,
+        "rope.tension": at_drum,
         "rope.lower_tension": lower,
     }
+    if data.sheaves_efficiency < 1.0:
+        z[UPPER_TENSION] = top
     if data.motor == "dc":
         z["motor.voltage"] = motor.applied
     if limits is not None or travel is not None or surroundings is not None:  # a simulation
@@ -243,6 +253,11 @@ def _butterworth(
     shown, moving = x[f"{stage}.displacement"], x[f"{stage}.velocity"]
     rate = bandwidth**2 * (signals[2] - shown) - math.sqrt(2.0) * bandwidth * moving
     return (rate, moving, shown), {f"{stage}.displacement": moving, f"{stage}.velocity": rate}
+
+
+def weighed_tension(signals: Collection[str]) -> str:
+    """Return which of a plant's signals a load cell at the rope's upper end weighs."""
+    return UPPER_TENSION if UPPER_TENSION in signals else "rope.tension"
 
 
 def displacement_names(n: int) -> list[str]:
@@ -304,6 +319,8 @@ def parameter_values(data: PlantData) -> dict[str, float]:
         "winch.inertia": data.inertia,
         "winch.viscous_friction": data.viscous_friction,
     }
+    if data.sheaves_efficiency < 1.0:
+        values["rope.sheaves_efficiency"] = data.sheaves_efficiency
     if data.coulomb_friction > 0.0:
         # Zero here: its slope at rest, T_c/omega_f, is no friction of a drum that moves.
         values["winch.coulomb_friction"] = 0.0
@@ -344,6 +361,7 @@ def _units(
         "force": "N",
         "tension": "N",
         "lower_tension": "N",
+        "upper_tension": "N",
         "minimum_tension": "N",
         "length": "m",
         "angle": "rad",

@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..basics import ComplexArray
-from .equations import DISTURBANCES, INPUTS, MEASUREMENTS, RATES
+from .equations import DISTURBANCES, INPUTS, MEASUREMENTS, RATES, UPPER_TENSION
 from .plant_data import PlantData, as_plant_data
 from .response import PlantResponse
 
@@ -76,6 +76,7 @@ def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) ->
     top = h * angle + heave
     payload = P_Y * top + P_F * force
     torque = forward * command - back * s * angle
+    upper = T_Y * top + T_F * force
     z = {
         "payload.displacement": payload,
         "payload.velocity": s * payload,
@@ -84,9 +85,11 @@ def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) ->
         "motor.torque": torque,
         "motor.speed": s * angle,
         "motor.current": torque / data.torque_constant,
-        "rope.tension": T_Y * top + T_F * force,
+        "rope.tension": data.mean_sheaves_factor * upper,
         "rope.lower_tension": (data.payload_mass * s**2 + drag * s) * payload - force,
     }
+    if data.sheaves_efficiency < 1.0:
+        z[UPPER_TENSION] = upper
     if data.motor == "dc":
         z["motor.voltage"] = command
     # Exact delay and low-passes: no Pade model, no states.

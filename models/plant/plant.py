@@ -26,7 +26,13 @@ import casadi as ca
 import numpy as np
 
 from ..basics import FloatArray, SolverError, check_range, pick, read_only
-from .equations import RATES, Equations, build_equations, displacement_names
+from .equations import (
+    RATES,
+    Equations,
+    build_equations,
+    displacement_names,
+    weighed_tension,
+)
 from .linear import LinearPlant
 from .plant_data import PlantData, as_plant_data
 from .rope import lump_rope
@@ -60,7 +66,7 @@ class OperatingPoint:
     torque
         Motor torque [N m].
     tension
-        Rope tension at the drum [N].
+        Rope tension at its upper end, below the sheaves [N].
     outputs
         Every performance output by name.
     residual
@@ -88,7 +94,7 @@ class Plant(Equations):
     ``winch.gear_direction`` in [-1, 1] is +1 when the motor drives the load (it feels 1/eta
     of its torque), -1 when the load drives the motor (eta), 0 the mean of both factors; with
     ``winch.gear_switching`` [s/rad] above zero the direction follows the motor's speed, as
-    tanh(switching * speed).
+    tanh(switching * speed).  The sheaves' losses go with the gear's.
     """
 
     @property
@@ -167,7 +173,7 @@ class Plant(Equations):
             p=read_only(p),
             command=float(u[0]),
             torque=outputs["motor.torque"],
-            tension=outputs["rope.tension"],
+            tension=outputs[weighed_tension(outputs)],
             outputs=outputs,
             residual=residual,
         )
@@ -179,8 +185,9 @@ class Plant(Equations):
 
         The command's own delay is in those of the measurements: the loop is the same.
 
-        Derivatives are automatic.  The gear has the mean of its two factors, (1/eta + eta)/2, and
-        ``static`` is rest with it; ``loss`` is what hauling takes above that, and dry friction.
+        Derivatives are automatic.  Gear and sheaves have the mean of their two factors,
+        (1/eta + eta)/2, and ``static`` is rest with it; ``loss`` is what hauling takes above that,
+        and dry friction.
         Where the losses do not switch (`PlantData.switching`) ``static`` is rest with the motor
         hauling and there is no ``loss``.
 
@@ -206,6 +213,9 @@ class Plant(Equations):
         if self.data.switching:
             held, torque = rest, hauling.torque - rest.torque + self.data.coulomb_friction
             loss = {name: torque * per for name, per in self.data.per_torque.items()}
+            if self.data.sheaves_efficiency < 1.0:
+                drum = "rope.tension"
+                loss[drum] = hauling.outputs[drum] - rest.outputs[drum]
         w = np.zeros(len(self.disturbances))
         names = ("A", "B", "E", "C", "D", "F", "Cz", "Dz", "Fz")
         blocks = zip(names, self.jacobians(rest.x, rest.u, w, rest.p), strict=True)

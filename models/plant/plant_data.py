@@ -40,6 +40,8 @@ class PlantData:
         [kg/m].
     rope_weight
         Submerged weight of the rope per length [N/m].
+    sheaves_efficiency
+        Tension behind the sheaves over that before them where the rope runs [-].
     damping_ratio
         Fraction of critical damping of the first axial mode [-].
     damping_law
@@ -88,6 +90,7 @@ class PlantData:
     rope_length: float
     mass_per_length: float
     rope_weight: float = 0.0
+    sheaves_efficiency: float = 1.0
     damping_ratio: float = 0.002
     damping_law: str = "kelvin-voigt"
     masses: int | None = None
@@ -127,7 +130,7 @@ class PlantData:
 
     @property
     def static_tension(self) -> float:
-        """Rope tension at the drum at rest: payload and rope, submerged [N]."""
+        """Rope tension below the sheaves at rest: payload and rope, submerged [N]."""
         return self.payload_weight + self.rope_weight * self.rope_length
 
     @property
@@ -219,9 +222,15 @@ class PlantData:
         """(1/eta + eta)/2: what one newton of rope costs the motor, mean of both ways [-].
 
         The motor feels 1/eta of the load's torque when it hauls and eta of it when the load
-        drives it.  A linear plant has one factor; the mean of both meets the work of a cycle.
+        drives it, eta being that of gear and sheaves.  A linear plant has one factor; the mean of
+        both meets the work of a cycle.
         """
-        return 0.5 * (1.0 / self.gear_efficiency + self.gear_efficiency)
+        return _mean_of_ways(self.gear_efficiency * self.sheaves_efficiency)
+
+    @property
+    def mean_sheaves_factor(self) -> float:
+        """Rope tension at the drum over that below the sheaves, mean of both ways [-]."""
+        return _mean_of_ways(self.sheaves_efficiency)
 
     @property
     def per_torque(self) -> dict[str, float]:
@@ -259,6 +268,7 @@ class PlantData:
             rope_length=rope.length,
             mass_per_length=rope.mass_per_length,
             rope_weight=rope.submerged_weight / rope.length,
+            sheaves_efficiency=rope.sheaves_efficiency,
             damping_ratio=rope.damping_ratio,
             damping_law=rope.damping_law,
             masses=None if rope.masses == "auto" else rope.masses,
@@ -281,6 +291,11 @@ class PlantData:
             delay=telemetry.delay,
             command_delay=winch.drive.command_delay,
         )
+
+
+def _mean_of_ways(efficiency: float) -> float:
+    """Return the mean of hauling in, 1/efficiency, and paying out, efficiency."""
+    return 0.5 * (1.0 / efficiency + efficiency)
 
 
 def as_plant_data(source: Case | PlantData) -> PlantData:

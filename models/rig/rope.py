@@ -37,6 +37,11 @@ class Rope(Section):
     water."""
     length: Annotated[float, Quantity("length", 1.0, 12000.0)]
     """Length paid out, from the drum to the payload."""
+    sheaves: Annotated[int, Quantity("count", 0, 20)] = 0
+    """Number of sheaves that the rope runs over between the drum and the load."""
+    sheave_efficiency: Annotated[float, Quantity("ratio", 0.8, 1.0)] = 0.98
+    """Tension behind a sheave over that before it where the rope runs: bending of the rope and
+    friction of the bearing. 0.98 is usual on roller bearings, 0.96 on plain ones."""
     damping_ratio: Annotated[float, Quantity("ratio", 0.0, 0.5)] = 0.002
     """Internal damping as a fraction of critical at the first axial mode."""
     damping_law: Literal["hysteretic", "kelvin-voigt"] = "kelvin-voigt"
@@ -96,6 +101,11 @@ class Rope(Section):
             buoyancy = 1.0 - SEA_WATER_DENSITY / STEEL_DENSITY
             per_length = self.mass_per_length * GRAVITY * buoyancy
         return per_length * self.length
+
+    @property
+    def sheaves_efficiency(self) -> float:
+        """Tension behind all sheaves over that before them where the rope runs [-]."""
+        return self.sheave_efficiency**self.sheaves
 
     @property
     def wave_speed(self) -> float:

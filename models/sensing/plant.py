@@ -12,7 +12,7 @@ so what is designed here runs there.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,6 +31,7 @@ from ..plant import (
     build_plant,
     late_and_held,
     line_response,
+    weighed_tension,
 )
 from ..rig import MRU, PayloadSensor, Sensors
 from .mru import PERFECT, error_density, low_pass, unit_response
@@ -55,8 +56,7 @@ NOISES = (
     *(f"{name}_noise" for name in MEASUREMENTS),
     "rope.tension_noise",
 )
-_ABOARD = (*ENCODER, "rope.tension")  # measured outputs of the plant
-_OF_PLANT = [MEASURED.index(name) for name in (*MEASUREMENTS, *_ABOARD)]
+_OF_PLANT = [MEASURED.index(name) for name in (*MEASUREMENTS, *ENCODER, "rope.tension")]
 DRIFT_BAND = 1e-6  # lower end of the band in which a drift is looked at [rad/s]
 SAMPLE_TIME = 0.01  # of the load cell's noise, which a data sheet gives per sample [s]
 
@@ -176,7 +176,7 @@ def with_sensors(plant: LinearPlant, sensors: Sensors | None, command_delay: flo
     C = np.zeros((len(MEASURED), len(states)))
     D = np.zeros((len(MEASURED), len(plant.inputs)))
     F = np.zeros((len(MEASURED), nw + len(NOISES)))
-    shown = [plant.outputs.index(name) for name in _ABOARD]
+    shown = _aboard(plant.outputs)
     C[_OF_PLANT, :n] = np.vstack([plant.C, plant.Cz[shown]])
     D[_OF_PLANT] = np.vstack([plant.D, plant.Dz[shown]])
     F[_OF_PLANT, :nw] = np.vstack([plant.F, plant.Fz[shown]])
@@ -228,6 +228,11 @@ def with_sensors(plant: LinearPlant, sensors: Sensors | None, command_delay: flo
         rates={**plant.rates, "mru.error_rate": "mru.error"},
         units={**plant.units, **units},
     )
+
+
+def _aboard(outputs: Sequence[str]) -> list[int]:
+    """Return which outputs of a plant encoder and load cell measure."""
+    return [outputs.index(name) for name in (*ENCODER, weighed_tension(outputs))]
 
 
 def payload_noise(sensors: Sensors, name: str) -> White | ShapingFilter | None:
@@ -309,7 +314,7 @@ def sensed_line_at(
     noises = tuple(name for name in NOISES if name != "mru.error_rate")
     yw = np.zeros((points.size, len(MEASURED), nw + len(noises)), complex)
     yu = np.zeros((points.size, len(MEASURED), len(line.inputs)), complex)
-    shown = [line.outputs.index(name) for name in _ABOARD]
+    shown = _aboard(line.outputs)
     yw[:, _OF_PLANT, :nw] = np.concatenate([line.yw, line.zw[:, shown]], axis=1)
     yu[:, _OF_PLANT] = np.concatenate([line.yu, line.zu[:, shown]], axis=1)
     if sensors.load_cell is not None:

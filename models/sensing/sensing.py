@@ -24,7 +24,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from ..basics import FloatArray, check_seed
 from ..case import Case
-from ..plant import ShapingFilter, noisy_hold
+from ..plant import ShapingFilter, noisy_hold, weighed_tension
 from ..rig import Encoder, LoadCell, PayloadSensor
 from .control import HEARD
 from .draws import SENSOR_NOISE, draw
@@ -141,7 +141,8 @@ class SensorModel:
     @staticmethod
     def raw(signals: Mapping[str, ca.SX]) -> ca.SX:
         """Return the vector of `RAW` from the plant's signals by name."""
-        return ca.vertcat(*(signals[name] for name in RAW))
+        cell = {"rope.tension": signals[weighed_tension(signals)]}
+        return ca.vertcat(*({**signals, **cell}[name] for name in RAW))
 
     @cached_property
     def noisy(self) -> bool:

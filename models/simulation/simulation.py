@@ -355,7 +355,7 @@ def _rest(case: Case, masses: int | None, surroundings: Surroundings | None) -> 
 def _parameters(case: Case, plant: Plant, changes: Mapping[str, float]) -> dict[str, float]:
     """Return the plant's parameters by name: losses and friction in, then the changes."""
     losses: dict[str, float] = {}
-    if case.winch.gearbox.efficiency < 1.0:
+    if case.winch.gearbox.efficiency * case.rope.sheaves_efficiency < 1.0:
         losses["winch.gear_switching"] = 1.0 / _GEAR_TURN
     if "winch.coulomb_friction" in plant.parameters:
         losses["winch.coulomb_friction"] = case.winch.motor.coulomb_friction

@@ -333,7 +333,7 @@ def _tensions(
     top = linear.outputs.index("rope.tension")
     row, feed = linear.Cz[top, keep] * scale, linear.Fz[top, hook]
     if plant.masses == 1:  # one spring: what it carries is less than at the drum by a constant
-        lowest = _weight_below(plant, 0)
+        lowest = plant.data.mean_sheaves_factor * _weight_below(plant, 0)
         return row[None], feed[None], np.array([lowest])
     names = [linear.states[i] for i in keep]
     p, n = plant.parameters, plant.masses

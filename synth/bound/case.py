@@ -468,7 +468,7 @@ def rms_limits(limits: Sequence[Limit], period: float) -> dict[str, float]:
         elif isinstance(limit, Peak | Minimum):
             k = math.sqrt(2.0 * math.log(max(limit.duration / period, math.e**0.5)))
             if isinstance(limit, Minimum):
-                room = (limit.static - limit.bound) / k
+                room = (limit.static - limit.loss - limit.bound) / k
             else:
                 room = (limit.bound - abs(limit.static) - limit.loss) / k
         else:

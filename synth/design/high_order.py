@@ -80,7 +80,9 @@ def _rooms(question: DesignQuestion, view: Assessment) -> dict[str, float]:
         value = limit.measure(view)
         if limit.use(value) <= 1.0:
             continue
-        static = limit.static if isinstance(limit, Minimum) else abs(limit.static) + limit.loss
+        static = abs(limit.static) + limit.loss
+        if isinstance(limit, Minimum):
+            static = limit.static - limit.loss
         if isinstance(limit, Power):
             # The speed is that of the hook, so it is the torque that has to give.
             fast = view.peak(limit.speed, limit.duration)

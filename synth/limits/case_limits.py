@@ -62,8 +62,7 @@ def drive_limits(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
 
     def add(kind: Callable[..., Limit], output: str, bound: float | None, **more: float) -> None:
         if bound is not None:
-            if kind is not Minimum:
-                more["loss"] = loss.get(output, 0.0)
+            more["loss"] = loss.get(output, 0.0)
             unit = plant.units[output]
             limits.append(
                 kind(bound=bound, output=output, static=static[output], unit=unit, **more)

@@ -173,9 +173,10 @@ class Peak(_OfOneSignal):
 
 @dataclass(frozen=True, kw_only=True)
 class Minimum(_OfOneSignal):
-    """static - k sigma of `output` at least `bound` in `duration` [s]: a rope that stays taut."""
+    """static - loss - k sigma of `output` at least `bound` in `duration` [s]: a taut rope."""
 
     static: float
+    loss: float = 0.0
     duration: float = 10800.0
     at_least: ClassVar[bool] = True
     kind: ClassVar[str] = "least"
@@ -186,7 +187,7 @@ class Minimum(_OfOneSignal):
 
     @override
     def measure(self, loop: Assessment | Symbols) -> Any:
-        return self.static - loop.peak(self.output, self.duration)
+        return self.static - self.loss - loop.peak(self.output, self.duration)
 
     @override
     def use(self, value: float) -> float:

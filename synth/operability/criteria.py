@@ -123,6 +123,7 @@ def case_criteria(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
                 bound=0.0,
                 output="rope.tension",
                 static=plant.static["rope.tension"],
+                loss=plant.loss.get("rope.tension", 0.0),
                 duration=case.limits.equivalent_exposure,
                 unit="N",
             )

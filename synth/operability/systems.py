@@ -158,11 +158,12 @@ class HeldSystem(System):
     def transfers(self, omega: FloatArray) -> ComplexArray:
         s = 1j * omega.astype(np.complex128)
         P_Y, P_F, T_Y, T_F = held_transfers(self.data, s, self.reference)
+        reeved = self.data.mean_sheaves_factor
         D = self.data.payload_mass * s**2 + self.reference * s
         rows = {
             PAYLOAD: (P_Y, P_F),
             VELOCITY: (s * P_Y, s * P_F),
-            "rope.tension": (T_Y, T_F),
+            "rope.tension": (reeved * T_Y, reeved * T_F),
             LOWER_TENSION: (D * P_Y, D * P_F - 1.0),
         }
         return np.array([rows[z] for z in (*self.outputs, VELOCITY)])

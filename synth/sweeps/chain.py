@@ -421,7 +421,7 @@ class Chain:
             "motor.current": _times(1.0 / self._own("torque_constant"), torque),
             "drive.command": command,
             "motor.voltage": command,
-            "rope.tension": (None, payload, None),
+            "rope.tension": (None, self._own("reeved") * payload, None),
         }
 
 

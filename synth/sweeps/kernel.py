@@ -83,7 +83,7 @@ class SpringLoops:
             "drum.haul": lambda: [h * c for c in drum],
             "drive.command": lambda: product(W, heard),
             "motor.voltage": lambda: product(W, heard),
-            "rope.tension": lambda: product(D, moved),
+            "rope.tension": lambda: [n["reeved"] * c for c in product(D, moved)],
             "rope.lower_tension": lambda: product([zero, loops.drag, n["payload_mass"]], moved),
         }
 

@@ -137,8 +137,9 @@ def finished(
             with np.errstate(all="ignore"):
                 crossings = np.maximum(exposure / loops.period(metric.output), np.exp(0.5))
             reach = np.sqrt(2.0 * np.log(crossings)) * value
+            reach = reach + loss.get(metric.output, np.zeros(1))
             value = rest - reach
             if metric.kind == "peak":
-                value = np.abs(rest) + loss.get(metric.output, np.zeros(1)) + reach
+                value = np.abs(rest) + reach
         found[metric.name] = np.where(loops.stable, value, np.nan)
     return found

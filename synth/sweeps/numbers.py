@@ -89,6 +89,7 @@ def columns_of(case: Case) -> dict[str, FloatArray]:
     The fields of `PlantData` and its plain properties by their names, and beside them
 
     * ``haul``: h = r/n, rope hauled by a turn of the motor [m]; ``load``: h (1/eta + eta)/2 [m];
+      ``reeved``: tension at the drum over that below the sheaves, mean of both ways [-];
     * ``phi``, ``beta``, ``lag``: torque per command, torque per speed, and the lag of the motor
       with its drive [s];
     * ``damping_time``, ``slow`` and the gains and times [s] of its branches: the rope's EA(s)/EA,
@@ -102,6 +103,7 @@ def columns_of(case: Case) -> dict[str, FloatArray]:
     found |= {name: getattr(data, name) for name in ("stiffness", "rope_mass", "static_tension")}
     haul = data.drum_radius / data.gear_ratio
     found |= {"haul": haul, "load": data.mean_gear_factor * haul}
+    found["reeved"] = data.mean_sheaves_factor
     phi: Any
     if data.motor == "dc":
         phi = data.torque_constant / data.resistance
@@ -143,11 +145,15 @@ def at_rest(numbers: Numbers) -> tuple[dict[str, FloatArray], dict[str, FloatArr
 
     As `LinearPlant.static` and `LinearPlant.loss`.
     """
-    tension, eta = numbers["static_tension"], numbers["gear_efficiency"]
-    mean, hauled = tension * numbers["load"], tension * numbers["haul"] / eta
-    switches = numbers["switches"]
-    held = switches * mean + (1.0 - switches) * hauled
-    loss = switches * (hauled - mean + numbers["coulomb_friction"])
+    tension, over = numbers["static_tension"], numbers["sheaves_efficiency"]
+    eta, switches = numbers["gear_efficiency"] * over, numbers["switches"]
+
+    def of_ways(mean: FloatArray, hauled: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return switches * mean + (1.0 - switches) * hauled, switches * (hauled - mean)
+
+    held, loss = of_ways(tension * numbers["load"], tension * numbers["haul"] / eta)
+    loss = loss + switches * numbers["coulomb_friction"]
+    drum, reeved = of_ways(tension * numbers["reeved"], tension / over)
 
     def drive(torque: FloatArray) -> dict[str, FloatArray]:
         current = torque / numbers["torque_constant"]
@@ -155,8 +161,8 @@ def at_rest(numbers: Numbers) -> tuple[dict[str, FloatArray], dict[str, FloatArr
         return {"motor.torque": torque, "motor.current": current, "motor.voltage": voltage}
 
     lowest = numbers["payload_weight"] * (1.0 - numbers["weight_uncertainty"])
-    ends = {"rope.tension": tension, "rope.lower_tension": lowest}
-    return {**ends, **drive(held)}, drive(loss)
+    ends = {"rope.tension": drum, "rope.lower_tension": lowest}
+    return {**ends, **drive(held)}, {"rope.tension": reeved, **drive(loss)}
 
 
 def numbers_of(

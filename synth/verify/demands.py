@@ -175,7 +175,7 @@ class Demand:
             for size, name in zip(sizes, self.outputs, strict=True)
         ]
         if self.kind == "least":
-            return self.static - peaks[0]
+            return self.static - self.loss - peaks[0]
         if self.kind == "breakdown":
             corner = abs(self.static) + self.loss + peaks[0]
             return corner * (peaks[1] / self.base_speed) ** 2
@@ -293,7 +293,7 @@ def case_demands(case: Case, data: PlantData, plant: LinearPlant, masses: int) -
                 enforced=wanted.drive == "enforce",
                 outputs=outputs,
                 static=lightest if signal == _AT_LOAD else float(plant.static[outputs[0]]),
-                loss=0.0 if kind == "least" else losses.get(outputs[0], 0.0),
+                loss=losses.get(outputs[0], 0.0),
                 duration=exposure,
                 base_speed=winch.cooled_speed,
             )
@@ -317,16 +317,20 @@ def _heating(static: float, torque: float, speed: float, base: float) -> float:
 def switching_losses(case: Case) -> dict[str, float]:
     """Return how far losses that switch with the direction carry signals to either side, by name.
 
-    Half of what hauling and paying out differ by, T_0 (1/eta - eta)/2, and dry friction.
+    Half of what hauling and paying out differ by, T_0 (1/eta - eta)/2, and dry friction.  Behind
+    the sheaves the rope's tension does so too.
     """
     winch, motor = case.winch, case.winch.motor
     if winch.losses == "hauling":
         return {}
-    eta = winch.gearbox.efficiency
+    over = case.rope.sheave_efficiency**case.rope.sheaves
+    eta = winch.gearbox.efficiency * over
     torque = 0.5 * case.static_torque * (1.0 / eta - eta) + motor.coulomb_friction
     found = {_TORQUE: torque, "motor.current": torque / winch.torque_constant}
     if motor.type == "dc":
         found["motor.voltage"] = found["motor.current"] * motor.resistance
+    if over < 1.0:
+        found[_TENSION] = 0.5 * case.static_tension * (1.0 / over - over)
     return found
 
 

@@ -28,6 +28,7 @@ GAINS = {
     "heave.bandwidth": 4.25241,
 }
 EXCEEDANCE, FRICTION = 0.1, 60.0
+SHEAVES, SHEAVE = 4, 0.97
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +37,8 @@ def design() -> Design:
         "limits.exceedance": EXCEEDANCE,
         "limits.drive": "report",
         "winch.motor.coulomb_friction": FRICTION,
+        "rope.sheaves": SHEAVES,
+        "rope.sheave_efficiency": SHEAVE,
     }
     case = sh.load_case("subsea-crane").replace(changes)
     return sh.evaluate_gains(case, GAINS, structure="combined")
@@ -43,16 +46,25 @@ def design() -> Design:
 
 def torques(case: sh.Case) -> tuple[float, float]:
     """Return mean and loss of the torque at rest [N m], by hand."""
-    eta = case.winch.gearbox.efficiency
-    weight = case.payload.submerged_weight + case.rope.submerged_weight
-    held = weight * case.drum_radius / case.winch.gearbox.ratio
+    eta = case.winch.gearbox.efficiency * SHEAVE**case.rope.sheaves
+    held = weight(case) * case.drum_radius / case.winch.gearbox.ratio
     return 0.5 * held * (1.0 / eta + eta), 0.5 * held * (1.0 / eta - eta) + FRICTION
+
+
+def pulls(case: sh.Case) -> tuple[float, float]:
+    """Return mean and loss of the tension at the drum at rest [N], by hand."""
+    over = SHEAVE**case.rope.sheaves
+    hauled, lowered = weight(case) / over, weight(case) * over
+    return 0.5 * (hauled + lowered), 0.5 * (hauled - lowered)
+
+
+def weight(case: sh.Case) -> float:
+    return case.payload.submerged_weight + case.rope.submerged_weight
 
 
 def test_every_limited_signal_holds_sea_unit_noise_and_losses(design: Design) -> None:
     case, loop = design.case, design.assessment
-    mean, loss = torques(case)
-    at_rest = {"motor.torque": (mean, loss), "rope.tension": (case.static_tension, 0.0)}
+    at_rest = {"motor.torque": torques(case), "rope.tension": pulls(case)}
     sides = {}
     for signal, kinds in LIMITED.items():
         parts = dict(design.shares[signal])
@@ -66,7 +78,7 @@ def test_every_limited_signal_holds_sea_unit_noise_and_losses(design: Design) ->
         k = math.sqrt(2.0 * math.log(-waves / math.log(1.0 - EXCEEDANCE)))
         wanted = {
             "peak": static + bounded + k * sigma,
-            "least": static - k * sigma,
+            "least": static - bounded - k * sigma,
             "continuous": math.hypot(static, bounded, sigma),
         }
         sides[signal] = wanted["peak"]
@@ -119,6 +131,7 @@ def test_operability_ends_where_the_design_says(design: Design, name: str, path:
 
 def test_a_dc_motor_holds_the_loss_in_current_and_voltage() -> None:
     gear = {"winch.gearbox.efficiency": 0.9, "winch.motor.coulomb_friction": FRICTION}
+    gear |= {"rope.sheaves": 1, "rope.sheave_efficiency": SHEAVE}
     case = sh.load_case("thesis-1975").replace({**gear, "limits.exceedance": EXCEEDANCE})
     found = sh.evaluate_gains(case, case.gains)
     loop, motor = found.assessment, case.winch.motor
@@ -132,6 +145,15 @@ def test_a_dc_motor_holds_the_loss_in_current_and_voltage() -> None:
         peak = (mean + loss) * per + k * loop.sigma(signal)
         assert found.limits[f"{signal}.peak"].value == pytest.approx(peak, rel=1e-7)
         assert found.shares[signal]["switching.loss"] == pytest.approx(loss * per, rel=1e-9)
+    friction = Spread({"winch.motor.coulomb_friction": "10 %"})
+    engine = FrequencyEngine(found, friction, metrics=["tension_peak", "tension_rms"])
+    swept = engine.evaluate(np.array([[FRICTION]]))  # one spring without delay: by polynomials
+    sigma, k = (
+        loop.sigma("rope.tension"),
+        loop.peak("rope.tension", case.limits.equivalent_exposure),
+    )
+    assert swept["tension_rms"][0] == pytest.approx(sigma, rel=1e-5)
+    assert swept["tension_peak"][0] == pytest.approx(sum(pulls(case)) + k, rel=1e-5)
 
 
 def test_losses_as_they_were_before_there_was_a_choice(design: Design) -> None:

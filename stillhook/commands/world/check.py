@@ -159,13 +159,16 @@ def _winch(case: Case, hook: HookMotion) -> Rows:
     rope_speed = winch.speed_limit * case.drum_radius / winch.gearbox.ratio
     fastest = hook.velocity.most_probable_maximum(case.limits.exposure_time)
     tension = case.limits.rope_tension_peak
-    allowed = "" if tension is None else f"{percent(case.static_tension / tension)} of what it may"
+    power = torque * fastest * winch.gearbox.ratio / case.drum_radius
+    allowed = (
+        "" if tension is None else f"{percent(case.static_tension_budget / tension)} of what it may"
+    )
     least = case.least_tension
     taut = "" if least is None else f"{quantity(least, 'N')} are to stay in the rope"
     kind = "DC" if winch.motor.type == "dc" else "AC"
     return [
         ("drum radius", quantity(case.drum_radius, "m"), "to the rope's centre, rope paid out"),
-        ("static rope tension", quantity(case.static_tension, "N"), allowed),
+        ("static rope tension", quantity(case.static_tension_budget, "N"), allowed),
         ("... at the load, least", quantity(case.payload.least_weight, "N"), taut),
         (
             "static motor torque",
@@ -185,8 +188,8 @@ def _winch(case: Case, hook: HookMotion) -> Rows:
         ),
         (
             "power to follow the hook",
-            quantity(case.static_tension * fastest / winch.gearbox.efficiency, "W"),
-            "static tension times that speed",
+            quantity(power, "W"),
+            "static tension times that speed, with losses",
         ),
     ]
 

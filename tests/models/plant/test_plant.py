@@ -37,6 +37,7 @@ VARIANTS = {
     "one third": replace(ROPE, masses=1),
     "dc with inductance": replace(ROPE, inductance=0.004, sensor_bandwidth=30.0),
     "modern": MODERN,
+    "sheaves": replace(MODERN, sheaves_efficiency=0.9),
     "torque mode": replace(MODERN, speed_gain=0.0, telemetry_bandwidth=math.inf),
     "ideal drive": replace(MODERN, torque_bandwidth=math.inf, sensor_bandwidth=math.inf),
 }
@@ -55,9 +56,11 @@ def test_operating_point_holds_the_load(data: PlantData) -> None:
     plant = build_plant(data)
     rest = plant.operating_point()
     tension = data.payload_weight + data.rope_weight * data.rope_length
-    torque = tension * data.drum_radius / (data.gear_ratio * data.gear_efficiency)
     assert rest.residual < 1e-12
     assert rest.tension == pytest.approx(tension, rel=1e-9)
+    tension /= data.sheaves_efficiency  # hauled over the sheaves
+    assert rest.outputs["rope.tension"] == pytest.approx(tension, rel=1e-9)
+    torque = tension * data.drum_radius / (data.gear_ratio * data.gear_efficiency)
     assert rest.torque == pytest.approx(torque, rel=1e-9)
     if data.motor == "dc":
         command = torque / data.torque_constant * data.resistance
@@ -94,6 +97,23 @@ def test_gear_helps_to_lower_and_hinders_to_haul() -> None:
     assert torque[1.0] == pytest.approx(ideal / 0.925)
     assert torque[-1.0] == pytest.approx(ideal * 0.925)
     assert torque[0.0] == pytest.approx(ideal * MODERN.mean_gear_factor)
+
+
+def test_sheaves_carry_to_the_drum_what_switches_with_the_gear() -> None:
+    data = replace(MODERN, sheaves_efficiency=0.97**4)
+    plant, ideal = build_plant(data), MODERN.static_tension
+    turned = MODERN.drum_radius / MODERN.gear_ratio
+    for direction, over in ((1.0, 0.97**-4), (-1.0, 0.97**4)):
+        rest = plant.operating_point({"winch.gear_direction": direction})
+        assert rest.tension == pytest.approx(ideal)
+        assert rest.outputs["rope.tension"] == pytest.approx(ideal * over)
+        assert rest.torque == pytest.approx(ideal * over * turned * 0.925**-direction)
+        assert rest.outputs["rope.lower_tension"] == pytest.approx(MODERN.payload_weight)
+    linear, eta = plant.linearise(drag=1e4), 0.925 * 0.97**4
+    assert linear.static["rope.tension"] == pytest.approx(ideal * (0.97**4 + 0.97**-4) / 2)
+    assert linear.loss["rope.tension"] == pytest.approx(ideal * (0.97**-4 - 0.97**4) / 2)
+    assert linear.static["motor.torque"] == pytest.approx(ideal * turned * (eta + 1 / eta) / 2)
+    assert linear.loss["motor.torque"] == pytest.approx(ideal * turned * (1 / eta - eta) / 2)
 
 
 def test_gear_direction_can_follow_the_motor() -> None:

@@ -424,6 +424,23 @@ def test_dry_friction_slows_a_turning_drum_by_its_torque() -> None:
     assert torque(rough) - torque(case) == pytest.approx(friction, rel=0.02)
 
 
+def test_sheaves_load_the_motor_as_so_much_worse_a_gear_would() -> None:
+    """And the drum's line has the rope's tension over their efficiency, or times it."""
+    over, gear = 0.97**4, crane().winch.gearbox.efficiency
+    reeved = crane(**{"rope.sheaves": 4, "rope.sheave_efficiency": 0.97})
+    geared = crane(**{"winch.gearbox.efficiency": gear * over})
+    a, b = (simulate(c, feedback(geared, CRANE), duration=60.0, seed=2) for c in (reeved, geared))
+    for name in ("payload.displacement", "motor.torque", "motor.speed", "rope.lower_tension"):
+        size = np.abs(b[name]).max()
+        np.testing.assert_allclose(a[name] / size, b[name] / size, atol=1e-9)
+    size = b["rope.tension"].max()
+    np.testing.assert_allclose(a["rope.upper_tension"] / size, b["rope.tension"] / size, atol=1e-9)
+    ratio, speed = a["rope.tension"] / b["rope.tension"], b["motor.speed"]
+    assert min((speed > 10.0).sum(), (speed < -10.0).sum()) > 100
+    np.testing.assert_allclose(ratio[speed > 10.0], 1.0 / over, rtol=1e-6)
+    np.testing.assert_allclose(ratio[speed < -10.0], over, rtol=1e-6)
+
+
 def test_a_lost_link_is_held_and_shown() -> None:
     case = crane()
     lost = Scenario(
