@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from ..casefile import Section
-from ..rig import GainBounds, Gains, Limits, Payload, Rope, Sensors, Winch
+from ..rig import Crane, GainBounds, Gains, Limits, Payload, Rigging, Rope, Sensors, Winch
 from ..sea import Sea
 from ..vessel import Vessel
 
@@ -29,6 +30,10 @@ class Contents(Section):
     """The vessel: the heave of its hook, or its RAOs and the hook's place."""
     rope: Rope
     """The rope between the drum and the payload."""
+    crane: Crane = Crane()
+    """What the rope hangs from: a boom that gives under the load."""
+    rigging: Rigging = Rigging()
+    """Hook block and slings between the rope and the payload."""
     payload: Payload
     """The load at the lower end of the rope."""
     winch: Winch
@@ -50,8 +55,9 @@ class Contents(Section):
 
     @property
     def static_tension(self) -> float:
-        """Rope tension at rest above payload and rope in water, below the sheaves [N]."""
-        return self.payload.submerged_weight + self.rope.submerged_weight
+        """Rope tension at rest above payload, block and rope in water, below the sheaves [N]."""
+        block = self.rigging.block_weight
+        return self.payload.submerged_weight + block + self.rope.submerged_weight
 
     @property
     def least_tension(self) -> float | None:
@@ -78,9 +84,17 @@ class Contents(Section):
 
     @property
     def moving_mass(self) -> float:
-        """Mass of the one-spring model: payload, added mass, and the rope's share [kg].
+        """Mass of the one-spring model: payload, added mass, hook block, the rope's share [kg].
 
         A third of the rope, or all of it with the thesis's lumping.
         """
         share = 1.0 if self.rope.lumping == "thesis" else 1.0 / 3.0
-        return self.payload.virtual_mass + share * self.rope.mass
+        return self.payload.virtual_mass + self.rigging.block_mass + share * self.rope.mass
+
+    @property
+    def chain_stiffness(self) -> float:
+        """Stiffness of tip, rope and slings in series [N/m]."""
+        crane, rigging = self.crane.stiffness, self.rigging.sling_stiffness
+        if math.isinf(crane) and math.isinf(rigging):
+            return self.rope.stiffness
+        return 1.0 / (1.0 / crane + 1.0 / self.rope.stiffness + 1.0 / rigging)

@@ -15,6 +15,8 @@ from .contents import Contents
 
 Finding = tuple[str, str]
 
+_SOFT = 0.05  # of the rope's stiffness, below which what is in series with it is implausible
+
 
 def contradictions(case: Contents) -> list[Finding]:
     """Return what makes the case impossible, as pairs of a dotted path and a sentence."""
@@ -62,6 +64,7 @@ def remarks(case: Contents) -> Iterator[Finding]:
             f"payload with {case.payload.weight_uncertainty:.3g} of its weight less; say "
             "payload.weight_uncertainty",
         )
+    yield from _soft(case)
     motor, drive = case.winch.motor, case.winch.drive
     if isinstance(motor, DCMotor):
         back_emf = motor.back_emf_constant * case.winch.speed_limit
@@ -81,6 +84,21 @@ def remarks(case: Contents) -> Iterator[Finding]:
     if case.limits.drive == "report":
         for at, load, rating in _overloads(case):
             yield at, f"{rating} is below {load}"
+
+
+def _soft(case: Contents) -> Iterator[Finding]:
+    """Yield what stands in series with the rope and is so soft that the rope hardly matters."""
+    rope = case.rope.stiffness
+    for path, what, stiffness in (
+        ("crane.tip_stiffness", "the crane's tip", case.crane.stiffness),
+        ("rigging.stiffness", "the slings", case.rigging.sling_stiffness),
+    ):
+        if stiffness < _SOFT * rope:
+            yield (
+                path,
+                f"{stiffness:.4g} N/m is {stiffness / rope:.2g} of the rope's {rope:.4g} N/m: "
+                f"nearly all of the stretch is that of {what}; numbers are in N/m",
+            )
 
 
 def changed_meanings(case: Contents) -> Iterator[Finding]:

@@ -64,8 +64,8 @@ def _landing(_: Case, values: Values) -> dict[str, Any]:
 
 def _lift_off(case: Case, values: Values) -> dict[str, Any]:
     weight = weight_in_air(case)
-    # The rope carries nothing at the start: the drum has let out its stretch, and the slack.
-    stretch = weight * values["rope"] / _slow_stiffness(case, values)
+    # The rope carries nothing at the start: the drum has let out all stretch, and the slack.
+    stretch = weight * _compliance(case, values)
     return {
         **moving(move(values, values["height"])),
         "initial_haul": -(stretch + values["slack"]),
@@ -73,9 +73,9 @@ def _lift_off(case: Case, values: Values) -> dict[str, Any]:
     }
 
 
-def _slow_stiffness(case: Case, values: Values) -> float:
-    """Return EA of the rope of a scenario at rest [N]."""
-    return PlantData.from_case(case.replace({"rope.length": values["rope"]})).slow_stiffness
+def _compliance(case: Case, values: Values) -> float:
+    """Return the compliance of tip, rope and slings of a scenario at rest [m/N]."""
+    return PlantData.from_case(case.replace({"rope.length": values["rope"]})).chain_compliance
 
 
 def _set_down(case: Case, values: Values) -> dict[str, Any]:
@@ -121,7 +121,7 @@ def _splash(case: Case, values: Values) -> dict[str, Any]:
         "surroundings": surroundings,
         "motions": {"surface": surface_motion(case, payload_side(case))},
         # Hauled in by what the rope stretches more under the weight in air, so that P is 0.
-        "initial_haul": -surroundings.rest_force * values["rope"] / _slow_stiffness(case, values),
+        "initial_haul": -surroundings.rest_force * _compliance(case, values),
         "case_changes": {"rope.length": values["rope"]},
     }
 

@@ -174,19 +174,17 @@ class Scenario:
             found.append((time, "parameter", ", ".join(parts)))
         return tuple(sorted(found))
 
-    def initial_displacements(self, springs: npt.ArrayLike, compliance: float) -> FloatArray:
+    def initial_displacements(self, compliances: npt.ArrayLike) -> FloatArray:
         """Return where the rope's masses and the payload are at rest at the start.
 
         The payload is at P = 0.  The masses above it have moved with the drum, and by what the
         rope's tension differs from that of the submerged payload, `Surroundings.rest_force` F:
-        x_j = initial_haul + F L/EA times the share of the springs above mass j.
+        x_j = initial_haul + F times the compliance of the springs above mass j.
 
         Parameters
         ----------
-        springs
-            Share of each spring in the rope's compliance, from the drum down (n,).
-        compliance
-            L/EA of the rope [m/N].
+        compliances
+            Of each spring, from the drum down (n,) [m/N].
 
         Returns
         -------
@@ -194,8 +192,8 @@ class Scenario:
             From the drum down, the payload's last (n,) [m].
         """
         force = self.surroundings.rest_force if self.surroundings is not None else 0.0
-        shares = np.cumsum(np.asarray(springs, dtype=np.float64))
-        result: FloatArray = self.initial_haul + force * compliance * shares
+        above = np.cumsum(np.asarray(compliances, dtype=np.float64))
+        result: FloatArray = self.initial_haul + force * above
         result[-1] = 0.0
         return result
 

@@ -14,13 +14,7 @@ if TYPE_CHECKING:
     from .discrete import hermite_hold, noisy_hold, root_of, zero_order_hold
     from .drag import consistent_drag, settled_drag, stochastic_equivalent
     from .drive import SPEED_BAND, DriveLimits
-    from .equations import (
-        MEASUREMENTS,
-        MOTION,
-        displacement_names,
-        parameter_values,
-        weighed_tension,
-    )
+    from .equations import MEASUREMENTS, MOTION, parameter_values, weighed_tension
     from .line import line_response, rope_transfers
     from .linear import LinearPlant, late_and_held
     from .pade import pade_bank

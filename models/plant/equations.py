@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import casadi as ca
 
 from .drive import DriveLimits, motor_equations
+from .rope import chain_of
 
 if TYPE_CHECKING:
     from .payout import DrumTravel
@@ -112,32 +113,42 @@ def build_equations(
     command = u[0] + set_point
     xdot: dict[str, ca.SX] = {"motor.angle": speed}
 
-    # Rope: position and velocity of the upper end, then of every mass.
-    position = [haul + heave, *(x_of[name] for name in displacement_names(n))]
-    velocity = [haul_rate + heave_rate, *(x_of[name] for name in _velocities(n))]
-    # The submerged weight below the top of each spring, its tension at rest.
-    of_rope = p["rope.submerged_weight_per_length"] * p["rope.length"]
-    hanging = [p["payload.submerged_weight"] + of_rope * float(part) for part in lumps.hanging]
+    # Rope: position and velocity of the vessel's end, then of every mass.
+    position = [haul + heave, *(x_of[name] for name in displacement_names(data, n))]
+    velocity = [haul_rate + heave_rate, *(x_of[name] for name in _velocities(data, n))]
+    links = chain_of(p, lumps, length)
     tension = []
-    for j in range(n):
-        k = p["rope.axial_stiffness"] / (length * lumps.springs[j])
+    for j, link in enumerate(links):
+        k = link.stiffness
         stretch = position[j] - position[j + 1]
         rate = velocity[j] - velocity[j + 1]
-        # A rope that has grown has the stretch of the static rope at its new stiffness.
-        at_rest = hanging[j] if travel is None else hanging[j] * p["rope.length"] / length
-        if relaxing:
+        at_rest = link.carried
+        if travel is not None and link.is_rope:
+            # A rope that has grown has the stretch of the static rope at its new stiffness.
+            at_rest = at_rest * p["rope.length"] / length
+        gives = j == 0 and "crane.tip_stiffness" in p  # part of the stretch is the tip's
+        give = link.give if gives else ca.SX(0)
+        if relaxing and link.is_rope:
             # Every branch is a spring behind a damper that has moved by q: what is left of the
             # stretch pulls too.
             moved = [x_of[name] for name in _branch_names(j, relaxing)]
             gains = [p[f"rope.branch_{b + 1}.gain"] for b in range(relaxing)]
             pulled = [g * (stretch - q) for g, q in zip(gains, moved, strict=True)]
             whole = at_rest + k * (stretch + sum(pulled[1:], start=pulled[0]))
+            quick = 1 + sum(gains[1:], start=gains[0])
+            give = give * quick
         else:
-            whole = at_rest + k * (stretch + p["rope.damping_time"] * rate)
+            damping_time = link.series_time if gives else link.damping_time
+            whole = at_rest + k * (stretch + damping_time * rate)
+        if gives:
+            # The tip gives (T - T_rest)/k_t, and the rope has the rest of the stretch.
+            whole = (whole + give * link.carried) / (1 + give)
         tension.append(ca.fmax(0, whole))  # a rope does not push
-        if relaxing:
+        if relaxing and link.is_rope:
+            if gives:
+                stretch = stretch - (whole - link.carried) * link.give / k
             # A slack piece is shorter than its ends are apart: by what leaves it no tension.
-            gained = (tension[j] - whole) / (k * (1 + sum(gains[1:], start=gains[0])))
+            gained = (tension[j] - whole) / (k * quick)
             for b, (name, q) in enumerate(zip(_branch_names(j, relaxing), moved, strict=True)):
                 xdot[name] = (stretch + gained - q) / p[f"rope.branch_{b + 1}.time"]
     # What no mass carries (two thirds of the rope on one spring) hangs on the drum all the same.
@@ -145,12 +156,11 @@ def build_equations(
     acceleration = other = ca.SX(0)
     load = p["payload.virtual_mass"]
     outside: Mapping[str, ca.SX] = {}
-    for j, (shift, move) in enumerate(zip(displacement_names(n), _velocities(n), strict=True)):
-        share = length * lumps.masses[j]
-        weight = p["rope.submerged_weight_per_length"] * share
-        mass = p["rope.mass_per_length"] * share
-        below = tension[j + 1] if j + 1 < n else ca.SX(0)
-        if j + 1 == n:
+    names = zip(links, displacement_names(data, n), _velocities(data, n), strict=True)
+    for j, (link, shift, move) in enumerate(names):
+        mass, weight = link.mass, link.weight
+        below = tension[j + 1] if j + 1 < len(links) else ca.SX(0)
+        if j + 1 == len(links):
             v, quadratic = velocity[-1], p["payload.quadratic_drag"]
             if surroundings is not None:
                 triples = zip(others[0::3], others[1::3], others[2::3], strict=True)
@@ -161,12 +171,12 @@ def build_equations(
                 force, outside = force + around.force, around.outputs
             # Quadratic drag has no slope at rest: a linear plant gets its drag as a parameter.
             other = force - quadratic * ca.fabs(v) * v - p["payload.linear_drag"] * v
-            mass += load
-            weight += p["payload.submerged_weight"]
+            mass = mass + load
+            weight = weight + p["payload.submerged_weight"]
         acceleration = (tension[j] - below - weight + other) / mass
         xdot[shift] = velocity[j + 1]
         xdot[move] = acceleration
-    # What the payload hangs on: the rope in its mass is above that.
+    # What the payload hangs on: rope and hook block in its mass are above that.
     lower = ca.fmax(0, load * acceleration + p["payload.submerged_weight"] - other)
 
     motor = motor_equations(data, p, x_of, command)
@@ -260,13 +270,17 @@ def weighed_tension(signals: Collection[str]) -> str:
     return UPPER_TENSION if UPPER_TENSION in signals else "rope.tension"
 
 
-def displacement_names(n: int) -> list[str]:
-    """Return the names of the displacements of the rope's masses from the drum down."""
-    return [*(f"rope.{j + 1}.displacement" for j in range(n - 1)), "payload.displacement"]
+def displacement_names(data: PlantData, n: int) -> list[str]:
+    """Return the names of the displacements of the chain's masses from the drum down.
+
+    With slings the rope's last mass is the hook block, and the payload one more.
+    """
+    above = n - 1 if math.isinf(data.sling_stiffness) else n
+    return [*(f"rope.{j + 1}.displacement" for j in range(above)), "payload.displacement"]
 
 
-def _velocities(n: int) -> list[str]:
-    return [*(f"rope.{j + 1}.velocity" for j in range(n - 1)), "payload.velocity"]
+def _velocities(data: PlantData, n: int) -> list[str]:
+    return [name.replace("displacement", "velocity") for name in displacement_names(data, n)]
 
 
 def _branch_names(piece: int, branches: int) -> list[str]:
@@ -280,7 +294,7 @@ def _state_names(data: PlantData, n: int) -> tuple[str, ...]:
         names.append("motor.current")
     if data.motor == "ac" and not math.isinf(data.torque_bandwidth):
         names.append("motor.torque")
-    names += [*displacement_names(n), *_velocities(n)]
+    names += [*displacement_names(data, n), *_velocities(data, n)]
     for piece in range(n):
         names += _branch_names(piece, data.branches[1].size)
     for stage, bandwidth in (
@@ -321,6 +335,13 @@ def parameter_values(data: PlantData) -> dict[str, float]:
     }
     if data.sheaves_efficiency < 1.0:
         values["rope.sheaves_efficiency"] = data.sheaves_efficiency
+    if not math.isinf(data.tip_stiffness):
+        values["crane.tip_stiffness"] = data.tip_stiffness
+    if not math.isinf(data.sling_stiffness):
+        values["rigging.stiffness"] = data.sling_stiffness
+    if data.block_mass > 0.0:
+        values["rigging.block_mass"] = data.block_mass
+        values["rigging.block_weight"] = data.block_weight
     if data.coulomb_friction > 0.0:
         # Zero here: its slope at rest, T_c/omega_f, is no friction of a drum that moves.
         values["winch.coulomb_friction"] = 0.0

@@ -13,7 +13,9 @@ For a rope of length L with payload equation D P = T_lower + F, D = M_1 s^2 + C 
     P     = (Y + l sinh(gamma)/gamma F) / (cosh(gamma) + D l sinh(gamma)/gamma),
     T_top = ((gamma sinh(gamma)/l + D cosh(gamma)) Y - F) / (the same denominator).
 
-The first is 1/(cosh gamma + Gamma sinh gamma) with Gamma = D l / gamma.
+The first is 1/(cosh gamma + Gamma sinh gamma) with Gamma = D l / gamma.  Slings of stiffness k_s
+under a hook block m_b make D g + m_b s^2 of D there, g = 1/(1 + D/k_s); a tip of stiffness k_t
+takes T_top/k_t from Y.
 """
 
 from __future__ import annotations
@@ -113,12 +115,12 @@ def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) ->
 
 
 def rope_transfers(
-    data: PlantData, s: ComplexArray, drag: float
+    data: PlantData, s: ComplexArray, drag: float, *, spring: bool = False
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
     """Return P/Y, P/F, T_top/Y and T_top/F of the rope with its payload, each (k,).
 
-    Y is the motion of the rope's upper end, F a force on the payload, T_top the tension at
-    the drum, as deviations from rest.  By reciprocity T_top/F = -P/Y.
+    Y is the motion of the rope's upper end, or of the foot of a tip that gives; F a force on the
+    payload, T_top the tension at the drum, as deviations from rest.  By reciprocity T_top/F = -P/Y.
 
     Parameters
     ----------
@@ -128,8 +130,38 @@ def rope_transfers(
         Points [1/s], (k,), Re s >= 0 for safety from overflow.
     drag
         Equivalent linear drag coefficient C of the payload [N s/m].
+    spring
+        Whether the rope is one spring with all of its mass below, as in the thesis.
     """
     stiffness = data.rope_modulus(s)
+    D, slings = data.payload_mass * s**2 + drag * s, 1.0 / data.sling_stiffness
+    g = 1.0 / (1.0 + D * slings)
+    hung = D * g + data.block_mass * s**2
+    if spring:
+        P_Y, P_F, T_Y = _spring_transfers(data, s, stiffness, hung)
+    else:
+        P_Y, P_F, T_Y = _line_transfers(data, s, stiffness, hung)
+    # From the rope's lower end to the payload, and from its upper end to the tip's foot.
+    P_Y, P_F = P_Y * g, (P_F * g + slings) * g
+    tip = 1.0 / data.tip_stiffness
+    e = 1.0 / (1.0 + T_Y * tip)
+    P_F = P_F + e * P_Y**2 * tip
+    return e * P_Y, P_F, e * T_Y, -e * P_Y
+
+
+def _spring_transfers(
+    data: PlantData, s: ComplexArray, stiffness: ComplexArray, hung: ComplexArray
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Return `_line_transfers` of one spring with all of the rope's mass below it."""
+    spring = stiffness / data.rope_length
+    P_F = 1.0 / (hung + data.rope_mass * s**2 + spring)
+    return spring * P_F, P_F, spring * (1.0 - spring * P_F)
+
+
+def _line_transfers(
+    data: PlantData, s: ComplexArray, stiffness: ComplexArray, hung: ComplexArray
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Return P/Y, P/F and T_top/Y of a rope with a load of dynamic stiffness `hung` below it."""
     compliance = data.rope_length / stiffness
     gamma = s * data.rope_length * np.sqrt(data.mass_per_length / stiffness)
     # All functions are even in gamma: take the root whose exponential does not grow.
@@ -138,10 +170,9 @@ def rope_transfers(
     cosh = 0.5 * (1.0 + decay**2)  # times exp(-gamma), as the next one
     safe = np.where(gamma == 0.0, 1.0, gamma)
     sinh_over_gamma = np.where(gamma == 0.0, 1.0, -0.5 * np.expm1(-2.0 * safe) / safe)
-    # The wave equation's solution between Y above and the payload's D P = F - tension below.
-    D = data.payload_mass * s**2 + drag * s
-    below = cosh + D * compliance * sinh_over_gamma
+    # The wave equation's solution between Y above and the load's D P = F - tension below.
+    below = cosh + hung * compliance * sinh_over_gamma
     P_Y = decay / below
     P_F = compliance * sinh_over_gamma / below
-    T_Y = (gamma**2 / compliance * sinh_over_gamma + D * cosh) / below
-    return P_Y, P_F, T_Y, -P_Y
+    T_Y = (gamma**2 / compliance * sinh_over_gamma + hung * cosh) / below
+    return P_Y, P_F, T_Y

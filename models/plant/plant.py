@@ -4,6 +4,9 @@
                                                     +--> rope: springs and masses --> payload P
     hook heave Z, heave rate Z' --------------------+
 
+Where the crane's tip gives, it is a spring in series with the uppermost rope, its foot moved by
+Z; with slings the hook block is a mass of its own above the payload.
+
 Everything moves in the vertical, positive up.  Displacements are measured from the static
 equilibrium, in which the state is zero but for the motor's current or torque.  Forces are
 whole, not deviations: every spring carries its share of the submerged weight and goes slack
@@ -26,16 +29,10 @@ import casadi as ca
 import numpy as np
 
 from ..basics import FloatArray, SolverError, check_range, pick, read_only
-from .equations import (
-    RATES,
-    Equations,
-    build_equations,
-    displacement_names,
-    weighed_tension,
-)
+from .equations import RATES, Equations, build_equations, displacement_names, weighed_tension
 from .linear import LinearPlant
 from .plant_data import PlantData, as_plant_data
-from .rope import lump_rope
+from .rope import Link, chain_of, lump_rope
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -99,8 +96,18 @@ class Plant(Equations):
 
     @property
     def masses(self) -> int:
-        """Number of masses along the rope, the payload's included."""
+        """Number of masses along the rope, the payload's or the hook block's included."""
         return len(self.lumps.masses)
+
+    @property
+    def displacements(self) -> list[str]:
+        """Names of the displacements of the chain's masses, from the drum down."""
+        return displacement_names(self.data, self.masses)
+
+    @property
+    def chain(self) -> list[Link]:
+        """The chain of springs and masses at rest, from the drum down."""
+        return chain_of(self.parameters, self.lumps, self.parameters["rope.length"])
 
     def parameter_vector(self, changes: Mapping[str, float] | None = None) -> FloatArray:
         """Return p, some of its entries replaced by name.
@@ -138,17 +145,15 @@ class Plant(Equations):
         # The angle's own equation says that the speed is zero; all nx are kept.
         system = {"x": unknown, "p": symbols, "g": xdot}
         solver = ca.rootfinder("static", "newton", system, _QUIET)
-        hanging = values["rope.submerged_weight_per_length"] * values["rope.length"]
-        carried = values["payload.submerged_weight"] + hanging * self.lumps.hanging
-        stretch = carried * values["rope.length"] * self.lumps.springs
-        stretch = stretch / values["rope.axial_stiffness"]
+        links = chain_of(values, self.lumps, values["rope.length"])
+        stretch = np.array([link.carried / link.series for link in links])
         start = np.zeros(nx)
-        first = self.states.index(displacement_names(self.masses)[0]) - 1
-        start[first : first + self.masses] = 0.5 * np.cumsum(stretch)
+        first = self.states.index(self.displacements[0]) - 1
+        start[first : first + len(links)] = 0.5 * np.cumsum(stretch)
         relaxed = [i for i, name in enumerate(self.states) if name.endswith(".stretch")]
         # The branches of a hysteretic rope, piece by piece, have followed.
         start[np.array(relaxed, dtype=np.intp) - 1] = np.repeat(
-            -0.5 * stretch, len(relaxed) // self.masses
+            -0.5 * stretch[: self.masses], len(relaxed) // self.masses
         )
         try:
             found = np.asarray(solver(x0=start, p=p)["x"], dtype=np.float64).ravel()

@@ -26,6 +26,7 @@ DEFAULT_BANDWIDTH = 40.0  # [rad/s]
 MODE_TOLERANCE = 0.05  # a mode is "in the model" if its frequency is met this well [-]
 # Pieces of rope h meet waves so well up to omega h / c of this, where sin(x/2) / (x/2) = 0.95.
 _PIECE = 1.1
+_STIFFER = 1e-4  # relative, of a difference for the rope's share of a mode
 _ITERATIONS = 4  # each wins the damping ratio's power: 1e-10 for one per cent
 
 
@@ -47,6 +48,11 @@ class PlantData:
     damping_law
         ``kelvin-voigt``: the fraction rises with a mode's frequency; ``hysteretic``: all modes
         have the same, see `zener_branches`.
+    tip_stiffness
+        Of the crane's tip, in series with the rope's upper end [N/m]; infinite: rigid.
+    sling_stiffness, block_mass, block_weight
+        Of the slings below the rope [N/m], infinite: rigid; mass [kg] and submerged weight [N] of
+        the hook block between the two.
     masses
         Masses along the rope, the payload's included, 1 to 40; None: chosen for 40 rad/s.
     lumping
@@ -95,6 +101,10 @@ class PlantData:
     damping_law: str = "kelvin-voigt"
     masses: int | None = None
     lumping: str = "distributed"
+    tip_stiffness: float = math.inf
+    sling_stiffness: float = math.inf
+    block_mass: float = 0.0
+    block_weight: float = 0.0
     payload_mass: float
     payload_weight: float
     quadratic_drag: float = 0.0
@@ -130,14 +140,63 @@ class PlantData:
 
     @property
     def static_tension(self) -> float:
-        """Rope tension below the sheaves at rest: payload and rope, submerged [N]."""
-        return self.payload_weight + self.rope_weight * self.rope_length
+        """Tension below the sheaves at rest: payload, hook block and rope, submerged [N]."""
+        return self.payload_weight + self.block_weight + self.rope_weight * self.rope_length
+
+    @property
+    def chain_compliance(self) -> float:
+        """Of tip, rope and slings in series, at rest [m/N]."""
+        rope = self.rope_length / self.slow_stiffness
+        return 1.0 / self.tip_stiffness + rope + 1.0 / self.sling_stiffness
 
     @property
     def first_mode(self) -> float:
-        """First exact axial mode, the upper end held [rad/s]."""
+        """First exact axial mode of the rope with its load on a rigid rig [rad/s].
+
+        Where the rope's damping is told: a property of the rope, whatever crane it hangs from.
+        """
         rope = (self.axial_stiffness, self.rope_length, self.mass_per_length)
-        return float(fixed_top_modes(*rope, self.payload_mass, 1)[0])
+        return float(fixed_top_modes(*rope, self.payload_mass + self.block_mass, 1)[0])
+
+    @property
+    def one_spring(self) -> bool:
+        """Whether the rope has no modes of its own: massless, or lumped as in the thesis."""
+        return self.lumping == "thesis" or self.mass_per_length == 0.0
+
+    @property
+    def hung_mass(self) -> float:
+        """Mass that moves in the first mode, about [kg]: load, hook block, a third of the rope.
+
+        All of the rope with the lumping of the thesis.
+        """
+        share = 1.0 if self.lumping == "thesis" else 1.0 / 3.0
+        return self.payload_mass + self.block_mass + share * self.rope_mass
+
+    def axial_modes(self, count: int) -> FloatArray:
+        """Return exact axial modes of the chain, the vessel held, from the lowest [rad/s].
+
+        As many as there are, where the rope has none of its own (`one_spring`).
+        """
+        if self.lumping == "thesis":
+            return self.lumped_axial_modes(1, "thesis")[:count]
+        if self.one_spring:
+            both = self.block_mass > 0.0 and not math.isinf(self.sling_stiffness)
+            count = min(count, 2 if both else 1)
+        rope = (self.axial_stiffness, self.rope_length, self.mass_per_length)
+        return fixed_top_modes(*rope, self.payload_mass, count, **self._rig)
+
+    def lumped_axial_modes(self, masses: int, lumping: str = "distributed") -> FloatArray:
+        """Return the axial modes of the chain with so many rope masses [rad/s]."""
+        rope = (self.axial_stiffness, self.rope_length, self.mass_per_length)
+        return lumped_modes(lump_rope(masses, lumping), *rope, self.payload_mass, **self._rig)
+
+    @property
+    def _rig(self) -> dict[str, float]:
+        return {
+            "tip_stiffness": self.tip_stiffness,
+            "sling_stiffness": self.sling_stiffness,
+            "block_mass": self.block_mass,
+        }
 
     @property
     def damping_time(self) -> float:
@@ -199,17 +258,23 @@ class PlantData:
             found = found + gain * (s * time / (1.0 + s * time))
         return found
 
-    def damped_modes(self, modes: FloatArray) -> ComplexArray:
-        """Return the poles [1/s] that the rope's damping makes of modes without any [rad/s].
+    def damped_modes(self, count: int) -> ComplexArray:
+        """Return the poles [1/s] that the rope's damping makes of `axial_modes`.
 
         To first order in the damping for Kelvin-Voigt; for a hysteretic rope by iterating s =
-        i omega sqrt(EA(s)/EA), whose stiffness follows the frequency as well.
+        i omega sqrt(EA(s)/EA), whose stiffness follows the frequency as well.  Of what tip and
+        slings store of a mode's energy nothing is lost: the rope's share is 2 dln omega/dln EA.
         """
+        modes = self.axial_modes(count)
+        share: FloatArray | float = 1.0
+        if not (math.isinf(self.tip_stiffness) and math.isinf(self.sling_stiffness)):
+            stiffer = replace(self, axial_stiffness=self.axial_stiffness * (1.0 + _STIFFER))
+            share = 2.0 * np.log(stiffer.axial_modes(count) / modes) / math.log1p(_STIFFER)
         if self.damping_law != "hysteretic":
-            return np.asarray(-0.5 * self.damping_time * modes**2 + 1j * modes)
+            return np.asarray(-0.5 * self.damping_time * share * modes**2 + 1j * modes)
         s = np.asarray(1j * modes)
         for _ in range(_ITERATIONS):
-            s = 1j * modes * np.sqrt(self.modulus_ratio(s))
+            s = 1j * modes * np.sqrt(self.modulus_ratio(s)) ** share
         return np.asarray(s)
 
     @property
@@ -273,6 +338,10 @@ class PlantData:
             damping_law=rope.damping_law,
             masses=None if rope.masses == "auto" else rope.masses,
             lumping=rope.lumping,
+            tip_stiffness=case.crane.stiffness,
+            sling_stiffness=case.rigging.sling_stiffness,
+            block_mass=case.rigging.block_mass,
+            block_weight=case.rigging.block_weight,
             payload_mass=payload.virtual_mass,
             payload_weight=payload.submerged_weight,
             quadratic_drag=payload.quadratic_drag,
@@ -326,19 +395,17 @@ def masses_for_bandwidth(data: PlantData, omega_max: float) -> int:
     """
     if data.lumping == "thesis" and data.masses is not None:
         return data.masses
-    rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
     if data.mass_per_length == 0.0:
         return 2
     # the modes' spacing tends to pi c / L from below
     wave_speed = math.sqrt(data.axial_stiffness / data.mass_per_length)
     count = int(omega_max * data.rope_length / (math.pi * wave_speed)) + 2
+    slings = 0 if math.isinf(data.sling_stiffness) else 1  # one more mode than the rope's
     if count <= 2 * MAX_MASSES:
-        exact = fixed_top_modes(*rope, data.payload_mass, count)
+        exact = data.axial_modes(count + slings)
         exact = exact[exact < omega_max]
-        for n in range(max(2, exact.size), MAX_MASSES + 1):
-            lumped = lumped_modes(lump_rope(n, data.lumping), *rope, data.payload_mass)[
-                : exact.size
-            ]
+        for n in range(max(2, exact.size - slings), MAX_MASSES + 1):
+            lumped = data.lumped_axial_modes(n, data.lumping)[: exact.size]
             if np.all(np.abs(lumped / exact - 1.0) <= MODE_TOLERANCE):
                 return n
     raise InputError(

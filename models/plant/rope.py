@@ -5,6 +5,10 @@ payload with its share of rope.  `lump_rope` gives lengths only (of each spring,
 rope that each mass stands for), so that the symbolic plant can multiply them by parameters.
 The exact modes, of a rope whose upper end is held, are the yardstick.
 
+`chain_of` makes the springs and masses of a lifting rig of them: a tip that gives is a spring in
+series with the uppermost piece of rope, and slings are one more spring below the rope's last
+mass, which then is the hook block, with the payload as one more mass.
+
 `zener_branches` are the hysteretic damping law: a loss factor that hardly depends on frequency, as
 a few springs with dampers, so that it is causal and rational, the same in frequency and in time.
 """
@@ -13,7 +17,9 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -86,17 +92,126 @@ def lump_rope(masses: int, lumping: str = "distributed") -> RopeLumps:
     return RopeLumps(springs=springs, masses=shares)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Link:
+    """A spring of the chain from the vessel to the payload, and the mass below it.
+
+    Its numbers are floats or symbols, as were those that it was made of.
+
+    Parameters
+    ----------
+    stiffness
+        k of the rope in it, or of the slings [N/m].
+    give
+        k over the stiffness of what stands in series with it, the crane's tip [-]; 0 without.
+    damping_time
+        Kelvin-Voigt time tau of k [s].
+    is_rope
+        Whether it is rope.
+    carried
+        Weight below its top, its tension at rest [N].
+    mass, weight
+        Of rope and hook block in the mass below it [kg], [N]; the payload's own are not in them.
+    """
+
+    stiffness: Any
+    give: Any
+    damping_time: Any
+    is_rope: bool
+    carried: Any
+    mass: Any
+    weight: Any
+
+    @property
+    def series(self) -> Any:
+        """Stiffness of both springs in series [N/m]."""
+        return self.stiffness / (1.0 + self.give)
+
+    @property
+    def series_time(self) -> Any:
+        """Kelvin-Voigt time of both in series [s], to first order in omega tau.
+
+        The error falls with the uppermost piece of rope as more masses make it shorter.
+        """
+        return self.damping_time / (1.0 + self.give)
+
+
+def chain_of(p: Mapping[str, Any], lumps: RopeLumps, length: Any) -> list[Link]:
+    """Return the chain of springs and masses of a plant's parameters, from the drum down.
+
+    Parameters
+    ----------
+    p
+        Parameters by name, as of `models.plant.equations.parameter_values`: numbers or symbols.
+    lumps
+        The rope's lumping.
+    length
+        Length of the rope [m]; ``rope.length`` unless it grows.
+    """
+    weight = p["payload.submerged_weight"]
+    of_rope = p["rope.submerged_weight_per_length"] * p["rope.length"]
+    block = "rigging.block_mass" in p
+    slings = "rigging.stiffness" in p
+    links = []
+    for j, (spring, share) in enumerate(zip(lumps.springs, lumps.masses, strict=True)):
+        piece = length * share
+        carried = weight + of_rope * float(lumps.hanging[j])
+        mass = p["rope.mass_per_length"] * piece
+        own = p["rope.submerged_weight_per_length"] * piece
+        if block:
+            carried = carried + p["rigging.block_weight"]
+            if j + 1 == len(lumps.masses):
+                mass = mass + p["rigging.block_mass"]
+                own = own + p["rigging.block_weight"]
+        stiffness = p["rope.axial_stiffness"] / (length * spring)
+        tip = j == 0 and "crane.tip_stiffness" in p
+        links.append(
+            Link(
+                stiffness=stiffness,
+                give=stiffness / p["crane.tip_stiffness"] if tip else 0.0,
+                damping_time=p["rope.damping_time"],
+                is_rope=True,
+                carried=carried,
+                mass=mass,
+                weight=own,
+            )
+        )
+    if slings:
+        links.append(
+            Link(
+                stiffness=p["rigging.stiffness"],
+                give=0.0,
+                damping_time=0.0,
+                is_rope=False,
+                carried=weight,
+                mass=0.0,
+                weight=0.0,
+            )
+        )
+    return links
+
+
 def fixed_top_modes(
     axial_stiffness: float,
     length: float,
     mass_per_length: float,
     payload_mass: float,
     count: int,
+    *,
+    tip_stiffness: float = math.inf,
+    sling_stiffness: float = math.inf,
+    block_mass: float = 0.0,
 ) -> FloatArray:
     """Return the exact axial modes of a rope with a payload, its upper end held [rad/s].
 
     The roots of nu tan nu = eps, eps = m L / M_1, with omega = (nu / L) sqrt(EA / m); one
     root lies in each interval (j pi, j pi + pi/2), j = 0, 1, ...
+
+    With a tip, slings and a block the phase of the standing wave at its two ends,
+
+        nu + arctan(nu K/k_t) - arg(nu (m_b (1 - x) + M_1) + i m L (1 - x)) = j pi,
+
+    K = EA/L and x = omega^2 M_1/k_s, whose left side rises from -pi/2: one root for each j.
 
     Parameters
     ----------
@@ -110,22 +225,51 @@ def fixed_top_modes(
         M_1, added mass included [kg].
     count
         How many modes, from the lowest.
+    tip_stiffness, sling_stiffness
+        k_t and k_s of the crane's tip and of the slings [N/m], infinite where rigid.
+    block_mass
+        m_b of the hook block between rope and slings [kg].
 
     Raises
     ------
     InputError
-        If more than one mode of a massless rope is asked for.
+        If a massless rope is asked for more modes than it has.
     """
+    rigid = math.isinf(tip_stiffness) and math.isinf(sling_stiffness)
     if mass_per_length == 0.0:
-        if count > 1:
-            raise InputError(f"rope: a massless rope has one axial mode, got count {count}")
-        return np.array([math.sqrt(axial_stiffness / (length * payload_mass))])
+        held = 2 if block_mass > 0.0 and not math.isinf(sling_stiffness) else 1
+        if count > held:
+            word = "one axial mode" if held == 1 else "two axial modes"
+            raise InputError(f"rope: a massless rope has {word}, got count {count}")
+        stiffness = 1.0 / (length / axial_stiffness + 1.0 / tip_stiffness)
+        if held == 2:
+            springs, masses = [stiffness, sling_stiffness], [block_mass, payload_mass]
+            return _chain_modes(np.array(springs), np.array(masses))[:count]
+        stiffness = stiffness if rigid else 1.0 / (1.0 / stiffness + 1.0 / sling_stiffness)
+        return np.array([math.sqrt(stiffness / (payload_mass + block_mass))])
+    if math.isinf(sling_stiffness):
+        payload_mass, block_mass = payload_mass + block_mass, 0.0
     eps = mass_per_length * length / payload_mass
 
     def excess(nu: float) -> float:  # no poles, unlike the tangent
         return nu * math.sin(nu) - eps * math.cos(nu)
 
-    roots = [brentq(excess, j * math.pi, (j + 0.5) * math.pi, xtol=1e-15) for j in range(count)]
+    tip = axial_stiffness / length / tip_stiffness
+    sling = axial_stiffness / (length * eps * sling_stiffness)
+    block = block_mass / payload_mass
+
+    def phase(nu: float, j: int) -> float:
+        free = 1.0 - nu * nu * sling
+        lower = math.atan2(eps * free, nu * (block * free + 1.0))
+        return nu + math.atan(nu * tip) - lower - j * math.pi
+
+    if rigid:
+        roots = [brentq(excess, j * math.pi, (j + 0.5) * math.pi, xtol=1e-15) for j in range(count)]
+    else:
+        roots = [
+            brentq(phase, max(0.0, (j - 1.5) * math.pi), (j + 0.5) * math.pi, (j,), xtol=1e-15)
+            for j in range(count)
+        ]
     return np.array(roots) / length * math.sqrt(axial_stiffness / mass_per_length)
 
 
@@ -135,11 +279,27 @@ def lumped_modes(
     length: float,
     mass_per_length: float,
     payload_mass: float,
+    *,
+    tip_stiffness: float = math.inf,
+    sling_stiffness: float = math.inf,
+    block_mass: float = 0.0,
 ) -> FloatArray:
-    """Return the undamped axial modes of a lumped rope, its upper end held, (N,) [rad/s]."""
+    """Return the undamped axial modes of a lumped rope, its upper end held [rad/s].
+
+    (N,), and one more with slings; the arguments are those of `fixed_top_modes`.
+    """
     k = axial_stiffness / (length * lumps.springs)
     mass = mass_per_length * length * lumps.masses
+    k[0] /= 1.0 + k[0] / tip_stiffness
+    mass[-1] += block_mass
+    if not math.isinf(sling_stiffness):
+        k, mass = np.append(k, sling_stiffness), np.append(mass, 0.0)
     mass[-1] += payload_mass
+    return _chain_modes(k, mass)
+
+
+def _chain_modes(k: FloatArray, mass: FloatArray) -> FloatArray:
+    """Return the modes of springs with a mass below each, the upper end held, (n,) [rad/s]."""
     # K x = omega^2 M x in mass-scaled coordinates is a symmetric tridiagonal problem.
     diagonal = (k + np.append(k[1:], 0.0)) / mass
     beside = -k[1:] / np.sqrt(mass[1:] * mass[:-1])

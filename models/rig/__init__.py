@@ -1,4 +1,4 @@
-"""Rig: rope, payload, drum, winch, sensors and limits, as sections of the case file.
+"""Rig: rope, crane, rigging, payload, drum, winch, sensors, limits: sections of the case file.
 
 Data of a case file come in; what follows from one section by itself (stiffness, virtual mass, the
 drum's radius, inertia at the shaft) goes out.
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
+    from .crane import Crane, Rigging
     from .limits import GainBounds, Gains, Limits
     from .payload import Payload, energy_equivalent
     from .rope import Rope

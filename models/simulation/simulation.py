@@ -27,7 +27,6 @@ from ..plant import (
     Plant,
     Surroundings,
     build_plant,
-    displacement_names,
 )
 from ..run import Run
 from ..sensing import (
@@ -396,8 +395,7 @@ def _initial_state(plant: Plant, rest: OperatingPoint, scenario: Scenario) -> Fl
     state[states.index("motor.speed")] = 0.0
     turned = scenario.initial_haul / p["winch.drum_radius"] * p["winch.gear_ratio"]
     state[states.index("motor.angle")] = turned
-    compliance = p["rope.length"] / p["rope.axial_stiffness"]
-    hanging = scenario.initial_displacements(plant.lumps.springs, compliance)
-    for name, displacement in zip(displacement_names(plant.masses), hanging, strict=True):
+    hanging = scenario.initial_displacements([1.0 / link.series for link in plant.chain])
+    for name, displacement in zip(plant.displacements, hanging, strict=True):
         state[states.index(name)] = displacement
     return state

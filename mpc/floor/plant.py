@@ -332,21 +332,16 @@ def _tensions(
     """Return rows of the lowest spring's tension and of that at the drum [N]."""
     top = linear.outputs.index("rope.tension")
     row, feed = linear.Cz[top, keep] * scale, linear.Fz[top, hook]
-    if plant.masses == 1:  # one spring: what it carries is less than at the drum by a constant
-        lowest = plant.data.mean_sheaves_factor * _weight_below(plant, 0)
-        return row[None], feed[None], np.array([lowest])
+    chain, shifts = plant.chain, plant.displacements
+    lowest = chain[-1]
+    if len(chain) == 1:  # one spring: what it carries is less than at the drum by a constant
+        carried = plant.data.mean_sheaves_factor * float(lowest.carried)
+        return row[None], feed[None], np.array([carried])
     names = [linear.states[i] for i in keep]
-    p, n = plant.parameters, plant.masses
-    k = p["rope.axial_stiffness"] / (p["rope.length"] * plant.lumps.springs[-1])
+    k, tau = float(lowest.stiffness), float(lowest.damping_time)
     lower = np.zeros(len(keep))
-    for kind, factor in (("displacement", 1.0), ("velocity", p["rope.damping_time"])):
-        lower[names.index(f"rope.{n - 1}.{kind}")] = k * factor
-        lower[names.index(f"payload.{kind}")] = -k * factor
-    static = np.array([_weight_below(plant, n - 1), top_at_rest])
+    for name, sign in ((shifts[-2], 1.0), (shifts[-1], -1.0)):
+        lower[names.index(name)] = k * sign
+        lower[names.index(name.replace("displacement", "velocity"))] = k * tau * sign
+    static = np.array([float(lowest.carried), top_at_rest])
     return np.stack([lower, row]), np.stack([np.zeros(2), feed]), static
-
-
-def _weight_below(plant: Plant, spring: int) -> float:
-    p = plant.parameters
-    rope = p["rope.submerged_weight_per_length"] * p["rope.length"]
-    return float(p["payload.submerged_weight"] + rope * plant.lumps.hanging[spring])

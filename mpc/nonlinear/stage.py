@@ -31,7 +31,7 @@ import casadi as ca
 import numpy as np
 
 from models.basics import FloatArray, InputError, ReadOnlyArrays
-from models.plant import DrumTravel, build_plant, displacement_names, hermite_hold, zero_order_hold
+from models.plant import DrumTravel, build_plant, hermite_hold, zero_order_hold
 from models.simulation import Kernel
 
 from ..winch import SampledWinch
@@ -228,11 +228,10 @@ def force_law(
         If there is no such spring.
     """
     data, rope = winch.data, _Rope(winch)
-    springs = (0, winch.masses - 1) if slack is None else tuple(slack)
-    if any(k not in range(winch.masses) for k in springs):
-        raise InputError(
-            f"{_OWNER}: slack must be springs from 0 to {winch.masses - 1}, got {springs}"
-        )
+    last = len(rope.hanging) - 1
+    springs = (0, last) if slack is None else tuple(slack)
+    if any(k not in range(last + 1) for k in springs):
+        raise InputError(f"{_OWNER}: slack must be springs from 0 to {last}, got {springs}")
     arguments: dict[str, Argument] = {}
     columns: dict[str, FloatArray] = {}
     forces: list[ca.SX] = []
@@ -273,7 +272,7 @@ def force_law(
         whole = linear
         if k == 0 and travel is not None:
             more = (changes[1] - 1.0) * rope.haul_per_angle * of(_SPEED)
-            whole = linear + rope.stiffness[0] * (changes[0] + rope.damping_time * more)
+            whole = linear + rope.stiffness[0] * (changes[0] + rope.damping_time[0] * more)
         at_rest = smooth(k, ca.SX(rope.hanging[k])) - rope.hanging[k]
         held[k] = smooth(k, whole) - at_rest if k in springs else whole
         act(f"slack.{k}", rope.column(k), held[k] - linear)
@@ -294,19 +293,17 @@ class _Rope:
     def __init__(self, winch: SampledWinch) -> None:
         symbolic = build_plant(winch.data, winch.masses)
         p, lumps, self._winch = symbolic.parameters, symbolic.lumps, winch
+        chain = symbolic.chain
         self._states = winch.plant.states
-        names = displacement_names(winch.masses)
+        names = symbolic.displacements
         self._shifts = [self.unit(name) for name in names]
         self._moves = [self.unit(name.replace("displacement", "velocity")) for name in names]
         length = p["rope.length"]
-        self.stiffness = p["rope.axial_stiffness"] / (length * lumps.springs)
-        self.damping_time = p["rope.damping_time"]
-        self.hanging = (
-            p["payload.submerged_weight"]
-            + p["rope.submerged_weight_per_length"] * length * lumps.hanging
-        )
+        self.stiffness = np.array([link.series for link in chain])
+        self.damping_time = np.array([link.series_time for link in chain])
+        self.hanging = np.array([link.carried for link in chain])
         self.at_drum = p["rope.submerged_weight_per_length"] * length * lumps.at_drum
-        self._masses = p["rope.mass_per_length"] * length * lumps.masses
+        self._masses = np.array([link.mass for link in chain])
         self._masses[-1] += p["payload.virtual_mass"]
         self.haul_per_angle = p["winch.drum_radius"] / p["winch.gear_ratio"]
 
@@ -323,13 +320,13 @@ class _Rope:
         """Return the tension of a spring that can push."""
         if k == 0:
             above = self.haul_per_angle * self.unit(_ANGLE), self.haul_per_angle * self.unit(_SPEED)
-            hook = np.array([1.0, self.damping_time])
+            hook = np.array([1.0, self.damping_time[0]])
         else:
             above, hook = (self._shifts[k - 1], self._moves[k - 1]), np.zeros(2)
         stretch, rate = above[0] - self._shifts[k], above[1] - self._moves[k]
         stiffness = float(self.stiffness[k])
         return Argument(
-            row=stiffness * (stretch + self.damping_time * rate),
+            row=stiffness * (stretch + self.damping_time[k] * rate),
             hook=stiffness * hook,
             rest=float(self.hanging[k]),
         )

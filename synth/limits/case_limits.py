@@ -9,7 +9,7 @@ import numpy as np
 
 from models.basics import InputError
 from models.case import Case
-from models.plant import LinearPlant, PlantData, fixed_top_modes, lump_rope, lumped_modes
+from models.plant import LinearPlant, PlantData
 
 from .frequency_limits import LowFrequency, MaxSensitivity, RollOff
 from .limits import Limit
@@ -134,11 +134,10 @@ def _check_static(case: Case, limits: list[Limit]) -> None:
 
 def modelled_bandwidth(data: PlantData, masses: int) -> float:
     """Return the frequency up to which `masses` hold every axial mode [rad/s]."""
-    if data.lumping == "thesis" or data.mass_per_length == 0.0:
+    if data.one_spring:
         return math.inf
-    rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
-    exact = fixed_top_modes(*rope, data.payload_mass, masses + 1)
-    lumped = lumped_modes(lump_rope(masses), *rope, data.payload_mass)
-    good = np.abs(lumped / exact[:masses] - 1.0) <= _HELD
-    first_bad = int(np.argmin(good)) if not good.all() else masses
+    lumped = data.lumped_axial_modes(masses)
+    exact = data.axial_modes(lumped.size + 1)
+    good = np.abs(lumped / exact[:-1] - 1.0) <= _HELD
+    first_bad = int(np.argmin(good)) if not good.all() else lumped.size
     return float(exact[first_bad])

@@ -34,7 +34,6 @@ from models.plant import (
     Plant,
     PlantData,
     build_plant,
-    fixed_top_modes,
     rope_transfers,
     settled_drag,
 )
@@ -396,16 +395,12 @@ def held_poles(data: PlantData, drag: float, highest: float) -> ComplexArray:
     highest
         Frequency up to which the modes are wanted [rad/s].
     """
-    if data.lumping == "thesis" or data.mass_per_length == 0.0:
-        mass = data.payload_mass + (data.rope_mass if data.lumping == "thesis" else 0.0)
-        modes = np.array([math.sqrt(data.stiffness / mass)])
-    else:
-        mass = data.payload_mass + data.rope_mass / 3.0
-        rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
-        spacing = math.pi / data.rope_length * math.sqrt(rope[0] / data.mass_per_length)
-        modes = fixed_top_modes(*rope, data.payload_mass, int(highest / spacing) + 1)
-    poles = data.damped_modes(modes)
-    poles[0] -= 0.5 * drag / mass
+    count = 1 if math.isinf(data.sling_stiffness) else 2
+    if not data.one_spring:
+        wave = math.sqrt(data.axial_stiffness / data.mass_per_length)
+        count += int(highest / (math.pi / data.rope_length * wave))
+    poles = data.damped_modes(count)
+    poles[0] -= 0.5 * drag / data.hung_mass
     return poles
 
 
@@ -413,12 +408,7 @@ def held_transfers(
     data: PlantData, s: ComplexArray, drag: float
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
     """Return P/Y, P/F, T/Y and T/F with the drum held: one spring, or the exact rope."""
-    if data.lumping != "thesis":
-        return rope_transfers(data, s, drag)
-    spring = data.stiffness * data.modulus_ratio(s)
-    mass = data.payload_mass + data.rope_mass
-    P_F = 1.0 / (mass * s**2 + drag * s + spring)
-    return spring * P_F, P_F, spring * (1.0 - spring * P_F), -spring * P_F
+    return rope_transfers(data, s, drag, spring=data.lumping == "thesis")
 
 
 def locked_response(case: Case, omega: FloatArray, drag: float) -> ComplexArray:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from models.basics import InputError, pick
 from models.case import Case
-from models.plant import PlantData, fixed_top_modes
+from models.plant import PlantData
 from models.sensing import SENSORS, aboard
 
 from .blocks import FilterSection, integral, lead_lag, notch, roll_off
@@ -98,9 +99,8 @@ def structure_named(name: str, case: Case) -> PayloadFeedback | WinchStructure |
     bounds = _bounds(case, amplifier)
     if name == PayloadFeedback.name:
         return PayloadFeedback(amplifier=amplifier, bounds=bounds)
-    modes = fixed_top_modes(
-        data.axial_stiffness, data.rope_length, data.mass_per_length, data.payload_mass, 2
-    )
+    # The rope's own, also where the design is made on one spring.
+    modes = replace(data, lumping="distributed").axial_modes(2)
     feedback = name.removeprefix("payload-feedback") if name.startswith("payload") else None
     corner = (1.0, TRANSPARENT)
     sections: dict[str, tuple[FilterSection, ...]] = {

@@ -5,8 +5,10 @@ The rope is a recursion from the payload up, x_0 = 1 at the payload: for every m
     delta <- delta - zeta x,   x <- x + delta,     zeta = -s^2 m h / (EA (1 + tau s))
 
 (piece h, its mass m; `models.plant.rope.lump_rope`), which ends at the drum with Y/P = y and T/P =
-f. Both are affine in what the payload itself asks for, M s^2 + C s, so one recursion serves any
-mass and drag. Around it stand the winch's own equations, as in `models.plant.line`, and the command
+f; slings with the hook block below the rope, and a tip that gives above it, are one more step of
+the kind each. Both are affine in what the payload itself asks for, M s^2 + C s, so one recursion
+serves any mass and drag. Around it stand the winch's own equations, as in `models.plant.line`, and
+the command
 
     u = -(G P + D X + E T) + H Z + N,      X = y P - Z (haul),  T = f P (tension),
 
@@ -227,8 +229,33 @@ class Chain:
             force = delta / piece + inner * x[0], (delta + 1.0 + q * c) / piece + inner * x[1]
             self._y = x[0] + springs[0] * force[0], x[1] + springs[0] * force[1]
             self._f, unit = (force[0] * spring, force[1] * spring), piece / spring
-        self._at_rest = s * s * unit * (self._own("payload_mass") + rope * masses[-1])
+        below = self._own("block_mass") + rope * masses[-1]  # what is in the rope's last mass
+        slings = self._own("sling_stiffness")
+        load = self._own("payload_mass")
+        if _somewhere(slings):
+            # The payload's force stretches them, and moves the mass above them.
+            inertial = s * s * unit * below
+            share = 1.0 / (slings * unit)
+            self._y, self._f = (
+                (end[0] + inertial * end[1], share * end[0] + (1.0 + share * inertial) * end[1])
+                for end in (self._y, self._f)
+            )
+            self._at_rest = s * s * unit * load
+        else:
+            self._at_rest = s * s * unit * (load + below)
         self._per_drag = s * unit
+        tip = self._own("tip_stiffness")
+        if _somewhere(tip):
+            give = 1.0 / tip
+            time = self._own("damping_time")
+            if np.any(value_of(time)):
+                # With a Kelvin-Voigt piece it is one such spring, as `models.plant.rope.Link` says.
+                piece = self._own("stiffness") / springs[0]
+                c = piece / tip
+                give = (1.0 + c) / (piece * (1.0 + s * time / (1.0 + c))) - 1.0 / (
+                    piece * (1.0 + s * time)
+                )
+            self._y = self._y[0] + give * self._f[0], self._y[1] + give * self._f[1]
 
     def _payload(self) -> Any:
         """Return what the payload's motion makes of the command."""
@@ -448,6 +475,11 @@ def abs2(values: Any) -> Any:
 def _there(column: Any) -> bool:
     """Return whether all plants have a number: a sensor, or a bandwidth that matters."""
     return bool(np.all(np.isfinite(value_of(column))))
+
+
+def _somewhere(column: Any) -> bool:
+    """Return whether any plant has a number: something that gives."""
+    return bool(np.any(np.isfinite(value_of(column))))
 
 
 def _times(factor: Any, terms: Numerator) -> Numerator:

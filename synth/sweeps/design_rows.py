@@ -166,6 +166,7 @@ class DesignRows:
         )
         three = question.structure.name == "payload-feedback"
         alone = self.lumps.masses.size == 1 and not (delayed or consistent or self._noisy)
+        alone = alone and case.crane.tip_stiffness is None and case.rigging.stiffness is None
         self.spring = alone and three and case.rope.damping_law == "kelvin-voigt"
 
     @property

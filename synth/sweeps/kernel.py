@@ -51,6 +51,7 @@ class SpringLoops:
         zero, one = np.zeros(1), np.ones(1)
         h, load, phi, beta = n["haul"], n["load"], n["phi"], n["beta"]
         K, mass = n["stiffness"], n["payload_mass"] + loops.lumps.masses[0] * n["rope_mass"]
+        mass = mass + n["block_mass"]
         kappa = _trimmed([K, K * n["damping_time"]])
         D, e = [zero, loops.drag, mass], _trimmed([one, n["lag"]])
         shaft = [zero, n["viscous_friction"], n["inertia"]]

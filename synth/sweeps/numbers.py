@@ -131,7 +131,7 @@ def _rope(data: PlantData) -> dict[str, Any]:
     if not np.any(zeta):
         return found
     wave = np.sqrt(data.axial_stiffness / np.maximum(data.mass_per_length, 1e-300))
-    nu = _first_root(np.asarray(data.rope_mass / data.payload_mass))
+    nu = _first_root(np.asarray(data.rope_mass / (data.payload_mass + data.block_mass)))
     if data.damping_law != "hysteretic":
         return found | {"damping_time": 2.0 * zeta * data.rope_length / (nu * wave)}
     first = nu * wave / data.rope_length

@@ -15,7 +15,7 @@ import numpy as np
 
 from models.basics import ComplexArray, FloatArray, SolverError, peak_factor, zero_crossing_period
 from models.case import Case
-from models.plant import LinearPlant, PlantData, fixed_top_modes, lump_rope, lumped_modes
+from models.plant import LinearPlant, PlantData
 
 from .claims import StatedLimit
 from .nyquist import CurveMargins, largest
@@ -355,11 +355,10 @@ def _pole_figure(kind: str, poles: ComplexArray, models: ComplexArray) -> float:
 
 def _first_unmodelled(data: PlantData, masses: int) -> float:
     """Return the first axial mode that a lumped rope does not hold [rad/s]."""
-    if data.lumping == "thesis" or data.mass_per_length == 0.0:
+    if data.one_spring:
         return math.inf
-    rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
-    exact = fixed_top_modes(*rope, data.payload_mass, masses + 1)
-    lumped = lumped_modes(lump_rope(masses), *rope, data.payload_mass)
+    lumped = data.lumped_axial_modes(masses)
+    exact = data.axial_modes(lumped.size + 1)
     for mode, approximate in zip(exact, lumped, strict=False):
         if abs(approximate / mode - 1.0) > _MODELLED:
             return float(mode)

@@ -26,7 +26,6 @@ from models.plant import (
     PlantData,
     PlantResponse,
     fit_shaping_filter,
-    fixed_top_modes,
 )
 from models.sensing import SAMPLE_TIME, UnitError, sensed_line_at, sensed_plant, sensed_spectra
 
@@ -322,7 +321,8 @@ class _Winch:
 def held_moments(data: PlantData, source: Source, drag: float) -> tuple[float, float, float]:
     """Return m0 of the hook [m^2], and m0 and m2 [m^2/s^2] of the payload with the drum held.
 
-    P/Z is that of one spring or 1/(cosh gamma + D l sinh(gamma)/gamma) of the distributed rope.
+    Displacement and tension go up from the payload by transfer matrices: slings (1, 1/k), hook
+    block (m s^2, 1), rope and the crane's tip (1, 1/k).
 
     Parameters
     ----------
@@ -335,12 +335,7 @@ def held_moments(data: PlantData, source: Source, drag: float) -> tuple[float, f
     """
     if source.band is None:
         raise SolverError("verification: the hook's motion has no band")
-    one_spring = data.lumping == "thesis" or data.mass_per_length == 0.0
-    mass = data.payload_mass + (data.rope_mass if data.lumping == "thesis" else 0.0)
-    rope = (data.axial_stiffness, data.rope_length, data.mass_per_length)
-    modes = np.array([math.sqrt(data.stiffness / mass)])
-    if not one_spring:
-        modes = fixed_top_modes(*rope, data.payload_mass, _HELD_MODES)
+    modes = data.axial_modes(_HELD_MODES)
     slow, gains, times = data.branches
 
     def stretching(s: ComplexArray) -> ComplexArray:
@@ -356,20 +351,30 @@ def held_moments(data: PlantData, source: Source, drag: float) -> tuple[float, f
         modes = modes * np.sqrt(there.real)
         decay = 0.5 * modes * there.imag / there.real
     # The payload hardly moves in the higher modes, so drag only damps the first.
-    decay[0] += 0.5 * drag / mass
+    load = data.payload_mass + data.block_mass
+    load += data.rope_mass if data.lumping == "thesis" else 0.0
+    decay[0] += 0.5 * drag / load
 
     def densities(omega: FloatArray) -> FloatArray:
         s = imaginary(omega)
         stretch = stretching(s)
-        load = (mass * s**2 + drag * s) / (data.stiffness * stretch)
-        if one_spring:
-            transfer = 1.0 / (1.0 + load)
+        spring = data.stiffness * stretch
+        tension = data.payload_mass * s**2 + drag * s
+        moving = 1.0 + tension / data.sling_stiffness
+        tension = tension + data.block_mass * s**2 * moving
+        if data.one_spring:
+            tension = tension + data.rope_mass * s**2 * moving
+            moving = moving + tension / spring
         else:
             speed = math.sqrt(data.axial_stiffness / data.mass_per_length)
             gamma = s * data.rope_length / (speed * np.sqrt(stretch))
-            transfer = 1.0 / (np.cosh(gamma) + load * np.sinh(gamma) / gamma)
+            along, across = np.cosh(gamma), np.sinh(gamma) / gamma
+            moving, tension = (
+                moving * along + tension * across / spring,
+                tension * along + moving * across * gamma**2 * spring,
+            )
         hook = source.density(omega)
-        moved = np.abs(transfer) ** 2 * hook
+        moved = np.abs(moving + tension / data.tip_stiffness) ** -2 * hook
         return np.stack([hook, moved, omega**2 * moved])
 
     edges = panels(*source.band, source.splits, -decay + 1j * modes)

@@ -122,21 +122,23 @@ def _rope(case: Case, hook: HookMotion) -> Rows:
     from synth.question import uncompensated
 
     rope, payload = case.rope, case.payload
-    # Of the payload's weight, and half the rope's own.
-    stretch = (payload.submerged_weight + 0.5 * rope.submerged_weight) / rope.stiffness
+    # Of the load's weight, and half the rope's own.
+    hung = payload.submerged_weight + case.rigging.block_weight
+    stretch = (hung + 0.5 * rope.submerged_weight) / rope.stiffness
     drag, rms = uncompensated(case, PlantData.from_case(case), hook)
     modes = _modes(case)
     periods = [quantity(2.0 * math.pi / mode, "s") for mode in modes]
     held = f"drum held; next {', '.join(periods[1:])}" if periods[1:] else "drum held, one spring"
+    masses = [f"payload {quantity(payload.mass, 'kg')}"]
+    masses += [f"added {quantity(payload.hydrodynamic_mass, 'kg')}"]
+    masses += [f"rope {quantity(rope.mass, 'kg')}"]
+    if case.rigging.block_mass:
+        masses += [f"hook block {quantity(case.rigging.block_mass, 'kg')}"]
     how = "fixed by the case" if payload.fixed_drag is not None else "with the drum held"
     return [
         ("stiffness K = EA/L", quantity(rope.stiffness, "N/m"), f"EA {quantity(rope.ea, 'N')}"),
-        (
-            "mass that moves, M",
-            quantity(case.moving_mass, "kg"),
-            f"payload {quantity(payload.mass, 'kg')}, "
-            f"added {quantity(payload.hydrodynamic_mass, 'kg')}, rope {quantity(rope.mass, 'kg')}",
-        ),
+        *_rig(case),
+        ("mass that moves, M", quantity(case.moving_mass, "kg"), ", ".join(masses)),
         ("natural period", periods[0], held),
         (
             "stretch at rest",
@@ -214,10 +216,20 @@ def _limits(case: Case) -> Rows:
 
 def _modes(case: Case) -> list[float]:
     """Return the natural frequencies with the drum held [rad/s]: the first three."""
-    from models.plant import fixed_top_modes
+    from models.plant import PlantData
 
-    rope = case.rope
-    if rope.lumping == "thesis":
-        return [math.sqrt(rope.stiffness / case.moving_mass)]
-    mass = case.payload.virtual_mass
-    return [float(w) for w in fixed_top_modes(rope.ea, rope.length, rope.mass_per_length, mass, 3)]
+    return [float(w) for w in PlantData.from_case(case).axial_modes(3)]
+
+
+def _rig(case: Case) -> Rows:
+    """Return what gives besides the rope, and all of it in series."""
+    crane, rigging = case.crane.tip_stiffness, case.rigging.stiffness
+    rows = []
+    for name, stiffness in (("... crane's tip", crane), ("... slings", rigging)):
+        if stiffness is not None:
+            share = percent(case.chain_stiffness / stiffness)
+            rows.append((name, quantity(stiffness, "N/m"), f"{share} of the stretch"))
+    if rows:
+        series = "tip, rope and slings, one below the other"
+        rows.append(("... in series", quantity(case.chain_stiffness, "N/m"), series))
+    return rows

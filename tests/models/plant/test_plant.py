@@ -31,6 +31,7 @@ from models.sensing import with_sensors
 
 OMEGA = np.geomspace(0.05, 30.0, 60)
 ROPE = replace(THESIS, lumping="distributed", masses=5, damping_ratio=0.01)
+RIG = {"tip_stiffness": 3e6, "sling_stiffness": 5e6, "block_mass": 4e3, "block_weight": 34e3}
 VARIANTS = {
     "thesis": THESIS,
     "rope": ROPE,
@@ -40,6 +41,10 @@ VARIANTS = {
     "sheaves": replace(MODERN, sheaves_efficiency=0.9),
     "torque mode": replace(MODERN, speed_gain=0.0, telemetry_bandwidth=math.inf),
     "ideal drive": replace(MODERN, torque_bandwidth=math.inf, sensor_bandwidth=math.inf),
+    "tip": replace(MODERN, tip_stiffness=3e6),
+    "rig": replace(MODERN, **RIG),
+    "rig, hysteretic": replace(MODERN, **RIG, damping_law="hysteretic", damping_ratio=0.02),
+    "rig, one mass": replace(THESIS, **RIG),
 }
 every_variant = pytest.mark.parametrize("data", VARIANTS.values(), ids=VARIANTS.keys())
 
@@ -55,7 +60,7 @@ def numbers(values: object) -> list[np.ndarray]:
 def test_operating_point_holds_the_load(data: PlantData) -> None:
     plant = build_plant(data)
     rest = plant.operating_point()
-    tension = data.payload_weight + data.rope_weight * data.rope_length
+    tension = data.payload_weight + data.block_weight + data.rope_weight * data.rope_length
     assert rest.residual < 1e-12
     assert rest.tension == pytest.approx(tension, rel=1e-9)
     tension /= data.sheaves_efficiency  # hauled over the sheaves

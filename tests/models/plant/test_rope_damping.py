@@ -18,7 +18,6 @@ from models.plant import (
     Plant,
     PlantData,
     build_plant,
-    displacement_names,
     fixed_top_modes,
     rope_transfers,
     zener_branches,
@@ -28,6 +27,7 @@ FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
 ROPE = replace(MODERN, damping_law="hysteretic", damping_ratio=0.002, masses=None)
+RIG = {"tip_stiffness": 3e6, "sling_stiffness": 5e6, "block_mass": 4e3, "block_weight": 34e3}
 HELD = 40.0  # [rad/s]: the modes that a rope of automatic masses holds
 LENGTHS = (100.0, 300.0, 1000.0, 3000.0)
 RATIOS = (0.0004, 0.002, 0.01)
@@ -144,7 +144,8 @@ def test_kelvin_voigt_has_no_branches_and_neither_has_an_undamped_rope() -> None
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_every_mode_of_the_exact_line_has_the_ratio(length: float, ratio: float) -> None:
     data = replace(ROPE, rope_length=length, damping_ratio=ratio)
-    for mode, near in zip(exact_modes(data), data.damped_modes(exact_modes(data)), strict=True):
+    modes = exact_modes(data)
+    for mode, near in zip(modes, data.damped_modes(modes.size), strict=True):
         s = line_mode(data, complex(near))
         assert -s.real / abs(s) == pytest.approx(ratio, rel=0.05)
         assert s == pytest.approx(near, rel=1e-6)  # what quadratures expect to be there
@@ -185,7 +186,7 @@ def test_a_mode_decays_in_time_as_the_ratio_says(mode: int) -> None:
     values, vectors = np.linalg.eig(A)
     order = np.argsort(np.where(values.imag > 1e-6, np.abs(values), np.inf))
     # The shape of the mode alone: the dampers of the branches begin where the stretch is.
-    names = displacement_names(12)
+    names = plant.displacements
     places = [[plant.states[i] for i in keep].index(name) for name in names]
     shape = (vectors[:, order[mode]] / vectors[places[-1], order[mode]]).real
     rest = plant.operating_point({"winch.gear_direction": 0.0})
@@ -230,21 +231,15 @@ def test_a_mode_decays_in_time_as_the_ratio_says(mode: int) -> None:
 
 def static_stretches(plant: Plant) -> FloatArray:
     """Stretch of each piece of the rope at rest, (N,) [m]."""
-    p, lumps = plant.parameters, plant.lumps
-    rope = p["rope.submerged_weight_per_length"] * p["rope.length"]
-    carried = p["payload.submerged_weight"] + rope * lumps.hanging
-    return np.asarray(carried * p["rope.length"] * lumps.springs / p["rope.axial_stiffness"])
+    return np.array([link.carried * (1.0 + link.give) / link.stiffness for link in plant.chain])
 
 
 def mechanical_energy(plant: Plant, state: FloatArray) -> float:
     """Kinetic energy, that of weights, of the springs and of the branches' springs [J]."""
-    p, n = plant.parameters, plant.masses
-    names = displacement_names(n)
+    p, chain, names = plant.parameters, plant.chain, plant.displacements
     at = [plant.states.index(name) for name in names]
     moving = [plant.states.index(name.replace("displacement", "velocity")) for name in names]
-    shares = p["rope.mass_per_length"] * p["rope.length"] * plant.lumps.masses
-    masses, weights = shares, p["rope.submerged_weight_per_length"] * p["rope.length"]
-    weights = weights * plant.lumps.masses
+    masses, weights = (np.array([getattr(c, own) for c in chain]) for own in ("mass", "weight"))
     masses[-1] += p["payload.virtual_mass"]
     weights[-1] += p["payload.submerged_weight"]
     hanging = np.cumsum(weights[::-1])[::-1]
@@ -252,22 +247,29 @@ def mechanical_energy(plant: Plant, state: FloatArray) -> float:
     stretch = -np.diff(np.append(0.0, state[at]))
     branches = sum(name.endswith(".gain") for name in p)
     gains = np.array([p[f"rope.branch_{b + 1}.gain"] for b in range(branches)])
-    for j in range(n):
-        k = p["rope.axial_stiffness"] / (p["rope.length"] * plant.lumps.springs[j])
+    for j, link in enumerate(chain):
+        k, g = link.stiffness, gains if link.is_rope else gains[:0]
         q = state[[i for i, s in enumerate(plant.states) if s.startswith(f"rope.{j + 1}.branch_")]]
         # the strain of the material: of a slack piece that without tension
-        free = (gains @ q - hanging[j] / k) / (1.0 + gains.sum())
-        e = max(float(stretch[j]), free)
-        total += hanging[j] * e + 0.5 * k * (e**2 + gains @ (e - q) ** 2)
+        free = (g @ q - hanging[j] / k) / (1.0 + g.sum())
+        of_both = stretch[j] + link.give * (g @ q)
+        e = max(float(of_both) / (1.0 + link.give * (1.0 + g.sum())), free)
+        total += hanging[j] * e + 0.5 * k * (e**2 + g @ (e - q) ** 2)
+        if link.give:  # what the tip has stored
+            pull, tip = k * ((1.0 + g.sum()) * e - g @ q), k / link.give
+            total += (hanging[j] + 0.5 * pull) * pull / tip
     return float(total)
 
 
+@pytest.mark.parametrize("rig", [{}, RIG], ids=["rope", "rig"])
 @pytest.mark.parametrize("ratio", [0.002, 0.1])
-def test_no_energy_comes_out_of_a_rope_that_goes_slack_and_snaps(ratio: float) -> None:
-    data = replace(ROPE, inertia=1e15, damping_ratio=ratio, quadratic_drag=0.0)
+def test_no_energy_comes_out_of_a_rope_that_goes_slack_and_snaps(
+    ratio: float, rig: dict[str, float]
+) -> None:
+    data = replace(ROPE, inertia=1e15, damping_ratio=ratio, quadratic_drag=0.0, **rig)
     plant = build_plant(data, 5)
     rest = plant.operating_point({"winch.gear_direction": 0.0})
-    start, names = np.array(rest.x), displacement_names(5)
+    start, names = np.array(rest.x), plant.displacements
     lifted = 2.5 * np.cumsum(static_stretches(plant))
     for name, more in zip(names, lifted, strict=True):
         start[plant.states.index(name)] += more

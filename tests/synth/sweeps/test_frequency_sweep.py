@@ -70,6 +70,8 @@ OUTPUTS = {
 }
 
 
+RIG = {"crane.tip_stiffness": 1e6, "rigging.stiffness": 2e6, "rigging.block_mass": 3e3}
+OF_RIG = {"crane.tip_stiffness": "20 %", "rigging.stiffness": "30 %", "rigging.block_mass": "9 %"}
 EXACT = {f"sensors.payload.{n}_noise": 0.0 for n in ("acceleration", "velocity", "displacement")}
 
 
@@ -85,6 +87,20 @@ def hysteretic_design() -> Design:
     """The same gains with a damping that keeps them stable in every mode."""
     law = {"rope.damping_law": "hysteretic", "rope.damping_ratio": 0.02}
     case = load_case("subsea-crane").replace({"rope.masses": 6, **EXACT, **law})
+    return replace(evaluate_gains(case, GAINS_ON_ROPE), verification=None)
+
+
+@pytest.fixture(scope="module")
+def rigged_design() -> Design:
+    """The first gains below a boom and above slings that give."""
+    more = {"rope.damping_ratio": 0.01, "limits.drive": "report", **RIG}
+    case = load_case("subsea-crane").replace({"rope.masses": 6, **EXACT, **more})
+    return replace(evaluate_gains(case, GAINS_ON_ROPE), verification=None)
+
+
+@pytest.fixture(scope="module")
+def hysteretic_rigged_design(hysteretic_design: Design) -> Design:
+    case = hysteretic_design.case.replace({"limits.drive": "report", **RIG})
     return replace(evaluate_gains(case, GAINS_ON_ROPE), verification=None)
 
 
@@ -120,6 +136,7 @@ def test_columns_of_numbers_are_those_of_the_checked_cases() -> None:
         "winch.gearbox.ratio": "5 %",
         "winch.drum.inertia": Uniform(0.0, 1e4),
         "delay": Uniform("0 ms", "50 ms"),
+        **OF_RIG,
     }
     own = {
         "thesis-1975": {"winch.motor.resistance": "5 %", "winch.motor.back_emf_constant": "5 %"},
@@ -128,7 +145,7 @@ def test_columns_of_numbers_are_those_of_the_checked_cases() -> None:
     }
     laws = "kelvin-voigt", "hysteretic"
     for (name, more), law in itertools.product(own.items(), laws):
-        case = load_case(name).replace({"rope.damping_law": law})
+        case = load_case(name).replace({"rope.damping_law": law, **RIG, "rigging.block_mass": 99.0})
         spread = Spread({**common, **more}).on(case)
         rows = spread.sample(24)
         numbers, columns = numbers_of(case, spread, rows)
@@ -181,13 +198,17 @@ def test_spring_sweep_is_one_by_one_evaluation_on_the_same_nodes() -> None:
         assert found["payload_period"][k] == pytest.approx(2 * np.pi * np.sqrt(ratio), rel=1e-10)
 
 
-@pytest.mark.parametrize("fixture", ["rope_design", "hysteretic_design"])
+@pytest.mark.parametrize(
+    "fixture", ["rope_design", "hysteretic_design", "rigged_design", "hysteretic_rigged_design"]
+)
 def test_rope_sweep_is_one_by_one_evaluation_on_the_same_nodes(
     fixture: str, request: pytest.FixtureRequest
 ) -> None:
     design: Design = request.getfixturevalue(fixture)
     nodes = few_nodes(design.case)
-    engine = FrequencyEngine(design, ROPE, metrics=[*OUTPUTS, "drag"], nodes=nodes)
+    rig = OF_RIG if design.case.crane.tip_stiffness else {}
+    spread = Spread({**ROPE.distributions, **rig})
+    engine = FrequencyEngine(design, spread, metrics=[*OUTPUTS, "drag"], nodes=nodes)
     rows = engine.spread.sample(6)
     found = engine.evaluate(rows)
     assert found["stable"].sum() > 3
