@@ -27,9 +27,11 @@ if TYPE_CHECKING:
         MAX_BRANCHES,
         MAX_MASSES,
         RopeLumps,
+        first_root,
         fixed_top_modes,
         lump_rope,
         lumped_modes,
+        skin_drag_share,
         zener_branches,
     )
     from .shaping import ShapingFilter, controllable_form, fit_shaping_filter, sampled_density

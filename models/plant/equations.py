@@ -174,6 +174,9 @@ def build_equations(
             mass = mass + load
             weight = weight + p["payload.submerged_weight"]
         acceleration = (tension[j] - below - weight + other) / mass
+        if data.skin_drag > 0.0 and j < n:
+            along, piece = velocity[j + 1], length * lumps.masses[j]
+            acceleration -= p["rope.skin_drag"] * piece * ca.fabs(along) * along / mass
         xdot[shift] = velocity[j + 1]
         xdot[move] = acceleration
     # What the payload hangs on: rope and hook block in its mass are above that.
@@ -323,7 +326,7 @@ def parameter_values(data: PlantData) -> dict[str, float]:
         **{f"rope.branch_{b + 1}.time": float(tau) for b, tau in enumerate(times)},
         "payload.virtual_mass": data.payload_mass,
         "payload.submerged_weight": data.payload_weight,
-        "payload.quadratic_drag": data.quadratic_drag,
+        "payload.quadratic_drag": data.payload_drag,
         "payload.linear_drag": 0.0,
         "winch.drum_radius": data.drum_radius,
         "winch.gear_ratio": data.gear_ratio,
@@ -333,6 +336,8 @@ def parameter_values(data: PlantData) -> dict[str, float]:
         "winch.inertia": data.inertia,
         "winch.viscous_friction": data.viscous_friction,
     }
+    if data.skin_drag > 0.0:
+        values["rope.skin_drag"] = data.skin_drag
     if data.sheaves_efficiency < 1.0:
         values["rope.sheaves_efficiency"] = data.sheaves_efficiency
     if not math.isinf(data.tip_stiffness):

@@ -10,12 +10,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..basics import ComplexArray, FloatArray, InputError, check_range
-from .rope import MAX_MASSES, fixed_top_modes, lump_rope, lumped_modes, zener_branches
+from .rope import (
+    MAX_MASSES,
+    fixed_top_modes,
+    lump_rope,
+    lumped_modes,
+    skin_drag_share,
+    zener_branches,
+)
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -60,7 +67,10 @@ class PlantData:
     payload_mass, payload_weight
         Mass with added mass [kg], submerged weight [N].
     quadratic_drag
-        q = 1/2 rho C_D A of the drag force q v|v| [N s2/m2].
+        q = 1/2 rho C_D A of the drag force q v|v| [N s2/m2], the rope's share of it included
+        (`skin_drag_share`), as a linear plant has it.
+    skin_drag
+        1/2 rho C_t pi d of the drag along the rope, per length [N s2/m3].
     drum_radius, gear_ratio, gear_efficiency
         r to the rope's centre [m], n motor over drum [-], eta in (0, 1] [-].
     inertia, viscous_friction
@@ -108,6 +118,7 @@ class PlantData:
     payload_mass: float
     payload_weight: float
     quadratic_drag: float = 0.0
+    skin_drag: float = 0.0
     drum_radius: float
     gear_ratio: float
     gear_efficiency: float = 1.0
@@ -127,6 +138,21 @@ class PlantData:
     telemetry_bandwidth: float = math.inf
     delay: float = 0.0
     command_delay: float = 0.0
+
+    @property
+    def payload_drag(self) -> float:
+        """The payload's own q [N s2/m2]: the rope has its own where it moves."""
+        if self.skin_drag == 0.0:
+            return self.quadratic_drag
+        return self.quadratic_drag - self.lumped_skin_drag
+
+    @property
+    def lumped_skin_drag(self) -> float:
+        """The q that does as much to the first mode at the load as the rope's drag [N s2/m2]."""
+        load = self.payload_mass + self.block_mass
+        share: Any = skin_drag_share(np.asarray(self.rope_mass / load))[()]
+        found: float = self.skin_drag * self.rope_length * share
+        return found
 
     @property
     def stiffness(self) -> float:
@@ -328,7 +354,7 @@ class PlantData:
         if motor.type == "dc":
             kept = ("resistance", "torque_constant", "back_emf_constant", "inductance")
         bandwidth, telemetry = sensors.payload.bandwidth, sensors.telemetry
-        return cls(
+        found = cls(
             axial_stiffness=rope.ea,
             rope_length=rope.length,
             mass_per_length=rope.mass_per_length,
@@ -345,6 +371,7 @@ class PlantData:
             payload_mass=payload.virtual_mass,
             payload_weight=payload.submerged_weight,
             quadratic_drag=payload.quadratic_drag,
+            skin_drag=0.5 * payload.water_density * rope.skin_drag_area,
             drum_radius=winch.drum.radius_at(rope.length, rope.diameter),
             gear_ratio=winch.gearbox.ratio,
             gear_efficiency=winch.gearbox.efficiency,
@@ -360,6 +387,9 @@ class PlantData:
             delay=telemetry.delay,
             command_delay=winch.drive.command_delay,
         )
+        if not np.any(found.skin_drag):
+            return found
+        return replace(found, quadratic_drag=found.quadratic_drag + found.lumped_skin_drag)
 
 
 def _mean_of_ways(efficiency: float) -> float:

@@ -36,6 +36,7 @@ MAX_BRANCHES = len(_DECADES) + 1
 _LOW_END = 0.5  # where their band begins, in first modes
 _INSIDE = 1.11  # how far the outermost branches lie within it
 _NODES = 300
+_NEWTON = 30  # steps at most
 _EXACT = 1e3  # weight of the first mode, whose ratio is the one that is given
 
 
@@ -271,6 +272,45 @@ def fixed_top_modes(
             for j in range(count)
         ]
     return np.array(roots) / length * math.sqrt(axial_stiffness / mass_per_length)
+
+
+def first_root(eps: FloatArray) -> FloatArray:
+    """Return the root of nu tan nu = eps in (0, pi/2), by Newton's rule; sqrt(eps) for small.
+
+    That of the first axial mode, omega = (nu / L) sqrt(EA / m), eps being the rope's mass over the
+    load's, (n,).
+    """
+    nu = np.sqrt(3.0 * eps / (3.0 + eps))
+    nu = np.minimum(nu, 0.5 * np.pi * eps / (1.0 + eps) + 1e-3)
+    for _ in range(_NEWTON):
+        value = nu * np.sin(nu) - eps * np.cos(nu)
+        slope = np.sin(nu) + nu * np.cos(nu) + eps * np.sin(nu)
+        step = value / slope
+        nu = np.clip(nu - step, 0.25 * nu, 0.5 * np.pi)
+        if np.all(np.abs(step) <= 1e-15 * nu):
+            break
+    return nu
+
+
+def skin_drag_share(eps: FloatArray) -> FloatArray:
+    """Return the share of the rope's skin drag that the load has to bear for it [-].
+
+    Drag q v|v| per length takes as much power out of the first mode, upper end held, as drag of
+    that share of q L at the load: the mean of the cube of the mode's shape sin(nu x/L) / sin(nu),
+
+        tan(nu/2) (2 + cos nu) / (6 nu cos^2(nu/2)),
+
+    which is a quarter for a light rope.  Stochastic linearisation keeps it, as all velocities of a
+    mode are in proportion.
+
+    Parameters
+    ----------
+    eps
+        Mass of the rope over that of the load, (n,).
+    """
+    nu = np.maximum(first_root(np.maximum(eps, 0.0)), 1e-9)
+    half = 0.5 * nu
+    return np.asarray(np.tan(half) * (2.0 + np.cos(nu)) / (6.0 * nu * np.cos(half) ** 2))
 
 
 def lumped_modes(

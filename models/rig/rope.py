@@ -42,6 +42,10 @@ class Rope(Section):
     sheave_efficiency: Annotated[float, Quantity("ratio", 0.8, 1.0)] = 0.98
     """Tension behind a sheave over that before it where the rope runs: bending of the rope and
     friction of the bearing. 0.98 is usual on roller bearings, 0.96 on plain ones."""
+    skin_drag_coefficient: Annotated[float, Quantity("ratio", 0.0, 0.2)] = 0.0
+    """C_t of the water's drag along the rope, rho C_t pi d v|v| / 2 per length; about 0.01 for wire
+    rope.  By default none, which is on the safe side: it calms the load.  In a design it adds to
+    payload drag that is `stochastic`; a coefficient that the case gives stands for both."""
     damping_ratio: Annotated[float, Quantity("ratio", 0.0, 0.5)] = 0.002
     """Internal damping as a fraction of critical at the first axial mode."""
     damping_law: Literal["hysteretic", "kelvin-voigt"] = "kelvin-voigt"
@@ -106,6 +110,11 @@ class Rope(Section):
     def sheaves_efficiency(self) -> float:
         """Tension behind all sheaves over that before them where the rope runs [-]."""
         return self.sheave_efficiency**self.sheaves
+
+    @property
+    def skin_drag_area(self) -> float:
+        """Area that drag along the rope acts on, per length, C_t pi d [m]."""
+        return self.skin_drag_coefficient * math.pi * self.diameter
 
     @property
     def wave_speed(self) -> float:

@@ -18,7 +18,7 @@ import numpy as np
 from models.basics import ComplexArray, FloatArray, IndexArray, InputError
 from models.case import Case
 from models.operation import PREFIX as FAULTS
-from models.plant import MAX_BRANCHES, PlantData, zener_branches
+from models.plant import MAX_BRANCHES, PlantData, first_root, zener_branches
 from models.spread import DRAG, GAINS, Spread, with_payload
 
 from ..loop import Dual
@@ -29,7 +29,6 @@ Numbers = Mapping[str, Any]
 that arithmetic on what does not vary costs nothing.  `columns_of` says which."""
 
 _AGREE = 1e-12
-_NEWTON = 30
 
 # Paths that nothing of a case's plant depends on.
 _ELSEWHERE = ("sea.", "vessel.", "limits.", FAULTS, GAINS, DRAG)
@@ -131,7 +130,7 @@ def _rope(data: PlantData) -> dict[str, Any]:
     if not np.any(zeta):
         return found
     wave = np.sqrt(data.axial_stiffness / np.maximum(data.mass_per_length, 1e-300))
-    nu = _first_root(np.asarray(data.rope_mass / (data.payload_mass + data.block_mass)))
+    nu = first_root(np.asarray(data.rope_mass / (data.payload_mass + data.block_mass)))
     if data.damping_law != "hysteretic":
         return found | {"damping_time": 2.0 * zeta * data.rope_length / (nu * wave)}
     first = nu * wave / data.rope_length
@@ -256,20 +255,6 @@ def _radius(case: Case, length: FloatArray) -> FloatArray:
     lays = drum.lays(diameter)  # innermost first: from which length on a radius holds
     inside = [length >= start for start, _ in lays]
     return np.select(inside, [radius for _, radius in lays], lays[-1][1])
-
-
-def _first_root(eps: FloatArray) -> FloatArray:
-    """Return the root of nu tan nu = eps in (0, pi/2), by Newton's rule; sqrt(eps) for small."""
-    nu = np.sqrt(3.0 * eps / (3.0 + eps))
-    nu = np.minimum(nu, 0.5 * np.pi * eps / (1.0 + eps) + 1e-3)
-    for _ in range(_NEWTON):
-        value = nu * np.sin(nu) - eps * np.cos(nu)
-        slope = np.sin(nu) + nu * np.cos(nu) + eps * np.sin(nu)
-        step = value / slope
-        nu = np.clip(nu - step, 0.25 * nu, 0.5 * np.pi)
-        if np.all(np.abs(step) <= 1e-15 * nu):
-            break
-    return nu
 
 
 def part_of(column: Column, rows: IndexArray) -> Column:

@@ -39,6 +39,7 @@ def design() -> Design:
         "winch.motor.coulomb_friction": FRICTION,
         "rope.sheaves": SHEAVES,
         "rope.sheave_efficiency": SHEAVE,
+        "rope.skin_drag_coefficient": 0.02,
     }
     case = sh.load_case("subsea-crane").replace(changes)
     return sh.evaluate_gains(case, GAINS, structure="combined")

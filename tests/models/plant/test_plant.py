@@ -121,6 +121,33 @@ def test_sheaves_carry_to_the_drum_what_switches_with_the_gear() -> None:
     assert linear.loss["motor.torque"] == pytest.approx(ideal * turned * (1 / eta - eta) / 2)
 
 
+def test_every_piece_of_rope_has_its_own_skin_drag() -> None:
+    per_length = 0.8
+    data = replace(MODERN, skin_drag=per_length)
+    lumped = replace(data, quadratic_drag=MODERN.quadratic_drag + data.lumped_skin_drag)
+    assert lumped.payload_drag == pytest.approx(MODERN.quadratic_drag, rel=1e-12)
+    plain, plant, rng = build_plant(MODERN), build_plant(lumped), np.random.default_rng(1)
+    x = plain.operating_point().x + 0.1 * rng.standard_normal(len(plain.states))
+    shares = plain.lumps.masses * data.rope_length
+    masses = data.mass_per_length * shares
+    masses[-1] += data.payload_mass
+    still = np.zeros(4)
+    a, b = (
+        np.asarray(p.function(x, 0.0, still, p.parameter_vector())[0]).ravel()
+        for p in (plain, plant)
+    )
+    found = dict(zip(plain.states, b - a, strict=True))
+    names = [*(f"rope.{j + 1}.velocity" for j in range(data.masses - 1)), "payload.velocity"]
+    for name, share, mass in zip(names, shares, masses, strict=True):
+        v = x[plain.states.index(name)]
+        force = -per_length * share * abs(v) * v
+        assert found.pop(name) == pytest.approx(force / mass, rel=1e-9)
+    assert max(map(abs, found.values())) == 0.0
+    # At rest its slope is nothing: a linear plant has it in the coefficient that it is given.
+    with_skin, without = (p.linearise(drag=1e4).A for p in (plant, plain))
+    np.testing.assert_allclose(with_skin, without, rtol=1e-12)
+
+
 def test_gear_direction_can_follow_the_motor() -> None:
     plant = build_plant(MODERN)
     p = plant.parameter_vector({"winch.gear_switching": 50.0})

@@ -10,9 +10,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from plant_numbers import MODERN, THESIS
+from scipy.integrate import quad
 
 from models.basics import InputError
-from models.plant import PlantData, fixed_top_modes, lump_rope, lumped_modes, masses_for_bandwidth
+from models.plant import (
+    PlantData,
+    first_root,
+    fixed_top_modes,
+    lump_rope,
+    lumped_modes,
+    masses_for_bandwidth,
+    skin_drag_share,
+)
 from models.plant.plant_data import MODE_TOLERANCE
 
 ROPE = (1.6e8, 2000.0, 8.1, 73_688.0)  # the 1975 thesis: EA, L, mass per length, M_1
@@ -74,6 +83,17 @@ def test_modes_in_the_limits_of_a_light_and_a_heavy_rope() -> None:
     np.testing.assert_allclose(massless, [1.0])
     with pytest.raises(InputError, match="a massless rope has one axial mode, got count 2"):
         fixed_top_modes(1e8, 1000.0, 0.0, 1e5, 2)
+
+
+@pytest.mark.parametrize("eps", [1e-6, 0.03, 0.5, 4.0, 300.0])
+def test_skin_drag_at_the_load_is_the_cube_of_the_mode(eps: float) -> None:
+    (nu,) = first_root(np.array([eps]))
+    (exact,) = fixed_top_modes(1.0, 1.0, eps, 1.0, 1) * math.sqrt(eps)
+    assert nu == pytest.approx(exact, rel=1e-12)
+    shape, _ = quad(lambda x: (math.sin(nu * x) / math.sin(nu)) ** 3, 0.0, 1.0, epsabs=1e-13)
+    assert skin_drag_share(np.array([eps])) == pytest.approx([shape], rel=1e-10)
+    if eps < 1e-5:
+        assert shape == pytest.approx(0.25, rel=1e-5)
 
 
 def test_damping_time_is_that_of_the_first_mode() -> None:

@@ -19,7 +19,7 @@ from models import Case, HookMotion, build_plant, load_case
 from models.plant import DriveLimits
 from models.simulation import SimulationOptions, prepare, run_simulation
 from synth import evaluate_gains
-from synth.controllers import LinearFeedback
+from synth.controllers import BrakeOn, LinearFeedback
 from synth.question import pose
 from synth.structures import sampled_loop
 
@@ -156,6 +156,29 @@ def test_stochastic_drag_predicts_the_rms_that_quadratic_drag_leaves(height: flo
         rms[name] = math.sqrt(np.mean(variances))
     assert rms["quadratic"] == pytest.approx(rms["linear"], rel=0.03)
     assert rms["quadratic"] != pytest.approx(rms["linear"], rel=1e-6)  # it did something
+
+
+@pytest.mark.ci
+def test_skin_drag_in_every_piece_calms_a_resonant_load_as_its_share_at_the_load_does() -> None:
+    deep = {
+        "rope.length": 2000.0,
+        "rope.axial_stiffness": 127.6e6,  # the first mode is at 8.2 s, in the sea
+        "winch.drum.rope_on_drum_total": 2500.0,
+        "sea.significant_height": 1.5,
+    }
+    simulated, predicted = [], []
+    for coefficient in (0.0, 0.02):  # 22 % of the payload's drag, were it all at the load
+        case = load_case("subsea-crane").replace(
+            {**deep, "rope.skin_drag_coefficient": coefficient}
+        )
+        predicted.append(pose(case).payload_rms_before)
+        simulation = prepare(case, BrakeOn(case), options=SimulationOptions(duration=3600.0))
+        runs = [run_simulation(simulation, seed=s) for s in range(2)]
+        variances = [r.statistics["payload.displacement"].standard_deviation ** 2 for r in runs]
+        simulated.append(math.sqrt(np.mean(variances)))
+    less = simulated[1] / simulated[0]
+    assert less < 0.985
+    assert predicted[1] / predicted[0] == pytest.approx(less, abs=0.003)
 
 
 MRU = {"heave_filter_period": 200.0, "delay": 0.02}
