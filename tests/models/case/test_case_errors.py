@@ -139,7 +139,7 @@ WRONG = {
     "key that is a number": (
         ("sea:", "7: {}\nsea:"),
         "my.yaml:3: 7: unknown key; known here: stillhook, name, description, sources, sea, "
-        "vessel, rope, payload, winch, sensors, limits, gains, gain_bounds",
+        "vessel, rope, crane, rigging, payload, winch, sensors, limits, gains, gain_bounds",
     ),
     "unknown key in a motor": (
         ("type: ac", "type: ac\n    resistance: 3"),
