@@ -182,7 +182,7 @@ def descend(
         if new is not None:  # what a step that failed tells of the curvature is worth as much
             rest = _updated(rest, moved - x, at, new, prices, equation_prices)
         if new is None or share < _SOUND:
-            room, stiff = _CLOSER * min(room, length), _SHARE
+            room, stiff = _CLOSER * min(room, length), min(_SHARE, 10 * stiff)
             stalled += 1
             if room < _LEAST_ROOM or stalled > _STALLED:
                 small = promised <= max(1e2 * tolerance, _NOTHING) and at.broken <= 1e2 * _KEPT
@@ -244,28 +244,38 @@ def _quadratic(
     # A row that no step within the box can bring to zero stays out.
     near = np.flatnonzero(rows + np.abs(at.jacobian) @ reach > 0.0)
     e = equations.size
+    slopes = np.vstack([at.slope[None], at.jacobian, at.equation_slopes])
+    # Of what can change within the box, or what a small box changes would be lost in tolerances.
+    unit = min(1.0, float((np.abs(slopes) @ reach).max()))
     H = np.zeros((n + 1, n + 1))
     # In shares of the reach, so that the sizes of the variables do not matter.
-    H[:n, :n], H[n, n] = (
-        _convex(hessian * np.outer(reach, reach), at.curvature * np.outer(reach, reach), stiff),
-        _SLACK,
-    )
-    f = np.append(at.slope * reach, weight)
+    model = at.curvature * np.outer(reach, reach)
+    H[:n, :n] = _convex(hessian * np.outer(reach, reach), model, stiff) / unit
+    H[n, n] = _SLACK
+    f = np.append(at.slope * reach / unit, weight)
     A = np.zeros((near.size + 2 * e, n + 1))
     A[: near.size, :n] = at.jacobian[near] * reach
     A[near.size : near.size + e, :n] = at.equation_slopes * reach
     A[near.size + e :, :n] = -at.equation_slopes * reach
+    A /= unit
     A[:, n] = -1.0
-    upper = np.concatenate([-rows[near], -equations, equations])
-    most = np.append(box[1] / reach, 1e6)
+    upper = np.concatenate([-rows[near], -equations, equations]) / unit
+    most = np.append(box[1] / reach, 1e6 / unit)
     least = np.append(box[0] / reach, 0.0)
-    above = np.concatenate([most, upper])
-    below = np.concatenate([least, np.full(upper.size, -1e30)])
-    kinds = np.zeros(above.size, dtype=np.intc)
-    # Rows that nearly coincide can make the active set go round in circles; proximal steps do not.
-    for proximal in (0.0, 1e-6, 1e-3):
+    kinds = np.zeros(n + 1 + upper.size, dtype=np.intc)
+    # The solver's tolerances are of curvatures of one.  Rows that nearly coincide can make its
+    # active set go round in circles; proximal steps that hold back the slack most do not.
+    ones = np.ones(n + 1)
+    for own, proximal in ((np.sqrt(H.diagonal()), 0.0), (ones, 1e-6), (ones, 1e-3)):
         answer, _, flag, info = daqp.solve(
-            H, f, A, above, below, kinds, primal_tol=1e-10, eps_prox=proximal
+            H / np.outer(own, own),
+            f / own,
+            A / own,
+            np.append(most * own, upper),
+            np.append(least * own, np.full(upper.size, -1e30)),
+            kinds,
+            primal_tol=1e-10,
+            eps_prox=proximal,
         )
         if flag >= 1:
             break
@@ -275,8 +285,8 @@ def _quadratic(
     prices = np.zeros(rows.size)
     prices[near] = lam[: near.size]
     equation_prices = lam[near.size : near.size + e] - lam[near.size + e :]
-    answer = np.asarray(answer, dtype=np.float64)
-    return answer[:n] * reach, max(0.0, float(answer[n])), prices, equation_prices
+    answer = np.asarray(answer, dtype=np.float64) / own
+    return answer[:n] * reach, unit * max(0.0, float(answer[n])), prices, equation_prices
 
 
 def _tried(
