@@ -189,8 +189,20 @@ def test_a_light_deep_load_hangs_on_a_tight_rope_or_is_not_ok() -> None:
     assert design.verification.ok
     checked = {check.name for check in design.verification.checks}
     assert {"limits.rope.lower_tension.least", "rope.rope.lower_tension.least"} <= checked
-    # The same gains in a higher sea keep the drum's limit alone.
-    for ends, kept in (("both", False), ("drum", True)):
-        higher = taut.replace({"sea.significant_height": 2.6, "limits.tension_ends": ends})
-        found = evaluate_gains(higher, design.parameters, structure="feed-forward")
-        assert found.drive_kept is kept
+    # Of what moves the load's end (10.1 kN) all but 3.6 kN is the unit's error, 5 cm up to a sea of
+    # 4.3 m and 5 % above: 2.6 m keep the limit, a unit a fifth worse breaks it alone, and 6 m with
+    # others that have nothing to do with the rope.
+    lower_end = ["rope.lower_tension.least"]
+    drives = ["motor.speed.peak", "motor.power.peak"]
+    for changes, others, slack in (
+        ({"sea.significant_height": 2.6}, [], []),
+        ({"sensors.mru.noise_floor": 0.06}, [], lower_end),
+        ({"sea.significant_height": 6.0}, drives, lower_end),
+    ):
+        for ends in ("both", "drum"):
+            other = taut.replace({**changes, "limits.tension_ends": ends})
+            found = evaluate_gains(other, design.parameters, structure="feed-forward")
+            broken = others + (slack if ends == "both" else [])
+            uses = found.limits.values()
+            assert [use.name for use in uses if use.enforced and not use.kept] == broken
+            assert found.ok is not bool(broken)
