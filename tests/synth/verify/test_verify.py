@@ -21,6 +21,7 @@ from synth import (
     LowOrder,
     MaxSensitivity,
     Peak,
+    Rms,
     StaticGain,
     Tuning,
     White,
@@ -275,6 +276,31 @@ def test_corrupted_tunings_are_caught(oscillator: Tuning) -> None:
         found = verify_tuning(replace(tuned, **changes))  # type: ignore[arg-type]
         assert not found.ok
         assert found.failed == named, str(found)
+
+
+def test_a_limit_of_a_users_own_fails_by_its_name_and_nothing_else_does(
+    oscillator: Tuning,
+) -> None:
+    class Still(Rms):
+        """A limit that this check has never heard of."""
+
+    own = Still(bound=1e3, output="x", name="still")
+    tuned = tune(
+        oscillator.problem.plant,
+        StaticGain(),
+        spectrum={"w1": White(1.0)},
+        minimise=oscillator.problem.minimise,
+        limits=[MaxSensitivity(bound=2.0), own],
+        starts=2,
+    )
+    assert "still" in tuned.limits
+    for answer in (
+        tuned,
+        replace(tuned, limits={"max_sensitivity": tuned.limits["max_sensitivity"]}),
+    ):
+        found = verify_tuning(answer)
+        assert found.failed == ("limits.still",), str(found)
+        assert "is a Still, which there is no independent measure for" in str(found)
 
 
 def test_tuning_of_an_unstable_plant_with_drag_and_delay() -> None:
