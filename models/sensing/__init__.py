@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         Bias,
         MruModel,
         MruState,
+        coherent_error,
         error_density,
         low_pass_noise,
         unit_response,

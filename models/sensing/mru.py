@@ -10,8 +10,9 @@ heave.  Makers state what is left as a gain error dg and a phase error dphi, a s
 noise.  Gain and phase error are coherent: the unit hears (1 + e) Z with e = +-dg +- i dphi, of
 signs that nobody knows but that stay as they are.  With F0 + e F1 from heave to any signal, the
 mean over both signs of both is |F0|^2 + (dg^2 + dphi^2) |F1|^2: for moments the coherent error is
-one more disturbance, of density (dg^2 + dphi^2) S_Z (`error_density`).  "5 cm or 5 %, whichever is
-greater" may instead be read as one noise in the band of the waves, the drift's law with its own
+one more disturbance, of density (dg^2 + dphi^2) S_Z (`error_density`); one pair of signs adds
+2 Re(F0* e F1) S_Z (`coherent_error`), and limits are held with the worst.  "5 cm or 5 %, whichever
+is greater" may instead be read as one noise in the band of the waves, the drift's law with its own
 bandwidth.
 
 Its low-passes, of the second order after Butterworth, are one complex number each.  The filter
@@ -453,6 +454,17 @@ def error_density(
         shape = 2.0 * math.sqrt(2.0) / math.pi * w**3 / (omega**4 + w**4)
         found = found + rms**2 * shape
     return found
+
+
+def coherent_error(unit: MRU, omega: FloatArray) -> ComplexArray:
+    """Return gain and phase error over the heave before the unit's delay, (0 to 2, n).
+
+    A row for each that there is, of its positive sign: what the unit's high-pass leaves of it.
+    """
+    s = 1j * omega
+    passed = unit_response(unit, s) * np.exp(s * unit.delay)
+    errors = [e for e in (unit.gain_error, 1j * unit.phase_error) if e != 0.0]
+    return np.asarray(np.array(errors, dtype=np.complex128)[:, None] * passed)
 
 
 def _independent(

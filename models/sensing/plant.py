@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, White
+from ..basics import ComplexArray, FloatArray, White
 from ..case import Case
 from ..hook import HookMotion
 from ..plant import (
@@ -34,7 +34,7 @@ from ..plant import (
     weighed_tension,
 )
 from ..rig import MRU, PayloadSensor, Sensors
-from .mru import PERFECT, error_density, low_pass, unit_response
+from .mru import PERFECT, coherent_error, error_density, low_pass, unit_response
 
 #: What is measured, in the order of the plant's measurements.
 MEASURED = (
@@ -97,6 +97,10 @@ class UnitError:
         frequency = np.asarray(omega, dtype=np.float64)
         heave = np.asarray(self.hook.density(frequency))
         return error_density(self.unit, frequency, heave, float(self.hook.displacement.rms))
+
+    def coherent(self, omega: npt.ArrayLike) -> ComplexArray:
+        """Return gain and phase error over the hook's heave (`coherent_error`), (0 to 2, n)."""
+        return coherent_error(self.unit, np.asarray(omega, dtype=np.float64))
 
 
 def sensed_plant(

@@ -65,7 +65,7 @@ def high_order_gains(
         parameters = question.named([float(v) for v in question.law.values(found.controller)])
         view = question.assess(parameters)
         drag = view.coefficient if question.drag is not None else drag
-        if all(limit.use(limit.measure(view)) <= 1.0 for limit in question.limits):
+        if all(limit.use(limit.worst(view)) <= 1.0 for limit in question.limits):
             break
         rooms |= _rooms(question, view)
     return question, parameters
@@ -77,7 +77,7 @@ def _rooms(question: DesignQuestion, view: Assessment) -> dict[str, float]:
     for limit in question.limits:
         if not isinstance(limit, Peak | Continuous | Minimum | Power):
             continue
-        value = limit.measure(view)
+        value = limit.worst(view)
         if limit.use(value) <= 1.0:
             continue
         static = abs(limit.static) + limit.loss

@@ -172,7 +172,7 @@ def _measured(
     """Return every limit of every member with what is measured of it."""
     for scenario, assessment in zip(problem.scenarios, assessments, strict=True):
         for lim in scenario.problem.limits:
-            yield lim, lim.measure(assessment)
+            yield lim, lim.worst(assessment)
 
 
 def _drags(free: Tuning) -> tuple[float | None, ...]:

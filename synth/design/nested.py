@@ -154,9 +154,7 @@ def _as_it_is(family: FamilyProblem, values: Sequence[float]) -> Solution | None
     drags = tuple(seen.coefficient if asked.drag is not None else None for asked, seen in loops)
     if not family.stable(values, drags):
         return None
-    if any(
-        lim.use(lim.measure(seen)) > 1.0 + KEPT for asked, seen in loops for lim in asked.limits
-    ):
+    if any(lim.use(lim.worst(seen)) > 1.0 + KEPT for asked, seen in loops for lim in asked.limits):
         return None
     costs = np.sqrt(
         [sum(w * seen.sigma(z) ** 2 for z, w in asked.minimise.items()) for asked, seen in loops]

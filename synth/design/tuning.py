@@ -260,7 +260,7 @@ def limit_uses(
     """Return the use of each limit by name; `prices` are in units of the cost per percent."""
     uses = {}
     for limit in limits:
-        value = limit.measure(assessment)
+        value = limit.worst(assessment)
         uses[limit.name] = LimitUse(
             name=limit.name,
             value=value,

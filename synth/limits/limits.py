@@ -20,6 +20,8 @@ import numpy as np
 
 from models.basics import BoolArray, FloatArray
 
+from ..loop import joined
+
 if TYPE_CHECKING:
     from ..loop import Assessment
 
@@ -67,8 +69,15 @@ class Symbols(Protocol):
     def moment(self, output: str, order: int) -> Any:
         """Return the spectral moment m_order of `output`, (1,)."""
 
+    def covariance(self, one: str, other: str) -> Any:
+        """Return the covariance of two outputs, (1,)."""
+
     def peak(self, output: str, duration: float) -> Any:
         """Return the most probable maximum of `output` in `duration` [s], (1,)."""
+
+    @property
+    def members(self) -> Sequence[Symbols]:
+        """The same for each combination of signs that sensors' errors may have, or this alone."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,6 +126,20 @@ class Limit(ABC):
     @abstractmethod
     def measure(self, loop: Assessment) -> float:
         """Return the value that is compared with the bound."""
+
+    def worst_rows(self, symbols: Symbols, bound: Any) -> Any:
+        """Return the rows for whatever signs sensors' errors may have, one after the other."""
+        if not self.drive:
+            return self.rows(symbols, bound)
+        found = [self.rows(one, bound) for one in symbols.members]
+        return joined(found) if len(found) > 1 else found[0]
+
+    def worst(self, loop: Assessment) -> float:
+        """Return what is measured with the worst signs that sensors' errors may have."""
+        if not self.drive:
+            return self.measure(loop)
+        found = [self.measure(one) for one in loop.members]
+        return min(found) if self.at_least else max(found)
 
     @property
     def edges(self) -> tuple[float, ...]:

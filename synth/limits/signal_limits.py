@@ -21,11 +21,13 @@ from typing_extensions import override
 
 from models.basics import check_range
 
-from ..loop import mapped
+from ..loop import at_least, mapped
 from .limits import Limit, Symbols
 
 if TYPE_CHECKING:
     from ..loop import Assessment
+
+_STILL = 1e-12  # a speed's variance over the base speed squared that is none
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,15 +85,16 @@ class Thermal(Continuous):
     """E[(T/T_c)^2] at most one, for a continuous torque T_c that falls above a speed.
 
     T_c is `bound` up to the motor speed `base_speed` [rad/s] and falls as 1/speed above (constant
-    power).  Of Gaussian torque, of standard deviation sigma about its mean, and speed, of standard
-    deviation base_speed/x,
+    power).  Of torque and speed that are Gaussian together, the speed of standard deviation
+    base_speed/x,
 
         E[max(1, u^2/x^2)]     = 1 + 2 (f/x + Q (1/x^2 - 1)),
         E[u^2 max(1, u^2/x^2)] = 1 + 2 (3 f/x + Q (3/x^2 - 1))
 
-    with u of standard deviation one, f its density and Q its tail beyond x.  The first is the
-    factor on the mean square, the second that on the variance where torque and speed go together:
-    the most that it can be whatever their correlation, as `Power` is.  Where the speed hardly ever
+    with u of standard deviation one, f its density and Q its tail beyond x.  The second is the
+    factor on that part of the torque's variance that goes with the speed, their covariance squared
+    over the speed's variance; the first that on all the rest and on the mean square, as an even
+    function of the speed has no mean product with the torque itself.  Where the speed hardly ever
     passes the base speed both are one.
     """
 
@@ -105,22 +108,29 @@ class Thermal(Continuous):
 
     @override
     def rows(self, symbols: Symbols, bound: Any) -> Any:
-        share = symbols.moment(self.speed, 0) / self.base_speed**2
-        dynamic = symbols.moment(self.output, 0) * mapped(share, *_MOVING)
-        steady = (self.static**2 + self.loss**2) * mapped(share, *_STEADY)
-        return (steady + dynamic) / (bound * bound) - 1.0
+        torque, speed = symbols.moment(self.output, 0), symbols.moment(self.speed, 0)
+        both = symbols.covariance(self.output, self.speed)
+        return self._heat(torque, speed, both) / (bound * bound) - 1.0
 
     @override
     def measure(self, loop: Assessment) -> float:
-        share = np.array((loop.sigma(self.speed) / self.base_speed) ** 2)
-        dynamic = loop.sigma(self.output) ** 2 * _MOVING[0](share)
-        steady = (self.static**2 + self.loss**2) * _STEADY[0](share)
-        return float(np.sqrt(steady + dynamic))
+        torque, speed = loop.sigma(self.output) ** 2, loop.sigma(self.speed) ** 2
+        if not np.isfinite(torque + speed):
+            return np.inf
+        both = loop.covariance(self.output, self.speed)
+        return float(np.sqrt(self._heat(torque, np.array(speed), both)))
+
+    def _heat(self, torque: Any, speed: Any, both: Any) -> Any:
+        """Return the mean square over T_c, times `bound` squared, of variances and covariance."""
+        share = speed / self.base_speed**2
+        along = both * both / (at_least(share, _STILL) * self.base_speed**2)
+        across = self.static**2 + self.loss**2 + torque - along
+        return across * mapped(share, *_STEADY) + along * mapped(share, *_MOVING)
 
 
 def _tail(share: Any) -> tuple[Any, Any, Any]:
     """Return x, density and tail beyond it of a speed's variance over the base speed squared."""
-    x = 1.0 / np.sqrt(np.maximum(share, 1e-12))
+    x = 1.0 / np.sqrt(np.maximum(share, _STILL))
     return x, np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi), ndtr(-x)
 
 

@@ -11,11 +11,12 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .assess import Assessment, consistent_coefficient, frequency_grid, integration_band
     from .controller import LinearController, closed_loop_matrix, closed_loop_poles
-    from .disturbance import Disturbance, disturbances
+    from .disturbance import CoherentError, Disturbance, disturbances
     from .drag_element import DragElement, with_drag
     from .dual import (
         Dual,
         at_least,
+        conj,
         constant,
         exp,
         imag,

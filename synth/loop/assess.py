@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from copy import copy
 from functools import cached_property, partial
 
 import numpy as np
@@ -25,7 +26,7 @@ from models.basics import (
 from models.plant import LinearPlant, consistent_drag, settled_drag
 
 from .controller import LinearController, closed_loop_plant, closed_loop_poles
-from .disturbance import Disturbance
+from .disturbance import CoherentError, Disturbance
 from .drag_element import DragElement, with_drag
 from .margins import Margins, least_distances, loop_margins, refine_minima, worst_margins
 from .pole_region import PoleRegion, with_delay_models
@@ -78,6 +79,8 @@ class Assessment:
         self._given = coefficient
         self._nodes, self._dense = nodes, grid
         self._parts: dict[tuple[str, ...], LinearPlant] = {}
+        self._signs: tuple[float, ...] = ()
+        self._kept: dict[tuple[str, ...], Quadrature] = {}
         self._moments: dict[str, tuple[float, float]] = {}
         self._shares: dict[str, dict[str, float]] = {}
 
@@ -169,7 +172,7 @@ class Assessment:
     def shares(self, output: str) -> dict[str, float]:
         """Return the standard deviation that each disturbance alone makes of `output`, by name.
 
-        Their squares add up to the variance.
+        Their squares add up to the variance, of a sensor's error over its signs.
         """
         self._moment(output)
         return dict(self._shares[output])
@@ -182,6 +185,31 @@ class Assessment:
     def peak(self, output: str, duration: float) -> float:
         """Return the most probable maximum of `output` in `duration` [s], without its mean."""
         return peak_factor(self.mean_period(output), duration) * self.sigma(output)
+
+    def covariance(self, one: str, other: str) -> float:
+        """Return the covariance of two outputs."""
+        nodes = self._kept.get(self.plant.outputs) or self._on([one, other])
+        responses, shaken = self._all([one, other], nodes.omega)
+        total = np.sum((responses[0].conj() * responses[1]).real * shaken * nodes.weights)
+        if self._signs:
+            cross = self._crossed(responses, shaken, nodes.omega)
+            total += (cross[0, 1] + cross[1, 0]).real @ nodes.weights
+        return float(total)
+
+    @property
+    def members(self) -> tuple[Assessment, ...]:
+        """The loop with each combination of signs that sensors' errors may have; or itself.
+
+        Their variances are those of one combination, where its own are the mean over all.
+        """
+        if self._signs or self._coherent is None:
+            return (self,)
+        found = []
+        for signs in self._coherent.signs:
+            own = copy(self)
+            own._signs, own._moments, own._shares = signs, {}, {}
+            found.append(own)
+        return tuple(found)
 
     def sensitivity_peaks(self, above: float) -> FloatArray:
         """Return the frequencies of all peaks of |S| above a value [rad/s]."""
@@ -264,13 +292,41 @@ class Assessment:
         return all(d.band is not None for d in self.disturbances)
 
     def _integrate(self, outputs: Sequence[str]) -> None:
-        nodes = self.quadrature(outputs)
-        parts = self._spectra(outputs, nodes.omega) * nodes.weights
+        nodes = self._on(outputs)
+        responses, shaken = self._all(outputs, nodes.omega)
+        parts = np.abs(responses) ** 2 * shaken * nodes.weights
         variances, rates = parts.sum(axis=2), parts @ nodes.omega**2
-        for output, own, rate in zip(outputs, variances, rates, strict=True):
+        both = np.stack([variances.sum(axis=1), rates.sum(axis=1)], axis=1)
+        if self._signs:
+            cross = np.einsum("zzk->zk", self._crossed(responses, shaken, nodes.omega))
+            powers = nodes.weights * np.stack([np.ones_like(nodes.omega), nodes.omega**2])
+            # Never below zero by rounding, where error and motion cancel.
+            both = np.maximum(both + 2.0 * cross.real @ powers.T, 0.0)
+        for output, own, pair in zip(outputs, variances, both, strict=True):
             names = (d.name for d in self.disturbances)
             self._shares[output] = dict(zip(names, np.sqrt(own).tolist(), strict=True))
-            self._moments[output] = float(own.sum()), float(rate.sum())
+            self._moments[output] = float(pair[0]), float(pair[1])
+
+    def _on(self, outputs: Sequence[str]) -> Quadrature:
+        """Return the nodes of some outputs, the same for every combination of signs."""
+        key = tuple(outputs)
+        if key not in self._kept:
+            self._kept[key] = self.quadrature(outputs)
+        return self._kept[key]
+
+    @cached_property
+    def _coherent(self) -> CoherentError | None:
+        return CoherentError.among(self.disturbances)
+
+    def _crossed(
+        self, responses: ComplexArray, shaken: FloatArray, omega: FloatArray
+    ) -> ComplexArray:
+        """Return conj(F0) e F1 S of outputs by outputs, with the error's signs, (z, z, k)."""
+        pair = self._coherent
+        assert pair is not None
+        share = np.array(self._signs) @ pair.shares(omega) * shaken[pair.source]
+        F0, F1 = responses[:, pair.source], responses[:, pair.error]
+        return np.asarray(F0.conj()[:, None] * F1 * share)
 
     def _responses(
         self, outputs: Sequence[str], sources: Sequence[str], omega: FloatArray
@@ -298,9 +354,13 @@ class Assessment:
 
     def _spectra(self, outputs: Sequence[str], omega: FloatArray) -> FloatArray:
         """Return what each disturbance alone makes of each output, (z, w, k)."""
+        responses, shaken = self._all(outputs, omega)
+        return np.asarray(np.abs(responses) ** 2 * shaken)
+
+    def _all(self, outputs: Sequence[str], omega: FloatArray) -> tuple[ComplexArray, FloatArray]:
+        """Return the responses of outputs to all disturbances, (z, w, k), and densities (w, k)."""
         densities = np.array([d.density(omega) for d in self.disturbances])
-        responses = self._responses(outputs, [d.name for d in self.disturbances], omega)
-        return np.asarray(np.abs(responses) ** 2 * densities)
+        return self._responses(outputs, [d.name for d in self.disturbances], omega), densities
 
     def _gains(self, omega: FloatArray) -> list[ComplexArray]:
         """Return L of each loop, (k,) each."""

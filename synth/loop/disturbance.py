@@ -7,24 +7,46 @@ and the frequencies where it is not smooth.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from models.basics import FloatArray, InputError, White, check_ascending, check_finite
+from models.basics import (
+    ComplexArray,
+    FloatArray,
+    InputError,
+    White,
+    check_ascending,
+    check_finite,
+)
 from models.plant import ShapingFilter
 
 
 @dataclass(frozen=True, kw_only=True)
 class Disturbance:
-    """One disturbance: its name, density, band [rad/s] (None: the half line) and kinks [rad/s]."""
+    """One disturbance.
+
+    Attributes
+    ----------
+    name, density
+        Its name, and its one-sided density per rad/s.
+    band, splits
+        The band that holds it [rad/s], None for the half line, and kinks in it [rad/s].
+    source, shares
+        Of an error that is in part a share of another disturbance, of signs that nobody knows: the
+        name of that one, and from frequencies (k,) [rad/s] to the shares, (e, k).  The density
+        holds them with the mean square over their signs.
+    """
 
     name: str
     density: Callable[[FloatArray], FloatArray]
     band: tuple[float, float] | None
     splits: tuple[float, ...] = ()
+    source: str = ""
+    shares: Callable[[FloatArray], ComplexArray] | None = None
 
     def scaled(self, amplitude: float) -> Disturbance:
         """Return the disturbance with its amplitude times `amplitude`."""
@@ -34,6 +56,37 @@ class Disturbance:
             return factor * plain(omega)
 
         return self if amplitude == 1.0 else replace(self, density=density)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoherentError:
+    """What a pair of disturbances have in common, see `Disturbance.shares`.
+
+    Attributes
+    ----------
+    error, source
+        Places of the error and of what it is a share of.
+    shares
+        From frequencies (k,) [rad/s] to the shares, (e, k).
+    """
+
+    error: int
+    source: int
+    shares: Callable[[FloatArray], ComplexArray]
+
+    @classmethod
+    def among(cls, every: Sequence[Disturbance]) -> CoherentError | None:
+        """Return the first of its kind among disturbances; None where there is none."""
+        names = [d.name for d in every]
+        for i, d in enumerate(every):
+            if d.shares is not None and d.source in names and len(d.shares(np.ones(1))):
+                return cls(error=i, source=names.index(d.source), shares=d.shares)
+        return None
+
+    @property
+    def signs(self) -> list[tuple[float, ...]]:
+        """Every combination of signs of the shares."""
+        return [*product((1.0, -1.0), repeat=len(self.shares(np.ones(1))))]
 
 
 def disturbances(spectrum: Mapping[str, Any], known: tuple[str, ...]) -> tuple[Disturbance, ...]:
@@ -75,6 +128,8 @@ def _disturbance(name: str, value: Any) -> Disturbance:
             density=_checked(name, value.density),
             band=tuple(value.band),
             splits=tuple(getattr(value, "splits", ())),
+            source=getattr(value, "source", ""),
+            shares=getattr(value, "shares", None),
         )
     if callable(value):
         return Disturbance(name=name, density=_checked(name, value), band=None)

@@ -126,6 +126,11 @@ def imag(x: Any) -> Any:
     return Dual(x.value.imag, x.slope.imag, x.at) if isinstance(x, Dual) else np.imag(x)
 
 
+def conj(x: Any) -> Any:
+    """Return the complex conjugate."""
+    return Dual(x.value.conj(), x.slope.conj(), x.at) if isinstance(x, Dual) else np.conj(x)
+
+
 def squared(x: Any) -> Any:
     """Return the squared magnitude."""
     if not isinstance(x, Dual):

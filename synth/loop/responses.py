@@ -166,6 +166,11 @@ class LoopResponses:
         entries = {(i, j): law[:, i, j] for i in range(size[0]) for j in range(size[1])}
         return cls(LoopBlocks.of(response, sources=sources), Closing(entries=entries, size=size))
 
+    @property
+    def omega(self) -> FloatArray:
+        """Size of the points, (k,) [rad/s]."""
+        return self._omega
+
     @cached_property
     def inverse(self) -> ComplexArray:
         """G = (I - C P_yu)^-1, (m, m, ..., k)."""

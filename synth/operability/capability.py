@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import FloatArray, Quadrature, ReadOnlyArrays
+from models.basics import ComplexArray, FloatArray, Quadrature, ReadOnlyArrays
 
 from ..limits import Breakdown, Continuous, Limit, Peak, Power, Thermal
 from .systems import PerfectSystem
@@ -71,10 +71,10 @@ def capability(
     order = np.argsort(-given)  # nodes ascend
     omega = 2.0 * math.pi / given[order]
     base = system.responses(Quadrature(omega=omega, weights=np.ones_like(omega)))
-    sizes = {name: np.abs(base.table[k, 0]) for k, name in enumerate(base.outputs)}
+    shown = {name: base.table[k, 0] for k, name in enumerate(base.outputs)}
     rows = []
     for limit in criteria:
-        amplitude = _amplitude(limit, sizes)
+        amplitude = _amplitude(limit, shown)
         row = np.empty_like(given)
         row[order] = 2.0 * np.maximum(amplitude, 0.0)
         rows.append(row)
@@ -86,25 +86,31 @@ class _Sine:
     """A heave of amplitudes (p,) [m] as the limits see it (`synth.limits.Symbols`)."""
 
     amplitude: FloatArray
-    sizes: dict[str, FloatArray]
+    shown: dict[str, ComplexArray]
 
     def moment(self, output: str, order: int) -> FloatArray:
         """Return the variance of an output."""
         del order
-        return np.asarray(0.5 * (self.amplitude * self.sizes[output]) ** 2)
+        return self.covariance(output, output)
+
+    def covariance(self, one: str, other: str) -> FloatArray:
+        """Return the covariance of two outputs."""
+        product = (self.shown[one].conj() * self.shown[other]).real
+        return np.asarray(0.5 * self.amplitude**2 * product)
 
     def peak(self, output: str, duration: float) -> FloatArray:
         """Return the amplitude of an output."""
         del duration
-        return self.amplitude * self.sizes[output]
+        return self.amplitude * np.abs(self.shown[output])
 
 
-def _amplitude(limit: Limit, sizes: dict[str, FloatArray]) -> FloatArray:
+def _amplitude(limit: Limit, shown: dict[str, ComplexArray]) -> FloatArray:
     """Return the amplitude of the heave at which a limit is reached (p,) [m]."""
+    sizes = {name: np.abs(response) for name, response in shown.items()}
     if isinstance(limit, Breakdown | Thermal):
 
         def excess(size: FloatArray) -> FloatArray:
-            return np.asarray(limit.rows(_Sine(amplitude=size, sizes=sizes), limit.bound))  # type: ignore[arg-type]
+            return np.asarray(limit.rows(_Sine(amplitude=size, shown=shown), limit.bound))  # type: ignore[arg-type]
 
         low, high = np.zeros_like(sizes[limit.speed]), np.full_like(sizes[limit.speed], 1e4)
         for _ in range(60):

@@ -154,8 +154,9 @@ def _excess(limit: Limit, moments: SeaMoments, stationary: BoolArray) -> FloatAr
     stationary
         Where there is a stationary motion at all (r,).
     """
-    # All that the limit asks of a programme's symbols is `moment` and `peak`.
-    raw = np.asarray(limit.rows(moments, limit.bound))  # type: ignore[arg-type]
+    each = moments.members if limit.drive else [moments]
+    # All that the limit asks of a programme's symbols is there.
+    raw = np.max([limit.rows(one, limit.bound) for one in each], axis=0)  # type: ignore[arg-type]
     # Finite, as a root finder takes differences of it.
     return np.where(stationary & np.isfinite(raw), np.minimum(raw, _BROKEN), _BROKEN)
 

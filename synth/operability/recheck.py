@@ -117,7 +117,7 @@ def recheck(design: Design, at: AtDepth, count: int) -> tuple[ContourCheck, ...]
                 heading=None if contour.headings is None else float(contour.headings[h]),
                 height=height,
                 criterion=criterion.name,
-                value=criterion.measure(assessment),
+                value=criterion.worst(assessment),
                 bound=criterion.bound,
                 drag=drag,
                 agreed=drag if fixed else slope * assessment.sigma("payload.velocity"),

@@ -21,25 +21,43 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
 from models.basics import ComplexArray, FloatArray, Quadrature, read_only
+
+_TOGETHER = ("motor.torque", "motor.speed")  # whose covariance heats a motor
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SeaMoments:
     """Variances m0 and second moments m2 of outputs in r sea states, each (r,).
 
+    `together` is the covariance of torque and speed, where both are among the outputs (r,).
+    `signed` has the same for each combination of signs that the reference unit's error may have.
     The limits on signals make their rows of it (`synth.limits.Limit.rows`), one for each sea state.
     """
 
     m0: Mapping[str, FloatArray]
     m2: Mapping[str, FloatArray]
+    together: FloatArray | None = None
+    signed: Sequence[SeaMoments] = ()
 
     def moment(self, output: str, order: int) -> FloatArray:
         """Return the spectral moment of order 0 or 2 of an output (r,)."""
         return (self.m2 if order else self.m0)[output]
+
+    def covariance(self, one: str, other: str) -> FloatArray:
+        """Return the covariance of the motor's torque and speed (r,)."""
+        assert {one, other} == {*_TOGETHER}
+        assert self.together is not None
+        return self.together
+
+    @property
+    def members(self) -> Sequence[SeaMoments]:
+        """The same for each combination of signs of the reference unit's error; or this alone."""
+        return self.signed or (self,)
 
     def peak(self, output: str, duration: float) -> FloatArray:
         """Return the most probable maximum in `duration` [s] without the mean (r,).
@@ -68,12 +86,18 @@ class DragResponses:
         last, to a force on the payload, at the coefficient `reference` (o + 1, w + 1, n).
     reference
         Drag coefficient C_0 that the responses hold [N s/m].
+    shares
+        Gain and phase error of the reference unit over the heave at the nodes, (0 to 2, n).
+    error
+        Which of the w disturbances that error is; the heave is the first.
     """
 
     nodes: Quadrature
     outputs: tuple[str, ...]
     table: ComplexArray
     reference: float
+    shares: ComplexArray | None = None
+    error: int = 0
 
     @property
     def _vf(self) -> ComplexArray:
@@ -85,23 +109,42 @@ class DragResponses:
         zf, vw = self.table[:-1, -1:], self.table[-1:, :-1]
         return np.asarray(self.table[:-1, :-1] * self._vf - zf * vw)
 
-    @cached_property
-    def _tables(self) -> FloatArray:
-        """Coefficients of 1, D, D^2 of every output's squared modulus, (w, n, 2 x 3 x o).
+    @property
+    def _pairs(self) -> list[tuple[int, int]]:
+        """Two outputs of every moment (p): each with itself, then torque with speed."""
+        pairs = [(k, k) for k in range(len(self.outputs))]
+        if {*_TOGETHER} <= {*self.outputs}:
+            pairs.append((self.outputs.index(_TOGETHER[0]), self.outputs.index(_TOGETHER[1])))
+        return pairs
 
-        First those of the densities, then those times omega^2.
+    def _products(self, one: ComplexArray, other: ComplexArray) -> FloatArray:
+        """Return coefficients of 1, D, D^2 of Re(conj(F) F') of pairs, (w, n, 2 x 3 x p).
+
+        First those of the densities, then those times omega^2; F and F', times the denominator, are
+        `one` and `other`, (2, o, w, n): what they are at the reference, and what D adds.
         """
-        zw = self.table[:-1, :-1]
-        parts = np.stack(
-            [
-                np.abs(zw) ** 2,
-                2.0 * np.real(np.conj(zw) * self._update),
-                np.abs(self._update) ** 2,
-            ]
-        )  # (3, o, w, n)
+        left, right = np.array(self._pairs).T
+        a, b = one[:, left].conj(), other[:, right]
+        parts = np.stack([a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[1] * b[1]]).real  # (3, p, w, n)
         both = np.stack([parts, parts * self.nodes.omega**2])
         moved = np.transpose(both, (3, 4, 0, 1, 2))
         return read_only(moved.reshape(*moved.shape[:2], -1))
+
+    @cached_property
+    def _tables(self) -> FloatArray:
+        """Coefficients of the moments over the densities of the disturbances; see `_products`."""
+        every = np.stack([self.table[:-1, :-1], self._update])
+        return self._products(every, every)
+
+    @cached_property
+    def _crossed(self) -> FloatArray:
+        """Coefficients of what gain and phase error add over the heave's density, (0 to 2, ..)."""
+        if self.shares is None or not len(self.shares):
+            return np.zeros((0, 0, 0))
+        every = np.stack([self.table[:-1, :-1], self._update])
+        heave, error = every[:, :, :1], every[:, :, self.error, None] * self.shares
+        heave = np.broadcast_to(heave, error.shape)
+        return self._products(heave, error) + self._products(error, heave)
 
     def weighted_speed(self, densities: Sequence[FloatArray]) -> FloatArray:
         """Return what `speed_variance` sums up, at the reference, (r, n).
@@ -137,19 +180,30 @@ class DragResponses:
         coefficient
             Drag coefficients (r,) [N s/m].
         """
-        rows = coefficient.size
+        rows, count = coefficient.size, len(self.outputs)
         weights = self.nodes.weights / self._denominator(coefficient)  # (r, n)
-        found = np.zeros((rows, self._tables.shape[-1]))
-        for table, density in zip(self._tables, densities, strict=True):
-            found += (weights * density) @ table
-        parts = found.reshape(rows, 2, 3, len(self.outputs))
-        D = (coefficient - self.reference)[:, None]
-        both = parts[:, :, 0] + D[:, None] * (parts[:, :, 1] + D[:, None] * parts[:, :, 2])
-        # Rounding may leave a trifle below zero where an output does not move at all.
-        m0, m2 = np.maximum(both, 0.0).transpose(1, 2, 0)
-        return SeaMoments(
-            m0=dict(zip(self.outputs, m0, strict=True)), m2=dict(zip(self.outputs, m2, strict=True))
-        )
+        D = (coefficient - self.reference)[:, None, None]
+
+        def of_drag(found: FloatArray) -> FloatArray:
+            parts = found.reshape(rows, 2, 3, -1)
+            both = parts[:, :, 0] + D * (parts[:, :, 1] + D * parts[:, :, 2])
+            return both.transpose(1, 2, 0)  # (2, p, r)
+
+        def named(both: FloatArray, signed: Sequence[SeaMoments] = ()) -> SeaMoments:
+            # Rounding may leave a trifle below zero where an output does not move at all.
+            plain = np.maximum(both[:, :count], 0.0)
+            m0, m2 = (dict(zip(self.outputs, part, strict=True)) for part in plain)
+            together = both[0, count] if both.shape[1] > count else None
+            return SeaMoments(m0=m0, m2=m2, together=together, signed=signed)
+
+        pairs = zip(self._tables, densities, strict=True)
+        mean = of_drag(sum((weights * density) @ table for table, density in pairs))
+        cross = [of_drag((weights * densities[0]) @ table) for table in self._crossed]
+        signs = product((1.0, -1.0), repeat=len(cross)) if cross else ()
+        members = [
+            named(mean + sum(s * part for s, part in zip(own, cross, strict=True))) for own in signs
+        ]
+        return named(mean, members)
 
     def gains(self, coefficient: float) -> FloatArray:
         """Return the squared moduli of the responses for one coefficient [N s/m], (o, w, n)."""

@@ -21,6 +21,7 @@ from typing_extensions import override
 from models.basics import ComplexArray, FloatArray, Quadrature
 from models.plant import LinearPlant, PlantData
 from models.rig import MRU
+from models.sensing import coherent_error
 
 from ..limits import LOWER_TENSION
 from ..loop import (
@@ -71,11 +72,15 @@ class System(ABC):
 
     def responses(self, nodes: Quadrature) -> DragResponses:
         """Return the responses on nodes, with the drag as a variable."""
+        names = [noise.name for noise in self.noises]
+        unit = self.mru if "mru.error" in names else None
         return DragResponses(
             nodes=nodes,
             outputs=self.outputs,
             table=self.transfers(nodes.omega),
             reference=self.reference,
+            shares=None if unit is None else coherent_error(unit, nodes.omega),
+            error=0 if unit is None else 1 + names.index("mru.error"),
         )
 
     @abstractmethod

@@ -8,6 +8,7 @@ without slopes, the same numbers screen candidates.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -22,9 +23,11 @@ from models.basics import BoolArray, ComplexArray, FloatArray, Quadrature
 from ..limits import DelayMargin, GainMargin, GainMarginDown, Limit, Size
 from ..loop import (
     Closing,
+    CoherentError,
     Dual,
     LoopResponses,
     at_least,
+    conj,
     counted_poles,
     exp,
     imag,
@@ -44,6 +47,7 @@ _SMALL = 1e-3  # of its typical size: a parameter below it is shifted as if it w
 _SINGLE, _NUDGE = 1e-9, 1e-15  # product of unit eigenvectors below which poles are pulled apart
 _AXIS, _CIRCLE = "real axis", "unit circle"
 _ORDERS = (0, 2)  # of the spectral moments
+_STILL = 1e-100  # a variance that is none
 _LEAST_CYCLES = float(np.exp(0.5))  # of a peak: a factor of one, below which the log turns negative
 
 
@@ -165,6 +169,8 @@ class LoopNumbers:
         self._amplitude = exp(extra * 2.0) if goal is Goal.SEA else None
         self._fresh: Fresh | None = None
         self._responses: dict[tuple[str, str], Any] = {}
+        self._shaken: dict[tuple[str, str], Any] = {}
+        self._signs: tuple[float, ...] = ()
 
     def under(self, problem: Problem, weights: FloatArray) -> LoopNumbers:
         """Return the same loop shaken by the disturbances of another problem."""
@@ -380,7 +386,60 @@ class LoopNumbers:
             moment: Any = Dual(every.value[row, found], every.slope[:, row, found])
         else:
             moment = every[row, ..., found]
+        if self._signs:
+            # A programme's logarithms want it above zero, where error and motion cancel.
+            moment = at_least(moment + self._crossed(output, output, order), _STILL)
         return moment if self._amplitude is None else moment * self._amplitude
+
+    def covariance(self, one: str, other: str) -> Any:
+        """Return the covariance of two outputs, (1,)."""
+        parts = [
+            real(conj(self._shown(one, d.name)) * self._shown(other, d.name)) @ weights[:, None]
+            for d, weights in zip(self._problem.disturbances, self._weights, strict=False)
+        ]
+        total = sum(parts[1:], parts[0])
+        if self._signs:
+            total = total + self._crossed(one, other, 0)
+        return total if self._amplitude is None else total * self._amplitude
+
+    @property
+    def members(self) -> tuple[LoopNumbers, ...]:
+        """The numbers for each combination of signs that sensors' errors may have; or themselves.
+
+        Their moments are those of one combination, where its own are the mean over all.
+        """
+        if self._signs or self._coherent is None:
+            return (self,)
+        _ = self._moments  # once for all
+        found = []
+        for signs in self._coherent.signs:
+            own = copy(self)
+            own._signs = signs
+            found.append(own)
+        return tuple(found)
+
+    @cached_property
+    def _coherent(self) -> CoherentError | None:
+        return CoherentError.among(self._problem.disturbances)
+
+    def _crossed(self, one: str, other: str, order: int) -> Any:
+        """Return what the error's signs add to an integral of conj(F) F of two outputs, (1,)."""
+        pair, loop = self._coherent, self._cost
+        assert pair is not None
+        source, error = (self._problem.disturbances[i].name for i in (pair.source, pair.error))
+        product = conj(self._shown(one, source)) * self._shown(other, error)
+        if one == other:
+            product = product * 2.0
+        else:
+            product = product + conj(self._shown(other, source)) * self._shown(one, error)
+        shares = np.array(self._signs) @ pair.shares(loop.omega)
+        return real(product @ (shares * self._weights[pair.source] * loop.omega**order)[:, None])
+
+    def _shown(self, output: str, source: str) -> Any:
+        """Return a response on the quadrature nodes, (k,)."""
+        if (output, source) not in self._shaken:
+            self._shaken[output, source] = self._padded(self._cost.response(output, source))
+        return self._shaken[output, source]
 
     def peak(self, output: str, duration: float) -> Any:
         """Return the most probable maximum of `output` in `duration` [s], (1,)."""

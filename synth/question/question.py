@@ -80,12 +80,16 @@ class SampledNoise:
         Time between samples [s].
     lowest, splits
         Frequency below which there is nothing of it, if that is low, and kinks [rad/s].
+    source, shares
+        Of an error that is in part a share of a disturbance, see `synth.loop.Disturbance`.
     """
 
     spectrum: Callable[[Any], Any]
     sample_time: float = SAMPLE_TIME
     lowest: float = math.inf
     splits: tuple[float, ...] = ()
+    source: str = ""
+    shares: Callable[[FloatArray], ComplexArray] | None = None
 
     @property
     def band(self) -> tuple[float, float]:
@@ -348,7 +352,13 @@ def heard_spectra(case: Case, hook: HookMotion, measurements: Sequence[str]) -> 
 
 def _sampled(spectrum: Any) -> SampledNoise:
     if isinstance(spectrum, UnitError):
-        return SampledNoise(spectrum=spectrum, lowest=spectrum.lowest, splits=spectrum.splits)
+        return SampledNoise(
+            spectrum=spectrum,
+            lowest=spectrum.lowest,
+            splits=spectrum.splits,
+            source=HOOK,
+            shares=spectrum.coherent,
+        )
     return SampledNoise(spectrum=getattr(spectrum, "density", spectrum))
 
 

@@ -69,7 +69,11 @@ class FamilyPlants:
         return self._scenarios[member]
 
     def loops(
-        self, values: Sequence[float], members: Sequence[Member], outputs: Sequence[str]
+        self,
+        values: Sequence[float],
+        members: Sequence[Member],
+        outputs: Sequence[str],
+        together: Sequence[tuple[str, str]] = (),
     ) -> Iterator[tuple[list[int], SolvedRows]]:
         """Yield the closed loops of members of one kind, and which members they are.
 
@@ -82,8 +86,8 @@ class FamilyPlants:
             The gains.
         members
             The members.
-        outputs
-            Those whose variances are wanted.
+        outputs, together
+            Those whose variances are wanted, and pairs of them whose covariances are.
         """
         kinds: dict[tuple[Any, ...], list[int]] = {}
         for k, member in enumerate(members):
@@ -97,6 +101,7 @@ class FamilyPlants:
                     self.family.spread(members[at[0]]),
                     outputs=outputs,
                     second=outputs,
+                    together=together,
                     peaks=True,
                     start=self.nominal.drag_before,
                     masses=self.posed.masses or self.posed.most_masses,

@@ -18,10 +18,10 @@ from scipy.stats import qmc
 
 from models.basics import FloatArray, InputError, peak_factor, read_only, share
 
-from ..limits import Limit, MaxSensitivity
+from ..limits import Limit, MaxSensitivity, Thermal
 from ..question import PAYLOAD, Objective
 from ..search import Progress
-from ..sweeps import SolvedRows
+from ..sweeps import SIGNS, SolvedRows, of_signs
 from .family import Member
 from .family_plants import FamilyPlants
 
@@ -110,7 +110,8 @@ def figures_of(
     limits = [lim for lim in plants.nominal.limits if lim.drive or isinstance(lim, MaxSensitivity)]
     outputs = sorted({PAYLOAD, *(o for limit in limits for o in limit.outputs)})
     found: dict[int, Figures] = {}
-    for at, loops in plants.loops(values, members, outputs):
+    together = [(lim.output, lim.speed) for lim in limits if isinstance(lim, Thermal)]
+    for at, loops in plants.loops(values, members, outputs, together):
         found |= {at[k]: _figures(limits, members[at[k]], loops, k) for k in range(len(at))}
     return [found[k] for k in range(len(members))]
 
@@ -119,14 +120,13 @@ def _figures(limits: Sequence[Limit], member: Member, loops: SolvedRows, index: 
     """Return what gains do to a member, by its index among solved loops."""
     if not loops.stable[index]:
         return _unstable(member)
-    moments = {name: column[index, :, 0] for name, column in loops.moments.items()}
     at_rest = {name: float(v[index % v.size]) for name, v in loops.at_rest.items()}
-    assessment = _OneLoop(max_sensitivity=float(loops.peak[index]), moments=moments)
+    assessment = _OneLoop(max_sensitivity=float(loops.peak[index]), loops=loops, index=index)
     losses = {name: float(v[index % v.size]) for name, v in loops.loss.items()}
     use, name = 0.0, ""
     for limit in limits:
         own = _at_rest(limit, at_rest, losses)
-        used = own.use(own.measure(assessment))  # type: ignore[arg-type]  # all that it asks for
+        used = own.use(own.worst(assessment))  # type: ignore[arg-type]  # all that it asks for
         if used > use:
             use, name = used, limit.name
     return Figures(
@@ -144,15 +144,39 @@ class _OneLoop:
     """One of many loops as the limits see it (`synth.limits.limits.Limit.measure`)."""
 
     max_sensitivity: float
-    moments: Mapping[str, FloatArray]
+    loops: SolvedRows
+    index: int
+    signs: tuple[float, ...] | None = None
+
+    @property
+    def members(self) -> list[_OneLoop]:
+        """The loop with each combination of signs of the reference unit's errors; or itself."""
+        hang = any(one == other for one, other in self.loops.products)
+        return [replace(self, signs=signs) for signs in SIGNS] if hang else [self]
+
+    def _both(self, output: str) -> FloatArray:
+        """Return the variances of an output and of its rate, (2,)."""
+        mean = self.loops.moments[output][self.index, :, 0]
+        return np.asarray(mean + self._of_signs((output, output)))
+
+    def _of_signs(self, pair: tuple[str, str]) -> FloatArray:
+        if self.signs is None or pair not in self.loops.products:
+            return np.zeros(2)
+        of_pair = self.loops.products[pair][self.index, None]
+        return np.asarray(of_signs(of_pair, self.signs)[0])
 
     def sigma(self, output: str) -> float:
         """Return the standard deviation of an output."""
-        return float(np.sqrt(self.moments[output][0]))
+        return float(np.sqrt(self._both(output)[0]))
+
+    def covariance(self, one: str, other: str) -> float:
+        """Return the covariance of two outputs."""
+        mean = self.loops.products[one, other][self.index, 0]
+        return float((mean + self._of_signs((one, other)))[0])
 
     def peak(self, output: str, duration: float) -> float:
         """Return the most probable maximum of an output in `duration` [s]."""
-        m0, m2 = self.moments[output]
+        m0, m2 = self._both(output)
         period = 2.0 * np.pi * np.sqrt(m0 / m2) if m2 > 0.0 else np.inf
         return peak_factor(float(period), duration) * self.sigma(output)
 
@@ -163,7 +187,7 @@ def exact_figures(plants: FamilyPlants, values: Sequence[float], member: Member)
     assessment = problem.assess(values)
     if not assessment.stable:
         return _unstable(member)
-    uses = {limit.name: limit.use(limit.measure(assessment)) for limit in problem.limits}
+    uses = {limit.name: limit.use(limit.worst(assessment)) for limit in problem.limits}
     name = max(uses, key=lambda n: uses[n], default="")
     return Figures(
         member=member,

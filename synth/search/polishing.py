@@ -215,7 +215,7 @@ def _measured(
         own = scenario.values(solved.values)
         assessments.append(replace(problem, disturbances=scaled).assess(own, coefficient))
     overs = {
-        (i, limit.name): limit.use(limit.measure(assessments[i])) - 1.0
+        (i, limit.name): limit.use(limit.worst(assessments[i])) - 1.0
         for i, limit in own_limits(family)
         if limit.name not in relaxed
     }

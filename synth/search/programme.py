@@ -297,7 +297,7 @@ class Programme:
                     if self._goal is Goal.RELAX and limit.name in self._relaxed:
                         wider = exp(seen.extra)
                         bound = bound / wider if limit.at_least else wider * bound
-                    row = limit.rows(seen, bound)
+                    row = limit.worst_rows(seen, bound)
                     if self._goal is Goal.FEASIBLE:
                         row = row - seen.extra
                     rows.append(((i, limit.name), row, first))

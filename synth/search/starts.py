@@ -249,7 +249,7 @@ def _merits(family: FamilyProblem, points: FloatArray) -> list[FloatArray]:
                 costs[i, some] = seen.cost()[..., 0]
                 for limit in member.limits:
                     if limit.drive or i == group[0]:
-                        row = np.max(limit.rows(seen, limit.bound), axis=-1, initial=-np.inf)
+                        row = np.max(limit.worst_rows(seen, limit.bound), axis=-1, initial=-np.inf)
                         # Rows are logarithms as the cost is: a margin broken tenfold outweighs a
                         # tenfold gain.
                         penalty[some] += np.clip(np.nan_to_num(row, nan=_WORST), 0.0, _WORST)

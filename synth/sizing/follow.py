@@ -101,7 +101,7 @@ class Answer:
 
     def uses(self) -> dict[str, float]:
         """Return the use of every limit by name."""
-        return {lim.name: lim.use(lim.measure(self.assessment)) for lim in self.problem.limits}
+        return {lim.name: lim.use(lim.worst(self.assessment)) for lim in self.problem.limits}
 
     def carried(self, problem: Problem) -> FloatArray:
         """Return the parameters for another problem, each as large for it as here.

@@ -61,7 +61,7 @@ class ParetoPoint:
     def value(self) -> float:
         """What the other quantity is."""
         limits, loop = self.answer.problem.limits, self.answer.assessment
-        return next((m.measure(loop) for m in limits if m.name == self.name), self.bound)
+        return next((m.worst(loop) for m in limits if m.name == self.name), self.bound)
 
     @cached_property
     def payload_rms(self) -> float:

@@ -10,7 +10,7 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .dataset import ATTRIBUTE, case_of, coordinates_of, law_of, spread_of
-    from .design_rows import DesignRows, SolvedRows
+    from .design_rows import SIGNS, DesignRows, SolvedRows, of_signs
     from .dual_loop import dual_figures
     from .frequency import FrequencyEngine, frequency_sweep
     from .metrics import METRICS

@@ -48,6 +48,7 @@ from .sweep_nodes import SweepNodes
 BLOCK = 12_000  # numbers of an array at once: the half dozen in use stay in the cache
 VELOCITY = "payload.velocity"
 
+Pair = tuple[str, str]
 # Coefficients of y, of f and of 1 in the numerator of an output over `closed`; None for zero.
 Numerator = tuple[Any, Any, Any]
 _PAYLOAD = ("acceleration", "velocity", "displacement")
@@ -394,6 +395,45 @@ class Chain:
                 for density, weights, factor, numerators in sources
             ]
             found[name] = sum(parts[1:], start=parts[0])
+        return found
+
+    def products(
+        self, pairs: Iterable[Pair], nodes: SweepNodes, shaken: Shaken, drag: FloatArray
+    ) -> list[FloatArray]:
+        """Return covariances of pairs of outputs, then of their rates, and what signs add to them.
+
+        Of each pair (m, 3, 2), by the rule that counts: the covariance, with gain and phase error
+        as the mean over their signs, and what positive signs of gain and of phase error add.
+        Parameters are those of `moments`.
+        """
+        y, f = self.ends(drag[:, None])
+        inverse = 1.0 / abs2(self.closed(y, f))
+        heave = inverse if shaken.ratios is None else inverse * part_of(shaken.ratios, self.rows)
+        heave = heave * at_rows(shaken.factors, self.rows)
+        sea = nodes.sea[:1] if shaken.ratios is None else nodes.weights[:1]
+        of_sea, flat = _both(sea, nodes.omega), _both(nodes.weights[:1], nodes.omega)
+        hung = (self._own("payload_mass") * self.s + drag[:, None]) * self.s
+        numerators = self._of_heave(), self._of_noise()
+
+        def shown(kind: int, name: str) -> Any:
+            own, times = (PAYLOAD, hung) if name == LOWER_TENSION else (name, 1.0)
+            return _sum_of(numerators[kind][own], y, f) * times
+
+        share = 0.0 if self.coherent is None else self.coherent
+        noise = inverse * self.noise(shaken.heave_rms) if shaken.noisy else 0.0 * inverse
+        shares = [self._own(name) * k for name, k in (("mru_gain", 1.0), ("mru_phase", 1j))]
+        found = []
+        for one, other in pairs:
+            a, b = ([shown(kind, name) for name in (one, other)] for kind in (0, 1))
+            driven = (b[0].conj() * b[1]).real
+            mean = ((a[0].conj() * a[1]).real + driven * share) * heave @ of_sea
+            mean = mean + (driven * noise) @ flat
+            parts = [mean]
+            for e in shares if self.coherent is not None else ():
+                crossed = a[0].conj() * b[1] + a[1].conj() * b[0]
+                parts.append((crossed * (self.H * e)).real * heave @ of_sea)
+            parts += [0.0 * mean] * (3 - len(parts))
+            found.append(np.stack(np.broadcast_arrays(*parts), axis=1))
         return found
 
     def velocity_of_drag(self, nodes: SweepNodes, shaken: Shaken) -> list[FloatArray]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from models.sensing import DRIFT_BAND, sensed_plant
 from models.spread import Spread
 
 from ..question import DesignQuestion, SampledNoise
-from .chain import BLOCK, VELOCITY, Chain, ChainLoops, Shaken
+from .chain import BLOCK, VELOCITY, Chain, ChainLoops, Pair, Shaken
 from .kernel import SpringLoops
 from .law_rows import DesignLaw
 from .numbers import NOISE_OF, at_rest, numbers_of
@@ -73,14 +74,34 @@ class SolvedRows:
     moments
         Variances of each output, and of its rate where that is wanted, by all rules, (n, 1 or 2,
         rules).
+    products
+        Covariances of pairs of outputs and of their rates, and what signs of the reference unit's
+        gain and phase error add to them, (n, 3, 2), where those are wanted; see `Chain.products`.
     """
 
-    def __init__(self, loops: ChainLoops, orders: Mapping[str, int], rules: int = 1) -> None:
+    def __init__(
+        self,
+        loops: ChainLoops,
+        orders: Mapping[str, int],
+        rules: int = 1,
+        pairs: Sequence[Pair] = (),
+    ) -> None:
         count, (self.at_rest, self.loss) = len(loops), at_rest(loops.numbers)
         self.drag, self.heave = np.full(count, np.nan), np.full(count, np.nan)
         self.stable = np.zeros(count, dtype=bool)
         self.peak = np.full(count, np.nan)
         self.moments = {name: np.full((count, k, rules), np.nan) for name, k in orders.items()}
+        self.products = {pair: np.full((count, 3, 2), np.nan) for pair in pairs}
+
+    def signed(self, output: str) -> list[FloatArray]:
+        """Return variances of an output and of its rate, (n, 2), by signs of the unit's errors.
+
+        One alone where nothing hangs on signs.
+        """
+        mean, both = self.moments[output][:, :, 0], self.products.get((output, output))
+        if both is None:
+            return [mean]
+        return [mean + of_signs(both, signs) for signs in SIGNS]
 
     def sigma(self, output: str) -> FloatArray:
         """Return the standard deviation of an output, (n,)."""
@@ -99,6 +120,17 @@ class SolvedRows:
         self.stable[at], self.peak[at] = other.stable, other.peak
         for name, column in other.moments.items():
             self.moments[name][at] = column[:, :, :1]
+        for pair, column in other.products.items():
+            self.products[pair][at] = column
+
+
+SIGNS = [*product((1.0, -1.0), repeat=2)]
+"""Of gain and phase error."""
+
+
+def of_signs(products: FloatArray, signs: Sequence[float]) -> FloatArray:
+    """Return what signs of gain and phase error add to products (n, 3, 2): (n, 2)."""
+    return np.asarray(np.tensordot(products[:, 1:], signs, axes=(1, 0)))
 
 
 class DesignRows:
@@ -141,6 +173,7 @@ class DesignRows:
         masses: int | None = None,
         accuracy: float = ACCURACY,
         nodes: Quadrature | None = None,
+        together: Sequence[Pair] = (),
     ) -> None:
         assert spread.case is not None
         case = spread.case
@@ -161,12 +194,19 @@ class DesignRows:
         wanted = [*outputs, *([VELOCITY] * consistent)]
         self._orders = {name: 2 if name in second else 1 for name in wanted}
         self._peaks, self._start = peaks, start
+        # A variance whose largest is asked for hangs on the signs of the reference unit's errors.
+        self._pairs = [*together]
+        if "mru.heave" in self._noisy:
+            numbers = self._loops(self._pilots).numbers
+            if any(np.any(numbers[name] > 0.0) for name in ("mru_gain", "mru_phase")):
+                self._pairs += [(name, name) for name in second]
         delayed = any(sensed_plant(case, masses=1, drag=0.0).delays) or any(
             path.endswith(("delay", "latency", "rate")) for path in spread.paths
         )
         three = question.structure.name == "payload-feedback"
         alone = self.lumps.masses.size == 1 and not (delayed or consistent or self._noisy)
         alone = alone and case.crane.tip_stiffness is None and case.rigging.stiffness is None
+        alone = alone and not self._pairs
         self.spring = alone and three and case.rope.damping_law == "kelvin-voigt"
 
     @property
@@ -183,7 +223,7 @@ class DesignRows:
             If a row is no valid case.
         """
         loops = self._loops(rows)
-        solved = SolvedRows(loops, self._orders)
+        solved = SolvedRows(loops, self._orders, pairs=self._pairs)
         # All rows on common nodes first; those whose two rules disagree begin again on panels half
         # as long, and so on: narrow resonances are few, and pay for themselves.
         at: IndexArray = np.arange(len(rows))
@@ -316,7 +356,7 @@ class DesignRows:
 
         `alone` leaves stability and M_s out: all count as stable.
         """
-        found = SolvedRows(loops, self._orders, len(nodes.weights))
+        found = SolvedRows(loops, self._orders, len(nodes.weights), self._pairs)
         ratios = self.sea.ratios(rows, nodes.omega)
         shaken = Shaken(
             factors=self.sea.factors(rows),
@@ -377,6 +417,10 @@ class DesignRows:
                 for name, column in moments.items():
                     both = column.reshape(rows.size, 2, -1)
                     found.moments[name][rows] = both[:, : self._orders[name]]
+            if self._pairs:
+                products = chain.products(self._pairs, nodes, shaken, _sound(found.drag[rows]))
+                for pair, column in zip(self._pairs, products, strict=True):
+                    found.products[pair][rows] = column
 
 
 def _sound(drag: FloatArray) -> FloatArray:

@@ -135,11 +135,19 @@ def finished(
             # The most probable maximum of a Gaussian signal (Rice 1945), as
             # `models.basics.metrics`.
             with np.errstate(all="ignore"):
-                crossings = np.maximum(exposure / loops.period(metric.output), np.exp(0.5))
-            reach = np.sqrt(2.0 * np.log(crossings)) * value
-            reach = reach + loss.get(metric.output, np.zeros(1))
+                each = [
+                    np.sqrt(2.0 * np.log(np.maximum(_cycles(both, exposure), np.exp(0.5))))
+                    * np.sqrt(both[:, 0])
+                    for both in loops.signed(metric.output)
+                ]
+            reach = np.max(each, axis=0) + loss.get(metric.output, np.zeros(1))
             value = rest - reach
             if metric.kind == "peak":
                 value = np.abs(rest) + reach
         found[metric.name] = np.where(loops.stable, value, np.nan)
     return found
+
+
+def _cycles(both: FloatArray, exposure: float) -> FloatArray:
+    """Return how often a signal swings in a time [s], from variances (n, 2)."""
+    return np.asarray(exposure / (2.0 * np.pi) * np.sqrt(both[:, 1] / both[:, 0]))

@@ -19,13 +19,12 @@ from models.plant import LinearPlant, PlantData
 
 from .claims import StatedLimit
 from .nyquist import CurveMargins, largest
-from .recompute import Loop, imaginary
+from .recompute import HOOK, Loop, imaginary
 
 Moments = Mapping[str, tuple[float, ...]]
 
 PAYLOAD = "payload.displacement"
 VELOCITY = "payload.velocity"
-HOOK = "hook.heave"
 
 _TORQUE, _SPEED, _TENSION = "motor.torque", "motor.speed", "rope.tension"
 _AT_LOAD = "rope.lower_tension"
@@ -121,6 +120,11 @@ class Demand:
             return {}
         return dict.fromkeys(self.outputs, (0, 2) if self.kind in _WITH_PERIOD else (0,))
 
+    @property
+    def together(self) -> str:
+        """Under which name among moments it wants the correlation of its outputs, if it does."""
+        return "*".join(self.outputs) if self.kind == "thermal" else ""
+
     def kept(self, value: float, tolerance: float) -> bool:
         """Return whether a value keeps the limit, to a relative tolerance."""
         room = tolerance * abs(self.bound)
@@ -167,7 +171,8 @@ class Demand:
             return math.hypot(self.static, self.loss, sizes[0])
         if self.kind == "thermal":
             torque, speed = sizes
-            return _heating(math.hypot(self.static, self.loss), torque, speed, self.base_speed)
+            rest, rho = math.hypot(self.static, self.loss), moments[self.together][0]
+            return _heating(rest, torque, speed, rho, self.base_speed)
         peaks = [
             size * peak_factor(zero_crossing_period(*moments[name]), self.duration)
             if all(map(math.isfinite, moments[name]))
@@ -301,17 +306,18 @@ def case_demands(case: Case, data: PlantData, plant: LinearPlant, masses: int) -
     return {demand.name: demand for demand in found}
 
 
-def _heating(static: float, torque: float, speed: float, base: float) -> float:
+def _heating(static: float, torque: float, speed: float, rho: float, base: float) -> float:
     """Return the root mean square of a torque over what holds for hours at each speed [N m].
 
-    Torque and speed are taken as going together, the worst that they can do; by a sum over the
-    Gaussian speed in steps of a thousandth of its standard deviation.
+    By a sum over the Gaussian speed in steps of a thousandth of its standard deviation, at each of
+    which the torque is Gaussian about rho times as many of its own.
     """
     u = np.linspace(-12.0, 12.0, 24001)
     chance = np.exp(-0.5 * u * u)
     chance /= chance.sum()
     heat = np.maximum(1.0, (u * speed / base) ** 2)
-    return math.sqrt(float(((static**2 + (torque * u) ** 2) * heat * chance).sum()))
+    square = static**2 + torque**2 * ((rho * u) ** 2 + 1.0 - rho**2)
+    return math.sqrt(float((square * heat * chance).sum()))
 
 
 def switching_losses(case: Case) -> dict[str, float]:

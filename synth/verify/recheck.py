@@ -16,7 +16,7 @@ from models.plant import LinearPlant, PlantResponse
 from .claims import ControllerMatrices, LoopClaims, SpectralSource
 from .demands import Demand
 from .nyquist import CurveMargins, curve_margins
-from .recompute import LawMatrices, Loop, closed_matrices, moments
+from .recompute import LawMatrices, Loop, closed_matrices, correlation, moments
 from .verification import Check, Verification, agreement, failure
 from .winding import Winding, count_unstable, open_loop_poles
 
@@ -123,11 +123,14 @@ class CheckedLoop(Loop):
         What is demanded of it, by name.
     own
         Outputs whose variances are wanted besides.
+    members
+        The same with each combination of signs of the reference unit's errors, where it has some.
     """
 
     sources: Sequence[SpectralSource]
     demands: Mapping[str, Demand]
     own: Iterable[str]
+    members: Sequence[CheckedLoop] = ()
 
     @classmethod
     def of(
@@ -178,12 +181,21 @@ class CheckedLoop(Loop):
         for demand in self.demands.values():
             for name, own in demand.orders.items():
                 orders[name] = max(orders.get(name, ()), own, key=len)
-        if any(source.band is None for source in self.sources):
-            return {n: tuple(self._endless(n, order) for order in own) for n, own in orders.items()}
         found: dict[str, tuple[float, ...]] = {}
+        if any(source.band is None for source in self.sources):
+            found = {
+                n: tuple(self._endless(n, order) for order in own) for n, own in orders.items()
+            }
+            # Where it cannot be told they are taken as going together, the worst they can do.
+            return found | {d.together: (1.0,) for d in self.demands.values() if d.together}
         for wanted in sorted(set(orders.values())):
             names = sorted(name for name, own in orders.items() if own == wanted)
             found |= moments(self, names, self.sources, orders=wanted)
+        for demand in self.demands.values():
+            if demand.together:
+                sizes = [math.sqrt(found[name][0]) for name in demand.outputs]
+                rho = correlation(self, demand.outputs, sizes, self.sources)
+                found[demand.together] = (rho,)
         return found
 
     def _endless(self, output: str, order: int) -> float:
@@ -198,8 +210,10 @@ class CheckedLoop(Loop):
         return math.sqrt(self.moments[output][0])
 
     def measured(self, demand: Demand) -> float:
-        """Return what the loop makes of a demand."""
-        return demand.measured(self, self.margins, self.region, self.moments)
+        """Return what the loop makes of a demand, with the worst signs of the unit's errors."""
+        each = self.members if demand.orders and self.members else (self,)
+        found = [demand.measured(one, self.margins, self.region, one.moments) for one in each]
+        return min(found) if demand.at_least else max(found)
 
     def margin_checks(self, claimed: object | None) -> list[Check]:
         """Return the checks of a `synth.loop.margins.Margins` against those found root by root."""

@@ -23,6 +23,7 @@ from .claims import ControllerMatrices, SpectralSource
 from .integrals import integrate, panels
 from .winding import Function
 
+HOOK = "hook.heave"
 _SMOOTH_TAIL, _RINGING_TAIL = 20, 1000  # panels of 1/omega above all poles
 _RUNG_OUT = 3000.0  # omega times delay where the ringing is too small to matter
 
@@ -73,12 +74,16 @@ class Loop:
         Poles [1/s] near which something happens: of the open and of the closed loop.
     exact
         Points s -> the plant's blocks, where they are not those of `plant` (a distributed rope).
+    shown
+        What the reference unit shows of the hook's motion over what it should, its gain and phase
+        error [-].
     """
 
     plant: LinearPlant
     law: LawMatrices
     marks: ComplexArray
     exact: Callable[[ComplexArray], PlantResponse] | None = None
+    shown: complex = 1.0
 
     def blocks(self, s: ComplexArray) -> PlantResponse:
         """Return the plant's four blocks at points s [1/s]."""
@@ -104,7 +109,12 @@ class Loop:
     ) -> ComplexArray:
         """Return the closed-loop responses, (k, outputs, disturbances)."""
         blocks = self.blocks(s).select(outputs=outputs, disturbances=disturbances)
-        heard = self.law(s) @ blocks.yw
+        seen = np.array(blocks.yw)
+        if self.shown != 1.0:
+            unit = [k for k, y in enumerate(blocks.measurements) if y.startswith("mru.")]
+            hook = [k for k, w in enumerate(blocks.disturbances) if w == HOOK]
+            seen[np.ix_(range(len(s)), unit, hook)] *= self.shown
+        heard = self.law(s) @ seen
         command = np.linalg.solve(self._matrix(s, blocks), heard)
         return np.asarray(blocks.zw + blocks.zu @ command, dtype=np.complex128)
 
@@ -121,6 +131,28 @@ class Source:
     density: Callable[[FloatArray], FloatArray]
     band: tuple[float, float] | None
     splits: tuple[float, ...] = ()
+
+
+def correlation(
+    loop: Loop,
+    pair: Sequence[str],
+    sizes: Sequence[float],
+    sources: Sequence[SpectralSource],
+    *,
+    delay: float = 0.0,
+) -> float:
+    """Return the correlation of two closed-loop outputs, from the variance of their sum.
+
+    Parameters
+    ----------
+    loop, sources, delay
+        As `moments` takes them.
+    pair, sizes
+        The outputs, and their standard deviations, by which they are divided first.
+    """
+    mixed = np.array([[1.0 / size for size in sizes]])
+    both = _integrals(loop, pair, sources, mixed, orders=(0,), rtol=1e-8, delay=delay)
+    return float(np.clip(0.5 * both[0, 0] - 1.0, -1.0, 1.0))
 
 
 def moments(
@@ -157,6 +189,22 @@ def moments(
     SolverError
         If it does not converge: the integral does not exist, or a spectrum is wild.
     """
+    plain = np.eye(len(outputs))
+    rows = _integrals(loop, outputs, sources, plain, orders=orders, rtol=rtol, delay=delay)
+    return {name: tuple(float(v) for v in row) for name, row in zip(outputs, rows, strict=True)}
+
+
+def _integrals(
+    loop: Loop,
+    outputs: Sequence[str],
+    sources: Sequence[SpectralSource],
+    mixed: FloatArray,
+    *,
+    orders: Sequence[int],
+    rtol: float,
+    delay: float,
+) -> FloatArray:
+    """Return the moments of sums of outputs with the weights `mixed`, (sums, outputs)."""
     names = [source.name for source in sources]
     powers = np.asarray(orders, dtype=np.float64)[:, None]
     low, high, splits, half_line = _band(sources, loop.marks)
@@ -168,14 +216,13 @@ def moments(
 
     def density(omega: FloatArray) -> FloatArray:
         """Return omega^n S of every output, (outputs * orders, k)."""
-        gains = np.abs(loop.transfer(imaginary(omega), outputs, names)) ** 2
+        gains = np.abs(mixed @ loop.transfer(imaginary(omega), outputs, names)) ** 2
         shaken = np.stack([source.density(omega) for source in sources])
         spectra = np.einsum("kzw,wk->zk", gains, shaken)
         return np.asarray((spectra[:, None] * omega**powers).reshape(-1, omega.size))
 
     found = integrate(density, edges, rtol=rtol, tail_panels=tail if half_line else 0)
-    rows = found.reshape(len(outputs), -1)
-    return {name: tuple(float(v) for v in row) for name, row in zip(outputs, rows, strict=True)}
+    return found.reshape(len(mixed), -1)
 
 
 def closed_matrices(

@@ -30,7 +30,7 @@ from models.plant import (
 from models.sensing import SAMPLE_TIME, UnitError, sensed_line_at, sensed_plant, sensed_spectra
 
 from .claims import DesignClaims
-from .demands import HOOK, PAYLOAD, VELOCITY, Demand, case_demands, switching_losses
+from .demands import PAYLOAD, VELOCITY, Demand, case_demands, switching_losses
 from .integrals import integrate, panels
 from .recheck import (
     TIGHT,
@@ -41,7 +41,7 @@ from .recheck import (
     winding_check,
     winding_of_plant,
 )
-from .recompute import LawMatrices, Source, imaginary, lyapunov_variances, moments
+from .recompute import HOOK, LawMatrices, Source, imaginary, lyapunov_variances, moments
 from .verification import Check, Verification, agreement, bounded
 from .winding import count_unstable, open_loop_poles
 
@@ -126,6 +126,24 @@ class _Winch:
             found.append(source if own is None else replace(source, splits=own.splits))
         return found
 
+    def _signed(self, loop: CheckedLoop) -> CheckedLoop:
+        """Return a loop with what it is for each sign of the reference unit's errors."""
+        unit, names = self.design.case.sensors.mru, [source.name for source in loop.sources]
+        if unit is None or "mru.error" not in names or not (unit.gain_error or unit.phase_error):
+            return loop
+        without = unit.model_copy(update={"gain_error": 0.0, "phase_error": 0.0})
+        rest = UnitError(unit=without, hook=self.hook)
+        sources = [
+            replace(one, density=rest) if one.name == "mru.error" else one for one in self.sources
+        ]
+        shown = [
+            1.0 + complex(gain * unit.gain_error, phase * unit.phase_error)
+            for gain in (1.0, -1.0)
+            for phase in (1.0, -1.0)
+        ]
+        members = [replace(loop, sources=sources, own=(), shown=one) for one in shown]
+        return replace(loop, members=members)
+
     @property
     def more_masses(self) -> int:
         if self.data.lumping == "thesis":
@@ -162,7 +180,8 @@ class _Winch:
         """The loop on the design's plant."""
         own = {PAYLOAD, VELOCITY, *self.design.shares}
         controller = self.design.controller
-        return CheckedLoop.of(self.coarse_plant, controller, self.sources, self.demands, own)
+        loop = CheckedLoop.of(self.coarse_plant, controller, self.sources, self.demands, own)
+        return self._signed(loop)
 
     @cached_property
     def fine(self) -> CheckedLoop:
@@ -170,7 +189,8 @@ class _Winch:
         exact = self._line if self.distributed else None
         plant = self._plant(self.more_masses)
         controller = self.design.controller
-        return CheckedLoop.of(plant, controller, self.sources, self.demands, [PAYLOAD], exact)
+        loop = CheckedLoop.of(plant, controller, self.sources, self.demands, [PAYLOAD], exact)
+        return self._signed(loop)
 
     @cached_property
     def demands(self) -> dict[str, Demand]:

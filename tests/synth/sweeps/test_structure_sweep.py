@@ -18,6 +18,7 @@ from models.hook import HookMotion
 from models.plant import consistent_drag
 from models.spread import Spread, Uniform
 from synth.loop import Assessment
+from synth.question import pose
 from synth.sensitivity.fixed_design import FixedDesign
 from synth.sweeps import FrequencyEngine
 
@@ -181,3 +182,29 @@ def test_sweep_of_a_structure_is_one_by_one_evaluation(name: str) -> None:
             assert found[metric][k] == pytest.approx(expected, rel=digits), metric
             assert free[metric][k] == pytest.approx(view.sigma(output), rel=1e-7), metric
         assert free["max_sensitivity"][k] == pytest.approx(view.max_sensitivity, rel=10.0 * digits)
+
+
+def test_extremes_of_a_sweep_are_those_with_the_worst_signs_of_the_units_errors() -> None:
+    case = stated_crane().replace({"limits.drive": "report", "limits.exceedance": 0.1})
+    design = structure_design(case, "combined", COMBINED)
+    metrics = {
+        "torque_peak": "motor.torque.peak",
+        "speed_peak": "motor.speed.peak",
+        "tension_peak": "rope.tension.peak",
+        "tension_least": "rope.tension.least",
+        "lower_tension_least": "rope.lower_tension.least",
+    }
+    spread = Spread({name: STATED[name] for name in STATED if "error" in name})
+    engine = FrequencyEngine(design, spread, metrics=[*metrics])
+    rows = np.array([[0.0, 0.0], [0.05, 0.0], [0.0, 0.05], [0.02, 0.05]])
+    found = engine.evaluate(rows)
+    for k, row in enumerate(rows):
+        view = alone(engine, row)
+        assert view is not None
+        own = pose(engine.spread.case_at(row), "combined", design.masses)
+        limits = {limit.name: limit for limit in own.reported}
+        for metric, name in metrics.items():
+            wanted = limits[name].worst(view)
+            assert found[metric][k] == pytest.approx(wanted, rel=1e-5), (metric, row)
+            if row.any():
+                assert abs(limits[name].measure(view) / wanted - 1.0) > 1e-4, (metric, row)
