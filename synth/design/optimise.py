@@ -186,13 +186,13 @@ def _optimised(
         if tuning.assessment is None or not any(member.drive for member in posed.questions):
             return _family_design(posed, tuning)
         return _best_possible(posed, count, seed, known, progress)
-    design = verified(_family_design(posed, tuning), progress, posed.first)
+    design = verified(_family_design(posed, tuning), progress)
     most = 1 if question.data.lumping == "thesis" else MAX_MASSES
     while tuning.ok and not design.ok and 2 * posed.masses <= most:
         # It stands on its own rope only: once more on twice the masses.
         posed = posed.on(2 * posed.masses)
         tuning = _again(posed.problem, tuning, count, seed, progress)
-        design = verified(_family_design(posed, tuning), progress, posed.first)
+        design = verified(_family_design(posed, tuning), progress)
     return design
 
 
@@ -211,7 +211,7 @@ def _high_order(posed: PosedFamily, order: int | None, progress: Progress | None
         loop = member.assess(parameters) if growth <= 0.0 else None
         designs.append(evaluated(member, parameters, loop, growth=growth))
     design = with_members(designs, posed)
-    return verified(replace(design, ok=all(one.ok for one in designs)), progress, question)
+    return verified(replace(design, ok=all(one.ok for one in designs)), progress)
 
 
 @one_thread()
@@ -238,7 +238,7 @@ def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback
     question, loop, growth = on_enough_masses(
         question, complete, lambda posed, values: posed.problem.assess(values)
     )
-    return verified(evaluated(question, complete, loop, growth=growth), None, question)
+    return verified(evaluated(question, complete, loop, growth=growth), None)
 
 
 def evaluated(
@@ -261,8 +261,11 @@ def evaluated(
         return recorded(question, parameters, None, {}, ok=False, status=status)
     uses = every_use(question, assessment, prices or {})
     broken = [u.name for u in uses.values() if u.enforced and not u.kept]
+    swings = question.problem.swings(question.values(parameters))
+    how = "unstable in small motion, where drag vanishes: it swings by itself" if swings else how
     status = f"{how}; " + (f"breaks {', '.join(broken)}" if broken else "keeps every limit")
-    return recorded(question, parameters, assessment, uses, ok=not broken, status=status)
+    ok = not (broken or swings)
+    return recorded(question, parameters, assessment, uses, ok=ok, status=status)
 
 
 def _answer(
@@ -523,13 +526,8 @@ def recorded(
     )
 
 
-def verified(
-    design: Design, progress: Progress | None, question: DesignQuestion | None = None
-) -> Design:
-    """Return the design with its independent check; one that fails it is not ok.
-
-    `question` is the design's own, where it is at hand: it need not be posed again.
-    """
+def verified(design: Design, progress: Progress | None) -> Design:
+    """Return the design with its independent check; one that fails it is not ok."""
     if design.margins is None:
         return design
     if progress is not None:
@@ -537,25 +535,12 @@ def verified(
     checked = design.verify()
     if progress is not None:
         progress("verify", 1, 1)
-    questions = [question or design.question, *(member.question for member in design.members)]
-    status = design.status + _in_small_motion(questions, design.parameters)
+    status = design.status
     if design.payload_rms > design.payload_rms_before:
         status += "; with the drum held the payload moves less"
     if not checked.ok:
         status = f"not verified: {checked.status}"
     return replace(design, ok=design.ok and checked.ok, status=status, verification=checked)
-
-
-def _in_small_motion(questions: Sequence[DesignQuestion], parameters: Mapping[str, float]) -> str:
-    """Return a remark if a loop needs its drag to be stable, else nothing.
-
-    Quadratic drag vanishes in small motion: such a loop swings by itself, at the amplitude
-    that gives it drag enough.
-    """
-    for q in questions:
-        if q.drag is not None and q.problem.loop_poles(q.values(parameters), 0.0).real.max() > 0.0:
-            return "; without drag, in small motion, the loop is unstable and swings by itself"
-    return ""
 
 
 def checked_parameters(question: DesignQuestion, gains: object) -> dict[str, float]:

@@ -222,7 +222,7 @@ class View:
         for member, one in zip(self._members, every, strict=True):
             if member.question.drag is not None:
                 member.drag = one.drag
-        return verified(design, None, posed.first) if verify else design
+        return verified(design, None) if verify else design
 
     def _descent(
         self,

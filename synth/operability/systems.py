@@ -37,6 +37,7 @@ from .responses import DragResponses
 VELOCITY, FORCE = "payload.velocity", "payload.force"
 _COEFFICIENTS = np.concatenate([[0.0], np.geomspace(1e-6, 1e2, 33)])  # over the slope [m/s]
 _EDGE = 1e-18  # how well the edge of stability is known, over the slope [m/s]
+_DECAY = 1e-9  # growth over the size of the largest pole that is none
 _HIGHEST = 60.0  # where seas end [rad/s]
 
 
@@ -117,7 +118,11 @@ class System(ABC):
 
         Whatever the sea, its motion is then at least the one that gives it drag enough.
         """
-        return self.slope > 0.0 and self._growth(0.0) > 0.0
+        if self.slope == 0.0:
+            return False
+        poles = self.poles(0.0)
+        # A mode that nothing damps stays where it is.
+        return self._growth(0.0) > _DECAY * float(np.abs(poles).max(initial=1.0))
 
     def _growth(self, coefficient: float) -> float:
         """Return the growth rate of the motion without a sea [1/s]; below zero it is stable."""

@@ -169,19 +169,29 @@ class FamilyProblem:
         return True
 
     def abscissa(self, values: Values, enough: float = np.inf) -> float:
-        """Return the largest `Problem.abscissa` of all loops; from `enough` on any such value."""
+        """Return the largest `Problem.abscissa` of all loops; from `enough` on any such value.
+
+        Of a loop that swings by itself it is that without drag.
+        """
         largest = -np.inf
         for group in self.groups:
             scenario = self.scenarios[group[0]]
-            largest = max(largest, scenario.problem.abscissa(scenario.values(values)))
+            problem, own = scenario.problem, scenario.values(values)
+            largest = max(largest, problem.abscissa(own))
+            if largest < enough and problem.swings(own):
+                largest = max(largest, problem.abscissa(own, 0.0))
             if largest >= enough:
                 break
         return largest
 
     def growth(self, values: Values) -> float:
-        """Return the largest real part of a pole of any loop [1/s]."""
+        """Return the largest real part of a pole of any loop [1/s], with drag and without."""
         firsts = [self.scenarios[group[0]] for group in self.groups]
-        return max(s.problem.growth(s.values(values)) for s in firsts)
+        found = [s.problem.growth(s.values(values)) for s in firsts]
+        for s in firsts:
+            if s.problem.drag is not None:
+                found.append(float(s.problem.loop_poles(s.values(values), 0.0).real.max()))
+        return max(found)
 
     def total(self, costs: Sequence[float] | FloatArray) -> float:
         """Return what the objective makes of the scenarios' costs."""

@@ -120,9 +120,21 @@ class Problem:
         poles = self.loop_poles(values, coefficient)
         return float(poles.real.max(initial=-1.0) / max(1.0, float(np.abs(poles).max(initial=1.0))))
 
-    def stable(self, values: Values, coefficient: float | None = None) -> bool:
-        """Return whether the closed loop is stable."""
+    def held(self, values: Values, coefficient: float | None = None) -> bool:
+        """Return whether the closed loop is stable with this drag."""
         return self.abscissa(values, coefficient) < -_DECAY
+
+    def swings(self, values: Values) -> bool:
+        """Return whether the closed loop swings by itself in small motion.
+
+        Quadratic drag vanishes there: a loop that is unstable without it swings in any sea, and in
+        none, at the amplitude that gives it drag enough.
+        """
+        return self.drag is not None and self.abscissa(values, 0.0) > _DECAY
+
+    def stable(self, values: Values, coefficient: float | None = None) -> bool:
+        """Return whether the closed loop is stable, with this drag and in small motion."""
+        return self.held(values, coefficient) and not self.swings(values)
 
     def assess(self, values: Values, coefficient: float | None = None) -> Assessment:
         """Return the closed loop in numbers, its drag solved for where no coefficient is given."""

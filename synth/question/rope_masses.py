@@ -85,7 +85,7 @@ def on_enough_masses(
             question, growth = most, there
     while growth <= 0.0:
         loop = assess(question, values)
-        if loop is None or not question.problem.stable(values, loop.coefficient):
+        if loop is None or not question.problem.held(values, loop.coefficient):
             break
         if (masses := masses_for(question, loop)) <= question.masses:
             return question, loop, growth

@@ -47,6 +47,7 @@ from .winding import count_unstable, open_loop_poles
 
 _GAINS = ("a", "a1", "a2")
 _UNDAMPED = 1e-5  # a rope damped less than this has modes without end on the axis
+_MARGINAL = 1e-9  # growth over the size of the fastest pole that is none
 _DECAY = 1e-7  # slowest decay that counts as stable [1/s]: a time constant of four months
 _RMS = 1e-6  # rms by another quadrature
 _TIME = 1e-3  # rms by a Lyapunov equation, with a Pade model for the delay
@@ -76,6 +77,7 @@ def verify_design(design: DesignClaims) -> Verification:
     winch = _Winch(design)
     steps = {
         "stability": winch.stability,
+        "calm": winch.in_a_calm,
         "parameters": winch.parameters,
         "margins": lambda: winch.coarse.margin_checks(design.margins),
         "limits": lambda: winch.coarse.limit_checks(design, by="case", on="design"),
@@ -162,8 +164,9 @@ class _Winch:
             return "the case's own one-spring rope"
         return f"a rope of {self.more_masses} masses (undamped, so its modes have no end)"
 
-    def _plant(self, masses: int) -> LinearPlant:
-        plant = sensed_plant(self.design.case, masses=masses, drag=self.design.drag)
+    def _plant(self, masses: int, drag: float | None = None) -> LinearPlant:
+        drag = self.design.drag if drag is None else drag
+        plant = sensed_plant(self.design.case, masses=masses, drag=drag)
         return plant.select(measurements=self.design.controller.measurements)
 
     def _line(self, s: ComplexArray) -> PlantResponse:
@@ -229,6 +232,16 @@ class _Winch:
             pole_check("poles", plant, law, fine, _DECAY),
             pole_check("poles.design", self.coarse.plant, self.coarse.law, coarse, _DECAY),
         ]
+
+    def in_a_calm(self) -> list[Check]:
+        """Return the check of the poles without drag, which in small motion there is none of."""
+        if self.design.case.payload.fixed_drag is not None or self.data.quadratic_drag == 0.0:
+            return []
+        plant, fastest = self._plant(self.more_masses, 0.0), float(np.abs(self.fine.marks).max())
+        on = f"a rope of {self.more_masses} masses, without drag"
+        check = pole_check("poles.calm", plant, self.fine.law, on, -_MARGINAL * fastest)
+        # What is told to swing may do so.
+        return [replace(check, counts=self.design.ok)]
 
     def parameters(self) -> list[Check]:
         """Return the check that the thesis's gains make the controller: u = -A (a P'' + ..)."""

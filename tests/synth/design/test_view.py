@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 from models import InputError, load_case
 from synth.design import Look, evaluate_gains, optimise_gains, prepare
+from synth.operability.pose import pose_operability
+from synth.question import FamilyProblem, pose
 
 CASES = {
     "thesis-1975": {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0},
@@ -146,12 +149,38 @@ def test_a_loop_that_swings_by_itself_without_its_drag_is_seen_on_the_verge() ->
     assert look.drag == pytest.approx(design.drag, rel=1e-6)
     assert look.payload_rms == pytest.approx(design.payload_rms, rel=1e-6)
 
+    # In small motion drag vanishes: no sea is calm enough, and all who are asked say so.
+    for one in (look, design):
+        assert not one.ok
+        assert one.status.startswith("unstable in small motion, where drag vanishes: it swings by")
+    problem, values = design.question.problem, design.question.values(gains)
+    assert problem.held(values, design.drag)
+    assert problem.swings(values)
+    assert not problem.stable(values, design.drag)
+    assert not FamilyProblem.of(problem).stable(values, [design.drag])
+    assert FamilyProblem.of(problem).abscissa(values) > 0.0
+    assert FamilyProblem.of(problem).growth(values) > 0.0 > problem.growth(values)
+    asked = pose_operability(design, ())
+    assert asked.loop is not None
+    assert asked.loop.swings
+    # A design that called itself good all the same is found out.
+    assert replace(design, ok=True).verify().failed[0] == "poles.calm"
+
     # No drag holds this one off the axis.
     gains = {"A": 0.889238533, "a": 48.22058768, "a1": 27.66414557, "a2": 6.365940700}
     look, design = prepare(case).evaluate(gains), evaluate_gains(case, gains)
     assert not look.stable
     assert design.margins is None
     assert "on the verge" in design.status
+
+
+def test_a_loop_that_nothing_damps_does_not_swing_by_itself() -> None:
+    changes = {"rope.damping_ratio": 0.0, "limits.drive": "report"}
+    posed = pose(load_case("subsea-crane").replace(changes), "payload-feedback", 3)
+    assert posed.drag is not None
+    still = [0.0] * len(posed.law.parameters)
+    assert abs(posed.problem.loop_poles(still, 0.0).real.max()) < 1e-8
+    assert not posed.problem.swings(still)
 
 
 def test_the_curves_are_those_of_the_figures() -> None:
