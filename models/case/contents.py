@@ -51,17 +51,27 @@ class Contents(Section):
     @property
     def drum_radius(self) -> float:
         """Pitch radius of the drum with the rope paid out [m]."""
-        return self.winch.drum.radius_at(self.rope.length, self.rope.diameter)
+        return self.winch.drum.radius_at(self.rope.paid_out, self.rope.diameter)
+
+    @property
+    def haul_radius(self) -> float:
+        """How far the load moves with a radian of the drum: its radius over the falls [m]."""
+        return self.drum_radius / self.rope.falls
 
     @property
     def static_tension(self) -> float:
-        """Rope tension at rest above payload, block and rope in water, below the sheaves [N]."""
+        """Rope tension at rest above payload, block and rope in water, of each fall [N]."""
+        return self.hung_weight / self.rope.falls
+
+    @property
+    def hung_weight(self) -> float:
+        """Weight of payload, hook block and rope in water [N]."""
         block = self.rigging.block_weight
         return self.payload.submerged_weight + block + self.rope.submerged_weight
 
     @property
     def least_tension(self) -> float | None:
-        """Smallest tension that a limit allows in the rope [N]; None if there is none."""
+        """Smallest tension that a limit allows in all falls together [N]; None if there is none."""
         given = self.limits.minimum_tension
         if given is None and self.limits.tension_ends == "both":
             return self.payload.taut_tension

@@ -26,7 +26,7 @@ class HookDemand:
     moments
         Spectral moments of order 0 to 8 of the displacement (9,) [m^2 (rad/s)^n].
     tension
-        Static rope tension at the winch [N].
+        Static tension of all falls [N].
     duration
         Exposure time [s].
     probability
@@ -59,7 +59,7 @@ class HookDemand:
         fractile_factor(1.0, probability)  # tells if it is out of range
         return cls(
             moments=HookMotion.from_case(case).moments,
-            tension=case.static_tension,
+            tension=case.hung_weight,
             duration=case.limits.exposure_time,
             probability=probability,
         )

@@ -169,8 +169,8 @@ def lifting_speed(case: Case) -> float:
 
 
 def rope_left(case: Case) -> float:
-    """Return the rope that is left on the drum [m], infinite where not known."""
-    return case.winch.drum.total(case.rope.diameter) - case.rope.length
+    """Return how far the rope left on the drum lets the load down [m], infinite if not known."""
+    return case.winch.drum.total(case.rope.diameter) / case.rope.falls - case.rope.length
 
 
 def wave_height(case: Case) -> float:
@@ -196,8 +196,8 @@ def weight_in_air(case: Case) -> float:
 
 
 def _line_speed(case: Case) -> float:
-    """Return the rope's speed at the motor's highest [m/s]."""
-    return case.winch.speed_limit * case.drum_radius / case.winch.gearbox.ratio
+    """Return the load's speed at the motor's highest [m/s]."""
+    return case.winch.speed_limit * case.haul_radius / case.winch.gearbox.ratio
 
 
 # ---- times -----------------------------------------------------------------------------------

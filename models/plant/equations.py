@@ -191,10 +191,11 @@ def build_equations(
     def lossy(efficiency: ca.SX) -> ca.SX:
         return 0.5 * ((1 + direction) / efficiency + (1 - direction) * efficiency)
 
-    eta, at_drum = p["winch.gear_efficiency"], top
+    upper = top if data.falls == 1.0 else top / data.falls  # of each
+    eta, at_drum = p["winch.gear_efficiency"], upper
     if data.sheaves_efficiency < 1.0:  # they switch with the gear: one efficiency to the motor
         eta = eta * p["rope.sheaves_efficiency"]
-        at_drum = lossy(p["rope.sheaves_efficiency"]) * top
+        at_drum = lossy(p["rope.sheaves_efficiency"]) * upper
     gear = lossy(eta)
     friction = p["winch.viscous_friction"] * speed
     if data.coulomb_friction > 0.0:
@@ -220,7 +221,7 @@ def build_equations(
         "rope.lower_tension": lower,
     }
     if data.sheaves_efficiency < 1.0:
-        z[UPPER_TENSION] = top
+        z[UPPER_TENSION] = upper
     if data.motor == "dc":
         z["motor.voltage"] = motor.applied
     if limits is not None or travel is not None or surroundings is not None:  # a simulation

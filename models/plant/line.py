@@ -78,7 +78,7 @@ def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) ->
     top = h * angle + heave
     payload = P_Y * top + P_F * force
     torque = forward * command - back * s * angle
-    upper = T_Y * top + T_F * force
+    upper = (T_Y * top + T_F * force) / data.falls  # of each
     z = {
         "payload.displacement": payload,
         "payload.velocity": s * payload,

@@ -38,8 +38,9 @@ class DrumTravel:
     @classmethod
     def from_case(cls, case: Case) -> DrumTravel:
         """Return the layer changes around the rope length of a case."""
-        paid_out = case.rope.length
-        lays = case.winch.drum.lays(case.rope.diameter)  # innermost first, by falling rope paid out
+        paid_out, falls = case.rope.length, case.rope.falls
+        # Innermost first, by falling rope paid out; as the load moves.
+        lays = [(s / falls, r / falls) for s, r in case.winch.drum.lays(case.rope.diameter)]
         here = next((i for i, (start, _) in enumerate(lays) if paid_out >= start), len(lays) - 1)
         outward = tuple(
             (paid_out - lays[i - 1][0], lays[i][1])

@@ -45,9 +45,11 @@ class PlantData:
     ----------
     axial_stiffness, rope_length, mass_per_length
         EA [N], its real part at the first axial mode, length paid out [m], mass per length
-        [kg/m].
+        [kg/m]; with falls of all of them together.
     rope_weight
         Submerged weight of the rope per length [N/m].
+    falls
+        Parallel parts of rope: the tension at the drum is that of one of them [-].
     sheaves_efficiency
         Tension behind the sheaves over that before them where the rope runs [-].
     damping_ratio
@@ -70,9 +72,10 @@ class PlantData:
         q = 1/2 rho C_D A of the drag force q v|v| [N s2/m2], the rope's share of it included
         (`skin_drag_share`), as a linear plant has it.
     skin_drag
-        1/2 rho C_t pi d of the drag along the rope, per length [N s2/m3].
+        1/2 rho C_t pi d of the drag along the rope, per length, of all falls [N s2/m3].
     drum_radius, gear_ratio, gear_efficiency
-        r to the rope's centre [m], n motor over drum [-], eta in (0, 1] [-].
+        r, what the load moves with a radian of the drum [m] (with one fall the radius to the
+        rope's centre, else that over the falls), n motor over drum [-], eta in (0, 1] [-].
     inertia, viscous_friction
         I [kg m2] and B [N m s/rad], everything referred to the motor shaft.
     coulomb_friction, friction_speed
@@ -106,6 +109,7 @@ class PlantData:
     rope_length: float
     mass_per_length: float
     rope_weight: float = 0.0
+    falls: float = 1.0
     sheaves_efficiency: float = 1.0
     damping_ratio: float = 0.002
     damping_law: str = "kelvin-voigt"
@@ -166,7 +170,12 @@ class PlantData:
 
     @property
     def static_tension(self) -> float:
-        """Tension below the sheaves at rest: payload, hook block and rope, submerged [N]."""
+        """Tension below the sheaves at rest, of each fall [N]."""
+        return self.hung_weight / self.falls
+
+    @property
+    def hung_weight(self) -> float:
+        """Weight of payload, hook block and rope, submerged [N]."""
         return self.payload_weight + self.block_weight + self.rope_weight * self.rope_length
 
     @property
@@ -355,10 +364,11 @@ class PlantData:
             kept = ("resistance", "torque_constant", "back_emf_constant", "inductance")
         bandwidth, telemetry = sensors.payload.bandwidth, sensors.telemetry
         found = cls(
-            axial_stiffness=rope.ea,
+            axial_stiffness=rope.falls * rope.ea,
             rope_length=rope.length,
-            mass_per_length=rope.mass_per_length,
+            mass_per_length=rope.falls * rope.mass_per_length,
             rope_weight=rope.submerged_weight / rope.length,
+            falls=float(rope.falls),
             sheaves_efficiency=rope.sheaves_efficiency,
             damping_ratio=rope.damping_ratio,
             damping_law=rope.damping_law,
@@ -372,7 +382,7 @@ class PlantData:
             payload_weight=payload.submerged_weight,
             quadratic_drag=payload.quadratic_drag,
             skin_drag=0.5 * payload.water_density * rope.skin_drag_area,
-            drum_radius=winch.drum.radius_at(rope.length, rope.diameter),
+            drum_radius=case.haul_radius,
             gear_ratio=winch.gearbox.ratio,
             gear_efficiency=winch.gearbox.efficiency,
             inertia=winch.inertia,

@@ -51,14 +51,15 @@ class Limits(Section):
     minimum_tension: Annotated[float, Quantity("force", 0.0, 1e9)] | None = None
     """Smallest rope tension, so that the rope does not go slack; by default a tenth of the least
     submerged weight (after the criterion of DNV-RP-N103 for the wave zone, by analogy at the
-    load's end). At the payload the least weight counts."""
+    load's end), of all falls together. At the payload the least weight counts."""
     tension_ends: Literal["both", "drum"] = "both"
     """Where `minimum_tension` holds: at both ends of the rope, or, as in older designs, at the drum
     alone, whose share of the rope's weight hides a slack lower end, and only if it is given."""
     rope_tension_peak: Annotated[float, Quantity("force", 0.0, 1e9, open_low=True)] | None = None
-    """Largest rope tension, such as the breaking load over a safety factor."""
+    """Largest rope tension, of each fall, such as the breaking load over a safety factor."""
     stroke: tuple[_Length, _Length] | None = None
-    """Lowest and highest haul of the drum while it holds the load; negative is paid out. It is
+    """Lowest and highest haul of the drum while it holds the load, as the load moves with it (the
+    rope taken in over falls); negative is paid out. It is
     for the simulation: a design does not know it."""
 
     @property

@@ -36,7 +36,11 @@ class Rope(Section):
     """Weight of the rope per length less its buoyancy; by default that of solid steel in sea
     water."""
     length: Annotated[float, Quantity("length", 1.0, 12000.0)]
-    """Length paid out, from the drum to the payload."""
+    """Length paid out, from the drum to the payload; with falls that of each."""
+    falls: Annotated[int, Quantity("count", 1, 40)] = 1
+    """Parallel parts of rope that the load hangs on, by a block: it moves by the rope that the drum
+    takes in over falls, each part has the load's tension over falls, and what hangs is as many
+    times as stiff and as heavy."""
     sheaves: Annotated[int, Quantity("count", 0, 20)] = 0
     """Number of sheaves that the rope runs over between the drum and the load."""
     sheave_efficiency: Annotated[float, Quantity("ratio", 0.8, 1.0)] = 0.98
@@ -89,22 +93,27 @@ class Rope(Section):
 
     @property
     def stiffness(self) -> float:
-        """Stiffness K = EA/L of the rope paid out [N/m]."""
-        return self.ea / self.length
+        """Stiffness K = EA/L of the rope paid out, of all falls [N/m]."""
+        return self.falls * self.ea / self.length
 
     @property
     def mass(self) -> float:
-        """Mass of the rope paid out [kg]."""
-        return self.mass_per_length * self.length
+        """Mass of the rope paid out, of all falls [kg]."""
+        return self.mass_per_length * self.paid_out
+
+    @property
+    def paid_out(self) -> float:
+        """Rope that has left the drum, of all falls [m]."""
+        return self.falls * self.length
 
     @property
     def submerged_weight(self) -> float:
-        """Weight of the rope paid out less its buoyancy [N]."""
+        """Weight of the rope paid out less its buoyancy, of all falls [N]."""
         per_length = self.submerged_weight_per_length
         if per_length is None:
             buoyancy = 1.0 - SEA_WATER_DENSITY / STEEL_DENSITY
             per_length = self.mass_per_length * GRAVITY * buoyancy
-        return per_length * self.length
+        return per_length * self.paid_out
 
     @property
     def sheaves_efficiency(self) -> float:
@@ -113,8 +122,8 @@ class Rope(Section):
 
     @property
     def skin_drag_area(self) -> float:
-        """Area that drag along the rope acts on, per length, C_t pi d [m]."""
-        return self.skin_drag_coefficient * math.pi * self.diameter
+        """Area that drag along the rope acts on, per length, C_t pi d of all falls [m]."""
+        return self.falls * self.skin_drag_coefficient * math.pi * self.diameter
 
     @property
     def wave_speed(self) -> float:

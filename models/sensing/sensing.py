@@ -120,7 +120,7 @@ class SensorModel:
             lags=TelemetrySchedule(sensors.telemetry, sample_time, seed=0, late=late).lags,
             encoder=sensors.encoder,
             load_cell=sensors.load_cell,
-            haul_per_angle=case.drum_radius / case.winch.gearbox.ratio,
+            haul_per_angle=case.haul_radius / case.winch.gearbox.ratio,
             static_tension=case.static_tension,
         )
 

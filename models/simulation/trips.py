@@ -60,7 +60,8 @@ def trip_limits(case: Case) -> tuple[TripLimit, ...]:
     total = case.winch.drum.total(case.rope.diameter)
     if total < math.inf:
         text = f"all {total:.6g} m of rope are paid out: brake"
-        limits.append(TripLimit(signal="rope.length", high=total, kind="rope-out", text=text))
+        most = total / case.rope.falls
+        limits.append(TripLimit(signal="rope.length", high=most, kind="rope-out", text=text))
     text = "all rope is hauled in, the payload is at the hook: brake"
     limits.append(TripLimit(signal="rope.length", low=1.0, kind="rope-in", text=text))
     return tuple(limits)

@@ -36,7 +36,9 @@ GAINS = "gains."
 _DERIVED: Mapping[str, Callable[[Case], float]] = {
     "rope.axial_stiffness": lambda case: case.rope.ea,
     "rope.modulus": lambda case: case.rope.ea / case.rope.area,
-    "rope.submerged_weight_per_length": lambda case: case.rope.submerged_weight / case.rope.length,
+    "rope.submerged_weight_per_length": lambda case: (
+        case.rope.submerged_weight / case.rope.paid_out
+    ),
     "payload.added_mass": lambda case: case.payload.hydrodynamic_mass,
     "payload.drag_coefficient": lambda case: case.payload.c_d,
     "winch.drum.radius": lambda case: case.drum_radius,

@@ -329,9 +329,9 @@ def _tensions(
     scale: FloatArray,
     top_at_rest: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return rows of the lowest spring's tension and of that at the drum [N]."""
-    top = linear.outputs.index("rope.tension")
-    row, feed = linear.Cz[top, keep] * scale, linear.Fz[top, hook]
+    """Return rows of the lowest spring's tension and of that at the drum, of all falls [N]."""
+    top, falls = linear.outputs.index("rope.tension"), plant.data.falls
+    row, feed = falls * linear.Cz[top, keep] * scale, falls * linear.Fz[top, hook]
     chain, shifts = plant.chain, plant.displacements
     lowest = chain[-1]
     if len(chain) == 1:  # one spring: what it carries is less than at the drum by a constant
@@ -343,5 +343,5 @@ def _tensions(
     for name, sign in ((shifts[-2], 1.0), (shifts[-1], -1.0)):
         lower[names.index(name)] = k * sign
         lower[names.index(name.replace("displacement", "velocity"))] = k * tau * sign
-    static = np.array([float(lowest.carried), top_at_rest])
+    static = np.array([float(lowest.carried), falls * top_at_rest])
     return np.stack([lower, row]), np.stack([np.zeros(2), feed]), static

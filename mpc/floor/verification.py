@@ -125,7 +125,8 @@ def verify_record(
     tension = linear.Cz[linear.outputs.index("rope.tension")]
     feed = linear.Fz[linear.outputs.index("rope.tension"), hook]
     ends = np.stack([problem.heave, problem.rate], axis=1)
-    top = (states @ tension + ends @ feed)[:N] + sampled.static_tensions[-1]
+    falls = case.rope.falls
+    top = falls * (states @ tension + ends @ feed)[:N] + sampled.static_tensions[-1]
     excess = max(
         excess, float(((problem.minimum_tension - top) / sampled.static_tensions[-1]).max())
     )

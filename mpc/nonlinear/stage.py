@@ -343,5 +343,5 @@ class _Rope:
         if "load_cell.tension" in self._states:
             cell = self._winch.case.sensors.load_cell
             bandwidth = 0.0 if cell is None else cell.bandwidth
-            column = column + bandwidth * self.unit("load_cell.tension")
+            column = column + bandwidth / data.falls * self.unit("load_cell.tension")
         return np.asarray(column)

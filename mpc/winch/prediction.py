@@ -301,8 +301,9 @@ def with_noise(model: PredictionModel, noise: ProcessNoise) -> PredictionModel:
 
 def constant_scales(model: PredictionModel) -> FloatArray:
     """Return what the constants are measured by: weight, peak torque, gravity, weight, (4,)."""
-    weight = model.winch.rest_tension
-    return np.array([weight, model.winch.case.winch.drive.torque_peak, _GRAVITY, weight])
+    weighed, falls = model.winch.rest_tension, model.winch.data.falls
+    peak = model.winch.case.winch.drive.torque_peak
+    return np.array([falls * weighed, peak, _GRAVITY, weighed])
 
 
 def _is_mass(name: str) -> bool:

@@ -117,7 +117,7 @@ class SampledWinch(ReadOnlyArrays):
 
         A velocity at which the drag would exceed the weight is no estimate to rely on.
         """
-        highest = math.sqrt(self.rest_tension / max(self.data.quadratic_drag, 1.0))
+        highest = math.sqrt(self.data.hung_weight / max(self.data.quadratic_drag, 1.0))
         velocity = min(max(velocity, -highest), highest)
         return (self.drag - self.data.quadratic_drag * abs(velocity)) * velocity
 

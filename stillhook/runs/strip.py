@@ -112,7 +112,7 @@ class Scene:
             time=time,
             hook=heave + highest - float(heave.min()) + room,
             payload=payload,
-            angle=of_run("drum.haul") / run.case.drum_radius,
+            angle=of_run("drum.haul") / run.case.haul_radius,
             tension=of_run("rope.tension"),
             slack=of_run("rope.minimum_tension") <= _SLACK,
             ground=ground,

@@ -136,7 +136,8 @@ def _panels(run: Run) -> list[_Panel]:
     panels.append(_Panel("motor torque", "N m", turning, limits=limits, rest=rest))
     panels.append(_Panel("motor speed", "rpm", turns, limits=(-speed, speed)))
     pull, limits = (("rope.tension", "", REFERENCE),), (-math.inf, most or math.inf)
-    panels.append(_Panel("rope tension", "N", pull, limits=limits, slack=True))
+    line = "rope tension" if run.case.rope.falls == 1 else "tension of a fall"
+    panels.append(_Panel(line, "N", pull, limits=limits, slack=True))
     if "contact.gap" in run:
         panels.append(_Panel("clearance below", "m", (("contact.gap", "", AFTER),)))
     return [panel for panel in panels if panel.signals[0][0] in (*run.signals, ERROR)]

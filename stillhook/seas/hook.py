@@ -298,7 +298,7 @@ def _demand(survey: HookSurvey) -> list[tuple[str, str]]:
     """Return what a winch that follows the hook has to do, beside what the case's can."""
     case, own = survey.case, survey.own
     winch = case.winch
-    fastest = winch.speed_limit * case.drum_radius / winch.gearbox.ratio
+    fastest = winch.speed_limit * case.haul_radius / winch.gearbox.ratio
     power = own.peak_power
     speed, acceleration = (
         motion.most_probable_maximum(own.duration) for motion in (own.velocity, own.acceleration)

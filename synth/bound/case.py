@@ -511,7 +511,7 @@ def faint_noise(
         result[name] = White((faint * scales[of]) ** 2 * _SAMPLE)
     added = list(exact)
     if _SHAKEN not in result:
-        result[_SHAKEN] = White((_FORCE * faint * case.static_tension) ** 2 * _SAMPLE)
+        result[_SHAKEN] = White((_FORCE * faint * case.hung_weight) ** 2 * _SAMPLE)
         added.append("the force on the payload")
     return noisy, result, tuple(added)
 

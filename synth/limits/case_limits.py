@@ -105,7 +105,7 @@ def drive_limits(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
         )
     add(Peak, "rope.tension", wanted.rope_tension_peak, duration=time)
     least = case.least_tension
-    add(Minimum, "rope.tension", least, duration=time)
+    add(Minimum, "rope.tension", least and least / case.rope.falls, duration=time)
     if least is not None and wanted.tension_ends == "both":
         lightest = case.payload.least_weight
         limits.append(

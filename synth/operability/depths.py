@@ -32,7 +32,7 @@ def drum_layer(case: Case) -> tuple[int, int]:
     InputError
         If the drum does not hold so much rope.
     """
-    drum, length = case.winch.drum, case.rope.length
+    drum, length = case.winch.drum, case.rope.paid_out
     if drum.radius is not None:
         return 0, 0
     lays = drum.lays(case.rope.diameter)  # the bare drum first

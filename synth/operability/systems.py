@@ -168,7 +168,7 @@ class HeldSystem(System):
     def transfers(self, omega: FloatArray) -> ComplexArray:
         s = 1j * omega.astype(np.complex128)
         P_Y, P_F, T_Y, T_F = held_transfers(self.data, s, self.reference)
-        reeved = self.data.mean_sheaves_factor
+        reeved = self.data.mean_sheaves_factor / self.data.falls
         D = self.data.payload_mass * s**2 + self.reference * s
         rows = {
             PAYLOAD: (P_Y, P_F),

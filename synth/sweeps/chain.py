@@ -190,7 +190,7 @@ class Chain:
             heard = self._heard = {name: row * late(s, delay) for name, row in heard.items()}
         zero = np.zeros((1, 1))
         self.D = -(heard.get("drum.haul", zero) + heard.get("motor.speed", zero) * s / h)
-        self.E = -heard.get("rope.tension", zero) * self._load_cell()
+        self.E = -heard.get("rope.tension", zero) * self._load_cell() / self._own("falls")
         self.G, self.H = -self._payload(), self._hook()
         self._of_y, self._of_f = self.W + self.drive * self.D, self.pull + self.drive * self.E
         self._rope()

@@ -88,7 +88,7 @@ def columns_of(case: Case) -> dict[str, FloatArray]:
     The fields of `PlantData` and its plain properties by their names, and beside them
 
     * ``haul``: h = r/n, rope hauled by a turn of the motor [m]; ``load``: h (1/eta + eta)/2 [m];
-      ``reeved``: tension at the drum over that below the sheaves, mean of both ways [-];
+      ``reeved``: tension at the drum over that of all falls, mean of both ways [-];
     * ``phi``, ``beta``, ``lag``: torque per command, torque per speed, and the lag of the motor
       with its drive [s];
     * ``damping_time``, ``slow`` and the gains and times [s] of its branches: the rope's EA(s)/EA,
@@ -99,10 +99,11 @@ def columns_of(case: Case) -> dict[str, FloatArray]:
     """
     data, drag = PlantData.from_case(case), case.payload.fixed_drag
     found = {name: getattr(data, name) for name in _PLAIN}
-    found |= {name: getattr(data, name) for name in ("stiffness", "rope_mass", "static_tension")}
+    derived = "stiffness", "rope_mass", "static_tension", "hung_weight"
+    found |= {name: getattr(data, name) for name in derived}
     haul = data.drum_radius / data.gear_ratio
     found |= {"haul": haul, "load": data.mean_gear_factor * haul}
-    found["reeved"] = data.mean_sheaves_factor
+    found["reeved"] = data.mean_sheaves_factor / data.falls
     phi: Any
     if data.motor == "dc":
         phi = data.torque_constant / data.resistance
@@ -150,7 +151,8 @@ def at_rest(numbers: Numbers) -> tuple[dict[str, FloatArray], dict[str, FloatArr
     def of_ways(mean: FloatArray, hauled: FloatArray) -> tuple[FloatArray, FloatArray]:
         return switches * mean + (1.0 - switches) * hauled, switches * (hauled - mean)
 
-    held, loss = of_ways(tension * numbers["load"], tension * numbers["haul"] / eta)
+    hung = numbers["hung_weight"]
+    held, loss = of_ways(hung * numbers["load"], hung * numbers["haul"] / eta)
     loss = loss + switches * numbers["coulomb_friction"]
     drum, reeved = of_ways(tension * numbers["reeved"], tension / over)
 
@@ -224,7 +226,8 @@ def _with_columns(case: Case, spread: Spread, rows: FloatArray) -> Any:
     pairs = zip(spread.paths, rows.T, strict=True)
     given = {path: column for path, column in pairs if not path.startswith(_ELSEWHERE)}
     if "rope.length" in given and case.winch.drum.radius is None:
-        given.setdefault("winch.drum.radius", _radius(case, given["rope.length"]))
+        paid_out = case.rope.falls * given["rope.length"]
+        given.setdefault("winch.drum.radius", _radius(case, paid_out))
     changed: Any = case
     for path, column in with_payload(case, given).items():
         changed = _with(changed, path.split("."), column)

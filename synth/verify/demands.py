@@ -279,7 +279,7 @@ def case_demands(case: Case, data: PlantData, plant: LinearPlant, masses: int) -
         _POWER: winch.power_limit,
         breakdown: winch.breakdown_limit / winch.cooled_speed**2,
         f"{_TENSION}.peak": wanted.rope_tension_peak,
-        f"{_TENSION}.least": least,
+        f"{_TENSION}.least": None if least is None else least / case.rope.falls,
         f"{_AT_LOAD}.least": least if both else None,
     }
     # k = sqrt(2 ln(N / -ln(1 - p))) is the most probable maximum of T / -ln(1 - p).

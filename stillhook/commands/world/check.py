@@ -122,13 +122,16 @@ def _rope(case: Case, hook: HookMotion) -> Rows:
     from synth.question import uncompensated
 
     rope, payload = case.rope, case.payload
-    # Of the load's weight, and half the rope's own.
+    # Of the load's weight, and half the rope's own; of tip and slings by what hangs on them.
     hung = payload.submerged_weight + case.rigging.block_weight
     stretch = (hung + 0.5 * rope.submerged_weight) / rope.stiffness
+    stretch += case.hung_weight / case.crane.stiffness
+    stretch += payload.submerged_weight / case.rigging.sling_stiffness
     drag, rms = uncompensated(case, PlantData.from_case(case), hook)
     modes = _modes(case)
     periods = [quantity(2.0 * math.pi / mode, "s") for mode in modes]
     held = f"drum held; next {', '.join(periods[1:])}" if periods[1:] else "drum held, one spring"
+    of = "" if rope.falls == 1 else f", {rope.falls} falls"
     masses = [f"payload {quantity(payload.mass, 'kg')}"]
     masses += [f"added {quantity(payload.hydrodynamic_mass, 'kg')}"]
     masses += [f"rope {quantity(rope.mass, 'kg')}"]
@@ -136,7 +139,7 @@ def _rope(case: Case, hook: HookMotion) -> Rows:
         masses += [f"hook block {quantity(case.rigging.block_mass, 'kg')}"]
     how = "fixed by the case" if payload.fixed_drag is not None else "with the drum held"
     return [
-        ("stiffness K = EA/L", quantity(rope.stiffness, "N/m"), f"EA {quantity(rope.ea, 'N')}"),
+        ("stiffness K = EA/L", quantity(rope.stiffness, "N/m"), f"EA {quantity(rope.ea, 'N')}{of}"),
         *_rig(case),
         ("mass that moves, M", quantity(case.moving_mass, "kg"), ", ".join(masses)),
         ("natural period", periods[0], held),
@@ -157,11 +160,11 @@ def _rope(case: Case, hook: HookMotion) -> Rows:
 def _winch(case: Case, hook: HookMotion) -> Rows:
     winch, drive = case.winch, case.winch.drive
     torque = case.static_torque_budget
-    mass = winch.inertia * (winch.gearbox.ratio / case.drum_radius) ** 2
+    mass = winch.inertia * (winch.gearbox.ratio / case.haul_radius) ** 2
     rope_speed = winch.speed_limit * case.drum_radius / winch.gearbox.ratio
     fastest = hook.velocity.most_probable_maximum(case.limits.exposure_time)
     tension = case.limits.rope_tension_peak
-    power = torque * fastest * winch.gearbox.ratio / case.drum_radius
+    power = torque * fastest * winch.gearbox.ratio / case.haul_radius
     allowed = (
         "" if tension is None else f"{percent(case.static_tension_budget / tension)} of what it may"
     )
@@ -181,7 +184,7 @@ def _winch(case: Case, hook: HookMotion) -> Rows:
         (
             "fastest rope",
             quantity(rope_speed, "m/s"),
-            f"the hook's largest speed is {percent(fastest / rope_speed)} of it",
+            f"the hook's largest speed is {percent(fastest * case.rope.falls / rope_speed)} of it",
         ),
         (
             "inertia",

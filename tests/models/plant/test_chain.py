@@ -11,8 +11,8 @@ import pytest
 import scipy.linalg
 from plant_numbers import MODERN, THESIS
 
-from models import load_case
-from models.plant import PlantData, build_plant, rope_transfers
+from models import Case, InputError, load_case
+from models.plant import DrumTravel, PlantData, build_plant, line_response, rope_transfers
 
 RIG = {"tip_stiffness": 3e6, "sling_stiffness": 5e6, "block_mass": 4e3, "block_weight": 34e3}
 RIGS = {
@@ -175,3 +175,76 @@ def test_a_case_says_them_and_warns_of_very_soft_ones() -> None:
     for path in ("crane.tip_stiffness", "rigging.stiffness"):
         with pytest.warns(UserWarning, match=f"{path}: 1e\\+04 N/m is 0.0"):
             load_case("subsea-crane").replace({path: 1e4, "limits.drive": "report"})
+
+
+# ---- falls
+
+
+def two_falls_and_one_line(**changes: object) -> tuple[Case, Case]:
+    """The crane with two falls, and with one line of twice everything on half the drum."""
+    case = load_case("subsea-crane").replace({"limits.drive": "report", **changes})
+    rope, layers = case.rope, case.winch.drum.lays(case.rope.diameter)
+    held = [3000.0 - paid_out for paid_out, _ in layers]
+    drum = case.winch.drum.model_dump() | {"geometry": None, "rope_on_drum_total": 3000.0}
+
+    def wound(share: float) -> dict[str, object]:
+        rows = [
+            {"pitch_diameter": 2.0 * share * r, "rope_on_drum": share * length}
+            for (_, r), length in zip(layers, held, strict=True)
+        ]
+        return drum | {"layers": rows, "rope_on_drum_total": share * 3000.0}
+
+    weight = rope.submerged_weight / rope.length
+    one = {
+        "rope.axial_stiffness": 2.0 * rope.ea,
+        "rope.mass_per_length": 2.0 * rope.mass_per_length,
+        "rope.submerged_weight_per_length": 2.0 * weight,
+        "rope.skin_drag_coefficient": 2.0 * rope.skin_drag_coefficient,
+        "winch.drum": wound(0.5),
+    }
+    peak = case.limits.rope_tension_peak
+    assert peak is not None
+    one["limits.rope_tension_peak"] = 2.0 * peak
+    return case.replace({"rope.falls": 2, "winch.drum": wound(1.0)}), case.replace(one)
+
+
+def test_two_falls_are_one_line_of_twice_everything_on_half_the_drum() -> None:
+    two, one = two_falls_and_one_line(
+        **{"rigging.block_mass": 3e3, "rope.sheaves": 2, "rope.skin_drag_coefficient": 0.01}
+    )
+    a, b = PlantData.from_case(two), PlantData.from_case(one)
+    assert replace(a, falls=1.0) == replace(b, delay=a.delay)
+    assert two.static_torque == pytest.approx(one.static_torque, rel=1e-12)
+    assert 2.0 * two.static_tension == pytest.approx(one.static_tension, rel=1e-12)
+    assert two.static_tension == pytest.approx(a.static_tension, rel=1e-12)
+    plants = [build_plant(data, 4) for data in (a, b)]
+    rests = [plant.operating_point() for plant in plants]
+    assert rests[0].torque == pytest.approx(rests[1].torque, rel=1e-12)
+    assert 2.0 * rests[0].tension == pytest.approx(rests[1].tension, rel=1e-12)
+    omega = np.array([0.1, 0.9, 4.0, 17.0])
+    linear = [plant.linearise(drag=5e3).response(omega) for plant in plants]
+    for found, other in (linear, [line_response(d, 1j * omega, drag=5e3) for d in (a, b)]):
+        for name, z, same in zip(
+            found.outputs, found.zw.transpose(1, 0, 2), other.zw.transpose(1, 0, 2), strict=True
+        ):
+            of_one = 2.0 if name in ("rope.tension", "rope.upper_tension") else 1.0
+            np.testing.assert_allclose(of_one * z, same, rtol=1e-9, err_msg=name)
+
+
+def test_a_drum_that_lowers_on_two_falls_changes_layer_where_one_line_would() -> None:
+    two, one = two_falls_and_one_line()
+    travels = [DrumTravel.from_case(case) for case in (two, one)]
+    for ends in ("outward", "inward"):
+        found, expected = (getattr(travel, ends) for travel in travels)
+        np.testing.assert_allclose(np.array(found), np.array(expected), rtol=1e-12)
+
+
+@pytest.mark.parametrize("falls", [0, 2.5, 41])
+def test_falls_are_whole(falls: float) -> None:
+    with pytest.raises(InputError, match=r"rope\.falls: must be a whole number in \[1, 40\]"):
+        load_case("subsea-crane").replace({"rope.falls": falls})
+
+
+def test_a_drum_that_has_not_the_rope_for_all_falls_is_refused() -> None:
+    with pytest.raises(InputError, match="1500 m of rope, less than the 2000 m paid out"):
+        load_case("subsea-crane").replace({"rope.falls": 2})

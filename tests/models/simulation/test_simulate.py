@@ -560,6 +560,28 @@ def test_a_load_left_to_itself_swings_at_the_exact_first_mode(
     assert 2.0 * math.pi / period == pytest.approx(exact, rel=1e-2 if masses == 1 else 2e-3)
 
 
+def test_two_falls_run_as_one_line_of_twice_everything_on_half_the_drum() -> None:
+    case = crane(**{"limits.drive": "report", **RIG})
+    radius, rope = case.drum_radius, case.rope
+    drum = {"winch.drum.radius": radius, "winch.drum.rope_on_drum_total": 3000.0}
+    two = case.replace({"rope.falls": 2, **drum})
+    one = case.replace(
+        {
+            "winch.drum.radius": 0.5 * radius,
+            "rope.axial_stiffness": 2.0 * rope.ea,
+            "rope.mass_per_length": 2.0 * rope.mass_per_length,
+            "rope.submerged_weight_per_length": 2.0 * rope.submerged_weight / rope.length,
+            "limits.rope_tension_peak": 1.7e6,
+        }
+    )
+    runs = [simulate(c, feedback(c, CRANE, 0.02), duration=30.0, seed=2) for c in (two, one)]
+    found, expected = runs
+    for name in ("payload.displacement", "motor.torque", "drum.haul", "rope.lower_tension"):
+        np.testing.assert_allclose(found[name], expected[name], rtol=1e-6, atol=1e-7, err_msg=name)
+    np.testing.assert_allclose(2.0 * found["rope.tension"], expected["rope.tension"], rtol=1e-6)
+    assert np.ptp(found["payload.displacement"]) > 0.1
+
+
 def test_a_hysteretic_rope_at_rest_stays_there() -> None:
     case = crane(**HYSTERETIC, **SILENT)
     still = Scenario(name="still", description="nothing moves", duration=20.0)

@@ -44,12 +44,26 @@ def a_sea(controller: LinearMPC, size: float, seed: int) -> FloatArray:
     return chi
 
 
-@pytest.mark.parametrize("name", ["thesis-1975", "thesis-1975-rope", "subsea-crane"])
-def test_linear_plant_and_forces_together_are_the_nonlinear_plant(name: str) -> None:
-    winch = sampled_winch(sh.load_case(name))
-    law = force_law(winch, slack=range(winch.masses))
-    stage = make_stage(winch, law, compiled=False)
+RIG = {"crane.tip_stiffness": 3e6, "rigging.stiffness": 5e6, "rigging.block_mass": 4e3}
+FALLS = {"rope.falls": 2, "winch.drum.radius": 1.07}
+
+
+@pytest.mark.parametrize(
+    ("name", "rig"),
+    [
+        ("thesis-1975", {}),
+        ("thesis-1975-rope", {}),
+        ("subsea-crane", {}),
+        ("subsea-crane", {**RIG, **FALLS}),
+    ],
+)
+def test_linear_plant_and_forces_together_are_the_nonlinear_plant(
+    name: str, rig: dict[str, float]
+) -> None:
+    winch = sampled_winch(sh.load_case(name).replace(rig))
     plant = build_plant(winch.data, winch.masses)
+    law = force_law(winch, slack=range(len(plant.chain)))
+    stage = make_stage(winch, law, compiled=False)
     rest = plant.operating_point(MEAN_LOSSES)
     p, nx = plant.parameter_vector(), len(plant.states)
     rng = np.random.default_rng(0)
