@@ -23,8 +23,9 @@ from ..basics import FloatArray, InputError, check_finite, pick, read_only
 #:
 #: The payload's signals are those received last, `payload.age` their age (delay and time held)
 #: and `payload.valid` 1 where a message has just arrived.  `drive.applied` is the command that
-#: the drive has really followed over the last sample, within its limits.  The references are
-#: what the operator asks of the payload.
+#: the drive has really followed over the last sample, within its limits; of a command that takes
+#: its time to the drive, the one asked for last as far as the drive is not at a limit.  The
+#: references are what the operator asks of the payload.
 HEARD: tuple[str, ...] = (
     "payload.acceleration",
     "payload.velocity",

@@ -161,7 +161,10 @@ def build_closed_loop(
     logged, signals = _log(plant, sensors, tuple(values), len(motions))
     one_step = braked_step(plant, tuple(values), len(motions), step.step)
     raw, applied = look(x, last, moved, p)
-    seen, m = sensors.function(of_sensors, raw, sensed, applied)
+    # What the drive has left out of a command that was on its way is told of the one asked for
+    # last: a controller that compares the two must not take the delay for a limit.
+    late = on_the_way[0] - last if waiting else 0.0
+    seen, m = sensors.function(of_sensors, raw, sensed, applied + late)
 
     def sample(command: ca.SX, seen: ca.SX, controller: ca.SX) -> list[ca.SX]:
         """Return the state after the sample and the log at its start."""

@@ -135,7 +135,7 @@ class SampledLoop:
         else:
             world.B[: len(A)] = Bd
         place = {name: HEARD.index(name) for name in HEARD}
-        world.H[place["drive.applied"], -1] = 1.0
+        world.H[place["drive.applied"], ends[-3] if waits else -1] = 1.0  # the one asked for last
         for name, row in zip(WINCH, winch, strict=True):
             if name == "rope.tension" and math.isfinite(cell):
                 world.H[place[name], n] = 1.0

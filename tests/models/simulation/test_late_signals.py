@@ -14,8 +14,11 @@ from models.sensing import sensed_plant, sensed_spectra
 from models.simulation import SimulationOptions, prepare, run_simulation
 from synth import evaluate_gains
 from synth.controllers import LinearFeedback
+from synth.loop import LinearController
+from synth.question import controller_for
 
 CRANE = {"A": 1.0, "a": 16.03, "a1": 44.47, "a2": 6.41}
+ROLLOFF = {**CRANE, "rolloff.corner": 10.0, "rolloff.damping": 0.7}
 PAYLOAD = ("payload.acceleration", "payload.velocity", "payload.displacement")
 QUIET = {
     "sea.significant_height": 0.01,
@@ -24,7 +27,9 @@ QUIET = {
 DRAG = 5000.0
 
 
-def linear(case: Case, gains: dict[str, float], sample_time: float, duration: float) -> Any:
+def linear(
+    case: Case, gains: dict[str, float] | LinearController, sample_time: float, duration: float
+) -> Any:
     """A run with nothing but linear parts, without limits, ready."""
     parameters = {
         "payload.quadratic_drag": 0.0,
@@ -121,3 +126,19 @@ def test_a_late_command_does_what_late_telemetry_does() -> None:
         runs[name] = run.values[:, run.signals.index("payload.displacement")]
     size = np.abs(runs["command"]).max()
     assert np.abs(runs["command"] - runs["telemetry"]).max() < 1e-9 * size
+
+
+def test_a_late_command_is_no_limit_to_a_controller_with_states() -> None:
+    # Anti-windup compares what the drive did with what it was asked: a command on its way is both.
+    late = {
+        "command": {"winch.drive.command_delay": 0.02},
+        "telemetry": {"sensors.telemetry.delay": 0.05},
+    }
+    runs = {}
+    for name, changes in late.items():
+        case = load_case("subsea-crane").replace({**QUIET, **changes})
+        law = controller_for(case, "payload-feedback-rolloff", ROLLOFF)
+        run = run_simulation(linear(case, law, 0.01, 120.0), seed=3)
+        runs[name] = run.values[:, run.signals.index("motor.torque")]
+    size = np.ptp(runs["telemetry"])
+    assert np.abs(runs["command"] - runs["telemetry"]).max() < 1e-6 * size
