@@ -21,7 +21,7 @@ STUDIES := $(addprefix docs/make/,$(addsuffix .py,headline landing saturation ra
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo test test-ci test-all lint bench docs studies clean
+.PHONY: help demo test test-ci test-all lint bench docs studies holds clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F'\t' '{printf "make %-9s %s\n", $$1, $$2}'
@@ -50,6 +50,10 @@ bench: $(VENV)/.installed-dev  ## how good and how fast the gain synthesis and t
 
 studies: $(VENV)/.installed-dev  ## the stored studies of the docs anew; takes hours
 	@for script in $(STUDIES); do echo "== $$script"; $(PY) $$script || exit 1; done
+
+holds: $(VENV)/.installed-dev  ## simulate what is called ok, for 3 h each; takes hours, and goes on where it stopped
+	$(PY) docs/make/holds.py
+	$(PY) docs/make/holds_page.py
 
 docs: $(VENV)/.installed-docs  ## the documentation, into docs/_build/html
 	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html

@@ -21,6 +21,7 @@ DOCS = ROOT / "docs"
 SCRIPTS: Mapping[str, str] = {
     "comparison.csv": "docs/make/comparison.py",
     "headline.csv": "docs/make/headline.py",
+    "holds.csv": "docs/make/holds.py",
     "landing.csv": "docs/make/landing.py",
     "mpc_solvers.csv": "benchmarks/mpc_speed.py",
     "mpc_steps.csv": "benchmarks/mpc_speed.py",

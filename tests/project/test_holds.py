@@ -1,0 +1,150 @@
+"""What is called ok holds in simulation: the study's rows, its judgement, and twelve rows anew."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import holds
+import holds_page as page
+import pytest
+from stored import read_rows
+
+import stillhook as sh
+from models.basics import GRAVITY, PhysicsWarning
+
+SHORT = 1800.0  # of a run here [s]
+SURE = 4.0  # standard errors that a short run may be off by: chance has no second run here
+ROWS = read_rows(holds.CSV)
+#: Twelve of the rows that were simulated, evenly over the file.
+DONE = page.simulated(ROWS)
+ANEW = [DONE[k * len(DONE) // 12] for k in range(12)] if len(DONE) > 12 else DONE
+
+
+def question(number):
+    (found,) = holds.questions(range(number, number + 1))
+    return found
+
+
+def test_random_cases_are_what_the_page_says_and_the_same_again():
+    for number in (48, 100, 247):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PhysicsWarning)
+            case, again = question(number).case, holds.random_case(number)
+        assert case == again
+        assert 50.0 <= case.rope.length <= 3000.0
+        assert 5e3 <= case.payload.mass <= 200e3
+        steepness = 2.0 * math.pi * case.sea.significant_height
+        steepness /= GRAVITY * case.sea.spectral_peak_period**2
+        assert steepness <= holds.STEEPEST
+        safety = holds.BREAKING * case.rope.diameter**2 / case.static_tension
+        assert 4.0 * (1.0 - 1e-9) <= safety <= 6.0 * (1.0 + 1e-9)
+        assert 1.2 <= case.winch.drive.torque_continuous / case.static_torque_budget <= 1.5
+    assert holds.random_case(48) != holds.random_case(49)
+
+
+def test_questions_are_bundled_cases_then_random_ones():
+    asked = holds.questions()
+    assert [q.number for q in asked] == list(range(248))
+    assert sum(q.name == "random" for q in asked) == 200
+    case = question(10).case  # the crane at 2000 m in its own sea: more rope on the drum
+    assert case.rope.length == 2000.0
+    assert case.sea.significant_height == 2.0
+    assert case.winch.drum.rope_on_drum_total == pytest.approx(2500.0)
+    assert case.winch.drum.radius_at(0.0, case.rope.diameter) > 0.0
+
+
+def test_seeds_cover_the_signs_of_a_reference_unit_and_part_structures():
+    plain, coherent = question(48), question(50)
+    assert holds.seeds_of(plain, plain.case, "combined") == [484_000]
+    assert len(holds.seeds_of(question(60), plain.case, "combined")) == 10
+    found = holds.seeds_of(coherent, coherent.case, "combined")
+    mru = coherent.case.sensors.mru
+    assert len({holds.MruModel(mru, 1.0, 1.0, seed).signs for seed in found}) == 4
+    assert not set(found) & set(holds.seeds_of(coherent, coherent.case, "drum-feedback"))
+
+
+def good_row():
+    row = dict.fromkeys(holds.COLUMNS, "")
+    row |= {"question": "7", "case": "crane", "runs": "2", "again": "0", "ok": "yes"}
+    row |= {"coherent": "no", "saturated": "0.01", "slack": "0", "trips": "0"}
+    row |= {"growth_hysteretic": "-0.01", "growth_kelvin-voigt": "-0.02"}
+    row |= {"torque.sigma": "100", "torque.found": "102.9", "torque.error": "0.005"}
+    return row | {"torque.up": "400", "torque.ups": "390 410", "power.up": "9", "power.ups": "8 7"}
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"torque.found": "103.1"}, "deviation of torque +3.1 %"),
+        ({"torque.found": "96.9"}, "deviation of torque -3.1 %"),
+        ({"torque.ups": "390 561"}, "torque up 1.40 times"),
+        ({"power.ups": "12.7 1"}, "power up 1.41 times"),
+        ({"slack": "0.001"}, "slack"),
+        ({"trips": "1"}, "1 runs ended early"),
+        ({"saturated": "0.2"}, "saturated"),
+        ({"growth_kelvin-voigt": "0.001"}, "grows"),
+    ],
+)
+def test_a_row_that_breaks_something_is_told(change, told):
+    assert page.faults(good_row()) == []
+    (fault,) = page.faults(good_row() | change)
+    assert fault.startswith(told)
+
+
+def test_three_standard_errors_are_let_pass():
+    assert page.faults(good_row() | {"torque.found": "106", "torque.error": "0.021"}) == []
+
+
+def test_extremes_are_counted_over_all_runs():
+    rows = [good_row(), good_row() | {"torque.ups": "401 402"}, good_row() | {"runs": ""}]
+    rows.append(good_row() | {"coherent": "yes"})
+    (kind,) = page.kinds(rows)
+    assert (kind.name, kind.trials, kind.exceeded) == ("torque up", 4, 3)
+    assert not kind.kept
+    more = good_row() | {"runs": "6", "saturated": "0.05"}
+    assert page.pooled_saturation([good_row(), more]) == pytest.approx(0.04)
+
+
+def test_a_book_goes_on_where_it_stopped(tmp_path):
+    path = tmp_path / "holds.csv"
+    first, second, third = holds.questions(range(3))
+    book = holds.Book(path, "new")
+    book.keep(second, [{"question": 1, "case": "crane", "ok": "no", "code": "old"}])
+    book.keep(third, [{"question": 2, "case": "crane", "ok": "no"}])
+    again = holds.Book(path, "new")
+    assert [q.number for q in again.left([first, second, third])] == [0, 1]
+    assert [row["question"] for row in read_rows(path)] == ["1", "2"]
+
+
+def test_the_page_tells_the_stored_rows():
+    text = page.PAGE.read_text(encoding="utf-8")
+    assert text.split(page.MARK)[1].strip() == page.tables(ROWS)
+
+
+@pytest.mark.filterwarnings("ignore::models.basics.PhysicsWarning")
+@pytest.mark.parametrize("row", ANEW, ids=lambda row: f"{row['question']}-{row['structure']}")
+def test_what_a_row_keeps_is_kept_again(row):
+    parameters = dict(part.split("=") for part in row["parameters"].split())
+    gains = {name: float(value) for name, value in parameters.items()}
+    case = question(int(row["question"])).case
+    design = sh.evaluate_gains(case, gains, row["structure"])
+    runs = sh.simulate(case, design, seeds=1, duration=2.0 * SHORT, settle=SHORT)
+    told = [run.statistics for run in runs]
+    kept = {name for name, (off, may) in page.deviations(row).items() if abs(off) <= may}
+    for word in kept:
+        signal = holds.SIGNALS[word][0]
+        off = holds.found_sigma(told, signal) / holds.printed_sigma(design, signal) - 1.0
+        error = holds.relative_error(design, signal, SHORT)
+        assert abs(off) <= max(holds.NEAR, SURE * error), word
+    near = {(one.signal, one.way) for one in page.extremes(row) if max(one.ratios) <= page.FARTHEST}
+    for word, way in near - {("power", "up")}:
+        most, values = holds.extremes_of(design, word, told, SHORT)[way]
+        assert max(values) <= page.FARTHEST * most, (word, way)
+    assert kept
+    assert told[0].value("saturated share") <= page.SATURATED
+    assert told[0].value("slack share") == 0.0
+    assert runs.tripped == 0
+    if page.growth(row) < 0.0:
+        grown = holds.growths(design)
+        assert max(float(value) for value in grown.values()) < 0.0
