@@ -97,6 +97,25 @@ def _largest_sea(problem: FamilyProblem, free: Tuning) -> Solution | None:
     return polished if excess <= _KEPT else None
 
 
+def larger_sea(
+    problem: FamilyProblem, values: FloatArray, drags: Sequence[float | None]
+) -> tuple[float, FloatArray] | None:
+    """Return the share of a sea that near parameters can do, and those; None if it is not found.
+
+    Parameters
+    ----------
+    problem
+        The problem in that sea.
+    values, drags
+        Searched parameters that keep its limits there, and drag coefficients [N s/m].
+    """
+    solved = settle(problem, values, drags, Goal.SEA, reference=values, extra=0.0)
+    if not solved.converged or not problem.stable(solved.values, solved.coefficients):
+        return None
+    polished, _, excess = polish(problem, solved, values, Goal.SEA)
+    return (float(np.exp(polished.extra)), polished.values) if excess <= _KEPT else None
+
+
 def _arrived(
     problem: FamilyProblem,
     begins: Sequence[FloatArray],

@@ -37,7 +37,7 @@ from ..search import KEPT, Found, Progress, polish, search, with_bests
 from ..structures import LowOrderFeedback, structures_aboard
 from .design import SWITCHING_LOSS, Design
 from .high_order import high_order_gains
-from .infeasible import Shortfall, shortfall
+from .infeasible import Shortfall, larger_sea, shortfall
 from .nested import WITHIN, gains_in_use, nested_starts, no_worse, starts_from
 from .tuning import LimitUse, Tuning, limit_uses, tuning_of
 
@@ -54,6 +54,8 @@ _ROUGHEST = 0.99  # of the largest sea that any structure can do
 _SHARE = 4  # of the starts that each of several structures has
 _RESUMED = 3  # ends of a search that the next one, on more masses, begins from
 _HAIR = 1e-4  # relative excess over a limit in the largest sea
+_ALIKE = 1e-3  # relative difference of two seas that are as large
+_CALMER_ROUNDS = 6  # of looking for parameters in the largest sea
 _CALMER = 3.0  # logarithm of what the largest sea may have to be calmer by, for the sensors' noise
 
 _D = TypeVar("_D", bound=Design)
@@ -359,7 +361,7 @@ def _best_possible(
         # The sea asked for is feasible after all: the search missed it, so it starts from there.
         found = search(posed.problem, 4, seed, [short.values], progress)
         return verified(_family_design(posed, tuning_of(posed.problem, found)), progress)
-    calm = _kept_in(posed, posed.first.named(short.values), short.share)
+    calm = _in_the_largest_sea(posed, short)
     height = calm.significant_height
     design = replace(
         calm,
@@ -376,23 +378,54 @@ def _best_possible(
     return replace(verified(design, progress), ok=False)
 
 
+def _in_the_largest_sea(posed: PosedFamily, short: Shortfall) -> Design:
+    """Return what the drive can do in the largest sea, with parameters for that.
+
+    The shortfall makes everything smaller that shakes the loop, but the noise of sensors does not
+    shrink with the sea.  Its parameters are kept in what sea they can; there, where the noise is
+    what it is, they are looked for again, until no larger sea is found.
+    """
+    values, share = np.array(short.values), short.share
+    found = _kept_in(posed, posed.first.named(short.values), share)
+    asked = posed.first.case.sea.significant_height
+    if found.significant_height > (1.0 - _ALIKE) * share * asked:
+        return found  # noise counts for nothing
+    for _ in range(_CALMER_ROUNDS):
+        there = _in_seas(posed, found.significant_height / asked)
+        pairs = zip(there.questions, (found, *found.members), strict=True)
+        drags = [None if question.drag is None else one.drag for question, one in pairs]
+        better = larger_sea(there.problem, values, drags)
+        if better is None or better[0] < 1.0 + _ALIKE:
+            break
+        share, values = better
+        found = _kept_in(there, posed.first.named([float(v) for v in values]), share)
+    return found
+
+
+def _in_seas(posed: PosedFamily, share: float) -> PosedFamily:
+    """Return a family in seas of a share of its own significant heights."""
+    questions = []
+    for question in posed.questions:
+        height = share * question.case.sea.significant_height
+        calmer = pose(
+            question.case.replace({"sea.significant_height": height}),
+            question.structure.name,
+            question.masses,
+            built_for=posed.first.case,
+        )
+        questions.append(replace(calmer, held=question.held))
+    return replace(posed, questions=tuple(questions))
+
+
 def _kept_in(posed: PosedFamily, parameters: Mapping[str, float], share: float) -> Design:
     """Return given parameters in seas near a share of those asked for that the drive can do.
 
-    The shortfall makes everything smaller that shakes the loop; but the noise of sensors does not
-    shrink with the sea, so that the sea may have to be calmer still.
+    The sea may have to be calmer than that, as the noise of sensors does not shrink with it.
     """
 
     def at(log_share: float) -> Design:
         designs = []
-        for question in posed.questions:
-            height = float(np.exp(log_share)) * question.case.sea.significant_height
-            calmer = pose(
-                question.case.replace({"sea.significant_height": height}),
-                question.structure.name,
-                question.masses,
-                built_for=posed.first.case,
-            )
+        for calmer in _in_seas(posed, float(np.exp(log_share))).questions:
             assessment = calmer.assess(parameters)
             uses = every_use(calmer, assessment, {})
             designs.append(recorded(calmer, parameters, assessment, uses, ok=False, status=""))

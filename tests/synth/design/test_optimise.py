@@ -10,7 +10,8 @@ import stillhook as sh
 from models import InputError, load_case
 from models.sensing import sensed_line_at
 from synth.design import evaluate_gains, optimise_gains, prepare
-from synth.question import PAYLOAD
+from synth.question import PAYLOAD, pose
+from synth.search import KEPT, search
 
 FED = {
     "drum.speed_gain": 0.0533,
@@ -126,6 +127,30 @@ def test_noise_does_not_shrink_with_the_largest_sea() -> None:
     assert max(used) == pytest.approx(1.0, abs=3e-4)
     noise = design.shares["motor.voltage"]["payload.velocity_noise"]
     assert noise > 0.02 * design.assessment.sigma("motor.voltage")
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("noise", [0.003, 0.01])
+def test_the_largest_sea_is_the_largest_in_which_a_search_keeps_the_limits(noise: float) -> None:
+    """The noise stays what it is: gains for a sea in which it were less keep a calmer one only."""
+    noisy = load_case("thesis-1975").replace(
+        {
+            "limits.drive": "enforce",
+            "sensors.payload.velocity_noise": noise,
+            "sea.significant_height": 4.0,
+        }
+    )
+    design = optimise_gains(noisy, "payload-feedback", starts=2)
+    assert not design.feasible
+    assert design.verification is not None
+    assert design.verification.ok
+    largest = design.significant_height
+    values = [design.parameters[name] for name in ("a", "a1", "a2")]
+    for share, kept in ((0.999, True), (1.004, False)):
+        sea = {"sea.significant_height": share * largest}
+        posed = pose(noisy.replace(sea), "payload-feedback")
+        found = search(posed.problem, 2, 0, [values])
+        assert (found.excess <= KEPT) == kept, share
 
 
 @pytest.mark.ci
