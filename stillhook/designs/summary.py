@@ -295,6 +295,9 @@ def facts(design: Design, *, bound: bool = True) -> list[tuple[str, str]]:
         rope = "one spring with all of the rope's mass at the payload"
     else:
         rope = f"{design.masses} masses along {quantity(case.rope.length, 'm', 4)}"
+    for what, stiffness in (("tip", case.crane.tip_stiffness), ("slings", case.rigging.stiffness)):
+        if stiffness is not None:
+            rope += f", {what} {quantity(stiffness, 'N/m')}"
     if case.rope.falls > 1:
         rope += f", {case.rope.falls} falls: tensions at the drum are those of each"
     if case.payload.fixed_drag is None:

@@ -99,6 +99,12 @@ def crane() -> Case:
     return load_case("subsea-crane").replace({"rope.masses": 5})
 
 
+def crane_of_two_falls() -> Case:
+    rig = {"crane.tip_stiffness": 3e6, "rigging.stiffness": 5e6, "rigging.block_mass": 3e3}
+    falls = {"rope.falls": 2, "winch.drum.radius": 1.07, "limits.drive": "report"}
+    return crane().replace(rig | falls)
+
+
 def stated_crane() -> Case:
     """The crane with a reference unit as makers state it."""
     unit = {"heave_filter_period": 200.0, "delay": 0.02, "gain_error": 0.02, "phase_error": 0.02}
@@ -120,6 +126,7 @@ QUESTIONS = {
     "crane, combined": (crane, "combined", COMBINED, CRANE, "payload.velocity_gain"),
     "crane, stated": (stated_crane, "combined", COMBINED, STATED, "payload.velocity_gain"),
     "crane, tension": (crane, "constant-tension", TENSION, CRANE, "tension.gain"),
+    "two falls, tension": (crane_of_two_falls, "constant-tension", TENSION, CRANE, "tension.gain"),
     "crane, corner": (crane, "combined", COMBINED, SLIGHT, "rolloff.corner"),
     "thesis, integral": (late_thesis, "payload-feedback-integral", INTEGRAL, PLANT, "a1"),
     "thesis, low order": (late_thesis, "low-order-2", LOW_ORDER, SLIGHT, "alpha1[1]"),
