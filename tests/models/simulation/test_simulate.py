@@ -20,8 +20,9 @@ from models.operation import Scenario, SineMotion, scenario_named
 from models.operation.profile import Move, Profile
 from models.plant import MEASUREMENTS, DriveLimits, PlantData
 from models.run import Run
-from models.sensing import HEARD, Measurement, sensed_plant
+from models.sensing import HEARD, Measurement, SensorModel, sensed_plant
 from models.simulation import Simulation, prepare, run_simulation
+from models.simulation.trips import trip_limits
 from synth.controllers import BrakeOn, LinearFeedback
 from synth.loop import closed_loop_poles
 from synth.structures import PayloadFeedback
@@ -580,6 +581,10 @@ def test_two_falls_run_as_one_line_of_twice_everything_on_half_the_drum() -> Non
         np.testing.assert_allclose(found[name], expected[name], rtol=1e-6, atol=1e-7, err_msg=name)
     np.testing.assert_allclose(2.0 * found["rope.tension"], expected["rope.tension"], rtol=1e-6)
     assert np.ptp(found["payload.displacement"]) > 0.1
+    hauls = [SensorModel.from_case(c, 0.02).haul_per_angle for c in (two, one)]
+    assert hauls[0] == pytest.approx(hauls[1], rel=1e-12)
+    # All rope is out when the load is half as deep.
+    assert [t.high for t in trip_limits(two) if t.kind == "rope-out"] == [1500.0]
 
 
 def test_a_hysteretic_rope_at_rest_stays_there() -> None:

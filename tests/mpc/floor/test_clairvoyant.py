@@ -339,3 +339,26 @@ def test_it_prints_as_a_tree() -> None:
     assert "cannot be held stiller than" in text
     assert text.count("\n") == 5
     assert "piqp" in text
+
+
+@pytest.mark.parametrize("masses", [1, 4])
+def test_tensions_of_two_falls_are_those_of_one_line(masses: int) -> None:
+    case = sh.load_case("subsea-crane").replace({"rigging.block_mass": 2e3})
+    radius, rope = case.drum_radius, case.rope
+    peak = {"limits.rope_tension_peak": None}
+    two = case.replace({"rope.falls": 2, "winch.drum.radius": radius, **peak})
+    one = case.replace(
+        {
+            "winch.drum.radius": 0.5 * radius,
+            "rope.axial_stiffness": 2.0 * rope.ea,
+            "rope.mass_per_length": 2.0 * rope.mass_per_length,
+            "rope.submerged_weight_per_length": 2.0 * rope.submerged_weight / rope.length,
+            **peak,
+        }
+    )
+    found, expected = (
+        record_plant(c, sample_time=0.05, drag=1e3, masses=masses) for c in (two, one)
+    )
+    for name in ("Phi", "Gamma", "tensions", "tension_feed", "static_tensions"):
+        mine, same = getattr(found, name), getattr(expected, name)
+        np.testing.assert_allclose(mine, same, rtol=1e-6, atol=1e-9 * np.abs(same).max())

@@ -80,7 +80,13 @@ def test_linear_plant_and_forces_together_are_the_nonlinear_plant(
         n, _ = stage.forces(y[None])
         found = winch.plant.A @ x + winch.plant.B[:, 0] * u + E @ w[:2]
         found += np.column_stack(list(stage.law.columns.values())) @ n[0]
-        true = np.asarray(plant.function(rest.x + x[:nx], rest.u + u, w, p)[0]).ravel()
+        rates, _, shown = plant.function(rest.x + x[:nx], rest.u + u, w, p)
+        true = np.asarray(rates).ravel()
+        if "load_cell.tension" in winch.plant.states:
+            cell = winch.plant.states.index("load_cell.tension")
+            line = float(shown[plant.outputs.index("rope.tension")]) - rest.tension
+            bandwidth = winch.case.sensors.load_cell.bandwidth
+            assert found[cell] == pytest.approx(bandwidth * (line - x[cell]), rel=1e-3, abs=1e4)
         slackened += int((n[0] > 1e5).sum())
         # What is left is the smoothing of a rope that goes slack.
         np.testing.assert_allclose(found[:nx], true, rtol=3e-4, atol=3e-4)
