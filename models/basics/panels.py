@@ -105,10 +105,12 @@ def cut_panels(
 ) -> list[tuple[float, float]]:
     """Cut the axis into panels: at the splits, at most `longest`, and short near the poles.
 
-    A panel's half-length is at most `clearance` times its distance from each pole.
+    A panel's half-length is at most `clearance` times its distance from each pole.  A pole that
+    lies farther from the axis than that of itself, such as a real one, needs no cut beside it.
     """
     first, last = axis.edges[0], axis.edges[-1]
-    cuts = {*axis.edges, *(p.real for p in marks)}
+    near = [p for p in marks if 0.5 * longest > clearance * p.imag]
+    cuts = {*axis.edges, *(p.real for p in near)}
     for omega in splits:
         value = check_range("quadrature", "splits", omega, low=0.0, unit="rad/s")
         if value > 0.0:
@@ -125,7 +127,7 @@ def cut_panels(
     done, panels = [], np.array(stack).reshape(-1, 2)
     while len(panels):
         half = 0.5 * (panels[:, 1] - panels[:, 0])
-        away = distance(panels[:, :1], panels[:, 1:], np.array(marks, dtype=np.complex128))
+        away = distance(panels[:, :1], panels[:, 1:], np.array(near, dtype=np.complex128))
         long = half > clearance * away.min(axis=1, initial=np.inf) * (1 + 1e-9)
         done += [(float(a), float(b)) for a, b in panels[~long]]
         middle = panels[long].mean(axis=1)

@@ -6,8 +6,8 @@ points, by back-substitution in the Schur form elsewhere::
     C (s I - A)^-1 B = sum_k c_k b_k / (s - lambda_k),  c_k = C v_k,  b_k = (V^-1 B)_k
 
 A conjugate pair is taken together, r/(s - lambda) + r*/(s - lambda*) =
-(2 Re(r) s - 2 Re(r lambda*)) / ((s - lambda)(s - lambda*)), so that the product is one of
-real residues.
+(2 Re(r) s - 2 Re(r lambda*)) / ((s - lambda)(s - lambda*)), so that all products are of real
+matrices; a real pole, of which a hysteretic rope's branches bring many, costs one division a point.
 """
 
 from __future__ import annotations
@@ -56,22 +56,41 @@ class Resolvent:
         poles, V, W = modes
         residues = (C @ V).T[:, :, None] * (W @ B)[:, None, :] * self._paths(C, B)
         residues = residues.reshape(len(poles), -1)
+        some = np.flatnonzero(residues.any(axis=0))  # no path leads elsewhere
         real, upper = np.flatnonzero(poles.imag == 0.0), np.flatnonzero(poles.imag > 0.0)
-        lower, above, pairs = upper + 1, poles[upper], residues[upper]  # LAPACK's order of pairs
-        nothing = _ROUNDING * np.abs(poles)
-        weights = np.concatenate(
-            [residues[real].real, 2.0 * pairs.real, -2.0 * (pairs * above.conj()[:, None]).real]
-        )
+        slow, pairs = residues[np.ix_(real, some)].real, residues[np.ix_(upper, some)]
+        at, above, width = poles[real].real, poles[upper], some.size
+        swing, on = 2.0 * pairs.real, 2.0 * (pairs * above.conj()[:, None]).real
+        plain = np.vstack([np.hstack([-slow, -at[:, None] * slow]), np.hstack([swing, -on])])
+        turned = np.hstack([swing, on])
+        nothing = _ROUNDING * np.abs(above)
+        near = (_ROUNDING * at) ** 2, (nothing * np.maximum(2.0 * above.imag, nothing)) ** 2
+
+        def some_of(points: ComplexArray) -> ComplexArray | None:
+            """1/(s - p) and 1/((s - lambda)(s - lambda*)) are conjugates over squares."""
+            x, y = points.real[:, None], points.imag[:, None]
+            right = x - above.real
+            across, along = right**2 + (above.imag - y) * (above.imag + y), 2.0 * y * right
+            size, sizes = (x - at) ** 2 + y**2, across**2 + along**2
+            if (size <= near[0]).any() or (sizes <= near[1]).any():
+                return None
+            both = np.concatenate([1.0 / size, across / sizes], axis=1) @ plain
+            twisted = (along / sizes) @ turned
+            found = np.empty((points.size, width), dtype=np.complex128)
+            found.real = y * twisted[:, :width] + both[:, width:]
+            found.imag = y * both[:, :width] + twisted[:, width:]
+            if x.any():
+                found += x * (both[:, :width] + 2.0 * (1.0 / size) @ slow)
+                found -= 1j * x * twisted[:, :width]
+            return found
 
         def transfer(s: ComplexArray) -> ComplexArray | None:
-            distance = s[:, None] - poles
-            if np.any(np.abs(distance) <= nothing):
-                return None
-            inverse = 1.0 / distance
-            both = inverse[:, upper] * inverse[:, lower]
-            kernel = np.concatenate([inverse[:, real], s[:, None] * both, both], axis=1)
-            found = np.empty((s.size, weights.shape[1]), dtype=np.complex128)
-            found.real, found.imag = kernel.real @ weights, kernel.imag @ weights
+            found = np.zeros((s.size, residues.shape[1]), dtype=np.complex128)
+            for start in range(0, s.size, _CHUNK):
+                own = some_of(s[start : start + _CHUNK])
+                if own is None:
+                    return None
+                found[start : start + _CHUNK, some] = own
             return found.reshape(s.size, len(C), B.shape[1])
 
         return transfer
@@ -93,8 +112,10 @@ class Resolvent:
 
     @cached_property
     def poles(self) -> ComplexArray:
-        """The eigenvalues of A, (n,)."""
-        found = np.asarray(np.linalg.eigvals(self.A), dtype=np.complex128)
+        """The eigenvalues of A, (n,): those of `modes` where they are at hand."""
+        modes = self.__dict__.get("modes")
+        found = np.linalg.eigvals(self.A) if modes is None else modes[0]
+        found = np.array(found, dtype=np.complex128)
         found.setflags(write=False)
         return found
 

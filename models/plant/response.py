@@ -77,19 +77,15 @@ class PlantResponse:
         InputError
             If a name is unknown.
         """
-        outputs = self.outputs if outputs is None else tuple(outputs)
-        disturbances = self.disturbances if disturbances is None else tuple(disturbances)
-        measurements = self.measurements if measurements is None else tuple(measurements)
-        z = pick("plant response", "output", self.outputs, outputs)
-        w = pick("plant response", "disturbance", self.disturbances, disturbances)
-        y = pick("plant response", "measurement", self.measurements, measurements)
-        return replace(
-            self,
-            zw=self.zw[:, z][:, :, w],
-            zu=self.zu[:, z],
-            yw=self.yw[:, y][:, :, w],
-            yu=self.yu[:, y],
-            outputs=tuple(outputs),
-            disturbances=tuple(disturbances),
-            measurements=tuple(measurements),
-        )
+        if outputs is not None:
+            z = pick("plant response", "output", self.outputs, outputs)
+            self = replace(self, zw=self.zw[:, z], zu=self.zu[:, z], outputs=tuple(outputs))
+        if disturbances is not None:
+            w = pick("plant response", "disturbance", self.disturbances, disturbances)
+            zw, yw = self.zw[:, :, w], self.yw[:, :, w]
+            self = replace(self, zw=zw, yw=yw, disturbances=tuple(disturbances))
+        if measurements is not None:
+            y = pick("plant response", "measurement", self.measurements, measurements)
+            yw, yu = self.yw[:, y], self.yu[:, y]
+            self = replace(self, yw=yw, yu=yu, measurements=tuple(measurements))
+        return self

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from copy import copy
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 
 import numpy as np
 
@@ -427,6 +427,7 @@ def consistent_coefficient(
         If no coefficient agrees: the loop is unstable with any drag.
     """
 
+    @cache
     def loop(coefficient: float) -> Assessment:
         return Assessment(
             plant, controller, disturbances, drag=drag, coefficient=coefficient, nodes=nodes
@@ -465,6 +466,7 @@ def consistent_coefficient(
                 raise
             # On the verge of stability no cut finds a peak, but it is known where it stands.
             nodes = partial(_known_nodes, disturbances)
+            loop.cache_clear()  # those are on no such nodes
     if found is None:
         # Nodes that do not adapt are as good for a loop with a little more drag, unless it is on
         # the verge of stability, where nothing but its own nodes sees how it swings.

@@ -129,4 +129,4 @@ def closed_loop_matrix(plant: LinearPlant, controller: LinearController) -> Floa
 
 def closed_loop_poles(plant: LinearPlant, controller: LinearController) -> ComplexArray:
     """Return the poles of the closed loop [1/s]; delays are ignored."""
-    return closed_loop_plant(plant, controller).poles()
+    return np.asarray(np.linalg.eigvals(closed_loop_matrix(plant, controller)), dtype=np.complex128)

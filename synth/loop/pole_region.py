@@ -9,6 +9,7 @@ models to be right.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -66,7 +67,16 @@ def with_delay_models(plant: LinearPlant) -> tuple[LinearPlant, ComplexArray]:
     late = max(plant.delays, default=0.0) > _LATE
     modelled = plant.without_delays(_LATE_PADE if late else _PADE)
     own = len(plant.states)  # those of the models come after them
-    return modelled, np.asarray(np.linalg.eigvals(modelled.A[own:, own:]), dtype=np.complex128)
+    models = modelled.A[own:, own:]
+    return modelled, _poles(models.tobytes(), len(models))
+
+
+@lru_cache(maxsize=64)
+def _poles(matrix: bytes, size: int) -> ComplexArray:
+    """Return the eigenvalues of delay models, (size,): a loop is closed many times with one."""
+    found = np.linalg.eigvals(np.frombuffer(matrix).reshape(size, size)).astype(np.complex128)
+    found.setflags(write=False)
+    return found
 
 
 def counted_poles(poles: ComplexArray, models: ComplexArray) -> tuple[BoolArray, BoolArray]:

@@ -150,6 +150,19 @@ def test_short_panels_get_few_nodes():
     assert len(spectral_nodes(0.25, 60.0, splits=rows, per_panel=8)) < len(q)
 
 
+def test_a_pole_far_from_the_axis_costs_no_nodes():
+    """Real poles, of which a hysteretic rope has a hundred: their panels are short enough."""
+    plain = spectral_nodes(0.25, 60.0)
+    decaying = spectral_nodes(0.25, 60.0, poles=-np.geomspace(0.5, 50.0, 40))
+    np.testing.assert_array_equal(decaying.omega, plain.omega)
+    corner = 5.0
+    known = spectral_nodes(0.25, 60.0, poles=[-corner])
+    want = (np.arctan(60.0 / corner) - np.arctan(0.25 / corner)) * corner
+    assert known.integrate(1.0 / (1.0 + (known.omega / corner) ** 2)) == pytest.approx(want, 1e-9)
+    light = spectral_nodes(0.25, 60.0, poles=[complex(-0.05, 5.0)])
+    assert len(light) > len(plain)
+
+
 def test_splits_on_and_beyond_the_ends_are_harmless():
     plain = spectral_nodes(0.5, 2.0)
     odd = spectral_nodes(0.5, 2.0, splits=[0.0, 0.5, 2.0, 7.0, 0.1])

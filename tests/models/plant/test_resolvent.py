@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from plant_numbers import MODERN
+from scipy.linalg import matrix_balance
 
-from models.plant import LinearPlant
+from models.plant import LinearPlant, build_plant
 from models.plant.resolvent import Resolvent
 
 POINTS = np.concatenate([1j * np.geomspace(1e-2, 1e3, 60), [0.3 + 2.0j, -0.4 + 1e-3j, -0.05j]])
@@ -22,6 +26,24 @@ def chain(masses: int, damping: float = 1e-3) -> np.ndarray:
     return np.block([[np.zeros((masses, masses)), np.eye(masses)], [-100.0 * K, -damping * K]])
 
 
+def branched(masses: int, corners: tuple[float, ...] = (2.0, 20.0, 200.0, 2000.0)) -> np.ndarray:
+    """The chain with springs that relax: states that hear the masses, and not each other."""
+    A, count = chain(masses, 0.0), len(corners)
+    eye, held = np.eye(masses), np.kron(np.ones((1, count)), A[masses:, :masses])
+    return np.block(
+        [
+            [
+                A + np.kron([[0.0, 0.0], [4e-3, 0.0]], A[masses:, :masses]),
+                np.vstack([0 * held, -1e-3 * held]),
+            ],
+            [
+                np.kron(np.diag(corners) @ np.ones((count, 1)), np.hstack([eye, 0 * eye])),
+                np.kron(-np.diag(corners), eye),
+            ],
+        ]
+    )
+
+
 def signals(n: int) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(3)
     return rng.normal(size=(3, n)), rng.normal(size=(n, 2))
@@ -32,11 +54,12 @@ def signals(n: int) -> tuple[np.ndarray, np.ndarray]:
     [
         np.random.default_rng(5).normal(size=(9, 9)) - 4.0 * np.eye(9),
         chain(15),
+        branched(15),
         np.diag([-1.0, -2.0, -3.0]) + 0.1,
         np.array([[0.0, 1.0], [-4.0, 0.0]]),
         np.diag([0.0, -1.0]),
     ],
-    ids=["random", "chain", "real", "undamped", "integrator"],
+    ids=["random", "chain", "branched", "real", "undamped", "integrator"],
 )
 def test_modes_give_what_a_solve_gives(A: np.ndarray) -> None:
     C, B = signals(len(A))
@@ -91,6 +114,21 @@ def test_plants_with_the_same_poles_share_one_decomposition() -> None:
     both = plant.response(omega)
     np.testing.assert_allclose(some.response(omega).zw, both.zw[:, 2:], rtol=1e-13)
     np.testing.assert_allclose(some.response(omega).yu, both.yu[:, 1:], rtol=1e-13)
+
+
+def test_a_hysteretic_rope_answers_as_the_dense_resolvent_does() -> None:
+    """Sixty branches: nearly as many real poles, in four heaps."""
+    rope = replace(MODERN, damping_law="hysteretic", damping_ratio=0.002, masses=15)
+    plant = build_plant(rope).linearise(drag=1e4)
+    assert np.count_nonzero(plant.poles().imag == 0.0) >= 60
+    C, B = np.vstack([plant.C, plant.Cz]), np.hstack([plant.B, plant.E])
+    found = plant.resolvent.between(C, B)(POINTS.astype(complex))
+    assert found is not None
+    A, (scale, _) = matrix_balance(plant.A, permute=False, separate=True)
+    want = dense(A, C * scale, B / scale[:, None])  # a solve wants equal units
+    # Towards zero, where the drum's angle integrates, neither has that many digits.
+    found, want = found[np.abs(POINTS) > 0.1], want[np.abs(POINTS) > 0.1]
+    assert np.all(np.abs(found - want) <= 1e-9 * np.abs(want).max(axis=0))
 
 
 def test_what_is_not_connected_is_not_heard_at_all() -> None:
