@@ -18,6 +18,8 @@ import numpy.typing as npt
 from .arrays import ComplexArray, FloatArray
 from .checks import InputError, check_range
 
+_HEAP = 0.03  # how far apart on the axis poles may be that count as one cut
+
 
 class FrequencyAxis:
     """The axis t on which panels live: t = ln(omega / low), continued smoothly to 0 and infinity.
@@ -105,12 +107,18 @@ def cut_panels(
 ) -> list[tuple[float, float]]:
     """Cut the axis into panels: at the splits, at most `longest`, and short near the poles.
 
-    A panel's half-length is at most `clearance` times its distance from each pole.  A pole that
-    lies farther from the axis than that of itself, such as a real one, needs no cut beside it.
+    A panel's half-length is at most `clearance` times its distance from each pole.  Of poles in a
+    heap far from the axis, such as the real ones of a rope's many pieces, one makes a cut.
     """
     first, last = axis.edges[0], axis.edges[-1]
+    far = sorted(p.real for p in marks if 0.5 * longest <= clearance * p.imag)
     near = [p for p in marks if 0.5 * longest > clearance * p.imag]
     cuts = {*axis.edges, *(p.real for p in near)}
+    heap = -math.inf
+    for t in far:
+        if t - heap > _HEAP:
+            heap = t
+            cuts.add(t)
     for omega in splits:
         value = check_range("quadrature", "splits", omega, low=0.0, unit="rad/s")
         if value > 0.0:
