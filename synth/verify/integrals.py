@@ -1,8 +1,8 @@
 """Integrals over frequency by other panels than the optimiser's, for the verification.
 
-The optimiser integrates with `models.basics.quadrature`, panel by panel.  Here the band is cut into
-panels of another kind and all of them are integrated at once, over a common coordinate from 0
-to 1, by a pair of Gauss rules whose difference says where that coordinate has to be halved.
+The optimiser integrates with `models.basics.quadrature`, by longer and longer rules on each panel.
+Here the band is cut into panels of another kind, all of them are integrated at once by a pair of
+Gauss rules, and those are halved where the two differ.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from models.basics import ComplexArray, FloatArray, SolverError
+from models.basics import BoolArray, ComplexArray, FloatArray, SolverError
 
-_INTERVALS = 40  # of the common coordinate, each with 22 nodes on every panel
+_PIECES = 40  # of each panel at most, on average, with 22 nodes each
 _PANELS_PER_DECADE = 4.0
 _RINGING = 1e-7  # accuracy of integrals to infinity
 _RULES = [np.polynomial.legendre.leggauss(count) for count in (15, 7)]
@@ -29,7 +29,7 @@ def integrate(
     rtol: float,
     tail_panels: int = 0,
 ) -> FloatArray:
-    """Return integrals over frequency, (m,), on all panels at once.
+    """Return integrals over frequency, (m,).
 
     Parameters
     ----------
@@ -49,52 +49,54 @@ def integrate(
         If it does not converge: the integral does not exist, or an integrand is wild.
     """
     half_line = tail_panels > 0
-    left = np.append(0.0, edges[:-1]) if half_line else edges[:-1]
+    start = np.append(0.0, edges[:-1]) if half_line else edges[:-1]
     width = np.diff(np.append(0.0, edges) if half_line else edges)
     # The tail in v = 1/omega.
     step = 1.0 / (max(1, tail_panels) * float(edges[-1]))
-    tail = step * np.arange(float(tail_panels))
+    start = np.append(start, step * np.arange(float(tail_panels)))
+    width = np.append(width, np.full(tail_panels, step))
+    ends = np.arange(start.size) >= start.size - tail_panels
 
-    def measured(spans: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the integrals over spans of t, (k, 2), and their errors, (k, m) each."""
+    def measured(spans: FloatArray, turned: BoolArray) -> tuple[FloatArray, FloatArray]:
+        """Return the integrals over spans of omega or v, (k, 2), and their errors, (m, k) each."""
         middle, half = spans.mean(axis=1), 0.5 * np.diff(spans)
-        t = (middle[:, None] + half * _NODES).reshape(-1, 1)
-        v = tail + t * step
-        omega = np.hstack([left + t * width, 1.0 / v])
-        weight = np.hstack([np.tile(width, (t.size, 1)), step / v**2])
-        values = np.asarray(density(omega.ravel())).reshape(-1, *omega.shape)
-        sums = np.einsum("mtp,tp->mt", values, weight).reshape(len(values), len(spans), -1)
-        fine, coarse = ((half.T * (sums @ weights)).T for weights in (_FINE, _COARSE))
+        at = middle[:, None] + half * _NODES
+        omega = np.where(turned[:, None], 1.0 / at, at)
+        weight = half * np.where(turned[:, None], omega**2, 1.0)
+        values = np.asarray(density(omega.ravel())).reshape(-1, *omega.shape) * weight
+        fine, coarse = values @ _FINE, values @ _COARSE
         return fine, np.abs(fine - coarse)
 
-    spans = np.array([[0.0, 1.0]])
-    sums, errors = measured(spans)
-    scale = np.where(sums[0] > 0.0, sums[0], 1.0)
+    spans = np.column_stack([start, start + width])
+    sums, errors = measured(spans, ends)
+    most = _PIECES * len(spans)
     # What is left of the ringing is far below the accuracy that it makes hard to prove.
     wanted = max(rtol, _RINGING) if half_line else rtol
     while True:
+        whole = sums.sum(axis=1, keepdims=True)
         # The difference is the coarser rule's error; what the finer one's is, QUADPACK says so.
-        relative = (errors / scale).max(axis=1)
+        relative = (errors / np.where(whole > 0.0, whole, 1.0)).max(axis=0)
         left_over = np.minimum(relative, (200.0 * relative) ** 1.5)
         if left_over.sum() <= wanted or not np.all(np.isfinite(sums)):
             break
         cut = left_over > 0.5 * wanted / len(spans)
-        if len(spans) + cut.sum() > _INTERVALS:
+        if len(spans) + cut.sum() > most:
             break
         middle = spans[cut].mean(axis=1)
         halves = np.concatenate(
             [np.column_stack([spans[cut, 0], middle]), np.column_stack([middle, spans[cut, 1]])]
         )
-        new = measured(halves)
+        new = measured(halves, np.tile(ends[cut], 2))
         spans = np.concatenate([spans[~cut], halves])
+        ends = np.concatenate([ends[~cut], np.tile(ends[cut], 2)])
         sums, errors = (
-            np.concatenate([old[~cut], found])
+            np.concatenate([old[:, ~cut], found], axis=1)
             for old, found in zip((sums, errors), new, strict=True)
         )
     missed = left_over.sum() > (100.0 * wanted if half_line else wanted)
     if missed or not np.all(np.isfinite(sums)):
         raise SolverError("verification: the quadrature of a spectral integral does not converge")
-    return np.asarray(sums.sum(axis=0), dtype=np.float64)
+    return np.asarray(sums.sum(axis=1), dtype=np.float64)
 
 
 def panels(

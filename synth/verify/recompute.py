@@ -2,8 +2,8 @@ r"""A closed loop computed a second time, by other formulas than those that desi
 
 The optimiser closes the loop by hand-written elimination on its nodes and integrates with
 `models.basics.quadrature`.  Here the loop is closed by LAPACK on stacked matrices, spectra are
-integrated on all panels at once (`synth.verify.integrals`), and white noise goes through a Lyapunov
-equation.  Only the plant's own responses and matrices are common to both.
+integrated by other rules on other panels (`synth.verify.integrals`), and white noise goes through a
+Lyapunov equation.  Only the plant's own responses and matrices are common to both.
 """
 
 from __future__ import annotations
@@ -166,8 +166,8 @@ def moments(
 ) -> dict[str, tuple[float, ...]]:
     """Return spectral moments of closed-loop outputs, m_n = integral of omega^n S.
 
-    The band is cut into panels, none longer than twice its distance from a pole, and
-    all panels are integrated at once over a common coordinate from 0 to 1.
+    The band is cut into panels, none longer than twice its distance from a pole; see
+    `synth.verify.integrals`.
 
     Parameters
     ----------
