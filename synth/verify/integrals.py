@@ -14,6 +14,7 @@ import numpy as np
 from models.basics import BoolArray, ComplexArray, FloatArray, SolverError
 
 _PIECES = 40  # of each panel at most, on average, with 22 nodes each
+_HALVINGS = 40  # of any panel at most: what has no integral has none at its end either
 _PANELS_PER_DECADE = 4.0
 _RINGING = 1e-7  # accuracy of integrals to infinity
 _RULES = [np.polynomial.legendre.leggauss(count) for count in (15, 7)]
@@ -72,7 +73,7 @@ def integrate(
     most = _PIECES * len(spans)
     # What is left of the ringing is far below the accuracy that it makes hard to prove.
     wanted = max(rtol, _RINGING) if half_line else rtol
-    while True:
+    for _ in range(_HALVINGS):
         whole = sums.sum(axis=1, keepdims=True)
         # The difference is the coarser rule's error; what the finer one's is, QUADPACK says so.
         relative = (errors / np.where(whole > 0.0, whole, 1.0)).max(axis=0)
