@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from former_cases import load_case
 
-from models import load_case
 from synth import evaluate_gains
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"

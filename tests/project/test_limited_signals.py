@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from former_cases import load_case
 
 import stillhook as sh
 from models.spread import Spread
@@ -41,7 +42,7 @@ def design() -> Design:
         "rope.sheave_efficiency": SHEAVE,
         "rope.skin_drag_coefficient": 0.02,
     }
-    case = sh.load_case("subsea-crane").replace(changes)
+    case = load_case("subsea-crane").replace(changes)
     return sh.evaluate_gains(case, GAINS, structure="combined")
 
 
@@ -133,7 +134,7 @@ def test_operability_ends_where_the_design_says(design: Design, name: str, path:
 def test_a_dc_motor_holds_the_loss_in_current_and_voltage() -> None:
     gear = {"winch.gearbox.efficiency": 0.9, "winch.motor.coulomb_friction": FRICTION}
     gear |= {"rope.sheaves": 1, "rope.sheave_efficiency": SHEAVE}
-    case = sh.load_case("thesis-1975").replace({**gear, "limits.exceedance": EXCEEDANCE})
+    case = load_case("thesis-1975").replace({**gear, "limits.exceedance": EXCEEDANCE})
     found = sh.evaluate_gains(case, case.gains)
     loop, motor = found.assessment, case.winch.motor
     mean, loss = torques(case)

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from former_cases import load_case
 
-from models import Case, load_case
+from models import Case
 from models.basics import wave_number
 from models.vessel import VesselRaos
 from models.vessel.readers import write_raos
@@ -65,6 +66,7 @@ def barge_case(folder: Path, *, headings: int = 24, **changes: Any) -> Case:
     vessel |= {key.removeprefix("vessel_"): v for key, v in changes.items() if "vessel_" in key}
     other = {key: value for key, value in changes.items() if "vessel_" not in key}
     wanted = {f"vessel.{key}": value for key, value in vessel.items()}
+    wanted["winch.motor.kind"] = "induction"  # stated, or who loads its file is told
     return load_case("subsea-crane").replace(
         wanted | {k.replace("__", "."): v for k, v in other.items()}
     )

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 
-from models import load_case
+from former_cases import load_case
+
 from models.case import Case
 from synth import Design, evaluate_gains
 from synth.design import LimitUse

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from models import Case, load_case
+from former_cases import load_case
+
+from models import Case
 from mpc.linear import LinearMPC
 from mpc.winch import ProcessNoise, Weights
 

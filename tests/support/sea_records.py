@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 import numpy.typing as npt
+from former_cases import load_case
 
 import models
 from models.case import Case
@@ -57,7 +58,7 @@ def sea(name: str) -> Sea:
     with warnings.catch_warnings():
         # That the spectrum reaches beyond the table of the vessel is not the matter here.
         warnings.simplefilter("ignore", models.PhysicsWarning)
-        case = models.load_case("subsea-crane" if name == "crane" else "thesis-1975")
+        case = load_case("subsea-crane" if name == "crane" else "thesis-1975")
         hook = HookMotion.from_case(case)
     if name in ("1 %", "5 %"):
         sensors = case.sensors.model_copy(update={"mru": white(0.01 if name == "1 %" else 0.05)})

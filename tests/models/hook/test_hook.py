@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from former_cases import load_case
 
-from models import load_case
 from models.basics import (
     InputError,
     PhysicsWarning,

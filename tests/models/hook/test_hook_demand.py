@@ -10,10 +10,11 @@ import warnings
 import numpy as np
 import pytest
 from barge import barge_case
+from former_cases import load_case
 from hypothesis import given
 from hypothesis import strategies as st
 
-from models import InputError, load_case
+from models import InputError
 from models.basics import PhysicsWarning, fractile_factor, peak_factor
 from models.hook import HookDemand, HookMotion, hook_motion
 

@@ -9,13 +9,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from former_cases import load_case
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly
 from scipy.spatial.transform import Rotation
 from still_motion import StillMotion
 
-from models import InputError, PhysicsWarning, load_case
+from models import InputError, PhysicsWarning
 from models.operation import RecordMotion, SineMotion, SpectrumMotion
 from models.operation.contact_scenarios import boat_motion, surface_motion
 from models.operation.excitation import (

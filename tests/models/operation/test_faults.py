@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from former_cases import load_case
 from hypothesis import given
 from hypothesis import strategies as st
 
-import stillhook as sh
 from models.basics import KINDS, InputError
 from models.operation import FAULTS, PREFIX, Scenario, fault_of, scenario_named, with_faults
 from models.rig import MRU, Telemetry
@@ -17,7 +17,7 @@ from stillhook.runs import simulate
 from stillhook.sweeps import fault_spread, usual_spread
 from stillhook.sweeps.usual import FAULT_SPREADS
 
-CASE = sh.load_case("subsea-crane")
+CASE = load_case("subsea-crane")
 HOLD = scenario_named("hold", CASE)
 
 

@@ -9,11 +9,12 @@ import warnings
 
 import numpy as np
 import pytest
+from former_cases import load_case
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from still_motion import StillMotion
 
-from models import InputError, PhysicsWarning, build_plant, load_case
+from models import InputError, PhysicsWarning, build_plant
 from models.operation import (
     Scenario,
     Schedule,

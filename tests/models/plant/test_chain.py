@@ -9,9 +9,10 @@ import casadi as ca
 import numpy as np
 import pytest
 import scipy.linalg
+from former_cases import load_case
 from plant_numbers import MODERN, THESIS
 
-from models import Case, InputError, load_case
+from models import Case, InputError
 from models.plant import DrumTravel, PlantData, build_plant, line_response, rope_transfers
 
 RIG = {"tip_stiffness": 3e6, "sling_stiffness": 5e6, "block_mass": 4e3, "block_weight": 34e3}

@@ -7,8 +7,9 @@ import math
 import casadi as ca
 import numpy as np
 import pytest
+from former_cases import load_case
 
-from models import Case, InputError, load_case
+from models import Case, InputError
 from models.plant import DriveLimits, PlantData
 from models.plant.drive import motor_equations
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from former_cases import load_case
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from plant_numbers import MODERN, THESIS
 
-from models import load_case
 from models.plant import (
     PlantData,
     build_plant,

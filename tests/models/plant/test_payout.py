@@ -5,12 +5,12 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
+from former_cases import load_case
 from hypothesis import given
 from hypothesis import strategies as st
 from one_run import simulate
 from still_motion import StillMotion
 
-from models import load_case
 from models.operation import Scenario, scenario_named
 from models.operation.profile import Move, Profile
 from models.plant import DrumTravel

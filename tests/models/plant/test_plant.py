@@ -8,6 +8,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from former_cases import load_case
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
@@ -23,7 +24,7 @@ from plant_numbers import (
     thesis_transfer,
 )
 
-from models import bundled_cases, load_case
+from models import bundled_cases
 from models.basics import InputError, SolverError
 from models.plant import PlantData, build_plant, fixed_top_modes
 from models.plant.plant_data import as_plant_data

@@ -7,11 +7,12 @@ import math
 import casadi as ca
 import numpy as np
 import pytest
+from former_cases import load_case
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from models import InputError, build_plant, load_case
+from models import InputError, build_plant
 from models.plant import Deck, Seabed, SplashZone, Surroundings
 
 NAMES = ("force", "mass", "drag_factor", "relative_velocity")

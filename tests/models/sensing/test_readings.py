@@ -7,8 +7,9 @@ import math
 import control
 import numpy as np
 import pytest
+from former_cases import load_case
 
-from models import Case, InputError, load_case
+from models import Case, InputError
 from models.plant import LinearPlant
 from models.sensing import (
     HEARD,

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from former_cases import load_case
 
-from models import Case, load_case
+from models import Case
 from models.basics import InputError, White
 from models.hook import HookMotion
 from models.plant import PlantData, build_plant

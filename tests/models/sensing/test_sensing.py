@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 import scipy.integrate
 import scipy.stats
+from former_cases import load_case
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models import InputError, load_case
+from models import InputError
 from models.rig import MRU, Encoder, LoadCell, PayloadSensor, Telemetry
 from models.sensing import HEARD, NOISE, MruModel, SensorModel, TelemetrySchedule
 from models.sensing.sensing import RAW

@@ -8,11 +8,12 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
+from former_cases import load_case
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from models import InputError, Plant, PlantData, build_plant, load_case
+from models import InputError, Plant, PlantData, build_plant
 from models.simulation.integrate import (
     StepChoice,
     choose_step,

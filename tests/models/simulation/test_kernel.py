@@ -21,11 +21,12 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
+from former_cases import load_case
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from models import InputError, SolverError, build_plant, load_case
+from models import InputError, SolverError, build_plant
 from models.simulation import Kernel
 from models.simulation.compiler import find_compiler, load_library
 from models.simulation.integrate import hermite_midpoint, rk4_step

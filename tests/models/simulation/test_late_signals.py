@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from former_cases import load_case
 
-from models import Case, HookMotion, load_case
+from models import Case, HookMotion
 from models.plant import DriveLimits
 from models.sensing import sensed_plant, sensed_spectra
 from models.simulation import SimulationOptions, prepare, run_simulation

@@ -10,12 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from former_cases import load_case
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from one_run import simulate
 from still_motion import StillMotion
 
-from models import Case, InputError, PhysicsWarning, build_plant, load_case
+from models import Case, InputError, PhysicsWarning, build_plant
 from models.operation import Scenario, SineMotion, scenario_named
 from models.operation.profile import Move, Profile
 from models.plant import MEASUREMENTS, DriveLimits, PlantData

@@ -13,9 +13,10 @@ import math
 
 import numpy as np
 import pytest
+from former_cases import load_case
 from sampled_response import sampled_response
 
-from models import Case, HookMotion, build_plant, load_case
+from models import Case, HookMotion, build_plant
 from models.plant import DriveLimits
 from models.simulation import SimulationOptions, prepare, run_simulation
 from synth import evaluate_gains

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
+from former_cases import load_case
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from models import load_case
 from models.basics import InputError
 from models.case import Case
 from models.spread import (

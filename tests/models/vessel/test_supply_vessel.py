@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from former_cases import load_case
 from scipy.interpolate import CubicSpline
 
-from models import load_case
 from models.basics import peak_factor
 from models.hook import HookDemand, HookMotion, hook_motion
 from models.vessel import heave_operators, vessel_raos

@@ -7,6 +7,7 @@ from pathlib import Path
 import cvxpy as cp
 import numpy as np
 import pytest
+from former_cases import load_case
 from one_run import simulate
 
 import stillhook as sh
@@ -20,7 +21,7 @@ from mpc.floor.qp import solve_record
 
 
 def case_at(height: float, name: str = "thesis-1975") -> sh.Case:
-    return sh.load_case(name).replace({"sea.significant_height": height})
+    return load_case(name).replace({"sea.significant_height": height})
 
 
 def record_of(case: sh.Case, duration: float, seed: int, step: float = 0.05) -> Motion:
@@ -343,7 +344,7 @@ def test_it_prints_as_a_tree() -> None:
 
 @pytest.mark.parametrize("masses", [1, 4])
 def test_tensions_of_two_falls_are_those_of_one_line(masses: int) -> None:
-    case = sh.load_case("subsea-crane").replace({"rigging.block_mass": 2e3})
+    case = load_case("subsea-crane").replace({"rigging.block_mass": 2e3})
     radius, rope = case.drum_radius, case.rope
     peak = {"limits.rope_tension_peak": None}
     two = case.replace({"rope.falls": 2, "winch.drum.radius": radius, **peak})

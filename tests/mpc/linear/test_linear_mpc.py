@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cvxpy_programme import oracle
+from former_cases import load_case
 from mpc_cases import WEIGHTS, case_of, controller_of
 from sea_predictor import SeaPredictor
 
@@ -565,7 +566,7 @@ def test_bad_arguments_get_one_clear_sentence(options, text):
 
 def test_moves_stay_below_the_breakdown_torque_at_the_planned_speeds() -> None:
     base = 60.0
-    case = sh.load_case("subsea-crane").variant(
+    case = load_case("subsea-crane").variant(
         {"winch.motor.kind": "induction", "winch.motor.base_speed": base}
     )
     controller = LinearMPC(case, weights=WEIGHTS["subsea-crane"])

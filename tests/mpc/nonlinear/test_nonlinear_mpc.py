@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
+from former_cases import load_case
 from ipopt_programme import nlp_oracle
 from one_sample import advanced
 
@@ -27,12 +28,12 @@ WEIGHTS = Weights(torque=0.02, noise=ProcessNoise(force=0.1, torque=0.02, rope=0
 
 @pytest.fixture(scope="module")
 def thesis() -> sh.Case:
-    return sh.load_case("thesis-1975")
+    return load_case("thesis-1975")
 
 
 @pytest.fixture(scope="module")
 def crane() -> sh.Case:
-    return sh.load_case("subsea-crane")
+    return load_case("subsea-crane")
 
 
 def a_sea(controller: LinearMPC, size: float, seed: int) -> FloatArray:
@@ -60,7 +61,7 @@ FALLS = {"rope.falls": 2, "winch.drum.radius": 1.07}
 def test_linear_plant_and_forces_together_are_the_nonlinear_plant(
     name: str, rig: dict[str, float]
 ) -> None:
-    winch = sampled_winch(sh.load_case(name).replace(rig))
+    winch = sampled_winch(load_case(name).replace(rig))
     plant = build_plant(winch.data, winch.masses)
     law = force_law(winch, slack=range(len(plant.chain)))
     stage = make_stage(winch, law, compiled=False)
@@ -109,7 +110,7 @@ def test_derivatives_of_the_forces_are_finite_differences(crane: sh.Case) -> Non
 
 def sample_errors(name: str, sample_time: float) -> tuple[float, float]:
     """Errors of one sample beside fine steps of the plant, with its forces and without."""
-    winch = sampled_winch(sh.load_case(name), sample_time=sample_time)
+    winch = sampled_winch(load_case(name), sample_time=sample_time)
     data = replace(PlantData.from_case(winch.case), sensor_bandwidth=math.inf)
     plant = build_plant(data, winch.masses)
     rest, T, p = plant.operating_point(MEAN_LOSSES), winch.sample_time, plant.parameter_vector()
@@ -191,7 +192,7 @@ def test_a_mean_at_the_peak_is_asked_for_beyond_it() -> None:
 
 @pytest.mark.parametrize("name", ["thesis-1975", "subsea-crane"])
 def test_without_nonlinearities_it_is_the_linear_controller(name: str) -> None:
-    case = sh.load_case(name)
+    case = load_case(name)
     # A linear programme has the power as bounds about the last plan.
     limits = replace(DriveLimits.from_case(case), power=math.inf)
     linear = LinearMPC(case, weights=WEIGHTS, limits=limits)
@@ -257,7 +258,7 @@ def test_condensed_linearisation_is_the_slope_of_a_simulation(thesis: sh.Case) -
     [("thesis-1975", 5, 1.0), ("thesis-1975", 8, 2.0), ("subsea-crane", 6, 0.3)],
 )
 def test_converged_iterations_are_ipopts_answer(name: str, seed: int, size: float) -> None:
-    case = sh.load_case(name)
+    case = load_case(name)
     controller = NonlinearMPC(case, weights=WEIGHTS, horizon=2.0, masses=1, minimum_tension=0.0)
     chi = a_sea(controller, size, seed)
     moves = controller.optimise(chi)

@@ -11,6 +11,7 @@ import signal
 import numpy as np
 import pytest
 from designs import thesis_design
+from former_cases import load_case
 from shown import terminal_text
 
 import stillhook as sh
@@ -26,7 +27,7 @@ from stillhook.comparison.store import STORE
 from stillhook.controllers import CONTENDERS, DEFAULTS, StoredDesign, contenders_of
 from synth.controllers import LinearFeedback
 
-CASE = sh.load_case("thesis-1975").replace({"sea.significant_height": 0.5})
+CASE = load_case("thesis-1975").replace({"sea.significant_height": 0.5})
 NOISY = CASE.replace({"sensors.mru": {"noise_floor": 0.02, "delay": 0.1}})
 FAST = {"seeds": 2, "duration": 30.0, "traces": False}
 
@@ -287,7 +288,7 @@ def test_a_process_that_dies_costs_its_own_runs_only_and_is_tried_twice(monkeypa
 
 
 def test_a_contender_that_cannot_take_part_is_a_row_with_its_reason():
-    case = sh.load_case("subsea-crane")
+    case = load_case("subsea-crane")
     found = sh.compare(
         case, ["none", "thesis", ("unmade", unmade), ("clumsy", clumsy)], jobs=1, **FAST
     )

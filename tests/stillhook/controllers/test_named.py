@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from former_cases import load_case
 
-from models import load_case
 from models.basics import InputError
 from models.plant import MEAN_LOSSES, build_plant
 from models.sensing import HEARD, Measurement

@@ -16,9 +16,10 @@ from designs import (
     thesis_design,
     unstable_design,
 )
+from former_cases import load_case
 
 import stillhook as sh
-from models import InputError, load_case
+from models import InputError
 from stillhook.designs.report import design_report
 from stillhook.designs.summary import (
     command_text,
@@ -74,7 +75,7 @@ def test_everything_is_written_and_listed(report):
 
 def test_the_parts_load_again(report):
     folder, _ = report
-    assert sh.load_case(folder / "case.yaml") == thesis_design().case
+    assert load_case(folder / "case.yaml") == thesis_design().case
     assert sh.load_design(folder / "design.yaml").payload_rms == thesis_design().payload_rms
     for name in FIGURES:
         assert ET.parse(folder / f"{name}.svg").getroot().tag.endswith("svg")

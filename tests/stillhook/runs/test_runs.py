@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 import pytest
 from designs import thesis_design
+from former_cases import load_case
 from scipy import stats
 
 import stillhook as sh
@@ -27,7 +28,7 @@ THESIS = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
 
 @cache
 def calm() -> sh.Case:
-    return sh.load_case("thesis-1975").replace({"sea.significant_height": 0.3})
+    return load_case("thesis-1975").replace({"sea.significant_height": 0.3})
 
 
 @cache
@@ -166,7 +167,7 @@ def test_lock_is_watched_at_the_significant_height_of_the_hook():
 
 def test_the_error_before_touchdown_is_that_of_the_traces():
     runs = sh.simulate(
-        sh.load_case("landing"),
+        load_case("landing"),
         "feed-forward",
         scenario="landing",
         options={"height": 3.0, "stop": 2.0},
@@ -186,7 +187,7 @@ def test_the_error_before_touchdown_is_that_of_the_traces():
 
 def test_a_lift_is_made_with_the_weight_in_air(monkeypatch):
     # The controller's static command is that of the lift, not of the case: the load would fall.
-    case = sh.load_case("thesis-1975")
+    case = load_case("thesis-1975")
     lift = scenario_named("lift-off", case)
     made = []
 
@@ -409,7 +410,7 @@ def test_a_snap_load_is_told_on_more_masses_too() -> None:
         "payload.submerged_weight": 60e3,
         "sea.significant_height": 3.2,
     }
-    case = sh.load_case("subsea-crane").replace(light)
+    case = load_case("subsea-crane").replace(light)
     runs = sh.simulate(case, "none", seeds=[1, 2], duration=600.0, masses=7)
     calm, snapped = runs
     assert "snap load on more masses" not in calm.statistics.quantities

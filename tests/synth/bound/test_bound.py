@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from bound_check import verify_bound, weighted_rms
+from former_cases import load_case
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -17,7 +18,6 @@ from models.basics import InputError, SynthesisError, White
 from models.plant import LinearPlant
 from models.sea import SeaSpectrum
 from models.sensing import MEASURED
-from stillhook import load_case
 from synth.bound import Bound, bound_for
 from synth.bound.bound import lqg_bound
 from synth.bound.case import rms_limits

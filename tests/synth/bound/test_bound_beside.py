@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 from bound_check import verify_bound
+from former_cases import load_case
 
 import stillhook as sh
 from models.basics import InputError, SolverError, SynthesisError
@@ -104,12 +105,12 @@ QUICK = ("payload-feedback", "combined")
 
 @cache
 def crane() -> sh.Design:
-    return sh.evaluate_gains(sh.load_case("subsea-crane"), CRANE_GAINS)
+    return sh.evaluate_gains(load_case("subsea-crane"), CRANE_GAINS)
 
 
 @cache
 def forward() -> sh.Design:
-    case = sh.load_case("thesis-1975").replace(NOISY_MRU)
+    case = load_case("thesis-1975").replace(NOISY_MRU)
     return sh.optimise_gains(case, "feed-forward", starts=2)
 
 
@@ -128,7 +129,7 @@ class Known:
 @cache
 def crane_design(name: str) -> Known:
     values, drag = CRANE[name]
-    case = sh.load_case("subsea-crane")
+    case = load_case("subsea-crane")
     posed = pose(case, name)
     view = posed.problem_with(posed.loop).assess(posed.values(values), drag)
     return Known(
@@ -219,7 +220,7 @@ def test_best_found_stands_on_the_exact_rope(name: str) -> None:
 
 @pytest.mark.ci
 def test_lqg_beside_the_bound_has_the_sensitivity_that_is_told() -> None:
-    late = sh.load_case("subsea-crane").replace({"sensors.telemetry.delay": "0.25 s"})
+    late = load_case("subsea-crane").replace({"sensors.telemetry.delay": "0.25 s"})
     for best in (
         bound_for(crane_design("combined")),
         bound_for(late, measurements=MEASUREMENTS),
@@ -248,7 +249,7 @@ def test_the_design_itself_where_nothing_better_was_found(monkeypatch: pytest.Mo
 
     monkeypatch.setattr("synth.bound.case.youla_design", fails)
     assert replace(best).is_own
-    case = bound_for(sh.load_case("subsea-crane"))
+    case = bound_for(load_case("subsea-crane"))
     assert case.found == "no controller keeps the limits"
     assert "none found within M_s 2: no controller keeps the limits" in str(case)
 
@@ -257,7 +258,7 @@ def test_the_design_itself_where_nothing_better_was_found(monkeypatch: pytest.Mo
 @pytest.mark.parametrize("name", ["thesis-1975", "thesis-1975-rope"])
 @pytest.mark.parametrize("structure", ["payload-feedback-rolloff", "feed-forward", "combined"])
 def test_bound_is_below_the_thesis_winch_with_a_noisy_reference(name: str, structure: str) -> None:
-    case = sh.load_case(name).replace({**NOISY_MRU, "limits.drive": "report"})
+    case = load_case(name).replace({**NOISY_MRU, "limits.drive": "report"})
     design = sh.optimise_gains(case, structure, starts=2)
     holds(design.bound)
 
@@ -314,16 +315,16 @@ def test_words_of_a_bound() -> None:
 
 
 def test_exact_sensors_have_no_meaningful_bound() -> None:
-    thesis = sh.load_case("thesis-1975")
+    thesis = load_case("thesis-1975")
     assert set(exact_sensors(thesis, aboard(thesis))) == {
         "payload.acceleration",
         "payload.velocity",
         "payload.displacement",
     }
     assert aboard(thesis) == (*MEASUREMENTS, "drum.haul", "motor.speed")
-    assert aboard(sh.load_case("subsea-crane")) == MEASURED
+    assert aboard(load_case("subsea-crane")) == MEASURED
     for name in ("subsea-crane", "landing"):
-        assert exact_sensors(sh.load_case(name), MEASURED) == ()
+        assert exact_sensors(load_case(name), MEASURED) == ()
     design = sh.evaluate_gains(thesis, {"A": 200, "a": 50, "a1": 100, "a2": 100})
     assert bound_rows(design)[0][1].endswith("no meaningful bound")
     assert "bound" not in design.__dict__  # nor is it computed

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from former_cases import load_case
 from linear_runs import linear_run, still, swell
 from sampled_response import sampled_response
 
-from models import load_case
 from models.basics import InputError, SynthesisError
 from models.plant import MEAN_LOSSES, build_plant
 from models.sensing import HEARD, Measurement

@@ -10,10 +10,10 @@ from functools import cache
 import casadi as ca
 import numpy as np
 import pytest
+from former_cases import load_case
 from hypothesis import given
 from hypothesis import strategies as st
 
-from models import load_case
 from models.basics import InputError
 from models.plant import MEAN_LOSSES, build_plant
 from models.sensing import HEARD, Controller, Measurement, Recursion, holds_brake, recursion_of

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 import scipy.signal
+from former_cases import load_case
 from hypothesis import given
 from hypothesis import strategies as st
 from linear_runs import linear_run, still
 from sampled_response import sampled_response
 
-from models import load_case
 from models.basics import InputError, SynthesisError
 from models.plant import MEAN_LOSSES, build_plant
 from models.sensing import Measurement

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from former_cases import load_case
 
 import stillhook as sh
 from models.basics import InputError, SynthesisError
@@ -24,7 +25,7 @@ NOISY = {
 
 @cache
 def spring() -> sh.Design:
-    return sh.optimise_gains(sh.load_case("thesis-1975").replace(NOISY), "high-order")
+    return sh.optimise_gains(load_case("thesis-1975").replace(NOISY), "high-order")
 
 
 @pytest.mark.ci
@@ -69,21 +70,19 @@ def test_few_states_are_asked_for_by_name() -> None:
 
 
 def test_it_is_there_on_request_only() -> None:
-    case = sh.load_case("subsea-crane")
+    case = load_case("subsea-crane")
     assert not any(name.startswith("high-order") for name in structure_names())
     named = structure_named("high-order-12", case)
     assert named.name == "high-order-12"
     assert "rope.tension" in named.measurements
-    assert (
-        "mru.heave" not in structure_named("high-order", sh.load_case("thesis-1975")).measurements
-    )
+    assert "mru.heave" not in structure_named("high-order", load_case("thesis-1975")).measurements
     with pytest.raises(InputError, match="its order must be told with its parameters"):
         _ = pose(case, "high-order").law
 
 
 @pytest.mark.slow
 def test_on_the_crane_all_limits_are_kept_on_the_exact_rope() -> None:
-    case = sh.load_case("subsea-crane")
+    case = load_case("subsea-crane")
     design = sh.optimise_gains(case, "high-order")
     assert design.ok, design.status
     assert design.payload_rms < 1.6e-3

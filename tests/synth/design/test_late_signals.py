@@ -6,8 +6,9 @@ import warnings
 
 import numpy as np
 import pytest
+from former_cases import load_case
 
-from models import InputError, load_case
+from models import InputError
 from models.basics import PhysicsWarning
 from models.spread import Spread, Uniform
 from mpc.winch import sampled_winch

@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from former_cases import load_case
 from loop_numbers import lyapunov_cost, oscillator, with_full_state
 from scipy.optimize import differential_evolution
 
-from models import InputError, load_case
+from models import InputError
 from synth import MaxSensitivity, StaticGain, White, tune
 from synth.design import Design, Tuning, evaluate_gains, optimise_gains, prepare
 from synth.loop import LinearController

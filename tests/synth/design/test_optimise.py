@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from designs import PERFECT_CELL, PERFECT_MRU, THESIS_GAINS, thesis_design
+from former_cases import load_case
 
 import stillhook as sh
-from models import InputError, load_case
+from models import InputError
 from models.sensing import sensed_line_at
 from synth.design import evaluate_gains, optimise_gains, prepare
 from synth.question import PAYLOAD, pose

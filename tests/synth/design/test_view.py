@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from former_cases import load_case
 
-from models import InputError, load_case
+from models import InputError
 from synth.design import Look, evaluate_gains, optimise_gains, prepare
 from synth.operability.pose import pose_operability
 from synth.question import FamilyProblem, pose

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 import scipy.signal
+from former_cases import load_case
 from loop_numbers import (
     closed_matrices,
     dense_grid,
@@ -25,7 +26,6 @@ from loop_numbers import (
 )
 from scipy.linalg import solve_continuous_lyapunov
 
-from models import load_case
 from models.basics import InputError, peak_factor
 from models.plant import LinearPlant, PlantData
 from synth import (

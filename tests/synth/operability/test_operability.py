@@ -10,11 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 from designs import THESIS_GAINS, thesis_design, unstable_design
+from former_cases import load_case
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from models import Case, InputError, load_case
+from models import Case, InputError
 from models.basics import Quadrature, peak_factor
 from models.hook import HookMotion
 from models.plant import PlantData

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from former_cases import load_case
 
-from models import load_case
 from models.basics import InputError
 from synth.question import (
     FamilyProblem,

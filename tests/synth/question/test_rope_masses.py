@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from former_cases import load_case
 
-from models import load_case
 from models.sensing import sensed_line_at
 from synth.question import masses_for, pose
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from former_cases import load_case
 
-from models import load_case
 from models.basics import InputError
 from models.sea import Scatter, read_scatter
 from synth.loop import Assessment

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from designs import THESIS_GAINS, structure_design, thesis_design, unstable_design
+from former_cases import load_case
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -24,7 +25,7 @@ CRANE_GAINS = {"A": 1.0, "a": 0.25, "a1": 0.6, "a2": 0.02}
 @cache
 def crane():
     """Gains for a shorter rope, late signals and drag that moves with the response."""
-    case = sh.load_case("subsea-crane").replace({"rope.length": 300.0, "rope.masses": 1})
+    case = load_case("subsea-crane").replace({"rope.length": 300.0, "rope.masses": 1})
     return sh.evaluate_gains(case, CRANE_GAINS)
 
 
@@ -33,7 +34,7 @@ def hysteretic():
     """A rope of some masses, of the same damping in every mode, in a rig that gives."""
     law = {"rope.damping_law": "hysteretic", "rope.damping_ratio": 0.02, "rope.masses": 4}
     rig = {"crane.tip_stiffness": 5e6, "rigging.stiffness": 2e7, "rigging.block_mass": 1e3}
-    return sh.evaluate_gains(sh.load_case("subsea-crane").replace(law | rig), CRANE_GAINS)
+    return sh.evaluate_gains(load_case("subsea-crane").replace(law | rig), CRANE_GAINS)
 
 
 def figures(view):
@@ -242,7 +243,7 @@ def test_errors_of_a_reference_unit_have_the_slopes_of_their_differences():
     stated = {"gain_error": 0.02, "phase_error": 0.03, "drift": 0.03, "drift_period": 150.0}
     stated |= {"noise": 1e-4, "bandwidth": 40.0}
     changes = {"limits.drive": "report", "rope.masses": 5, "sensors.mru": stated}
-    case = sh.load_case("subsea-crane").replace(changes)
+    case = load_case("subsea-crane").replace(changes)
     gains = {"drum.position_gain": 0.1, "heave.gain": 0.98, "heave.lead": 0.66}
     gains["heave.bandwidth"] = 1.4173
     design = structure_design(case, "feed-forward", gains)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from former_cases import load_case
 
 import stillhook as sh
 from models.basics import InputError
@@ -32,7 +33,7 @@ def answer(case: sh.Case, near: Answer | None = None) -> Answer:
 @pytest.fixture(scope="module")
 def case() -> sh.Case:
     changes = {"sea.significant_height": 1.0, "limits.drive": "enforce"}
-    return sh.load_case("thesis-1975").replace(changes)
+    return load_case("thesis-1975").replace(changes)
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +78,7 @@ def test_a_drum_that_gains_nothing_stays_as_it_is(case: sh.Case, best: CoDesign)
 
 
 def test_a_larger_drum_is_heavier_with_the_cube() -> None:
-    case = sh.load_case("subsea-crane")
+    case = load_case("subsea-crane")
     changes = gear_changes(case, 90.0, 2.0 * case.drum_radius)
     assert changes["winch.drum.inertia"] == pytest.approx(8.0 * case.winch.drum.inertia)
     assert gear_changes(case, 90.0) == {"winch.gearbox.ratio": 90.0}

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from former_cases import load_case
 
 import stillhook as sh
 from synth.sizing import Worth
@@ -26,11 +27,11 @@ HARD = {
 
 @pytest.fixture(scope="module")
 def late() -> Worth:
-    return sh.worth(sh.load_case("thesis-1975").replace(LATE), starts=8)
+    return sh.worth(load_case("thesis-1975").replace(LATE), starts=8)
 
 
 def test_elasticities_are_the_multipliers_of_the_limits() -> None:
-    case = sh.load_case("thesis-1975").replace(HARD)
+    case = load_case("thesis-1975").replace(HARD)
     design = sh.optimise_gains(case, "payload-feedback", starts=2)
     problem = posed(case, "payload-feedback", design.masses).problem
     here = follow(problem, [np.array(design.question.values(design.parameters))])
@@ -45,7 +46,7 @@ def test_elasticities_are_the_multipliers_of_the_limits() -> None:
 def test_elasticities_are_what_optimising_anew_gives(late: Worth) -> None:
     assert late.first is not None
     assert late.first.item.name == "telemetry delay"
-    less = sh.load_case("thesis-1975").replace({"sensors.telemetry.delay": 0.05 * math.exp(-0.05)})
+    less = load_case("thesis-1975").replace({"sensors.telemetry.delay": 0.05 * math.exp(-0.05)})
     design = sh.optimise_gains(less, "payload-feedback", starts=8)
     share = math.log(design.payload_rms / late.payload_rms) / -0.05
     assert late.first.elasticity == pytest.approx(share, rel=1e-2)
@@ -63,18 +64,18 @@ def test_the_first_thing_to_buy_is_the_delay_and_no_margin(late: Worth) -> None:
 
 
 def test_twice_as_good_is_the_optimum_of_that_case(late: Worth) -> None:
-    half = sh.load_case("thesis-1975").replace({"sensors.telemetry.delay": "25 ms"})
+    half = load_case("thesis-1975").replace({"sensors.telemetry.delay": "25 ms"})
     design = sh.optimise_gains(half, "payload-feedback", starts=8)
     assert late.first is not None
     assert late.first.twice_rms == pytest.approx(design.payload_rms, rel=1e-3)
     # 10 ms less: near the slope, with what the curve bends
-    ten = sh.load_case("thesis-1975").replace({"sensors.telemetry.delay": "40 ms"})
+    ten = load_case("thesis-1975").replace({"sensors.telemetry.delay": "40 ms"})
     less = sh.optimise_gains(ten, "payload-feedback", starts=8).payload_rms
     assert late.first.per_step == pytest.approx(less - late.payload_rms, rel=0.1)
 
 
 def test_what_is_for_sale_is_what_the_structure_hears() -> None:
-    case = sh.load_case("subsea-crane")
+    case = load_case("subsea-crane")
     names = {}
     for name in ("payload-feedback", "feed-forward", "constant-tension"):
         heard = structure_named(name, case).measurements
@@ -90,7 +91,7 @@ def test_what_is_for_sale_is_what_the_structure_hears() -> None:
 
 def test_a_drive_that_is_too_small_is_said_before_anything_is_priced() -> None:
     small = {"limits.drive": "enforce", "winch.drive.torque_peak": "5.95 kN m"}
-    result = sh.worth(sh.load_case("thesis-1975").replace(small), starts=1)
+    result = sh.worth(load_case("thesis-1975").replace(small), starts=1)
     assert not result.ok
     assert result.rows == ()
     assert "motor.torque.peak breaks first" in result.status

@@ -6,6 +6,7 @@ import itertools
 from pathlib import Path
 
 import pytest
+from former_cases import load_case
 
 import stillhook as sh
 from models.basics import InputError
@@ -27,7 +28,7 @@ ROWS = [
 
 @pytest.fixture(scope="module")
 def case() -> sh.Case:
-    return sh.load_case("thesis-1975").replace(CALM)
+    return load_case("thesis-1975").replace(CALM)
 
 
 @pytest.fixture(scope="module")
@@ -37,14 +38,14 @@ def sizing(case: sh.Case) -> Sizing:
 
 def test_a_motor_of_scale_one_is_the_case_itself() -> None:
     for name in ("thesis-1975", "subsea-crane"):
-        case = sh.load_case(name)
+        case = load_case(name)
         assert with_motor(case, 1.0, case.winch.gearbox.ratio) == case
 
 
 @pytest.mark.parametrize("scale", [0.8, 3.0])
 def test_motors_of_the_family_keep_what_makes_them_similar(scale: float) -> None:
     for name in ("thesis-1975", "subsea-crane"):
-        case = sh.load_case(name).replace({"limits.drive": "report"})
+        case = load_case(name).replace({"limits.drive": "report"})
         made = with_motor(case, scale, 50.0)
         old, new = MotorData.of(case), MotorData.of(made)
         assert made.winch.gearbox.ratio == 50.0

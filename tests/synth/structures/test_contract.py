@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pytest
 from designs import PERFECT_CELL, PERFECT_MRU
+from former_cases import load_case
 from loop_numbers import FloatArray, double_integrator, two_carts, with_full_state
 from scipy.stats import qmc
 
-from models import load_case
 from models.plant import LinearPlant
 from synth.loop import Dual, closed_loop_matrix
 from synth.question import pose

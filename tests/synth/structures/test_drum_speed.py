@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from former_cases import load_case
 from linear_runs import linear_run, still
 from sampled_response import sampled_response
 
-from models import Case, load_case
+from models import Case
 from models.basics import InputError, SynthesisError
 from models.plant import build_plant
 from models.sensing import Measurement

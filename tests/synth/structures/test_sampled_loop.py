@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from former_cases import load_case
 from linear_runs import linear_run, sine_part, swell
 from sampled_response import sampled_response
 
-from models import load_case
 from models.plant import build_plant
 from synth.controllers import ConstantTension, LinearFeedback, VelocityFeedForward
 from synth.loop import LinearController, closed_loop_matrix

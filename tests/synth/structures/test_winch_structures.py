@@ -10,9 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from designs import PERFECT_MRU
+from former_cases import load_case
 from scipy.stats import qmc
 
-from models import Case, load_case
+from models import Case
 from models.basics import FloatArray, InputError
 from models.plant import DriveLimits
 from models.simulation import SimulationOptions, prepare, run_simulation

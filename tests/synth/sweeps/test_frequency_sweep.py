@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from designs import thesis_design, unstable_design
+from former_cases import load_case
 from solved_loops import solved_variance
 
-from models import load_case
 from models.basics import InputError, Quadrature, spectral_nodes
 from models.case import Case
 from models.hook import HookMotion

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from designs import structure_design
+from former_cases import load_case
 from solved_loops import solved_variance
 
-from models import load_case
 from models.basics import spectral_nodes
 from models.case import Case
 from models.hook import HookMotion

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from designs import thesis_design
+from former_cases import load_case
 
-from models import load_case
 from models.basics import FrequencyAxis
 from models.plant import build_plant, lump_rope
 from models.spread import LogNormal, Normal, Spread
