@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 
 from ..basics import InputError
-from ..rig import DCMotor
+from ..rig import ACMotor, DCMotor
 from .contents import Contents
 
 Finding = tuple[str, str]
@@ -113,6 +113,13 @@ def changed_meanings(case: Contents) -> Iterator[Finding]:
                 f"is not given: noise of {', '.join(noisy)} now passes the low-pass of its sensor "
                 "(`before-filter`); it was added behind it (`after-filter`) before",
             )
+    motor = case.winch.motor
+    if isinstance(motor, ACMotor) and "kind" not in motor.model_fields_set:
+        yield (
+            "winch.motor.kind",
+            "is not given: neither a breakdown torque nor a rating that falls above the base speed "
+            "is held; say `induction` or `permanent-magnet`",
+        )
 
 
 def _overloads(case: Contents) -> list[tuple[str, str, str]]:

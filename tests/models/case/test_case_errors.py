@@ -47,6 +47,7 @@ CASE = textwrap.dedent(
         inertia: 20 kg m2
         base_speed: 1000 rpm
         maximum_speed: 2000 rpm
+        kind: induction
       drive:
         torque_continuous: 8 kN m
         torque_peak: 14.4 kN m
@@ -244,7 +245,7 @@ WRONG = {
     ),
     "continuous torque below the static load": (
         ("torque_continuous: 8 kN m", "torque_continuous: 4 kN m"),
-        "my.yaml:37: winch.drive.torque_continuous: must be at least the static motor torque, "
+        "my.yaml:38: winch.drive.torque_continuous: must be at least the static motor torque, "
         "5.778 kN m (rope tension 534.5 kN on a drum radius of 1 m through a gear of 100 and "
         "efficiency 0.925), got 4 kN m",
     ),
@@ -323,7 +324,7 @@ def test_several_findings_of_one_section(check):
 def test_both_ratings_below_the_static_load(check):
     lines = check(("8 kN m", "4 kN m"), ("14.4 kN m", "5 kN m"))
     assert len(lines) == 2
-    assert lines[1].startswith("my.yaml:38: winch.drive.torque_peak: must be at least the static")
+    assert lines[1].startswith("my.yaml:39: winch.drive.torque_peak: must be at least the static")
     assert lines[1].endswith("got 5 kN m")
 
 
