@@ -255,15 +255,17 @@ def _sensors(rng: np.random.Generator, within: Any, among: Any) -> dict[str, Any
     if rng.random() < 1.0 / 3.0:
         found["sensors.payload.velocity_rate"] = 2.0 * math.pi * float(rng.choice([5.0, 10.0]))
         found["sensors.payload.displacement_rate"] = 2.0 * math.pi * 10.0
+    stated = ("gain_error", "phase_error", "drift", "noise")
+    unit = {**dict.fromkeys(stated, 0.0), "noise_floor": 0.05, "noise_fraction": 0.05}
     if rng.random() < 0.5:
-        found |= {
-            "sensors.mru.noise_floor": 0.0,
-            "sensors.mru.noise_fraction": 0.0,
-            "sensors.mru.gain_error": within(0.0, 0.01),
-            "sensors.mru.phase_error": math.radians(within(0.0, 1.0)),
-            "sensors.mru.drift": within(0.0, 0.05),
+        unit = {
+            "noise_floor": 0.0,
+            "noise_fraction": 0.0,
+            "gain_error": within(0.0, 0.01),
+            "phase_error": math.radians(within(0.0, 1.0)),
+            "drift": within(0.0, 0.05),
         }
-    return found
+    return found | {f"sensors.mru.{name}": value for name, value in unit.items()}
 
 
 def _with_winch(case: Case, within: Any) -> Case:
@@ -271,10 +273,11 @@ def _with_winch(case: Case, within: Any) -> Case:
     fastest = HookDemand.from_case(case).velocity.most_probable_maximum(EXPOSURE)
     radius, pull = case.drum_radius, case.static_tension
     efficiency = within(0.88, 0.95)
+    losses = efficiency * case.rope.sheaves_efficiency
     base, most = within(1000.0, 1500.0) * math.pi / 30.0, within(1.4, 2.0)
     rope_speed = max(within(1.2, 1.7) * fastest, 0.5)
     ratio = most * base * radius / rope_speed
-    held = pull * radius / (ratio * efficiency)
+    held = pull * radius / (ratio * losses)
     rating = within(1.2, 1.5) * held
     inertia = within(0.6, 1.4) * 20.0 * (rating / 8e3) ** 1.4
     drum = within(0.5, 1.5) * 40e3 * pull / 524e3 * (radius / 1.07) ** 2

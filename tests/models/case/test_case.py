@@ -114,7 +114,9 @@ class TestBundled:
     def test_crane_follows_its_sources(self, crane):
         d = crane.rope.diameter
         assert crane.rope.mass_per_length == pytest.approx(5293 * d**2, rel=1e-3)
-        assert crane.rope.ea == pytest.approx(97.1e9 * d**2, rel=1e-3)
+        assert crane.rope.ea == pytest.approx(65e9 * math.pi / 4 * d**2, rel=1e-3)
+        cube = 1025 * 0.68 * 4**3  # DNV-RP-N103: rho C_A V_ref of a square prism as high as wide
+        assert cube < crane.payload.added_mass < 1.15 * cube
         buoyancy = 1025 * math.pi / 4 * (1.18 * d) ** 2
         assert crane.rope.submerged_weight_per_length == pytest.approx(
             9.80665 * (5293 * d**2 - buoyancy), rel=1e-3
@@ -132,7 +134,8 @@ class TestBundled:
         assert crane.static_torque == pytest.approx(
             crane.static_tension * crane.drum_radius / crane.winch.gearbox.ratio
         )
-        assert crane.static_torque_budget == pytest.approx(crane.static_torque / 0.925)
+        losses = 0.925 * 0.98**3  # gear and three sheaves
+        assert crane.static_torque_budget == pytest.approx(crane.static_torque / losses)
 
 
 class TestReplace:
