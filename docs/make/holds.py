@@ -392,17 +392,21 @@ def growths(design: Design) -> Row:
     """Return the growth of the slowest mode at the rope's least damping, under both laws [1/s].
 
     The least damping is a tenth of the case's, but no less than that of solid steel, a loss factor
-    of 4e-4; drag is that of the design.
+    of 4e-4; drag is that of the design, and losses do not damp.
     """
     own = design.case.rope.damping_ratio
-    least = min(own, max(0.1 * own, 2e-4))
     found = {}
     for law in ("hysteretic", "kelvin-voigt"):
-        case = design.case.replace({"rope.damping_law": law, "rope.damping_ratio": least})
+        case = design.case.replace(
+            {
+                "rope.damping_law": law,
+                "rope.damping_ratio": min(own, max(0.1 * own, 2e-4)),
+                "payload.drag": {"method": "given", "coefficient": design.drag},
+            }
+        )
         masses = design.masses if case.rope.lumping == "thesis" else 2 * design.masses
         posed = pose(case, design.structure, min(masses, MAX_MASSES), built_for=design.case)
-        poles = posed.problem.loop_poles(posed.values(design.parameters), design.drag)
-        found[f"growth_{law}"] = f"{float(poles.real.max()):.4g}"
+        found[f"growth_{law}"] = f"{posed.problem.growth(posed.values(design.parameters)):.4g}"
     return found
 
 
