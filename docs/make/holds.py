@@ -230,6 +230,12 @@ def random_case(number: int) -> Case:
         "rope.submerged_weight_per_length": WEIGHT * diameter**2,
         "rope.length": depth,
         "rope.damping_ratio": among(0.001, 0.01),
+        "rope.sheaves": int(rng.integers(1, 4)),
+        "rope.sheave_efficiency": within(0.96, 0.99),
+        "rope.skin_drag_coefficient": within(0.0, 0.015),
+        "crane.tip_stiffness": among(1e6, 2e7),
+        "rigging.stiffness": weight / within(0.01, 0.05) if rng.random() < 0.5 else None,
+        "rigging.block_mass": within(0.0, 0.05) * mass,
         "limits.rope_tension_peak": BREAKING * diameter**2 / 3.0,
         "winch.drum.geometry.core_diameter": core,
         "winch.drum.geometry.width": width,
@@ -255,17 +261,16 @@ def _sensors(rng: np.random.Generator, within: Any, among: Any) -> dict[str, Any
     if rng.random() < 1.0 / 3.0:
         found["sensors.payload.velocity_rate"] = 2.0 * math.pi * float(rng.choice([5.0, 10.0]))
         found["sensors.payload.displacement_rate"] = 2.0 * math.pi * 10.0
-    stated = ("gain_error", "phase_error", "drift", "noise")
-    unit = {**dict.fromkeys(stated, 0.0), "noise_floor": 0.05, "noise_fraction": 0.05}
-    if rng.random() < 0.5:
-        unit = {
-            "noise_floor": 0.0,
-            "noise_fraction": 0.0,
-            "gain_error": within(0.0, 0.01),
-            "phase_error": math.radians(within(0.0, 1.0)),
-            "drift": within(0.0, 0.05),
-        }
-    return found | {f"sensors.mru.{name}": value for name, value in unit.items()}
+    stated, drawn = rng.random() < 0.5, [within(0.0, high) for high in (0.035, 2.0, 0.05, 1e-4)]
+    return found | {
+        "sensors.mru.noise_floor": 0.0 if stated else 0.05,
+        "sensors.mru.noise_fraction": 0.0 if stated else 0.05,
+        "sensors.mru.gain_error": stated * drawn[0],
+        "sensors.mru.phase_error": stated * math.radians(drawn[1]),
+        "sensors.mru.drift": stated * drawn[2],
+        "sensors.mru.drift_period": 100.0,
+        "sensors.mru.noise": stated * drawn[3],
+    }
 
 
 def _with_winch(case: Case, within: Any) -> Case:
