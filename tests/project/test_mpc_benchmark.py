@@ -6,12 +6,13 @@ import csv
 import math
 import os
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+from stored import read_rows
 
 from mpc.linear import LinearMPC
 from mpc.nonlinear import NonlinearMPC
@@ -260,3 +261,27 @@ def test_the_docs_hold_the_marks_and_the_data(words):
         rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
         assert {row["sea"] for row in rows} >= {"calm", "rough"}
         assert all(float(row["median"]) > 0.0 for row in rows if not row["trouble"])
+
+
+def test_the_docs_page_shows_the_stored_times(words):
+    docs = FOLDER.parent / "docs"
+    page = (docs / "performance.md").read_text(encoding="utf-8")
+
+    def timings(name):
+        kinds = {"float": float, "int": int, "str": str}
+        return tuple(
+            words.Timing(**{f.name: kinds[f.type](row[f.name]) for f in fields(words.Timing)})
+            for row in read_rows(docs / "data" / name)
+        )
+
+    solvers, every = timings("mpc_solvers.csv"), timings("mpc_steps.csv")
+    first = next(k for k, one in enumerate(every) if one.name == "NonlinearMPC")
+    results = words.Results(
+        solvers=solvers, steps=every[:first], nonlinear=every[first:], minutes=(), limited={},
+        load=(0.0, 0.0),
+    )  # fmt: skip
+    tables = [words.solver_table(solvers, *asked) for asked in {(s.sea, s.moves) for s in solvers}]
+    tables += [words.step_table(results), words.plain_table(results)]
+    tables += [words.nonlinear_table([n for n in results.nonlinear if n.name[:6] == "Nonlin"])]
+    for table in tables:
+        assert words.markdown(table) in page, table[1]
