@@ -42,10 +42,6 @@ STRUCTURES = (
     "payload-feedback-rolloff",
     "drum-feedback",
     "combined",
-    "payload-feedback-lead",
-    "payload-feedback-notch",
-    "payload-feedback-integral",
-    "low-order-4",
 )
 WITHIN: Mapping[str, tuple[str, ...]] = {
     "payload-feedback-rolloff": ("payload-feedback",),

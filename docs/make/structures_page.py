@@ -24,8 +24,6 @@ ROPES = (*(f"{length:g}" for length in LENGTHS), "one spring")
 LOOKS: Mapping[str, tuple[str, str]] = {
     "payload-feedback": ("#d55e00", "o"),
     "payload-feedback-rolloff": ("#e69f00", "v"),
-    "payload-feedback-notch": ("#cc79a7", "^"),
-    "low-order-4": ("#7f7f7f", "D"),
     "drum-feedback": ("#009e73", "s"),
     "combined": ("#0072b2", "P"),
 }
