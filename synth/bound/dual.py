@@ -163,7 +163,8 @@ class Dual:
         Raises
         ------
         SolverError
-            If the regulator's Riccati equation has no stabilising solution.
+            If the regulator's Riccati equation has no stabilising solution, or rounding has left
+            a variance below zero.
         """
         plant, kalman = self.plant, self.estimator
         charge = self.charge(multipliers)
@@ -176,6 +177,9 @@ class Dual:
         moved = plant.Cz + plant.Dz @ K
         variances = np.sum((moved @ estimate) * moved, axis=1)
         variances += np.sum((plant.Cz @ kalman.Y) * plant.Cz, axis=1)
+        if not np.all(variances >= 0.0):
+            # As the price of a limit that cannot be kept grows without end.
+            raise SolverError("bound: no digits are left of the variances at these multipliers")
         return DualPoint(
             multipliers=multipliers,
             regulator=feedback,
@@ -278,17 +282,23 @@ class Dual:
             if not active.any():
                 break
             columns = []
-            for i in np.flatnonzero(active):
-                moved = theta.copy()
-                moved[i] += 1e-4
-                there = self.at(np.exp(moved))
-                columns.append(np.log(there.variances[self.rows] / self.squares) - excess)
+            try:
+                for i in np.flatnonzero(active):
+                    moved = theta.copy()
+                    moved[i] += 1e-4
+                    there = self.at(np.exp(moved))
+                    columns.append(np.log(there.variances[self.rows] / self.squares) - excess)
+            except SolverError:
+                break  # every point is a lower bound: the best so far stays
             jacobian = np.array(columns).T[active] / 1e-4
             step = np.zeros(theta.size)
             step[active] = np.linalg.lstsq(jacobian, -excess[active], rcond=1e-12)[0]
             step = np.clip(step, -2.0, 2.0)
             for shrink in (1.0, 0.3, 0.1, 0.03):
-                trial = self.at(np.exp(np.clip(theta + shrink * step, low, high)))
+                try:
+                    trial = self.at(np.exp(np.clip(theta + shrink * step, low, high)))
+                except SolverError:
+                    continue
                 if self.value(trial) > self.value(point) or self.gap(trial) < self.gap(point):
                     break
             else:

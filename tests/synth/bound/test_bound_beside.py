@@ -378,3 +378,12 @@ def test_what_cannot_be_computed_is_said(monkeypatch: pytest.MonkeyPatch) -> Non
     assert bound_rows(again) == [("bound", "not computed: no stabilising solution")]
     structure = replace(forward())
     assert bound_cell(structure) == "-"
+
+
+def test_a_speed_that_is_hardly_enough_leaves_a_bound() -> None:
+    # Its price grows until rounding leaves variances below zero: the last good point is a bound.
+    case = load_case("subsea-crane").replace({"rope.falls": 2, "rope.length": "500 m"})
+    bound = sh.evaluate_gains(case, {"A": 1.0, "a": 0.0, "a1": 20.0, "a2": 3.0}).bound.free
+    assert bound.feasible
+    assert 0.03 < bound.value < 0.1
+    assert verify_bound(bound).ok
