@@ -29,6 +29,9 @@ from ..casefile import (
 from .contents import Contents
 from .plausibility import Finding, contradictions, remarks
 
+#: What a design's M_s may be of its limit where the rope is damped least.
+_SENSITIVITY = 1.25
+_MOST = 100.0  # that a case may allow
 #: What a stored case meant that lacks a field of a section.
 _BEFORE: Mapping[tuple[str, ...], Any] = {
     ("limits", "tension_ends"): "drum",
@@ -149,6 +152,20 @@ class Case(Contents):
         case = self._changed(changes) if changes else self.model_copy()
         case._quiet = True
         return case
+
+    @property
+    def with_least_damping(self) -> Case | None:
+        """The case with the least damping of its rope that a design must hold at.
+
+        There M_s may be 1.25 times its limit.  None where the case's own damping is the least.
+        """
+        least = self.rope.least_damping_ratio
+        if least >= self.rope.damping_ratio:
+            return None
+        sensitivity = _SENSITIVITY * self.limits.max_sensitivity
+        return self.variant(
+            {"rope.damping_ratio": least, "limits.max_sensitivity": min(sensitivity, _MOST)}
+        )
 
     def _changed(self, changes: Mapping[str, Any]) -> Case:
         tree = replaced(self.to_dict(), Case, changes, self.label)

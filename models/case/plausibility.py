@@ -65,6 +65,15 @@ def remarks(case: Contents) -> Iterator[Finding]:
             "payload.weight_uncertainty",
         )
     yield from _soft(case)
+    rope = case.rope
+    if rope.damping_measured is not None:
+        lowest, highest = rope.damping_measured
+        if not lowest <= rope.damping_ratio <= highest:
+            yield (
+                "rope.damping_ratio",
+                f"{rope.damping_ratio:g} is not between {lowest:g} and {highest:g}, which "
+                "damping_measured says",
+            )
     motor, drive = case.winch.motor, case.winch.drive
     if isinstance(motor, DCMotor):
         back_emf = motor.back_emf_constant * case.winch.speed_limit

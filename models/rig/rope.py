@@ -14,6 +14,10 @@ from ..basics import GRAVITY, SEA_WATER_DENSITY
 from ..casefile import Quantity, Section
 from .tables import STEEL_DENSITY
 
+_Ratio = Annotated[float, Quantity("ratio", 0.0, 0.5, open_low=True)]
+_TENTH = 0.1  # of the damping ratio, which a design holds at as well
+_SOLID_STEEL = 2e-4  # damping ratio of a rope that loses no more than solid steel does
+
 
 class Rope(Section):
     """The rope between the drum and the payload."""
@@ -55,6 +59,10 @@ class Rope(Section):
     damping_law: Literal["hysteretic", "kelvin-voigt"] = "kelvin-voigt"
     """How damping depends on frequency: `hysteretic`, about the same fraction in all modes, as of
     wire rope; or `kelvin-voigt`, a fraction that rises in proportion to a mode's frequency."""
+    damping_measured: tuple[_Ratio, _Ratio] | None = None
+    """Lowest and highest damping ratio of the first axial mode, where it was measured. A design
+    holds at the lowest too; without a measurement at a tenth of `damping_ratio`, but at no less
+    than solid steel has, 0.0002."""
     masses: Annotated[int | Literal["auto"], Quantity("count", 1, 40, word="auto")] = "auto"
     """Number of lumped masses that stand for the rope; `auto` takes as many as the bandwidth
     of the loop needs."""
@@ -71,6 +79,13 @@ class Rope(Section):
                 f"'thesis' puts all of the rope at the payload: needs masses 1, got {self.masses!r}"
             )
             yield ("lumping", text)
+        if (
+            self.damping_measured is not None
+            and self.damping_measured[0] > self.damping_measured[1]
+        ):
+            low, high = self.damping_measured
+            text = f"must be [low, high] with low at most high, got [{low:g}, {high:g}]"
+            yield ("damping_measured", text)
         weight = self.submerged_weight_per_length
         if weight is not None and weight > self.mass_per_length * GRAVITY:
             yield (
@@ -78,6 +93,18 @@ class Rope(Section):
                 f"must be at most the weight in air, {self.mass_per_length * GRAVITY:.4g} N/m "
                 f"({self.mass_per_length:g} kg/m), got {weight:g} N/m",
             )
+
+    @property
+    def least_damping_ratio(self) -> float:
+        """Damping ratio of the first axial mode at which a design must hold, besides its own.
+
+        The lowest that was measured, else a tenth of it, as wire rope's damping is not known to
+        better than a factor; its own where that is lower.
+        """
+        least = max(_TENTH * self.damping_ratio, _SOLID_STEEL)
+        if self.damping_measured is not None:
+            least = self.damping_measured[0]
+        return min(least, self.damping_ratio)
 
     @property
     def area(self) -> float:
