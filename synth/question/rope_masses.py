@@ -1,56 +1,179 @@
-"""The rope masses that a loop asks for, by its crossover and by the rope as it is.
+"""The rope masses that a loop asks for, by its gain on the rope as it is.
 
 Few masses have their higher modes in the wrong place.  What they place within a few percent is
 enough where the loop is weak; but a mode far above all crossovers may carry the peak of S, and
-then what is kept on the masses is broken on the rope.
+then what is kept on the masses is broken on the rope.  Resonances of rope are narrower than any
+grid: they are looked for at the poles of the rope, with the loop open and closed.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from models.basics import FloatArray, InputError
-from models.plant import MAX_MASSES, PlantResponse, masses_for_bandwidth
+from models.basics import ComplexArray, FloatArray, IndexArray, InputError
+from models.plant import MAX_MASSES, masses_for_bandwidth
 from models.sensing import sensed_line_at
 
-from ..limits import MaxSensitivity
-from ..loop import Assessment, LinearController, LoopResponses, refine_minima
+from ..limits import DelayMargin, GainMargin, GainMarginDown, Limit, MaxSensitivity
+from ..loop import Assessment, LoopResponses, Margins, loop_margins
 from .problem import Values
 from .question import DesignQuestion, with_masses
 
-_MODES = 5.0  # every rope mode below this many crossovers belongs in the plant
-_ONE_MODE = 1.05  # ratio of frequencies on the same mode
-_ON_MODE = 64  # points about such a mode
-_HARMLESS = 0.05  # share by which |S| on a mode lies below its peak
+_PER_DECADE = 40  # frequencies apart from the poles
+_BESIDE = (-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0)  # ... and beside a pole, in its widths
+_NARROW = 1e-7  # relative width of a pole that has none
+_CLOSE = 1.05  # of the peak of |S| on those frequencies, at which margins are refined
+_FAR = 0.1  # relative length of the longest step
+_FELT = 0.15  # loop gain below which no margin is looked for
+_WEAK = 0.5  # loop gain below which S is at most 2, wherever a mode stands
 _KEPT = 1e-3  # relative excess on the rope as it is over a limit that its masses keep
+_RESERVED = 0.03  # ... that a limit may hold in reserve
+_STEPS = 8  # of Newton's method towards a pole
+_FINE = 1e-7  # relative difference for a slope
+_SAME = 1e-6  # relative distance of poles that are one
+_LIGHT = 0.3  # damping ratio above which a pole is no resonance
 
 
 def masses_for(question: DesignQuestion, loop: Assessment) -> int:
     """Return the rope masses that a stable loop asks for, where the case leaves them open.
 
-    Every mode below five crossovers has its place, and a limit on the sensitivity that is kept is
-    kept on the distributed rope too, to a thousandth.  Never fewer than the question's own.
+    Every mode up to the frequency above which the loop gain on the distributed rope stays below a
+    half has its place, and the margins that are kept are kept on that rope too, to a thousandth.
+    Never fewer than the question's own.
     """
-    data, crossovers = question.data, loop.margins.crossovers
-    if data.masses is not None or not crossovers.size:
-        return question.masses
+    return _masses(question, loop, _KEPT)[0]
+
+
+def masses_and_reserve(
+    question: DesignQuestion, loop: Assessment
+) -> tuple[int, Mapping[str, float]]:
+    """Return the rope masses that a stable loop asks for, and what its limits hold in reserve.
+
+    As `masses_for`, but a search need not have more masses where a margin is broken on the
+    distributed rope by a few percent: it holds that margin with as much in reserve.
+
+    Returns
+    -------
+    tuple
+        The masses; and by name of the limit its relative excess on the distributed rope.
+    """
+    masses, excess = _masses(question, loop, _RESERVED)
+    return masses, {name: over for name, over in excess.items() if over > _KEPT}
+
+
+def _masses(
+    question: DesignQuestion, loop: Assessment, most: float
+) -> tuple[int, Mapping[str, float]]:
+    """Return the masses with which no margin's excess on the rope is above `most`, and those.
+
+    The excess is negative of a margin that is broken on the masses only.
+    """
+    data = question.data
+    if data.masses is not None or data.lumping == "thesis":
+        return question.masses, {}
+    line = _OnTheRope(question, loop)
     try:
-        wanted = masses_for_bandwidth(data, _MODES * _crossover(loop))
+        wanted = masses_for_bandwidth(data, line.reach)
     except InputError:
-        return MAX_MASSES
-    if wanted > question.masses or data.lumping == "thesis":
-        return max(wanted, question.masses)
-    most = next(lim.bound for lim in question.loop if isinstance(lim, MaxSensitivity))
-    if loop.max_sensitivity <= most * (1.0 + _KEPT):
-        excess = _sensitivity_on_the_rope(question, loop, most) / most - 1.0
-        if excess > _KEPT:
-            # The error of a lumped rope's modes falls with the square of its masses.
-            finer = math.ceil(question.masses * math.sqrt(excess / _KEPT))
-            return min(max(finer, question.masses + 1), MAX_MASSES)
-    return question.masses
+        wanted = MAX_MASSES
+    if wanted > question.masses:
+        return wanted, {}
+    excess = line.excess
+    # For given gains it matters as well that none is broken on the masses that the rope keeps.
+    apart = excess.values() if most > _KEPT else map(abs, excess.values())
+    if (largest := max(apart, default=0.0)) > most:
+        # The error of a lumped rope's modes falls with the square of its masses.
+        finer = math.ceil(question.masses * math.sqrt(largest / most))
+        return min(max(finer, question.masses + 1), MAX_MASSES), excess
+    return question.masses, excess
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Seen:
+    """The margins of a loop on the rope as limits see it (`synth.limits.limits.Limit.measure`)."""
+
+    max_sensitivity: float
+    margins: Margins
+
+
+class _OnTheRope:
+    """A loop on the distributed rope instead of its masses.
+
+    Parameters
+    ----------
+    question, loop
+        The question, and the loop on its masses.
+    """
+
+    def __init__(self, question: DesignQuestion, loop: Assessment) -> None:
+        self.question, self.loop = question, loop
+        self.drag = question.drag_in(loop)
+        poles = self._poles()
+        omega, width = poles.imag, np.maximum(-poles.real, _NARROW * poles.imag)
+        near = omega[:, None] + width[:, None] * np.array(_BESIDE)
+        low, high = 1e-3 * omega.min(), 2.0 * omega.max()
+        even = np.geomspace(low, high, int(_PER_DECADE * math.log10(high / low)))
+        self.grid = np.unique(np.concatenate([even, near[near > 0.0]]))
+        self.gains = self._gains(1j * self.grid)
+
+    @property
+    def reach(self) -> float:
+        """Frequency above which the loop gain stays below a half [rad/s]."""
+        strong = np.flatnonzero(np.abs(self.gains).max(axis=0) >= _WEAK)
+        return float(self.grid[strong[-1]]) if strong.size else 0.0
+
+    @property
+    def excess(self) -> dict[str, float]:
+        """What each margin is broken by on the rope more than on the masses, relatively."""
+        margins = MaxSensitivity | GainMargin | GainMarginDown | DelayMargin
+        limits = [limit for limit in self.question.loop if isinstance(limit, margins)]
+        found = dict.fromkeys((limit.name for limit in limits), 0.0)
+        for i, gain in enumerate(self.gains if limits else ()):
+            felt = np.abs(gain) > _FELT
+            peak = _CLOSE / float(np.abs(1.0 + gain).min())
+            kept = all(limit.use(_least(limit, peak)) <= 1.0 for limit in limits)
+            if kept or not felt.any():
+                continue
+            grid = self.grid[felt]
+            own = loop_margins(partial(self._gain, i), grid, gain[felt])
+            seen = _Seen(max_sensitivity=own.max_sensitivity, margins=own)
+            for limit in limits:
+                use = limit.use(limit.measure(seen))  # type: ignore[arg-type]  # all it asks for
+                found[limit.name] = max(found[limit.name], use - 1.0)
+        for limit in limits:
+            found[limit.name] -= max(limit.use(limit.measure(self.loop)) - 1.0, 0.0)
+        return found
+
+    def _gains(self, s: ComplexArray) -> ComplexArray:
+        """Return L of each loop at points [1/s], (loops, k)."""
+        question, controller = self.question, self.loop.controller
+        line = sensed_line_at(question.case, s, drag=self.drag, data=question.data)
+        heard = line.select(measurements=controller.measurements)
+        found = LoopResponses.of(heard, controller)
+        loops = range(len(controller.inputs))
+        return np.array([found.difference(i) - 1.0 for i in loops])
+
+    def _gain(self, index: int, omega: FloatArray) -> ComplexArray:
+        """Return L of one loop at frequencies [rad/s], (k,)."""
+        return np.asarray(self._gains(1j * omega)[index])
+
+    def _poles(self) -> ComplexArray:
+        """Return the light poles of the rope with the loop open and with it closed [1/s]."""
+        lumped = np.concatenate([self.loop.plant.poles(), self.loop.poles])
+        lumped = lumped[(lumped.imag > 0.0) & (-lumped.real < _LIGHT * np.abs(lumped))]
+        begins = np.concatenate([self.question.data.damped_modes(MAX_MASSES), lumped])
+        half = np.arange(2 * begins.size) < begins.size
+
+        def open_and_closed(s: ComplexArray, at: IndexArray) -> ComplexArray:
+            gain = self._gains(s)[0]
+            return np.asarray(np.where(half[at], 1.0 / gain, 1.0 + gain))
+
+        return np.concatenate([begins, _zeros(open_and_closed, np.tile(begins, 2))])
 
 
 def on_enough_masses(
@@ -94,37 +217,37 @@ def on_enough_masses(
     return question, None, growth
 
 
-def _crossover(loop: Assessment) -> float:
-    """Return the highest crossover [rad/s] that is not one of two on the same harmless mode.
+def _least(limit: Limit, peak: float) -> float:
+    """Return the least that a margin can be where |S| stays below a value, 0 where nothing is."""
+    if isinstance(limit, MaxSensitivity):
+        return peak
+    reach = peak / (peak - 1.0) if peak > 1.0 else math.inf
+    if isinstance(limit, GainMargin):
+        return reach
+    return peak / (peak + 1.0) if isinstance(limit, GainMarginDown) else 0.0
 
-    A mode with hardly any damping stands out above a gain of one far above the bandwidth.  Its
-    place matters where |S| on it is about its peak; else the rope itself is looked at anyhow.
+
+def _zeros(
+    function: Callable[[ComplexArray, IndexArray], ComplexArray], begins: ComplexArray
+) -> ComplexArray:
+    """Return light zeros [1/s] that Newton's method finds, each of its own analytic function.
+
+    The function takes points, and of which beginning each is.
     """
-    found = list(loop.margins.crossovers)
-    while len(found) > 2 and found[-1] < _ONE_MODE * found[-2]:
-        mode = np.geomspace(found[-2] / _ONE_MODE, found[-1] * _ONE_MODE, _ON_MODE)
-        nearest = _distance(loop.plant.response_at(1j * mode), loop.controller).min()
-        if loop.max_sensitivity * nearest < 1.0 + _HARMLESS:
-            break
-        del found[-2:]
-    return float(found[-1])
-
-
-def _sensitivity_on_the_rope(question: DesignQuestion, loop: Assessment, above: float) -> float:
-    """Return the largest peak of |S| on the distributed rope that lies above a value."""
-    controller, grid = loop.controller, loop.grid
-    drag = question.drag_in(loop)
-
-    def distance(omega: FloatArray) -> FloatArray:
-        line = sensed_line_at(question.case, 1j * omega, drag=drag, data=question.data)
-        return _distance(line, controller)
-
-    near = distance(grid)
-    return float(1.0 / refine_minima(distance, grid, near, near < 1.0 / above)[1].min())
-
-
-def _distance(plant: PlantResponse, controller: LinearController) -> FloatArray:
-    """Return |1 + L| of the loop that comes nearest to -1 with it, at the plant's points."""
-    found = LoopResponses.of(plant.select(measurements=controller.measurements), controller)
-    loops = range(len(controller.inputs))
-    return np.asarray(np.min([np.abs(found.difference(i)) for i in loops], axis=0))
+    s, at = begins, np.arange(begins.size)
+    arrived: list[ComplexArray] = [begins[:0]]
+    with np.errstate(all="ignore"):
+        for _ in range(_STEPS):
+            step = _FINE * np.abs(s)
+            both = function(np.concatenate([s, s + step]), np.concatenate([at, at]))
+            value, beside = both[: s.size], both[s.size :]
+            move = value * step / (beside - value)
+            far = np.abs(move) > _FAR * np.abs(s)
+            s = s - np.where(far, _FAR * np.abs(s) * move / np.abs(move), move)
+            light = np.isfinite(s) & (s.imag > 0.0) & (np.abs(s.real) < _LIGHT * np.abs(s))
+            done = np.abs(move) < _SAME * np.abs(s)
+            arrived.append(s[light & done])
+            s, at = s[light & ~done], at[light & ~done]
+            if not s.size:
+                break
+    return np.concatenate(arrived)

@@ -157,6 +157,7 @@ def polish(
     family = FamilyProblem.of(asked)
     tighten: dict[tuple[int, str], float] = {}
     best: tuple[Solution, tuple[Assessment, ...], float] | None = None
+    rough = solved
     for _ in range(1 + _HAIRS):
         found = settle(
             family,
@@ -188,8 +189,12 @@ def polish(
             break
     if best is None:
         assessments, overs = _measured(family, solved, goal, relaxed)
-        best = replace(solved, converged=False), assessments, max([1.0, *overs.values()])
-    return best
+        return replace(solved, converged=False), assessments, max([1.0, *overs.values()])
+    found, assessments, excess = best
+    if rough.converged and abs(found.objective - rough.objective) < _SETTLED and excess <= KEPT:
+        # Rounding may leave no further programme where there is nothing more to gain.
+        found = replace(found, converged=True)
+    return found, assessments, excess
 
 
 def assess(
