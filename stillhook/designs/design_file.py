@@ -66,7 +66,7 @@ def design_text(design: Design) -> str:
         for same in (other, *other["members"]):
             del same["case"]
     for one in (content, *content["alternatives"]):
-        for member in one["members"]:
+        for member in _further(one):
             del member["built_for"]
     # The case comes last: it is the longest, and the one part that is not an answer.
     content["case"] = content.pop("case")
@@ -89,10 +89,16 @@ def design_data(design: Design) -> dict[str, Any]:
     for one, told in zip(
         (design, *design.alternatives), (data, *data["alternatives"]), strict=True
     ):
-        for member, fields in zip(one.members, told["members"], strict=True):
+        exhibit = [] if one.exhibit is None else [one.exhibit]
+        for member, fields in zip((*one.members, *exhibit), _further(told), strict=True):
             del fields["case"], fields["built_for"]
             fields["difference"] = difference_text(one.case, member.case)
     return data
+
+
+def _further(told: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the members, and the exhibit, of a design as plain data."""
+    return [*told["members"], *([told["exhibit"]] if "exhibit" in told else [])]
 
 
 def load_design(path: str | Path) -> Design:
@@ -144,13 +150,14 @@ def _complete(fields: Mapping[str, Any]) -> None:
     def designs(of: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
         return [one for one in of.get(name) or () if isinstance(one, dict)]
 
-    own = designs(fields, "members")
-    for other in designs(fields, "alternatives"):
+    own, others = designs(fields, "members"), designs(fields, "alternatives")
+    for other in others:
         other.setdefault("case", fields.get("case"))
         for member, same in zip(designs(other, "members"), own, strict=False):
             member.setdefault("case", same.get("case"))
             member.setdefault("built_for", fields.get("case"))
-    for member in own:
+    exhibits = [o["exhibit"] for o in (fields, *others) if isinstance(o.get("exhibit"), dict)]
+    for member in (*own, *exhibits):
         member.setdefault("built_for", fields.get("case"))
 
 

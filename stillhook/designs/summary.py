@@ -152,10 +152,11 @@ def _why_not(taken: Design, other: Design) -> str:
 
 def member_table(design: Design) -> Table | None:
     """Return what the design does in each member of its family; None without a family."""
-    if not design.members:
+    further = [*design.members, *([design.exhibit] if design.exhibit is not None else [])]
+    if not further:
         return None
     every = [("the case", design), *(
-        (difference_text(design.case, member.case), member) for member in design.members
+        (difference_text(design.case, member.case), member) for member in further
     )]  # fmt: skip
     rows = []
     for name, one in every:

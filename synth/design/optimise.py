@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -29,9 +30,12 @@ from ..question import (
     FamilyProblem,
     Objective,
     PosedFamily,
+    least_damping_text,
+    on_common_masses,
     on_enough_masses,
     pose,
     pose_family,
+    with_masses,
 )
 from ..search import KEPT, Found, Progress, polish, search, with_bests
 from ..structures import LowOrderFeedback, structures_aboard
@@ -52,6 +56,7 @@ NESTED = (
 _AS_STILL = 1.05  # of the stillest design's motion, with which a simpler one is preferred
 _ROUGHEST = 0.99  # of the largest sea that any structure can do
 _SHARE = 4  # of the starts that each of several structures has
+ROUNDS = 6  # of asking an answer for what the rope asks of it
 _RESUMED = 3  # ends of a search that the next one, on more masses, begins from
 _HAIR = 1e-4  # relative excess over a limit in the largest sea
 _ALIKE = 1e-3  # relative difference of two seas that are as large
@@ -76,10 +81,11 @@ def optimise_gains(
 ) -> Design:
     """Return the controller that minimises the payload's variance within the limits of a case.
 
-    With `members` it is one controller for the case and for others like it, which keeps the limits
-    of all of them.  Of several structures it is the simplest within five percent of the stillest
-    that is ok; the others are its `alternatives`.  Where the limits cannot all be kept, it is the
-    stillest in the largest sea in which any structure can keep them.
+    It is one controller for the case and for the case with the least damping that its rope may
+    have (`synth.question.pose_family`), with `members` for others like it too, which keeps the
+    limits of all of them.  Of several structures it is the simplest within five percent of the
+    stillest that is ok; the others are its `alternatives`.  Where the limits cannot all be kept, it
+    is the stillest in the largest sea in which any structure can keep them.
 
     Parameters
     ----------
@@ -179,15 +185,16 @@ def _optimised(
     known = starts_from(question, guesses) or nested_starts(question, starts, seed, progress)
     count = starts + len(known)
     known = [*known, *gains_in_use(question)]
-    posed, tuning = _answer(posed, count, seed, known, progress)
-    while (wanted := _masses_wanted(posed, tuning)) > posed.masses:
-        # The rope turned out to need more masses: the ends of the search are the guesses.
-        posed = posed.on(wanted)
-        tuning = _again(posed.problem, tuning, count, seed, progress)
+    given = posed
+    answered = _answer(given, count, seed, known, progress)
+    posed, tuning = _on_the_rope(given, *answered, count, seed, progress)
     if not tuning.ok:
         if tuning.assessment is None or not any(member.drive for member in posed.questions):
             return _family_design(posed, tuning)
-        return _best_possible(posed, count, seed, known, progress)
+        missed = _best_possible(posed, count, seed, known, progress)
+        if isinstance(missed, Design):
+            return missed
+        posed, tuning = _on_the_rope(given, *missed, count, seed, progress)
     design = verified(_family_design(posed, tuning), progress)
     most = 1 if question.data.lumping == "thesis" else MAX_MASSES
     while tuning.ok and not design.ok and 2 * posed.masses <= most:
@@ -196,6 +203,46 @@ def _optimised(
         tuning = _again(posed.problem, tuning, count, seed, progress)
         design = verified(_family_design(posed, tuning), progress)
     return design
+
+
+def _on_the_rope(
+    given: PosedFamily,
+    posed: PosedFamily,
+    tuning: Tuning,
+    starts: int,
+    seed: int,
+    progress: Progress | None,
+) -> tuple[PosedFamily, Tuning]:
+    """Return the answer on the masses and with the reserves that it asks for itself."""
+    settled = False
+    for _ in range(ROUNDS):
+        fitted = _fitted(posed, tuning)
+        if fitted is posed:
+            # What asked for more on the way may be gone: then on the masses of `evaluate_gains`.
+            fewer = _masses_of(given, tuning) if tuning.ok and not settled else posed.masses
+            if fewer >= posed.masses:
+                break
+            settled, fitted = True, given.on(fewer)
+        # The ends of the search are the guesses.
+        posed, tuning = fitted, _again(fitted.problem, tuning, starts, seed, progress)
+    return posed, tuning
+
+
+def _masses_of(posed: PosedFamily, tuning: Tuning) -> int:
+    """Return the masses on which `evaluate_gains` looks at an answer."""
+    solved = tuning.found.solved
+    assert solved is not None
+    parameters = posed.first.named([float(v) for v in solved.values])
+    looks = [partial(_looked_at, question, parameters) for question in posed.questions]
+    return max(question.masses for question, _, _ in on_common_masses(looks))
+
+
+def _fitted(posed: PosedFamily, tuning: Tuning) -> PosedFamily:
+    """Return the family as an answer asks for it; itself where a member is not stable."""
+    seen = [t.assessment for t in (tuning, *tuning.members) if t.assessment is not None]
+    if len(seen) < len(posed.questions) or not all(one.stable for one in seen):
+        return posed
+    return posed.fitted(seen)
 
 
 def _high_order(posed: PosedFamily, order: int | None, progress: Progress | None) -> Design:
@@ -212,13 +259,14 @@ def _high_order(posed: PosedFamily, order: int | None, progress: Progress | None
         growth = member.problem.growth(member.values(parameters))
         loop = member.assess(parameters) if growth <= 0.0 else None
         designs.append(evaluated(member, parameters, loop, growth=growth))
-    design = with_members(designs, posed)
-    return verified(replace(design, ok=all(one.ok for one in designs)), progress)
+    return verified(together(designs, posed), progress)
 
 
 @one_thread()
 def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback") -> Design:
     """Return what given parameters do on a case, in the same form as an optimised design.
+
+    It is ok if the limits are kept with the least damping that the rope may have, too.
 
     Parameters
     ----------
@@ -235,12 +283,25 @@ def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback
     InputError
         If there is no such structure, or a parameter is missing, unknown or out of its range.
     """
-    question = pose(case, structure)
-    complete = checked_parameters(question, gains)
-    question, loop, growth = on_enough_masses(
-        question, complete, lambda posed, values: posed.problem.assess(values)
+    posed = pose_family(case, (), structure)
+    complete = checked_parameters(posed.first, gains)
+    looked = on_common_masses([partial(_looked_at, one, complete) for one in posed.questions])
+    posed = replace(posed, questions=tuple(question for question, _, _ in looked))
+    designs = [
+        evaluated(question, complete, loop, growth=growth) for question, loop, growth in looked
+    ]
+    return verified(together(designs, posed), None)
+
+
+def _looked_at(
+    question: DesignQuestion, parameters: Mapping[str, float], masses: int
+) -> tuple[DesignQuestion, Assessment | None, float]:
+    """Return a question on the masses that given parameters ask for, and their loop in it."""
+    if question.masses < masses and question.data.masses is None:
+        question = with_masses(question, masses)
+    return on_enough_masses(
+        question, parameters, lambda posed, values: posed.problem.assess(values)
     )
-    return verified(evaluated(question, complete, loop, growth=growth), None)
 
 
 def evaluated(
@@ -287,9 +348,28 @@ def _answer(
     tuning = tuning_of(alone, no_worse(alone, search(alone, starts, seed, known, progress), known))
     if len(posed.questions) == 1:
         return posed, tuning
-    posed = posed.on(max(posed.masses, _masses_wanted(posed.alone, tuning)))
+    posed = posed.on(_fitted(posed.alone, tuning).masses)
     family = posed.problem if drive else posed.without_drive
-    return posed, _again(family, tuning, starts, seed, progress, known)
+    again = _again(family, tuning, starts, seed, progress, known)
+    if tuning.ok and not again.ok:
+        again = replace(again, status=_damped_too_little(posed, again) or again.status)
+    return posed, again
+
+
+def _damped_too_little(posed: PosedFamily, tuning: Tuning) -> str:
+    """Return what the least damping of the rope breaks, "" where that is not what is in the way."""
+    each = zip(posed.questions, (tuning, *tuning.members), strict=False)
+    for question, member in [*each][posed.given :]:
+        peak = member.limits.get("max_sensitivity")
+        if member.margins is None or peak is None or peak.kept:
+            continue
+        words = least_damping_text(posed.first.case)
+        return (
+            f"no ok design: at {words} M_s is {_number(peak.value, peak.bound)} instead of "
+            f"{_number(question.case.limits.max_sensitivity, peak.value)} near "
+            f"{member.margins.peak:.3g} rad/s"
+        )
+    return ""
 
 
 def _again(
@@ -346,12 +426,17 @@ def _best_possible(
     seed: int,
     known: Sequence[Sequence[float]],
     progress: Progress | None,
-) -> Design:
-    """Return the best design in the largest feasible sea, for a drive that is too small."""
+) -> Design | tuple[PosedFamily, Tuning]:
+    """Return the best design in the largest feasible sea, for a drive that is too small.
+
+    Or the answer in the sea asked for, where that is feasible after all.
+    """
     case = posed.first.case
     posed, free = _answer(posed, starts, seed, known, progress, drive=False)
     if not free.ok:
-        status = f"whatever the drive: {free.status}"
+        status = free.status
+        if not status.startswith("no ok design"):
+            status = f"whatever the drive: {status}"
         return _family_design(posed, replace(free, status=status), drive_kept=False)
     short = shortfall(posed.problem, free, progress)
     if short is None:
@@ -360,7 +445,7 @@ def _best_possible(
     if short.share >= 1.0:
         # The sea asked for is feasible after all: the search missed it, so it starts from there.
         found = search(posed.problem, 4, seed, [short.values], progress)
-        return verified(_family_design(posed, tuning_of(posed.problem, found)), progress)
+        return posed, tuning_of(posed.problem, found)
     calm = _in_the_largest_sea(posed, short)
     height = calm.significant_height
     design = replace(
@@ -466,8 +551,9 @@ def _number(value: float, other: float) -> str:
 
 
 def _family_design(posed: PosedFamily, tuning: Tuning, *, drive_kept: bool = True) -> Design:
-    """Return a tuning as a design, with one for each further member that has a stable loop."""
-    each = zip(posed.questions, (tuning, *tuning.members), strict=False)
+    """Return a tuning as a design, with one for each further member."""
+    tunings = (tuning, *tuning.members) if tuning.members else (tuning,) * len(posed.questions)
+    each = zip(posed.questions, tunings, strict=True)
     return with_members([design_of(*pair, drive_kept=drive_kept) for pair in each], posed)
 
 
@@ -480,6 +566,16 @@ def with_members(designs: Sequence[_D], posed: PosedFamily) -> _D:
         fixed=tuple(posed.first.held),
         members=tuple(replace(member, built_for=posed.first.case) for member in others),
     )
+
+
+def together(designs: Sequence[_D], posed: PosedFamily) -> _D:
+    """Return the first of the members' designs with the others, ok if all of them are."""
+    each = zip(posed.names, designs, strict=True)
+    failed = [f"{name}: {one.status}" for name, one in each if not one.ok]
+    design = with_members(designs, posed)
+    if len(designs) == 1 or not failed:
+        return design
+    return replace(design, ok=False, status="; ".join(failed))
 
 
 def design_of(question: DesignQuestion, tuning: Tuning, *, drive_kept: bool = True) -> Design:
@@ -560,7 +656,10 @@ def recorded(
 
 
 def verified(design: Design, progress: Progress | None) -> Design:
-    """Return the design with its independent check; one that fails it is not ok."""
+    """Return the design with its independent check; one that fails it is not ok.
+
+    An exhibit is looked at with the least damping of its rope too.
+    """
     if design.margins is None:
         return design
     if progress is not None:
@@ -573,7 +672,25 @@ def verified(design: Design, progress: Progress | None) -> Design:
         status += "; with the drum held the payload moves less"
     if not checked.ok:
         status = f"not verified: {checked.status}"
-    return replace(design, ok=design.ok and checked.ok, status=status, verification=checked)
+    return replace(
+        design,
+        ok=design.ok and checked.ok,
+        status=status,
+        verification=checked,
+        exhibit=_exhibit(design),
+    )
+
+
+def _exhibit(design: Design) -> Design | None:
+    """Return what a design does with the least damping of its rope, where that is reported only."""
+    least = design.sea_case.with_least_damping
+    if least is None or design.case.rope.damping_law == "hysteretic":
+        return None
+    question = pose(least, design.structure, design.masses, built_for=design.built_for)
+    question, loop, growth = _looked_at(question, design.parameters, 0)
+    found = evaluated(question, design.parameters, loop, growth=growth)
+    limits = {name: replace(use, enforced=False) for name, use in found.limits.items()}
+    return replace(found, limits=limits, built_for=design.built_for or design.case)
 
 
 def checked_parameters(question: DesignQuestion, gains: object) -> dict[str, float]:
@@ -601,10 +718,3 @@ def checked_parameters(question: DesignQuestion, gains: object) -> dict[str, flo
             "gains", name, every[name], low=0.0 if low >= 0.0 else -np.inf, open_low=low > 0.0
         )
     return checked
-
-
-def _masses_wanted(posed: PosedFamily, tuning: Tuning) -> int:
-    seen = [t.assessment for t in (tuning, *tuning.members) if t.assessment is not None]
-    if len(seen) < len(posed.questions) or not all(one.stable for one in seen):
-        return posed.masses
-    return posed.masses_wanted(seen)

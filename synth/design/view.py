@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -30,17 +30,16 @@ from ..question import (
     Objective,
     PosedFamily,
     Values,
+    on_common_masses,
     on_enough_masses,
     pose_family,
     with_masses,
 )
 from ..search import KEPT, Solution, cost_nodes, margin_nodes, settle, with_bests
 from .design import Design
-from .optimise import checked_parameters, evaluated, verified, with_members
+from .optimise import ROUNDS, checked_parameters, evaluated, together, verified
 
 _PER_DECADE = 40  # margin frequencies; peaks and crossings between them are refined
-
-_D = TypeVar("_D", bound=Design)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -116,7 +115,8 @@ class View:
 
     def __init__(self, posed: PosedFamily, drags: Sequence[float | None] = ()) -> None:
         self.posed = posed
-        each = zip(posed.questions, drags or [None] * len(posed.questions), strict=True)
+        known = [*drags, *[None] * (len(posed.questions) - len(drags))]
+        each = zip(posed.questions, known, strict=False)
         self._members = [_Member(*one) for one in each]
         self._problems: dict[tuple[int, ...], FamilyProblem] = {}
 
@@ -145,7 +145,8 @@ class View:
             If a parameter is missing, unknown or out of its range.
         """
         parameters = checked_parameters(self.posed.first, gains)
-        return self._together([member.look(parameters) for member in self._members])
+        looks = on_common_masses([partial(one.loop, parameters) for one in self._members])
+        return together([_look(parameters, *look) for look in looks], self.posed)
 
     @one_thread()
     def replace(self, changes: Mapping[str, Any]) -> View:
@@ -158,7 +159,8 @@ class View:
         InputError
             If a change is not valid.
         """
-        first, *others = (q.case.replace(dict(changes)) for q in self.posed.questions)
+        given = self.posed.questions[: self.posed.given]
+        first, *others = (question.case.replace(dict(changes)) for question in given)
         objective = self.posed.objective
         posed = pose_family(first, others, self.structure, objective=objective, known=self.posed)
         return View(posed, [member.drag for member in self._members])
@@ -186,8 +188,8 @@ class View:
         given = self.case.gains if start is None else start
         parameters = checked_parameters(self.posed.first, given)
         begin, questions = [], []
-        for member in self._members:
-            question, loop, growth = member.loop(parameters)
+        looks = on_common_masses([partial(one.loop, parameters) for one in self._members])
+        for question, loop, growth in looks:
             if loop is None:
                 raise InputError(
                     f"start: must be gains of a stable loop, got one that grows by {growth:.3g} 1/s"
@@ -197,13 +199,25 @@ class View:
         posed = replace(self.posed, questions=tuple(questions))
         reference = np.array(posed.first.values(parameters))
         solved, ended = self._descent(posed, reference, reference, begin)
-        if ended is not None and (wanted := posed.masses_wanted(ended)) > posed.masses:
-            # What a descent arrives at may need more masses than where it began.
-            finer = posed.on(wanted)
-            again = self._assessed(finer, reference)
-            if again is not None:
-                posed, begin = finer, again
-                solved, ended = self._descent(posed, solved.values, reference, ended)
+        settled = False
+        for _ in range(ROUNDS):
+            # What a descent arrives at may ask for more, or for less, than where it began.
+            if ended is None:
+                break
+            if (fitted := posed.fitted(ended)) is posed:
+                if settled:
+                    break
+                there = posed.first.named([float(v) for v in solved.values])
+                looks = on_common_masses([partial(one.loop, there) for one in self._members])
+                fewer = max(question.masses for question, _, _ in looks)
+                if fewer >= posed.masses:
+                    break
+                settled, fitted = True, self.posed.on(fewer)
+            again = self._assessed(fitted, reference)
+            if again is None:
+                break
+            posed, begin = fitted, again
+            solved, ended = self._descent(posed, solved.values, reference, ended)
         how = "the descent did not converge: the start as it was"
         design = self._design(posed, parameters, begin, how=how)
         if ended is not None:
@@ -243,11 +257,11 @@ class View:
 
     def _problem(self, posed: PosedFamily, guesses: Sequence[FloatArray] = ()) -> FamilyProblem:
         """Return the problem on some rope masses, for the regret with the best of each member."""
+        if posed.objective is not Objective.REGRET:
+            return posed.problem
         masses = tuple(question.masses for question in posed.questions)
         if masses not in self._problems:
-            regret = posed.objective is Objective.REGRET
-            found = with_bests(posed.problem, guesses=guesses) if regret else posed.problem
-            self._problems[masses] = found
+            self._problems[masses] = with_bests(posed.problem, guesses=guesses)
         return self._problems[masses]
 
     def _assessed(
@@ -276,19 +290,7 @@ class View:
             rms = loop.sigma(PAYLOAD)
             priced = {name: 0.01 * abs(p) * rms for name, p in own.items()}
             designs.append(evaluated(question, parameters, loop, priced, how=how))
-        return self._together(designs)
-
-    def _together(self, designs: Sequence[_D]) -> _D:
-        """Return the first of the members' designs with the others, ok if all of them are."""
-        failed = [
-            f"{name}: {one.status}"
-            for name, one in zip(self.posed.names, designs, strict=True)
-            if not one.ok
-        ]
-        design = with_members(designs, self.posed)
-        if len(designs) == 1 or not failed:
-            return design
-        return replace(design, ok=False, status="; ".join(failed))
+        return together(designs, self.posed)
 
 
 class _Member:
@@ -298,30 +300,14 @@ class _Member:
         self.question, self.drag = question, drag
         self._posed = {question.masses: question}
 
-    def look(self, parameters: Mapping[str, float]) -> Look:
-        """Return what given parameters do in this member."""
-        question, loop, growth = self.loop(parameters)
-        design = evaluated(question, parameters, loop, growth=growth)
-        omega = spectrum = np.zeros(0)
-        response = loop_gain = omega.astype(np.complex128)
-        if loop is not None:
-            omega, loop_gain = loop.grid, loop.gains[0]
-            response = loop.response(PAYLOAD, HOOK, omega)
-            spectrum = loop.spectrum(PAYLOAD, omega)
-        return Look(
-            **{field.name: getattr(design, field.name) for field in fields(design)},
-            growth=growth,
-            omega=omega,
-            response=response,
-            spectrum=spectrum,
-            loop_gain=loop_gain,
-        )
-
     def loop(
-        self, parameters: Mapping[str, float]
+        self, parameters: Mapping[str, float], masses: int
     ) -> tuple[DesignQuestion, Assessment | None, float]:
         """Return the question on the masses that suit a loop, the loop (or None), its growth."""
-        return on_enough_masses(self.question, parameters, self.assessed, self.on)
+        question = self.question
+        if question.masses < masses and question.data.masses is None:
+            question = self.on(question, masses)
+        return on_enough_masses(question, parameters, self.assessed, self.on)
 
     def on(self, question: DesignQuestion, masses: int) -> DesignQuestion:
         """Return the question on some rope masses, posed once."""
@@ -355,3 +341,27 @@ class _Member:
         grid = partial(margin_nodes, problem, per_decade=_PER_DECADE)
         same = (lambda _: last[-1]) if last else nodes  # what the drag was found on does
         return Assessment(*loop, drag=problem.drag, coefficient=coefficient, nodes=same, grid=grid)
+
+
+def _look(
+    parameters: Mapping[str, float],
+    question: DesignQuestion,
+    loop: Assessment | None,
+    growth: float,
+) -> Look:
+    """Return what given parameters do in a member."""
+    design = evaluated(question, parameters, loop, growth=growth)
+    omega = spectrum = np.zeros(0)
+    response = loop_gain = omega.astype(np.complex128)
+    if loop is not None:
+        omega, loop_gain = loop.grid, loop.gains[0]
+        response = loop.response(PAYLOAD, HOOK, omega)
+        spectrum = loop.spectrum(PAYLOAD, omega)
+    return Look(
+        **{field.name: getattr(design, field.name) for field in fields(design)},
+        growth=growth,
+        omega=omega,
+        response=response,
+        spectrum=spectrum,
+        loop_gain=loop_gain,
+    )

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         FamilyQuestion,
         PosedFamily,
         difference_text,
+        least_damping_text,
         pose_family,
     )
     from .loop_numbers import LoopNumbers, Point, moment_weights
@@ -33,6 +34,6 @@ if TYPE_CHECKING:
         uncompensated,
         with_masses,
     )
-    from .rope_masses import masses_for, on_enough_masses
+    from .rope_masses import masses_for, on_common_masses, on_enough_masses
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -5,10 +5,16 @@
 
 The controller is one: its law is bound to the plant of the case itself and used around every
 member.  Members that differ in nothing but the sea share their plant where drag is fixed.
+
+The damping of wire rope is not known to better than a factor: every member is joined by itself
+with the least damping that a design must hold at, where M_s may be 1.25 times its limit
+(`Case.with_least_damping`).  A rope by Kelvin and Voigt's law, which flatters its higher modes, is
+an exhibit: what is designed for it is not held to that.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,11 +23,12 @@ from typing import Any
 from models.case import Case
 from models.plant import LinearPlant
 
+from ..limits import Limit
 from ..loop import Assessment
 from ..structures import ParametrisedController
 from .family_problem import FamilyLoop, FamilyProblem, Objective
 from .question import DesignQuestion, pose, with_masses
-from .rope_masses import masses_for
+from .rope_masses import masses_and_reserve, masses_for
 
 PAYLOAD_FEEDBACK = "payload-feedback"
 
@@ -95,11 +102,17 @@ class PosedFamily:
         What each member is called.
     objective
         What is made small over all of them.
+    given
+        How many of them were given: the first; the others are these with the least damping.
+    reserves
+        By member, what limits hold in reserve for the distributed rope, relative and by name.
     """
 
     questions: tuple[DesignQuestion, ...]
     names: tuple[str, ...]
     objective: Objective = Objective.WORST
+    given: int = 1
+    reserves: tuple[Mapping[str, float], ...] = ()
 
     @property
     def first(self) -> DesignQuestion:
@@ -109,7 +122,13 @@ class PosedFamily:
     @property
     def alone(self) -> PosedFamily:
         """The case itself, a family of one."""
-        return replace(self, questions=self.questions[:1], names=self.names[:1])
+        return replace(
+            self,
+            questions=self.questions[:1],
+            names=self.names[:1],
+            given=1,
+            reserves=self.reserves[:1],
+        )
 
     @property
     def masses(self) -> int:
@@ -129,8 +148,12 @@ class PosedFamily:
     def _problem(self, *, drive: bool) -> FamilyProblem:
         plants: dict[tuple[object, ...], LinearPlant] = {}
         loops = []
-        for name, question in zip(self.names, self.questions, strict=True):
-            problem = question.problem_with(question.limits if drive else question.loop)
+        reserves = self.reserves or ({},) * len(self.questions)
+        for name, question, reserve in zip(self.names, self.questions, reserves, strict=True):
+            limits = question.limits if drive else question.loop
+            problem = question.problem_with(
+                [_reserved(limit, reserve.get(limit.name, 0.0)) for limit in limits]
+            )
             plant = plants.setdefault(_loop_key(question), problem.plant)
             problem = replace(problem, plant=plant, law=self.first.law)
             loops.append(FamilyLoop(name=name, problem=problem))
@@ -139,6 +162,21 @@ class PosedFamily:
     def masses_wanted(self, assessments: Sequence[Assessment]) -> int:
         """Return the rope masses that the most demanding loop of any member asks for."""
         return max(self.masses, _masses_wanted(self.questions, assessments))
+
+    def fitted(self, assessments: Sequence[Assessment]) -> PosedFamily:
+        """Return the family on the masses, with the reserves, that its loops ask for; or itself."""
+        each = zip(self.questions, assessments, strict=True)
+        needs = [masses_and_reserve(*pair) for pair in each]
+        if (masses := max(wanted for wanted, _ in needs)) > self.masses:
+            return self.on(masses)
+        if not any(more for _, more in needs):
+            return self
+        known = self.reserves or ({},) * len(needs)
+        reserves = tuple(
+            {name: own.get(name, 0.0) + more.get(name, 0.0) for name in {**own, **more}}
+            for own, (_, more) in zip(known, needs, strict=True)
+        )
+        return replace(self, reserves=reserves)
 
     def on(self, masses: int) -> PosedFamily:
         """Return the family on a number of rope masses, where members have fewer."""
@@ -168,7 +206,8 @@ def pose_family(
     case
         The case, the first member of the family.
     members
-        The further members: changes of the case by dotted path, or cases.
+        The further members: changes of the case by dotted path, or cases.  The case and each of
+        them are followed by themselves with the least damping of the rope.
     structure, masses
         As `FamilyQuestion` takes them.
     objective
@@ -176,30 +215,51 @@ def pose_family(
     held
         Parameters of the structure that are not searched, by name.
     known
-        As many members like these, posed: what each has in common with its like is taken from it.
+        Members like these, posed: what each has in common with its like is taken from it.
 
     Raises
     ------
     InputError
         If a change is not valid, or there is no such structure, objective or parameter.
     """
-    cases = [m if isinstance(m, Case) else case.replace(dict(m)) for m in members]
+    given = [case, *(m if isinstance(m, Case) else case.replace(dict(m)) for m in members)]
+    cases = [*given, *damped_least(given)]
     posed = FamilyQuestion(case, structure, masses)
-    alike = [None] * (1 + len(cases)) if known is None else known.questions
-    questions = map(posed.question, (case, *cases), alike)
+    alike: list[DesignQuestion | None] = [] if known is None else [*known.questions]
+    alike += [None] * (len(cases) - len(alike))
+    questions = map(posed.question, cases, alike)
     return PosedFamily(
         questions=tuple(replace(question, held=dict(held or {})) for question in questions),
-        names=(case.name, *(difference_text(case, one) for one in cases)),
+        names=(case.name, *(difference_text(case, one) for one in cases[1:])),
         objective=Objective.of(objective),
+        given=len(given),
     )
+
+
+def damped_least(cases: Sequence[Case]) -> list[Case]:
+    """Return cases with the least damping that a design must hold at, of those that ask for it."""
+    least = (case.with_least_damping for case in cases if case.rope.damping_law == "hysteretic")
+    return [case for case in least if case is not None]
 
 
 def difference_text(case: Case, other: Case) -> str:
     """Return in what a case differs from another, as ``rope.damping_ratio 0.0003``."""
+    if other == case.with_least_damping:
+        return f"{least_damping_text(case)}, M_s up to {other.limits.max_sensitivity:g}"
     own, others = _flat(case.to_dict()), _flat(other.to_dict())
     paths = [path for path in {**own, **others} if own.get(path) != others.get(path)]
     told = (f"{path} {_value_text(others.get(path))}" for path in paths)
     return ", ".join(told) or "the case itself"
+
+
+def least_damping_text(case: Case) -> str:
+    """Return what the least damping is that a design must hold at, in words."""
+    rope, least = case.rope, case.rope.least_damping_ratio
+    if rope.damping_measured is not None:
+        return f"the least damping measured, {least:g}"
+    if math.isclose(least, 0.1 * rope.damping_ratio):
+        return "a tenth of the rope's damping"
+    return f"the damping of solid steel, {least:g}"
 
 
 def _flat(data: Mapping[str, Any], above: str = "") -> dict[str, Any]:
@@ -215,6 +275,12 @@ def _value_text(value: Any) -> str:
     if isinstance(value, list):
         return "changed"
     return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _reserved(limit: Limit, share: float) -> Limit:
+    """Return a limit that is held with a share of itself in reserve."""
+    factor = 1.0 + share if limit.at_least else 1.0 / (1.0 + share)
+    return replace(limit, bound=factor * limit.bound) if share else limit
 
 
 def _loop_key(question: DesignQuestion) -> tuple[object, ...]:

@@ -9,7 +9,7 @@ grid: they are looked for at the poles of the rope, with the loop open and close
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -160,7 +160,7 @@ class _OnTheRope:
 
     def _gain(self, index: int, omega: FloatArray) -> ComplexArray:
         """Return L of one loop at frequencies [rad/s], (k,)."""
-        return np.asarray(self._gains(1j * omega)[index])
+        return np.asarray(self._gains(np.asarray(1j * omega, dtype=np.complex128))[index])
 
     def _poles(self) -> ComplexArray:
         """Return the light poles of the rope with the loop open and with it closed [1/s]."""
@@ -170,8 +170,8 @@ class _OnTheRope:
         half = np.arange(2 * begins.size) < begins.size
 
         def open_and_closed(s: ComplexArray, at: IndexArray) -> ComplexArray:
-            gain = self._gains(s)[0]
-            return np.asarray(np.where(half[at], 1.0 / gain, 1.0 + gain))
+            # 1/L and 1 + 1/L, which are smooth where L has a pole.
+            return np.asarray(1.0 / self._gains(s)[0] + ~half[at])
 
         return np.concatenate([begins, _zeros(open_and_closed, np.tile(begins, 2))])
 
@@ -215,6 +215,32 @@ def on_enough_masses(
         question = finer(question, masses)
         growth = question.problem.growth(values)
     return question, None, growth
+
+
+def on_common_masses(
+    looks: Sequence[Callable[[int], tuple[DesignQuestion, Assessment | None, float]]],
+) -> list[tuple[DesignQuestion, Assessment | None, float]]:
+    """Return the loops of a family on the masses that the most demanding of them asks for.
+
+    Parameters
+    ----------
+    looks
+        For each member, the case's own first: from the least number of masses to what
+        `on_enough_masses` returns.
+    """
+    found: dict[int, tuple[DesignQuestion, Assessment | None, float]] = {}
+    asked = dict.fromkeys(range(len(looks)), -1)
+    least = 0
+    while any(masses < least for masses in asked.values()) or not found:
+        # The last have the least damping, and ask for most.
+        for i in reversed(range(len(looks))):
+            if asked[i] < least or i not in found:
+                asked[i] = least
+                found[i] = looks[i](least)
+                question, loop, _ = found[i]
+                if loop is not None and question.data.masses is None:
+                    asked[i] = least = max(least, question.masses)
+    return [found[i] for i in range(len(looks))]
 
 
 def _least(limit: Limit, peak: float) -> float:

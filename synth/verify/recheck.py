@@ -23,6 +23,8 @@ from .winding import Winding, count_unstable, open_loop_poles
 PADE = 8  # order of the delay models: those of the optimiser have five or six
 _COUNTED_PADE = 6  # order of the delay models that say which poles a limit on poles counts
 _LATE, _LATE_PADE = 0.2, 12  # delay beyond which that is too little [s], and the order it takes
+_STEP, _SECANTS = 1e-6, 12  # first relative step of the secant method, and how many it takes
+_FARTHEST, _ARRIVED = 0.1, 1e-7  # its relative steps: at most, and at a root
 TIGHT = 1e-4  # of margins, drag and limits on the design's own plant
 
 
@@ -109,6 +111,23 @@ def closed_loop_marks(plant: LinearPlant, law: LawMatrices) -> ComplexArray:
     poles = [open_loop_poles(plant.A), open_loop_poles(law.A), np.linalg.eigvals(closed)]
     found = np.concatenate(poles)
     return np.asarray(found[np.abs(found) > 0.0], dtype=np.complex128)
+
+
+def roots_near(
+    function: Callable[[ComplexArray], ComplexArray], begins: ComplexArray
+) -> ComplexArray:
+    """Return roots [1/s] of an analytic function that the secant method finds near some points."""
+    before, s = begins, begins * (1.0 + _STEP)
+    with np.errstate(all="ignore"):
+        last = function(before)
+        for _ in range(_SECANTS):
+            value = function(s)
+            move = value * (s - before) / (value - last)
+            move = np.where(np.isfinite(move) & (value != 0.0), move, 0.0)
+            before, last = s, value
+            s = s - move * np.minimum(1.0, _FARTHEST * np.abs(s) / np.abs(move))
+    arrived = np.abs(s - before) < _ARRIVED * np.abs(s)
+    return np.asarray(s[arrived & (s.imag > 0.0)])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -38,6 +38,7 @@ from .recheck import (
     looked_at,
     pade_order,
     pole_check,
+    roots_near,
     winding_check,
     winding_of_plant,
 )
@@ -193,7 +194,13 @@ class _Winch:
         plant = self._plant(self.more_masses)
         controller = self.design.controller
         loop = CheckedLoop.of(plant, controller, self.sources, self.demands, [PAYLOAD], exact)
-        return self._signed(loop)
+        loop = self._signed(loop)
+        if exact is None:
+            return loop
+        # A mode with hardly any damping is narrower than what its place on masses is off by.
+        begins = np.concatenate([loop.marks, self.data.damped_modes(_HELD_MODES)])
+        own = roots_near(partial(_near_pole, loop), begins[begins.imag > 0.0])
+        return replace(loop, marks=np.concatenate([loop.marks, own]))
 
     @cached_property
     def demands(self) -> dict[str, Demand]:
@@ -349,6 +356,12 @@ class _Winch:
                 f"{check.found:.3g} 1/s): all figures belong to the one-spring model of the case"
             )
         return [replace(check, note=note, counts=False)]
+
+
+def _near_pole(loop: CheckedLoop, s: ComplexArray) -> ComplexArray:
+    """Return (1 + L)/L, which vanishes where 1 + L does and is smooth where L has a pole."""
+    difference = loop.difference(s)
+    return np.asarray(difference / (difference - 1.0))
 
 
 def held_moments(data: PlantData, source: Source, drag: float) -> tuple[float, float, float]:
