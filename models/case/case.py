@@ -36,6 +36,7 @@ _MOST = 100.0  # that a case may allow
 _BEFORE: Mapping[tuple[str, ...], Any] = {
     ("limits", "tension_ends"): "drum",
     ("winch", "losses"): "hauling",
+    ("rope", "damping_law"): "kelvin-voigt",
     ("sensors", "payload", "noise_enters"): "after-filter",
 }
 
