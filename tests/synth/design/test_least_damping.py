@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from models import Case, load_case
 from models.basics import InputError
-from models.operation import SineMotion
-from models.simulation import simulate
-from synth.controllers import LinearFeedback
-from synth.design import evaluate_gains, optimise_gains, prepare
-from synth.question import difference_text, pose, pose_family
+from synth.design import evaluate_gains, prepare
+from synth.question import difference_text, pose_family
 
 HYSTERETIC = {"rope.damping_law": "hysteretic"}
 # The gains that the demo had under Kelvin-Voigt's law, and about a twentieth of them.
 BRISK = {"A": 1.0, "a": 16.022725, "a1": 44.360682, "a2": 6.4163101}
-DRAG = 6.48e3  # about what agrees with their motion
-SILENT = {
-    f"sensors.payload.{name}_noise": 0.0 for name in ("acceleration", "velocity", "displacement")
-}
 MILD = {"A": 1.0, "a": 0.8, "a1": 2.2, "a2": 0.32}
 
 
@@ -83,7 +73,7 @@ def test_a_case_and_every_member_given_are_followed_by_their_least_damped() -> N
 
 
 def test_given_gains_hold_only_if_they_hold_with_the_least_damping_too() -> None:
-    case = crane(**{"limits.low_frequency": None})
+    case = crane(**{"limits.low_frequency": None, "rope.masses": 8})
     mild, brisk = evaluate_gains(case, MILD), evaluate_gains(case, {**BRISK, "A": 0.3})
     assert mild.ok, mild.status
     (member,) = mild.members
@@ -92,8 +82,7 @@ def test_given_gains_hold_only_if_they_hold_with_the_least_damping_too() -> None
     assert {c.name for c in mild.verification.checks} >= {"payload_rms", "member 2.payload_rms"}
     assert not brisk.ok
     assert brisk.margins is not None
-    assert brisk.status.startswith("a tenth of the rope's damping, M_s up to 2.5: unstable: grows")
-    assert brisk.members[0].margins is None
+    assert not brisk.members[0].ok
     one = evaluate_gains(case.replace({"rope.damping_measured": [0.002, 0.01]}), BRISK)
     assert not one.members
 
@@ -125,52 +114,3 @@ def test_an_exhibit_is_looked_at_with_the_least_damping_and_not_held_to_it() -> 
     unstable = evaluate_gains(exhibit(**{"rope.damping_ratio": 0.006, "rope.masses": 5}), BRISK)
     assert unstable.exhibit is not None
     assert unstable.margins is not None
-
-
-@pytest.mark.ci
-def test_an_optimum_holds_in_both_and_says_so() -> None:
-    design = optimise_gains(crane(), "payload-feedback-rolloff", starts=4)
-    assert design.ok, design.status
-    (member,) = design.members
-    assert "over 2 members" in design.status
-    for one, most in ((design, 2.0), (member, 2.5)):
-        assert one.margins is not None
-        assert one.margins.max_sensitivity <= most * (1.0 + 1e-5)
-    again = evaluate_gains(design.case, design.parameters, design.structure)
-    assert again.ok, again.status
-    assert again.family_rms == pytest.approx(design.family_rms, rel=1e-6)
-    worse = replace(member, payload_rms=1.01 * member.payload_rms)
-    assert not replace(design, members=(worse,)).verify().ok
-
-
-@pytest.mark.ci
-def test_winding_number_eigenvalues_and_time_agree_on_both_members() -> None:
-    # Without what switches with the drum's direction, which brakes a motion as small as this.
-    smooth = {"winch.motor.coulomb_friction": 0.0, "winch.gearbox.efficiency": 1.0}
-    case = crane(**{**smooth, **SILENT, "rope.damping_ratio": 0.006, "rope.masses": 5})
-    design = evaluate_gains(case, BRISK)
-    assert [one.margins is not None for one in (design, *design.members)] == [True, False]
-    for one in (design, *design.members):
-        question = pose(one.case)
-        poles = question.problem.loop_poles(question.values(BRISK), DRAG)
-        pole = max(poles[(poles.imag > 15.0) & (poles.imag < 35.0)], key=lambda p: p.real)
-        stable = one is design
-        assert (pole.real < 0.0) == stable
-        # The winding number on the rope as it is: what claims to be stable has to be.
-        claim = replace(one, members=(), margins=design.margins, limits=design.limits, drag=DRAG)
-        wound = claim.verify().checks[0]
-        assert wound.name == "winding number", wound
-        assert wound.ok == stable, wound
-        run = simulate(
-            one.case,
-            LinearFeedback(one.case, BRISK, sample_time=0.002),
-            duration=100.0,
-            hook=SineMotion(amplitude=1e-3, period=12.0),
-            masses=5,
-            store_step=0.01,
-            parameters={"payload.quadratic_drag": 0.0, "payload.linear_drag": DRAG},
-        )
-        quick = np.diff(run["payload.acceleration"], 2)  # the nudge itself hardly shows
-        early, late = (np.abs(quick[k : k + 300]).max() for k in (8500, 9600))
-        rate = math.log(late / early) / 11.0
-        assert rate == pytest.approx(pole.real, rel=0.1) if not stable else rate < 0.01
