@@ -25,6 +25,7 @@ import scipy.optimize
 from models.basics import spectral_nodes
 from models.sensing import sensed_line_at
 from synth.limits import (
+    Breakdown,
     Continuous,
     GainMargin,
     GainMarginDown,
@@ -343,10 +344,13 @@ def _use(
         steady = limit.static**2 + limit.loss**2
         return np.sqrt(steady + moments[limit.output][0]) / limit.bound
     if isinstance(limit, Minimum):
-        return peak(limit.output, limit.duration) / (limit.static - limit.bound)
+        reach = limit.loss + peak(limit.output, limit.duration)
+        return reach / (limit.static - limit.bound)
     if isinstance(limit, Power):
         torque = abs(limit.static) + limit.loss + peak(limit.torque, limit.duration)
-        return torque * peak(limit.speed, limit.duration) / limit.bound
+        speed = peak(limit.speed, limit.duration)
+        fast = (speed / limit.base_speed) ** 2 if isinstance(limit, Breakdown) else speed
+        return torque * fast / limit.bound
     raise TypeError(f"no peer knows the limit {limit.name}")
 
 

@@ -117,8 +117,8 @@ def test_a_small_run_ends_in_rows_and_tables(synthesis, tmp_path):
     assert {row.by for row in rows} >= {"ours", "evolution", "SLSQP"}
     assert all(row.seconds > 0.0 for row in rows)
     ours = rows[0]
-    assert ours.excess < 1e-3
-    assert ours.rms == pytest.approx(0.37275, rel=1e-3)
+    assert ours.excess < 1e-2  # designed on masses, measured on the exact rope
+    assert ours.rms == pytest.approx(0.5526, rel=1e-3)
     stored = sys.modules["stored"].read_rows(tmp_path / "data" / "synthesis.csv")
     again = [synthesis.Row.of(cells) for cells in stored]
     assert [row.cells() for row in again] == [row.cells() for row in rows]
