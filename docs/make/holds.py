@@ -396,16 +396,14 @@ def seeds_of(question: Question, case: Case, structure: str) -> list[int]:
 def growths(design: Design) -> Row:
     """Return the growth of the slowest mode at the rope's least damping, under both laws [1/s].
 
-    The least damping is a tenth of the case's, but no less than that of solid steel, a loss factor
-    of 4e-4; drag is that of the design, and losses do not damp.
+    Drag is that of the design, and losses do not damp.
     """
-    own = design.case.rope.damping_ratio
     found = {}
     for law in ("hysteretic", "kelvin-voigt"):
         case = design.case.replace(
             {
                 "rope.damping_law": law,
-                "rope.damping_ratio": min(own, max(0.1 * own, 2e-4)),
+                "rope.damping_ratio": design.case.rope.least_damping_ratio,
                 "payload.drag": {"method": "given", "coefficient": design.drag},
             }
         )
