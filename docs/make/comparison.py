@@ -5,7 +5,7 @@
 Torque of at most twice the rating, quadratic drag, and a reference unit whose error is white noise
 of 1 or 5 % of the heave's rms sampled at 4 Hz.  Runs of 20 minutes.  It takes some hours on two
 cores, in parts that are named in `PARTS`: one that was stopped goes on, and rows of other parts
-stay as they are.  Writes `docs/data/comparison.csv`, a row for each run, and prints the tables of
+stay as they are.  Writes `docs/data/comparison.csv`, a row for each run, and the tables of
 `docs/compare.md`.
 """
 
@@ -24,6 +24,7 @@ from stillhook.comparison.cell import Cell
 
 ROOT = Path(__file__).resolve().parents[2]
 CSV = ROOT / "docs" / "data" / "comparison.csv"
+PAGE = ROOT / "docs" / "compare.md"
 HEIGHTS = (1.0, 1.25, 1.9, 2.43, 3.75)  # H_s [m]
 CALM = (0.5, 1.0)  # H_s where next to nothing saturates [m]
 LINEAR = ("none", "thesis", "feedback", "feedback-half", "combined", "combined-half")
@@ -308,8 +309,12 @@ def main(argv: Sequence[str] | None = None) -> None:
         )
         print(name, datetime.datetime.now().strftime("%H:%M"), flush=True)
         write(rows_of(part, found.cells), path)
-    for make in TABLES.values():
-        print(make(load()), end="\n\n")
+    page = PAGE.read_text(encoding="utf-8")
+    for name, make in TABLES.items():
+        begin, end = f"<!-- {name}: begin -->\n", f"\n<!-- {name}: end -->"
+        before, _, rest = page.partition(begin)
+        page = before + begin + make(load()) + end + rest.partition(end)[2]
+    PAGE.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -7,10 +7,11 @@ reference unit's error is white noise of 1 % of the heave's rms sampled at 4 Hz.
 ones, and that of an acoustic link at 1500 m/s; light in an umbilical takes 10 us for 2000 m, which
 is no delay here.
 
-It takes hours, and can be stopped at any time: rows that are in the file are not done again.  The
-first pass goes from the simple structures to those that contain them and from the longest delay to
-none, each search beginning with its neighbours' answers too.  Further passes (``--passes``) look at
-every row again from the answers around it, until none gets better.
+It takes hours, and can be stopped at any time: rows that today's code has made are not done again,
+and those of other code are where searches begin.  The first pass goes from the simple structures to
+those that contain them and from the longest delay to none, each search beginning with its
+neighbours' answers too.  Further passes (``--passes``) look at every row again from the answers
+around it, until none gets better.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
-from stored import docs_folder, read_rows, study_parser, write_rows
+from stored import digest_of, docs_folder, read_rows, study_parser, write_rows
 
 from models import Case, PhysicsWarning, load_case
 from synth.design import Design, optimise_gains
@@ -89,6 +90,7 @@ class Row:
     starts: int = 0
     agreed: int = 0
     seconds: float = 0.0
+    code: str = ""  # that made it
     parameters: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -163,7 +165,7 @@ def read(path: Path) -> dict[tuple[str, str, str, float], Row]:
     for entry in read_rows(path):
         values: dict[str, object] = {}
         for column in fields(Row):
-            text = entry[column.name]
+            text = entry.get(column.name, "")
             if column.name == "parameters":
                 pairs = (item.partition("=") for item in text.split(";") if item)
                 values[column.name] = {name: float(value) for name, _, value in pairs}
@@ -241,18 +243,20 @@ def main(argv: Sequence[str] | None = None) -> None:
     output = docs_folder(given.quick) / "data" / OUTPUT.name
     ropes = ["one spring" if v == "spring" else v for v in given.lengths.split(",")]
     asked = questions(given.structures.split(","), ropes)
-    rows = read(output)
+    rows, code = read(output), digest_of("docs/make/structures.py")
     for k in range(given.passes):
         better = 0
         for row in asked:
             known = rows.get(row.key)
-            if k == 0 and known is not None and known.ok:
+            if known is not None and k == 0 and known.ok and known.code == code:
                 continue
             # Within a pass after the first, a few starts beside the neighbours' answers.
             near = guesses(row, rows)
             if known is not None and known.parameters:
                 near.insert(0, dict(known.parameters))
-            new = answered(row, near, given.starts if k == 0 else 1)
+            if known is not None and known.code != code:
+                known = None
+            new = replace(answered(row, near, given.starts if k == 0 else 1), code=code)
             if known is not None and known.ok:
                 if not (new.ok and new.payload_rms < known.payload_rms * (1.0 - _BETTER)):
                     continue
