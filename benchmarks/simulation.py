@@ -35,7 +35,16 @@ from typing import Any
 
 import numpy as np
 from simulation_peers import Answer, Peer
-from simulation_report import REST, Comparison, Memory, Speed, missed, report, write_into
+from simulation_report import (
+    REST,
+    Comparison,
+    Memory,
+    Speed,
+    missed,
+    report,
+    rows_of,
+    write_into,
+)
 from tables import markdown, plain
 
 from models import load_case
@@ -291,6 +300,14 @@ def measured(
     return speeds, found, memory_of(effort.hours)
 
 
+def store(path: Path, results: tuple[list[Speed], list[Comparison], Memory]) -> None:
+    """Write the rows of everything that was measured."""
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs" / "make"))
+    from stored import write_rows
+
+    write_rows(path, ("kind", "fields"), rows_of(*results))
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("--quick", action="store_true", help="short runs, each once")
@@ -313,6 +330,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(report(*results, plain))
     if given.write is not None:
         write_into(given.write, report(*results, markdown))
+        store(given.write.parent / "data" / "simulation.csv", results)
     words = missed(*results)
     if words:
         print("\nmissed: " + "; ".join(words))

@@ -7,13 +7,23 @@ page of the documentation.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 import numpy as np
-from synthesis import machine
 
-__all__ = ["PART_NAMES", "REST", "Comparison", "Memory", "Speed", "missed", "report", "write_into"]
+__all__ = [
+    "PART_NAMES",
+    "REST",
+    "Comparison",
+    "Memory",
+    "Speed",
+    "missed",
+    "report",
+    "results_of",
+    "rows_of",
+    "write_into",
+]
 
 BEGIN, END = "<!-- simulation: begin -->", "<!-- simulation: end -->"
 WANTED_RATIO = 100.0  # over solve_ivp that does the same work
@@ -164,6 +174,9 @@ def report(
     draw: Callable[[Sequence[Sequence[str]]], str],
 ) -> str:
     """Return everything that was measured."""
+    # It brings solvers that are no part of a simulation, whose memory is measured.
+    from synthesis import machine
+
     return (
         f"Measured on {machine()}; processor times.\n\n{draw(speed_table(speeds))}\n\n"
         f"Where the time of a compiled run goes, for one control sample:\n\n"
@@ -172,6 +185,46 @@ def report(
         f"{draw(peer_table(found))}\n\n"
         f"{memory.hours:g} hours took {memory.peak:.0f} MB at most, {memory.imported:.0f} MB of "
         f"which were there before the run (wanted: {WANTED_MEMORY:.0f} MB)."
+    )
+
+
+def rows_of(
+    speeds: Sequence[Speed], found: Sequence[Comparison], memory: Memory
+) -> list[dict[str, str]]:
+    """Return everything that was measured as rows of text: its kind, its fields."""
+    rows = []
+    for one in (*speeds, *found, memory):
+        cells: list[str] = []
+        for key, value in asdict(one).items():
+            inner = value if isinstance(value, dict) else {"": value}
+            for name, number in inner.items():
+                text = f"{number:.7g}" if isinstance(number, float) else str(number)
+                cells.append(f"{key}{'.' * bool(name)}{name}={text}")
+        rows.append({"kind": type(one).__name__, "fields": ";".join(cells)})
+    return rows
+
+
+def results_of(rows: Sequence[Mapping[str, str]]) -> tuple[list[Speed], list[Comparison], Memory]:
+    """Return what rows say."""
+    kinds: dict[str, type[Speed | Comparison | Memory]] = {
+        kind.__name__: kind for kind in (Speed, Comparison, Memory)
+    }
+    read: dict[str, Callable[[str], object]] = {
+        "str": str, "bool": "True".__eq__, "int": int, "float": float
+    }  # fmt: skip
+    found: list[Speed | Comparison | Memory] = []
+    for row in rows:
+        kind, cells = kinds[row["kind"]], dict(c.split("=") for c in row["fields"].split(";"))
+        types = {field.name: str(field.type) for field in fields(kind)}
+        values = {name: read[t](cells[name]) for name, t in types.items() if t in read}
+        if "parts" in types:
+            values["parts"] = {k[6:]: float(v) for k, v in cells.items() if k[:6] == "parts."}
+        found.append(kind(**values))  # type: ignore[arg-type]
+    (memory,) = (one for one in found if isinstance(one, Memory))
+    return (
+        [one for one in found if isinstance(one, Speed)],
+        [one for one in found if isinstance(one, Comparison)],
+        memory,
     )
 
 

@@ -33,6 +33,7 @@ SCRIPTS: Mapping[str, str] = {
     "said_structures.csv": "docs/make/said_structures.py",
     "saturation.csv": "docs/make/saturation.py",
     "sea_reading.csv": "benchmarks/sea_reading.py",
+    "simulation.csv": "benchmarks/simulation.py",
     "structure_bounds.csv": "docs/make/robust.py",
     "structures.csv": "docs/make/structures.py",
     "sweep.csv": "benchmarks/sweep.py",

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stored import read_rows
 
 from models.simulation import run_simulation
 from models.simulation.compiler import find_compiler
@@ -159,6 +160,21 @@ def test_small_runs_end_in_a_row_of_each_table(results, simulation, words):
     assert "| one spring | C |" in text
     assert [c.same_work for c in found] == [True, True, False]
     assert max(c.difference for c in found if c.same_work) < 1e-4
+
+
+def test_rows_say_what_was_measured(results, simulation, words, tmp_path):
+    simulation.store(tmp_path / "simulation.csv", results)
+    again = words.results_of(read_rows(tmp_path / "simulation.csv"))
+    assert words.report(*again, simulation.markdown) == words.report(*results, simulation.markdown)
+
+
+def test_the_docs_page_shows_the_stored_times(simulation, words):
+    page = (FOLDER.parent / "docs" / "performance.md").read_text(encoding="utf-8")
+    speeds, found, memory = words.results_of(
+        read_rows(FOLDER.parent / "docs" / "data" / "simulation.csv")
+    )
+    _, _, told = words.report(speeds, found, memory, simulation.markdown).partition("times.\n\n")
+    assert told in page
 
 
 def test_memory_is_that_of_a_process_of_its_own(results, words):
