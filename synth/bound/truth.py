@@ -40,6 +40,7 @@ from .dual import Dual, DualPoint
 from .spectral_factor import SpectralFactor
 
 _ORDER = 12  # Gauss-Legendre nodes a panel
+_LOWEST = 1e-6  # [rad/s]: further down integrators leave no digits of what cancels
 _TAIL = 8  # panels of 1/omega above all features
 _BELOW = 1e-3  # of the slowest pole: from there on to zero the densities are constant
 _BEYOND = 30.0  # ... which begin this far above the fastest pole
@@ -58,7 +59,7 @@ def frequencies(
     sizes = np.abs(marks)
     sizes = sizes[sizes > 1e-6]
     ends = [w for s in sources for w in (*(s.band or ()), *s.splits)]
-    low = min([_BELOW * float(sizes.min(initial=1.0)), *(0.1 * w for w in ends)])
+    low = max(_LOWEST, min([_BELOW * float(sizes.min(initial=1.0)), *(0.1 * w for w in ends)]))
     high = max([_BEYOND * float(sizes.max(initial=1.0)), *ends])
     edges = panels(low, high, ends, marks)
     rule, weight = np.polynomial.legendre.leggauss(_ORDER)
@@ -69,7 +70,7 @@ def frequencies(
     half = 0.5 * np.diff(inverse)
     v = ((inverse[:-1] + half)[:, None] + half[:, None] * rule).ravel()
     beyond = (half[:, None] * weight).ravel() / v**2
-    # Towards zero the density is even, but integrators leave nothing of its digits.
+    # Towards zero the density is even.
     return np.concatenate([[low], omega, 1.0 / v]), np.concatenate([[low], weights, beyond])
 
 
