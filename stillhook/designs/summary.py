@@ -164,14 +164,21 @@ def member_table(design: Design) -> Table | None:
         tightest = max(enforced, key=lambda use: use.use, default=None)
         used = (tightest.use, label_of(one, tightest.name)) if tightest else (None, "")
         peak = None if one.margins is None else one.margins.max_sensitivity
-        rows.append((name, one.payload_rms, one.payload_rms_before, peak, *used))
+        moves = one.payload_rms if math.isfinite(one.payload_rms) else None
+        rows.append((name, moves, one.payload_rms_before, peak, *used))
     heads = "member=; payload_rms=payload [m]; held=drum held [m]; M_s; use [%]; of <"
     small = {
         "worst": "the worst of them",
         "mean": "their root mean square",
         "regret": "the worst, over what gains of its own would reach",
     }[design.objective]
-    return Table(columns=columns(heads), rows=rows, notes=(f"made small: {small}",))
+    notes = [f"made small: {small}"] if design.members else []
+    if design.exhibit is not None:
+        found = (
+            "" if design.exhibit.margins is not None else f"; there it is {design.exhibit.status}"
+        )
+        notes.append(f"the last is told, not asked of a Kelvin-Voigt rope{found}")
+    return Table(columns=columns(heads), rows=rows, notes=tuple(notes))
 
 
 def has_loop(design: Design) -> bool:

@@ -27,6 +27,7 @@ from stillhook.designs.summary import (
     facts,
     limit_table,
     margin_table,
+    member_table,
     motion_table,
     parameter_table,
     required_table,
@@ -336,3 +337,16 @@ def test_feed_forward_says_what_hangs_on_how_the_error_of_its_unit_is_read(unit,
     if said:
         assert "without it these gains leave 30.0 mm" in found[0]
         assert unit_notes([dataclasses.replace(design, ok=False)]) == ()
+
+
+def test_a_rope_that_rings_without_its_damping_is_told_beside_the_design() -> None:
+    case = load_case("subsea-crane")
+    gains = {"A": 1.0, "a": 16.022725, "a1": 44.360682, "a2": 6.4163101}
+    table = member_table(sh.evaluate_gains(case, gains))
+    assert table is not None
+    (_, own, *_), (name, least, *_) = table.rows
+    assert own > 0.0
+    assert name.startswith("a tenth of the rope's damping")
+    assert least is None
+    (note,) = table.notes
+    assert "not asked of a Kelvin-Voigt rope; there it is unstable" in note
