@@ -117,7 +117,8 @@ def roots_near(
     function: Callable[[ComplexArray], ComplexArray], begins: ComplexArray
 ) -> ComplexArray:
     """Return roots [1/s] of an analytic function that the secant method finds near some points."""
-    before, s = begins, begins * (1.0 + _STEP)
+    # Not at the points themselves: where a controller has a pole its response has no value.
+    before, s = begins * (1.0 - _STEP), begins * (1.0 + _STEP)
     with np.errstate(all="ignore"):
         last = function(before)
         for _ in range(_SECANTS):
