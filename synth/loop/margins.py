@@ -20,6 +20,7 @@ _NOTHING = 1e-9  # |L| below which neither a peak nor a crossing matters to any 
 _CLOSE, _MOST_STEPS = 1e-14, 60  # relative width of a bracket that is a point; steps towards it
 _ZOOM = np.linspace(0.0, 1.0, 17)
 _ROUNDS = 7  # each zooms by a factor of eight: 8^7 is 2e6
+_NEARER = 0.5  # share of a least height on the grid below which there may be zeros beside it
 _LEVEL = 1e-12  # relative depth of a minimum below which it is none
 _FORETOLD = 1e-11  # relative error of a parabola that the next round makes as good as exact
 _ROUNDING = 1e-15  # relative, of a value
@@ -78,11 +79,14 @@ def loop_margins(
     `minima` are its `least_distances`, where they are known already.
     """
     (peak_at, distance), (_, disk) = minima or least_distances(loop, grid, gain)
-    felt = np.abs(gain) > _NOTHING
 
     def heights(at: ComplexArray) -> FloatArray:
         return np.array([np.abs(at) - 1.0, at.imag])
 
+    turns = _turns(grid, heights(gain))
+    grid, order = np.unique(np.append(grid, turns), return_index=True)
+    gain = np.append(gain, loop(turns))[order]
+    felt = np.abs(gain) > _NOTHING
     among = np.array([np.ones_like(felt), felt])
     crossovers, axis = _crossings(lambda w: heights(loop(w)), grid, heights(gain), among)
     turn = np.angle(-loop(crossovers))  # angle beyond -180 deg
@@ -204,6 +208,26 @@ def _all_minima(
             (np.concatenate([at[mine], grid[others]]), np.concatenate([best[mine], own[others]]))
         )
     return found
+
+
+def _turns(grid: FloatArray, values: FloatArray) -> FloatArray:
+    """Return where functions, (f, k), may cross zero twice between two points of a grid.
+
+    It is the vertex of the parabola through three points of one sign whose middle one is nearest
+    to zero, if it is much nearer still.
+    """
+    left, mid, right = values[:, :-2], values[:, 1:-1], values[:, 2:]
+    size = np.abs(mid)
+    nearest = (left * mid > 0.0) & (right * mid > 0.0) & (size < np.minimum(abs(left), abs(right)))
+    which, at = np.nonzero(nearest)
+    x0, x1, x2 = (np.log(grid[at + i]) for i in range(3))
+    f0, f1, f2 = (values[which, at + i] for i in range(3))
+    # Newton's form: f1 + (first) (x - x1) + bend (x - x1) (x - x0).
+    first = (f1 - f0) / (x1 - x0)
+    bend = ((f2 - f1) / (x2 - x1) - first) / (x2 - x0)
+    step = -0.5 * (first + bend * (x1 - x0)) / bend
+    lowest = f1 + step * (first + bend * (x1 - x0) + bend * step)
+    return np.asarray(np.exp((x1 + step)[lowest / f1 < _NEARER]))
 
 
 def _crossings(

@@ -136,6 +136,18 @@ def test_crossing_that_falls_on_a_grid_point_is_seen() -> None:
     assert m.delay == pytest.approx(np.pi / 2.0, rel=1e-9)
 
 
+def test_two_crossings_between_two_grid_points_are_seen() -> None:
+    # Im L = -((ln w)^2 - 0.09)/w: zero at exp(-0.3) and exp(0.3), and no grid point between them.
+    grid = np.array([0.1, 0.2, 0.4, 0.7, 1.4, 3.0, 10.0])
+
+    def loop(omega):
+        return (-3.0 + omega - 1j * (np.log(omega) ** 2 - 0.09)) / omega
+
+    m = loop_margins(loop, grid, loop(grid))
+    assert m.real_axis_crossings == pytest.approx(np.exp([-0.3, 0.3]), rel=1e-9)
+    assert m.gain_down == pytest.approx(1.0 / (3.0 * np.exp(-0.3) - 1.0), rel=1e-9)
+
+
 def test_narrow_peak_between_grid_points_is_found() -> None:
     grid = np.geomspace(0.01, 100.0, 60)
 
