@@ -129,7 +129,10 @@ class _OnTheRope:
 
     @property
     def excess(self) -> dict[str, float]:
-        """What each margin is broken by on the rope more than on the masses, relatively."""
+        """What each margin is broken by on the rope more than on the masses, relatively.
+
+        Nothing where it is broken on both.
+        """
         margins = MaxSensitivity | GainMargin | GainMarginDown | DelayMargin
         limits = [limit for limit in self.question.loop if isinstance(limit, margins)]
         found = dict.fromkeys((limit.name for limit in limits), 0.0)
@@ -146,7 +149,9 @@ class _OnTheRope:
                 use = limit.use(limit.measure(seen))  # type: ignore[arg-type]  # all it asks for
                 found[limit.name] = max(found[limit.name], use - 1.0)
         for limit in limits:
-            found[limit.name] -= max(limit.use(limit.measure(self.loop)) - 1.0, 0.0)
+            lumped = max(limit.use(limit.measure(self.loop)) - 1.0, 0.0)
+            both = min(found[limit.name], lumped) > _KEPT
+            found[limit.name] = 0.0 if both else found[limit.name] - lumped
         return found
 
     def _gains(self, s: ComplexArray) -> ComplexArray:
@@ -173,7 +178,10 @@ class _OnTheRope:
             # 1/L and 1 + 1/L, which are smooth where L has a pole.
             return np.asarray(1.0 / self._gains(s)[0] + ~half[at])
 
-        return np.concatenate([begins, _zeros(open_and_closed, np.tile(begins, 2))])
+        found = np.concatenate([begins, _zeros(open_and_closed, np.tile(begins, 2))])
+        # Points about a pole that is there twice would lie apart by rounding only.
+        same = np.abs(found[:, None] - found) < _SAME * np.abs(found)
+        return np.asarray(found[~np.tril(same, -1).any(axis=1)])
 
 
 def on_enough_masses(

@@ -42,3 +42,22 @@ def test_a_peak_that_is_higher_on_the_rope_asks_for_masses() -> None:
     loop = question.problem.assess([4.0597, 13.539, 7.7354])
     assert loop.max_sensitivity <= 2.0 * (1.0 + 1e-3)
     assert masses_for(question, loop) > 15
+
+
+def test_looks_from_two_places_ask_for_the_same_masses() -> None:
+    # Points about a pole that was found twice once hid the peak beside them: 12 masses or 40.
+    question = pose(load_case("subsea-crane"))
+    gains = {"A": 0.879864568998902, "a": 23.387589861224058, "a1": 171.8977436489725}
+    gains["a2"] = 5.312489944373191
+    drag = question.assess(gains).coefficient
+    changes = np.linspace(-1e-7, 1e-7, 9)
+    loops = [question.assess(gains, drag * (1.0 + change)) for change in changes]
+    assert {masses_for(question, loop) for loop in loops} == {question.masses}
+
+
+def test_a_margin_that_is_broken_on_rope_and_masses_asks_for_no_masses() -> None:
+    question = pose(load_case("landing"))
+    gains = {"A": 0.8076705021147271, "a": 69.96066263279, "a1": 266.2386142632147}
+    loop = question.assess({**gains, "a2": 1236.2104855477444})
+    assert loop.max_sensitivity > 3.0
+    assert masses_for(question, loop) == question.masses
