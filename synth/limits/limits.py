@@ -20,8 +20,6 @@ import numpy as np
 
 from models.basics import BoolArray, FloatArray
 
-from ..loop import joined
-
 if TYPE_CHECKING:
     from ..loop import Assessment
 
@@ -67,17 +65,17 @@ class Symbols(Protocol):
         """Radius of the disc about -1 that a limit on the sensitivity keeps clear; 0 without."""
 
     def moment(self, output: str, order: int) -> Any:
-        """Return the spectral moment m_order of `output`, (1,)."""
+        """Return the spectral moment m_order of `output`, (1,), or by combination of signs."""
 
     def covariance(self, one: str, other: str) -> Any:
-        """Return the covariance of two outputs, (1,)."""
+        """Return the covariance of two outputs, (1,), or by combination of signs."""
 
     def peak(self, output: str, duration: float) -> Any:
-        """Return the most probable maximum of `output` in `duration` [s], (1,)."""
+        """Return the most probable maximum of `output` in `duration` [s], as its moments are."""
 
     @property
-    def members(self) -> Sequence[Symbols]:
-        """The same for each combination of signs that sensors' errors may have, or this alone."""
+    def signed(self) -> Symbols:
+        """The same by combination of the signs that sensors' errors may have, or this."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,11 +126,8 @@ class Limit(ABC):
         """Return the value that is compared with the bound."""
 
     def worst_rows(self, symbols: Symbols, bound: Any) -> Any:
-        """Return the rows for whatever signs sensors' errors may have, one after the other."""
-        if not self.drive:
-            return self.rows(symbols, bound)
-        found = [self.rows(one, bound) for one in symbols.members]
-        return joined(found) if len(found) > 1 else found[0]
+        """Return the rows for whatever signs sensors' errors may have."""
+        return self.rows(symbols.signed if self.drive else symbols, bound)
 
     def worst(self, loop: Assessment) -> float:
         """Return what is measured with the worst signs that sensors' errors may have."""

@@ -79,9 +79,12 @@ class Assessment:
         self._given = coefficient
         self._nodes, self._dense = nodes, grid
         self._parts: dict[tuple[str, ...], LinearPlant] = {}
-        self._signs: tuple[float, ...] = ()
+        self._signs: FloatArray = np.zeros(0)
+        # What `members` share: nodes; m_0 and m_2 of outputs and covariances of pairs, the means
+        # over the signs and what each sign adds, (.., 1 + e); and standard deviations by cause.
         self._kept: dict[tuple[str, ...], Quadrature] = {}
-        self._moments: dict[str, tuple[float, float]] = {}
+        self._moments: dict[str, FloatArray] = {}
+        self._products: dict[tuple[str, str], FloatArray] = {}
         self._shares: dict[str, dict[str, float]] = {}
 
     @cached_property
@@ -188,26 +191,28 @@ class Assessment:
 
     def covariance(self, one: str, other: str) -> float:
         """Return the covariance of two outputs."""
-        nodes = self._kept.get(self.plant.outputs) or self._on([one, other])
-        responses, shaken = self._all([one, other], nodes.omega)
-        total = np.sum((responses[0].conj() * responses[1]).real * shaken * nodes.weights)
-        if self._signs:
-            cross = self._crossed(responses, shaken, nodes.omega)
-            total += (cross[0, 1] + cross[1, 0]).real @ nodes.weights
-        return float(total)
+        if (one, other) not in self._products:
+            nodes = self._kept.get(self.plant.outputs) or self._on([one, other])
+            responses, shaken = self._all([one, other], nodes.omega)
+            mean = np.sum((responses[0].conj() * responses[1]).real * shaken * nodes.weights)
+            first, second = responses
+            added = self._crossed(first, second, shaken, nodes)[0]
+            added = added + self._crossed(second, first, shaken, nodes)[0]
+            self._products[one, other] = np.append(mean, added)
+        return float(self._of_signs(self._products[one, other]))
 
-    @property
+    @cached_property
     def members(self) -> tuple[Assessment, ...]:
         """The loop with each combination of signs that sensors' errors may have; or itself.
 
         Their variances are those of one combination, where its own are the mean over all.
         """
-        if self._signs or self._coherent is None:
+        if self._signs.size or self._coherent is None:
             return (self,)
         found = []
         for signs in self._coherent.signs:
             own = copy(self)
-            own._signs, own._moments, own._shares = signs, {}, {}
+            own._signs = np.array(signs)
             found.append(own)
         return tuple(found)
 
@@ -282,9 +287,16 @@ class Assessment:
                 self._integrate([output])
             except SolverError:
                 # A pole so close to the axis that the variance has no digits: it has no bound.
-                self._moments[output] = np.inf, np.inf
+                self._moments[output] = np.full((2, 1), np.inf)
                 self._shares[output] = dict.fromkeys((d.name for d in self.disturbances), np.inf)
-        return self._moments[output]
+        # Never below zero by rounding, where error and motion cancel.
+        m0, m2 = np.maximum(self._of_signs(self._moments[output]), 0.0).tolist()
+        return m0, m2
+
+    def _of_signs(self, integrals: FloatArray) -> FloatArray:
+        """Return integrals with the error's signs, of the mean and what each adds, (.., 1 + e)."""
+        mean, added = integrals[..., 0], integrals[..., 1:]
+        return np.asarray(mean + added @ self._signs if added.size and self._signs.size else mean)
 
     @property
     def _bounded(self) -> bool:
@@ -296,16 +308,12 @@ class Assessment:
         responses, shaken = self._all(outputs, nodes.omega)
         parts = np.abs(responses) ** 2 * shaken * nodes.weights
         variances, rates = parts.sum(axis=2), parts @ nodes.omega**2
-        both = np.stack([variances.sum(axis=1), rates.sum(axis=1)], axis=1)
-        if self._signs:
-            cross = np.einsum("zzk->zk", self._crossed(responses, shaken, nodes.omega))
-            powers = nodes.weights * np.stack([np.ones_like(nodes.omega), nodes.omega**2])
-            # Never below zero by rounding, where error and motion cancel.
-            both = np.maximum(both + 2.0 * cross.real @ powers.T, 0.0)
-        for output, own, pair in zip(outputs, variances, both, strict=True):
+        means = np.stack([variances.sum(axis=1), rates.sum(axis=1)], axis=1)
+        for i, output in enumerate(outputs):
             names = (d.name for d in self.disturbances)
-            self._shares[output] = dict(zip(names, np.sqrt(own).tolist(), strict=True))
-            self._moments[output] = float(pair[0]), float(pair[1])
+            self._shares[output] = dict(zip(names, np.sqrt(variances[i]).tolist(), strict=True))
+            added = 2.0 * self._crossed(responses[i], responses[i], shaken, nodes)
+            self._moments[output] = np.concatenate([means[i, :, None], added], axis=1)
 
     def _on(self, outputs: Sequence[str]) -> Quadrature:
         """Return the nodes of some outputs, the same for every combination of signs."""
@@ -319,14 +327,19 @@ class Assessment:
         return CoherentError.among(self.disturbances)
 
     def _crossed(
-        self, responses: ComplexArray, shaken: FloatArray, omega: FloatArray
-    ) -> ComplexArray:
-        """Return conj(F0) e F1 S of outputs by outputs, with the error's signs, (z, z, k)."""
-        pair = self._coherent
-        assert pair is not None
-        share = np.array(self._signs) @ pair.shares(omega) * shaken[pair.source]
-        F0, F1 = responses[:, pair.source], responses[:, pair.error]
-        return np.asarray(F0.conj()[:, None] * F1 * share)
+        self, one: ComplexArray, other: ComplexArray, shaken: FloatArray, nodes: Quadrature
+    ) -> FloatArray:
+        """Return what each of the error's signs adds to integrals of conj(F) F and its like.
+
+        From responses of two outputs to all disturbances, (w, k); of the powers 0 and 2 of omega,
+        (2, e).
+        """
+        if self._coherent is None:
+            return np.zeros((2, 0))
+        source, error, shares = self._coherent.source, self._coherent.error, self._coherent.shares
+        product = one[source].conj() * other[error] * shaken[source] * nodes.weights
+        powers = np.stack([np.ones_like(nodes.omega), nodes.omega**2])
+        return np.asarray((powers @ (product * shares(nodes.omega)).T).real)
 
     def _responses(
         self, outputs: Sequence[str], sources: Sequence[str], omega: FloatArray

@@ -170,7 +170,9 @@ class LoopNumbers:
         self._fresh: Fresh | None = None
         self._responses: dict[tuple[str, str], Any] = {}
         self._shaken: dict[tuple[str, str], Any] = {}
-        self._signs: tuple[float, ...] = ()
+        self._crosses: dict[tuple[str, str], Any] = {}
+        self._peaks: dict[tuple[str, float], Any] = {}
+        self._signs: FloatArray | None = None
 
     def under(self, problem: Problem, weights: FloatArray) -> LoopNumbers:
         """Return the same loop shaken by the disturbances of another problem."""
@@ -379,61 +381,69 @@ class LoopNumbers:
         return self._padded(self._cost.moments(self._cost.outputs, self._weights, _ORDERS))
 
     def moment(self, output: str, order: int) -> Any:
-        """Return the spectral moment m_order of `output`, (1,)."""
+        """Return the spectral moment m_order of `output`, (1,), or by combination of signs."""
         row, at = self._cost.outputs.index(output), _ORDERS.index(order)
         found, every = slice(at, at + 1), self._moments
         if isinstance(every, Dual):
             moment: Any = Dual(every.value[row, found], every.slope[:, row, found])
         else:
             moment = every[row, ..., found]
-        if self._signs:
+        if self._signs is not None:
             # A programme's logarithms want it above zero, where error and motion cancel.
             moment = at_least(moment + self._crossed(output, output, order), _STILL)
         return moment if self._amplitude is None else moment * self._amplitude
 
     def covariance(self, one: str, other: str) -> Any:
-        """Return the covariance of two outputs, (1,)."""
+        """Return the covariance of two outputs, (1,), or by combination of signs."""
         parts = [
             real(conj(self._shown(one, d.name)) * self._shown(other, d.name)) @ weights[:, None]
             for d, weights in zip(self._problem.disturbances, self._weights, strict=False)
         ]
         total = sum(parts[1:], parts[0])
-        if self._signs:
+        if self._signs is not None:
             total = total + self._crossed(one, other, 0)
         return total if self._amplitude is None else total * self._amplitude
 
-    @property
-    def members(self) -> tuple[LoopNumbers, ...]:
-        """The numbers for each combination of signs that sensors' errors may have; or themselves.
+    @cached_property
+    def signed(self) -> LoopNumbers:
+        """The numbers by combination of the signs that sensors' errors may have; or themselves.
 
-        Their moments are those of one combination, where its own are the mean over all.
+        Its moments are those of each combination, (c,), where its own are the mean over all.
         """
-        if self._signs or self._coherent is None:
-            return (self,)
-        _ = self._moments  # once for all
-        found = []
-        for signs in self._coherent.signs:
-            own = copy(self)
-            own._signs = signs
-            found.append(own)
-        return tuple(found)
+        if self._coherent is None:
+            return self
+        _ = self._moments, self._shares  # once for both
+        own = copy(self)
+        own._signs, own._peaks = np.array(self._coherent.signs), {}
+        return own
 
     @cached_property
     def _coherent(self) -> CoherentError | None:
         return CoherentError.among(self._problem.disturbances)
 
+    @cached_property
+    def _shares(self) -> ComplexArray:
+        """Weights of the products of source and error, (k, orders times errors)."""
+        assert self._coherent is not None
+        omega = self._cost.omega
+        shares = self._coherent.shares(omega) * self._weights[self._coherent.source]
+        return np.concatenate([shares * omega**order for order in _ORDERS]).T
+
     def _crossed(self, one: str, other: str, order: int) -> Any:
-        """Return what the error's signs add to an integral of conj(F) F of two outputs, (1,)."""
-        pair, loop = self._coherent, self._cost
+        """Return what the error's signs add to an integral of conj(F) F of two outputs, (c,)."""
+        pair, signs = self._coherent, self._signs
         assert pair is not None
-        source, error = (self._problem.disturbances[i].name for i in (pair.source, pair.error))
-        product = conj(self._shown(one, source)) * self._shown(other, error)
-        if one == other:
-            product = product * 2.0
-        else:
-            product = product + conj(self._shown(other, source)) * self._shown(one, error)
-        shares = np.array(self._signs) @ pair.shares(loop.omega)
-        return real(product @ (shares * self._weights[pair.source] * loop.omega**order)[:, None])
+        assert signs is not None
+        if (one, other) not in self._crosses:
+            source, error = (self._problem.disturbances[i].name for i in (pair.source, pair.error))
+            product = conj(self._shown(one, source)) * self._shown(other, error)
+            if one == other:
+                product = product * 2.0
+            else:
+                product = product + conj(self._shown(other, source)) * self._shown(one, error)
+            self._crosses[one, other] = real(product @ self._shares)
+        errors, at = signs.shape[1], _ORDERS.index(order)
+        return self._crosses[one, other][..., at * errors : (at + 1) * errors] @ signs.T
 
     def _shown(self, output: str, source: str) -> Any:
         """Return a response on the quadrature nodes, (k,)."""
@@ -442,10 +452,13 @@ class LoopNumbers:
         return self._shaken[output, source]
 
     def peak(self, output: str, duration: float) -> Any:
-        """Return the most probable maximum of `output` in `duration` [s], (1,)."""
-        m0, m2 = self.moment(output, 0), self.moment(output, 2)
-        cycles = sqrt(m2 / m0) * (duration / (2.0 * np.pi))
-        return sqrt(log(at_least(cycles, _LEAST_CYCLES)) * 2.0) * sqrt(m0)
+        """Return the most probable maximum of `output` in `duration` [s], as its moments are."""
+        if (output, duration) not in self._peaks:
+            m0, m2 = self.moment(output, 0), self.moment(output, 2)
+            cycles = sqrt(m2 / m0) * (duration / (2.0 * np.pi))
+            factor = sqrt(log(at_least(cycles, _LEAST_CYCLES)) * 2.0)
+            self._peaks[output, duration] = factor * sqrt(m0)
+        return self._peaks[output, duration]
 
     def cost(self) -> Any:
         """Return the logarithm of the square root of the weighted variance, (1,)."""

@@ -156,9 +156,10 @@ def series(first: Matrices, then: Matrices) -> Matrices:
     """Return two systems one behind the other; the first may have many inputs."""
     A1, B1, C1, D1 = first
     A2, B2, C2, D2 = then
-    n1, n2 = len(A1), len(A2)
-    A = np.block([[A1, np.zeros((n1, n2))], [B2 @ C1, A2]])
-    return A, np.vstack([B1, B2 @ D1]), np.hstack([D2 @ C1, C2]), D2 @ D1
+    n = len(A1)
+    A = np.zeros((n + len(A2), n + len(A2)))  # np.block takes ten times as long
+    A[:n, :n], A[n:, :n], A[n:, n:] = A1, B2 @ C1, A2
+    return A, np.concatenate([B1, B2 @ D1]), np.concatenate([D2 @ C1, C2], axis=1), D2 @ D1
 
 
 def _polynomial(coefficients: Sequence[Any], x: Any) -> Any:
