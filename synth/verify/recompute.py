@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,7 @@ from .integrals import integrate, panels
 from .winding import Function
 
 HOOK = "hook.heave"
+_KEPT = 8  # sets of points whose responses are kept
 _SMOOTH_TAIL, _RINGING_TAIL = 20, 1000  # panels of 1/omega above all poles
 _RUNG_OUT = 3000.0  # omega times delay where the ringing is too small to matter
 
@@ -84,6 +85,7 @@ class Loop:
     marks: ComplexArray
     exact: Callable[[ComplexArray], PlantResponse] | None = None
     shown: complex = 1.0
+    _known: dict[bytes, tuple[PlantResponse, ComplexArray]] = field(default_factory=dict)
 
     def blocks(self, s: ComplexArray) -> PlantResponse:
         """Return the plant's four blocks at points s [1/s]."""
@@ -108,15 +110,28 @@ class Loop:
         self, s: ComplexArray, outputs: Sequence[str], disturbances: Sequence[str]
     ) -> ComplexArray:
         """Return the closed-loop responses, (k, outputs, disturbances)."""
-        blocks = self.blocks(s).select(outputs=outputs, disturbances=disturbances)
+        whole, inner = self._closed(s)
+        blocks = whole.select(outputs=outputs, disturbances=disturbances)
         seen = np.array(blocks.yw)
         if self.shown != 1.0:
             unit = [k for k, y in enumerate(blocks.measurements) if y.startswith("mru.")]
             hook = [k for k, w in enumerate(blocks.disturbances) if w == HOOK]
             seen[np.ix_(range(len(s)), unit, hook)] *= self.shown
-        heard = self.law(s) @ seen
-        command = np.linalg.solve(self._matrix(s, blocks), heard)
-        return np.asarray(blocks.zw + blocks.zu @ command, dtype=np.complex128)
+        return np.asarray(blocks.zw + blocks.zu @ (inner @ seen), dtype=np.complex128)
+
+    def _closed(self, s: ComplexArray) -> tuple[PlantResponse, ComplexArray]:
+        """Return the plant's blocks and (I - C P_yu)^-1 C, (k, nu, ny).
+
+        They are kept: other outputs, and other signs of the unit's errors, ask for the same points.
+        """
+        key = s.tobytes()
+        if key not in self._known:
+            blocks = self.blocks(s)
+            if len(self._known) >= _KEPT:
+                self._known.clear()
+            inner = np.linalg.solve(self._matrix(s, blocks), self.law(s)).astype(np.complex128)
+            self._known[key] = blocks, inner
+        return self._known[key]
 
     def _matrix(self, s: ComplexArray, blocks: PlantResponse) -> ComplexArray:
         through = self.law(s) @ blocks.yu
