@@ -81,6 +81,8 @@ def stated(
         relaxed=relaxed,
         tolerance=tolerance,
         exact=exact,
+        # Rough descents look whether a start leads anywhere: of one that gets stuck there are more.
+        in_a_calm=not rough,
     )
 
 

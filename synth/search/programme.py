@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -31,7 +32,7 @@ import numpy as np
 from models.basics import FloatArray, Quadrature
 
 from ..limits import Limit
-from ..loop import Dual, LoopResponses, exp, value_of
+from ..loop import Dual, LoopResponses, exp, real, sqrt, squared, value_of
 from ..question import (
     FamilyLoop,
     FamilyProblem,
@@ -49,7 +50,12 @@ _ROOM = 12.0  # how far the logarithms of drag, sea and factors may move: e^12
 _STEPS, _MOST_STEPS = 60, 120  # of a solve with few and with many parameters
 _MANY = 6
 _SHIFT = 1e-6  # relative, of a bound or a frequency, of differences
-_SLOW = "slow pole"
+_SLOW, _CALM = "slow pole", "small motion"  # rows that are no limits of a case
+_HANGS = 0.5  # share of its decay from which a pole hangs on drag
+_LEAST_DAMPING = 3e-4  # of such a pole without drag, if parameters can move it
+_SMALL = 1e-3  # of its typical size: a parameter below it moves as much as if it were that
+_STEEP = 10.0  # weight of a damping ratio among rows
+_BESIDE = 1e-5  # relative difference for a slope along s
 _HANGING = 30.0  # how sharply the worst member stands for its family in a model of the curvature
 Tighten = Mapping[tuple[int, str], float]
 
@@ -110,6 +116,9 @@ class Programme:
     exact
         Whether margins are held where they are measured, at refined peaks and crossings of the
         curve, and not only on the margin frequencies and by discs that are a little too large.
+    in_a_calm
+        Whether rows hold the loop stable in small motion.  Without them a descent that comes to
+        where it is not gets stuck there, soon.
     """
 
     def __init__(
@@ -124,11 +133,12 @@ class Programme:
         tolerance: float = 1e-8,
         max_iterations: int | None = None,
         exact: bool = False,
+        in_a_calm: bool = True,
     ) -> None:
         self.family = family = FamilyProblem.of(asked)
         scenarios, count = family.scenarios, len(family.parameters)
         self._goal, self._relaxed, self._exact = goal, frozenset(relaxed), exact
-        self._tolerance = tolerance
+        self._tolerance, self._calm = tolerance, in_a_calm
         many = _MOST_STEPS if count > _MANY else _STEPS
         self._most = many if max_iterations is None else max_iterations
         drags = [i for i, s in enumerate(scenarios) if s.problem.drag is not None]
@@ -207,7 +217,11 @@ class Programme:
     ) -> tuple[FloatArray, dict[tuple[int, str], float]]:
         """Return the log costs and the largest row of each limit at a vector; see `solve`."""
         costs, rows = self._numbers(x, tighten)
-        worst = {key: float(np.max(row, initial=-np.inf)) for key, row in rows if key[1] != _SLOW}
+        worst = {
+            key: float(np.max(row, initial=-np.inf))
+            for key, row in rows
+            if key[1] not in (_SLOW, _CALM)
+        }
         return np.array([cost.item() for cost in costs]), worst
 
     def solve(
@@ -307,6 +321,9 @@ class Programme:
             # No limit of the case: it stops a real pole from creeping to zero, below every node.
             rows.append(((first, _SLOW), slow, first))
             if log_drag is not None:
+                if self._calm:
+                    row = loop.in_a_calm(own, log_drag, extra, slopes)
+                    rows.append(((first, _CALM), row, first))
                 balances.append((numbers.drag_balance(), first))
         every = range(len(family.scenarios))
         bends = [curvatures[i] for i in every] if slopes else []
@@ -317,10 +334,11 @@ class Programme:
         at = self._values(x)
         with np.errstate(all="ignore"):
             costs, rows, balances, curvatures = self._parts(x, tighten, slopes=True)
-        values, slopes = [], []
-        for _, row, i in rows:
+        values, slopes, firm = [], [], []
+        for key, row, i in rows:
             values.append(np.ravel(row.value))
             slopes.append(self._spread(row, i, at))
+            firm.append(np.full(row.value.size, key[1] == _CALM))
         spread = [(float(c.value.item()), self._spread(c, i, at)[0]) for c, i in costs]
         slope = np.zeros(self.size)
         if self._extra_at is not None:
@@ -338,6 +356,7 @@ class Programme:
                 own[self._bound_at] = -1.0
                 values.append(np.array([cost - best - objective]))
                 slopes.append(own[None])
+                firm.append(np.zeros(1, np.bool_))
         else:
             objective, slope = spread[0][0] - float(self._best[0]), spread[0][1]
         empty = np.zeros((0, self.size))
@@ -354,6 +373,7 @@ class Programme:
             slope=slope,
             rows=np.concatenate(values),
             jacobian=np.concatenate(slopes),
+            firm=np.concatenate(firm),
             equations=np.concatenate([np.zeros(0), *(b.value for b, _ in balances)]),
             equation_slopes=np.concatenate([empty, *(self._spread(b, i, at) for b, i in balances)]),
         )
@@ -415,7 +435,7 @@ class Programme:
         for (key, more), (_, less) in zip(above, below, strict=True):
             own = found.prices[at : at + more.size]
             at += more.size
-            if key[1] != _SLOW and more.shape == less.shape and own.size == more.size:
+            if key[1] not in (_SLOW, _CALM) and more.shape == less.shape and own.size == more.size:
                 result[key[0]][key[1]] = float(own @ (more - less)) / (2.0 * _SHIFT)
         return result
 
@@ -443,6 +463,7 @@ class _Loop:
         self._parts = [slice(*pair) for pair in pairwise(ends)]
         drag = None if problem.drag is None else problem.drag.reference
         begin = Point(values=list(members[0].values(reference)), drag=drag)
+        self._scales = np.array([p.scale for p in problem.law.parameters])
         slow = self._blocks[-1]
         there = LoopResponses(slow, begin.closing(problem, slow.s)).determinant()
         self._there = float(np.real(there[0]))
@@ -495,10 +516,50 @@ class _Loop:
         found = slow.determinant()
         if not isinstance(found, Dual):
             return 1e-6 - np.real(found) / self._there
-        slope = found.slope.real
-        if extra is not None:
-            slope = np.concatenate([slope, np.zeros_like(slope[:1])])
-        return 1e-6 - Dual(found.value.real, slope) / self._there
+        return 1e-6 - _padded(real(found), extra) / self._there
+
+    def in_a_calm(
+        self, values: FloatArray, log_drag: float, extra: float | None, slopes: bool
+    ) -> Any:
+        """Return rows that keep the poles which hang on drag stable without it.
+
+        Drag is none in small motion.  With drag the margins keep complex poles off the axis; one
+        that has much of its decay from drag may cross it without, all limits kept, and a descent
+        that knew no row there would end at the edge of what it may evaluate.  The slope of a pole
+        s is that of det(I - C yu) by the parameters over that by s.
+        """
+        calm, dragged = (
+            poles[poles.imag > 0.0]
+            for poles in map(
+                partial(self.problem.loop_poles, values), (0.0, float(np.exp(log_drag)))
+            )
+        )
+        if not calm.size or not dragged.size:
+            calm = dragged = calm[:0]
+        else:
+            dragged = dragged[np.abs(calm[:, None] - dragged).argmin(axis=1)]
+        poles = calm[calm.real > _HANGS * dragged.real]
+        # At the pole itself the matrix is singular.
+        points = np.concatenate([poles * (1.0 + _BESIDE), poles * (1.0 - _BESIDE)])
+        point = Point(values=[float(v) for v in values], drag=0.0, slopes=True)
+        closing = point.closing(self.problem, points)
+        found = LoopResponses(self.problem.blocks(points), closing).determinant()
+        above, below = np.split(found.value, 2)
+        by_parameters = sum(np.split(found.slope, 2, axis=1))
+        moved = by_parameters * (_BESIDE * poles) / (below - above)
+        pole = Dual(poles, moved)
+        damping = real(pole) / -sqrt(squared(pole))
+        sizes = np.append(np.maximum(np.abs(values), _SMALL * self._scales), 1.0)
+        movable = np.abs(damping.slope * sizes[:, None]).max(axis=0) > _LEAST_DAMPING
+        row = (_LEAST_DAMPING - damping[movable]) * _STEEP
+        return _padded(row, extra) if slopes else row.value
+
+
+def _padded(found: Dual, extra: float | None) -> Dual:
+    """Return a number with a slope of zero by the variable of the goal, if there is one."""
+    if extra is None:
+        return found
+    return Dual(found.value, np.concatenate([found.slope, np.zeros_like(found.slope[:1])]))
 
 
 def _point(values: FloatArray, log_drag: float | None, slopes: bool) -> Point:

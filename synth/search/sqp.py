@@ -21,10 +21,9 @@ from dataclasses import dataclass
 
 import daqp
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import eigh
 
-from models.basics import FloatArray
+from models.basics import BoolArray, FloatArray
 
 _SLACK = 1e-8  # curvature of the slack, which the quadratic programme wants positive
 _FLAT = 1e-8  # least curvature of the model
@@ -51,7 +50,8 @@ _SKIPPED = 1e-6  # an update along less than this share of a step is left out
 class Evaluation:
     """A programme at a point: objective, rows at most zero, equations, and their slopes.
 
-    Shapes: slope (n,), rows (m,), jacobian (m, n), equations (e,), their slopes (e, n).
+    Shapes: slope (n,), rows (m,), jacobian (m, n), firm (m,), equations (e,), their slopes (e, n).
+    A `firm` row is held while others are broken still: beyond it no point may be evaluated.
     `curvature` (n, n), positive semidefinite, is a model of the objective's Hessian from its
     slopes alone (Gauss-Newton).
     """
@@ -60,6 +60,7 @@ class Evaluation:
     slope: FloatArray
     rows: FloatArray
     jacobian: FloatArray
+    firm: BoolArray
     equations: FloatArray
     equation_slopes: FloatArray
     curvature: FloatArray
@@ -103,7 +104,7 @@ def descend(
     low: FloatArray,
     high: FloatArray,
     *,
-    logarithmic: npt.NDArray[np.bool_],
+    logarithmic: BoolArray,
     tolerance: float = 1e-8,
     most: int = 60,
 ) -> Descent:
@@ -133,6 +134,7 @@ def descend(
             slope=np.zeros_like(x),
             rows=none,
             jacobian=np.zeros((0, x.size)),
+            firm=np.zeros(0, np.bool_),
             equations=none,
             equation_slopes=np.zeros((0, x.size)),
             curvature=np.zeros((x.size, x.size)),
@@ -259,6 +261,9 @@ def _quadratic(
     A[near.size + e :, :n] = -at.equation_slopes * reach
     A /= unit
     A[:, n] = -1.0
+    # A firm row is broken by as much as it is now, whatever the others are.
+    firm = np.flatnonzero(at.firm[near])
+    A[firm, n] = -np.maximum(at.rows[near][firm], 0.0) / max(at.broken, 1e-300)
     upper = np.concatenate([-rows[near], -equations, equations]) / unit
     most = np.append(box[1] / reach, 1e6 / unit)
     least = np.append(box[0] / reach, 0.0)

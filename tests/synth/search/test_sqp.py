@@ -28,6 +28,7 @@ def test_an_answer_keeps_its_prices_where_values_round(beside: float) -> None:
             slope=np.array([-PRICE, 0.2 * away]),
             rows=np.array([x[0] + 0.5 * away**2 - 1.0 + rounding]),
             jacobian=np.array([[1.0, away]]),
+            firm=np.zeros(1, dtype=np.bool_),
             equations=np.zeros(0),
             equation_slopes=np.zeros((0, 2)),
             curvature=np.diag([1e-3, 0.2]),
