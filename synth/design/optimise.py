@@ -213,18 +213,28 @@ def _on_the_rope(
     seed: int,
     progress: Progress | None,
 ) -> tuple[PosedFamily, Tuning]:
-    """Return the answer on the masses and with the reserves that it asks for itself."""
-    settled = False
+    """Return the answer on the masses that it asks for itself, nothing in reserve.
+
+    On the way there limits hold a reserve for the distributed rope instead of more masses; at the
+    end only where no more masses are to be had.
+    """
     for _ in range(ROUNDS):
         fitted = _fitted(posed, tuning)
         if fitted is posed:
-            # What asked for more on the way may be gone: then on the masses of `evaluate_gains`.
-            fewer = _masses_of(given, tuning) if tuning.ok and not settled else posed.masses
-            if fewer >= posed.masses:
-                break
-            settled, fitted = True, given.on(fewer)
+            break
         # The ends of the search are the guesses.
         posed, tuning = fitted, _again(fitted.problem, tuning, starts, seed, progress)
+    least = 0  # what asked for more on the way may be gone
+    for _ in range(ROUNDS):
+        if not tuning.ok:
+            break
+        least = max(least, _masses_of(given, tuning))
+        told = given.on(least)
+        if least == posed.masses and (least == MAX_MASSES or not posed.reserves):
+            told = _fitted(posed, tuning)
+            if told is posed or least < MAX_MASSES:
+                break
+        posed, tuning = told, _again(told.problem, tuning, starts, seed, progress)
     return posed, tuning
 
 

@@ -7,6 +7,7 @@ import pytest
 from designs import PERFECT_CELL, PERFECT_MRU, THESIS_GAINS, thesis_design
 from former_cases import load_case
 
+import models
 import stillhook as sh
 from models import InputError
 from models.sensing import sensed_line_at
@@ -154,6 +155,15 @@ def test_the_largest_sea_is_the_largest_in_which_a_search_keeps_the_limits(noise
         assert (found.excess <= KEPT) == kept, share
 
 
+def sensitivity_on_the_rope(design, omega):
+    """|S| of payload feedback on the distributed rope, (k,)."""
+    gains = design.parameters
+    line = sensed_line_at(design.case, 1j * omega, drag=design.drag)
+    heard = ("payload.acceleration", "payload.velocity", "payload.displacement")
+    felt = line.yu[:, [line.measurements.index(name) for name in heard], 0]
+    return 1.0 / np.abs(1.0 + gains["A"] * felt @ [gains["a"], gains["a1"], gains["a2"]])
+
+
 @pytest.mark.ci
 def test_a_limit_that_binds_on_a_rope_mode_is_kept_on_the_distributed_rope() -> None:
     """With late payload signals the peak of S stands on a mode far above all crossovers."""
@@ -164,12 +174,8 @@ def test_a_limit_that_binds_on_a_rope_mode_is_kept_on_the_distributed_rope() -> 
     bound = design.limits["max_sensitivity"].bound
     assert design.margins.max_sensitivity == pytest.approx(bound, rel=1e-5)
 
-    gains, omega = design.parameters, np.geomspace(1e-2, 1e2, 40_000)
-    line = sensed_line_at(case, 1j * omega, drag=design.drag)
-    heard = ("payload.acceleration", "payload.velocity", "payload.displacement")
-    felt = line.yu[:, [line.measurements.index(name) for name in heard], 0]
-    loop = gains["A"] * felt @ [gains["a"], gains["a1"], gains["a2"]]
-    on_the_rope = 1.0 / np.abs(1.0 + loop)
+    omega = np.geomspace(1e-2, 1e2, 40_000)
+    on_the_rope = sensitivity_on_the_rope(design, omega)
     assert np.max(on_the_rope) == pytest.approx(bound, rel=1e-3)
     far = omega > 5.0 * design.margins.crossovers.max()
     assert np.max(on_the_rope[far]) == pytest.approx(bound, rel=1e-3)
@@ -180,6 +186,21 @@ def test_a_limit_that_binds_on_a_rope_mode_is_kept_on_the_distributed_rope() -> 
     assert few.verification is not None
     assert few.verification.failed == ("rope.max_sensitivity",)
     assert "max_sensitivity" in evaluate_gains(case, LATE_ON_7).status
+
+
+@pytest.mark.ci
+def test_a_margin_holds_a_reserve_where_no_number_of_masses_is_enough() -> None:
+    case = models.load_case("subsea-crane").replace({"sensors.telemetry.delay": 0.4})
+    design = optimise_gains(case, "payload-feedback", starts=4)
+    assert design.ok
+    assert design.margins is not None
+    assert design.masses == 40
+    bound = design.limits["max_sensitivity"].bound
+    # Nothing in reserve it would be 2.0033 on the rope.
+    assert 0.996 * bound < design.margins.max_sensitivity < 0.9995 * bound
+    assert sensitivity_on_the_rope(design, np.geomspace(1.0, 20.0, 40_000)).max() == pytest.approx(
+        bound, rel=1e-4
+    )
 
 
 def test_a_gain_that_fades_away_along_a_valley_has_arrived() -> None:
