@@ -37,7 +37,7 @@ from ..question import (
     pose_family,
     with_masses,
 )
-from ..search import KEPT, Found, Progress, polish, search, with_bests
+from ..search import KEPT, Found, Progress, hardest, polish, search, with_bests
 from ..structures import LowOrderFeedback, structures_aboard
 from .design import SWITCHING_LOSS, Design
 from .high_order import high_order_gains
@@ -350,15 +350,20 @@ def _answer(
     *,
     drive: bool = True,
 ) -> tuple[PosedFamily, Tuning]:
-    """Return the answer of the case alone, and from where its search ended that of the family.
+    """Return the answer of one member alone, and from where its search ended that of the family.
 
-    The family stands on the rope masses that the answer of the case alone asks for.
+    Where the worst member counts it is the hardest, whose answer is nearly that of all; else the
+    case.  The family stands on the rope masses that the answer of the one alone asks for.
     """
-    alone = posed.alone.problem if drive else posed.alone.without_drive
+    family = posed.problem if drive else posed.without_drive
+    one = 0
+    if len(posed.questions) > 1 and posed.objective is Objective.WORST:
+        one = hardest(family, seed)
+    alone = family.scenarios[one].problem
     tuning = tuning_of(alone, no_worse(alone, search(alone, starts, seed, known, progress), known))
     if len(posed.questions) == 1:
         return posed, tuning
-    posed = posed.on(_fitted(posed.alone, tuning).masses)
+    posed = posed.on(_fitted(posed.alone(one), tuning).masses)
     family = posed.problem if drive else posed.without_drive
     again = _again(family, tuning, starts, seed, progress, known)
     if tuning.ok and not again.ok:

@@ -119,15 +119,15 @@ class PosedFamily:
         """The question of the case itself."""
         return self.questions[0]
 
-    @property
-    def alone(self) -> PosedFamily:
-        """The case itself, a family of one."""
+    def alone(self, index: int) -> PosedFamily:
+        """Return one member, a family of one."""
+        only = slice(index, index + 1)
         return replace(
             self,
-            questions=self.questions[:1],
-            names=self.names[:1],
+            questions=self.questions[only],
+            names=self.names[only],
             given=1,
-            reserves=self.reserves[:1],
+            reserves=self.reserves[only],
         )
 
     @property

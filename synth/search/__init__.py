@@ -14,6 +14,6 @@ if TYPE_CHECKING:
     from .nodes import cost_nodes, margin_nodes
     from .polishing import KEPT, assess, polish, settle, stated
     from .programme import Programme, Solution
-    from .starts import begin_points, briskest, start_coefficients
+    from .starts import begin_points, briskest, hardest, start_coefficients
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -32,6 +32,7 @@ from ..structures import pace
 from .nodes import around, cost_nodes, margin_nodes
 
 _CANDIDATES = 512
+_TRIED = 64  # candidates that say which member of a family is the hardest
 _ENOUGH = 8  # stable ones: no more are made of unstable ones
 _SCATTERED, _FAR = 9, 1.5  # candidates about an answer (a power of two), and how far in decades
 _FROM_ZERO = 0.1  # of its scale: about which a parameter is scattered that is smaller
@@ -81,6 +82,19 @@ def begin_points(
         stable = np.vstack([*[f[None] for f in found], stable])
     kinds = np.split(np.arange(len(stable)), [len(stable) - beside])
     return [*first, *_picked(family, stable, kinds, wanted)]
+
+
+def hardest(family: FamilyProblem, seed: int) -> int:
+    """Return the member that candidates do worst with: unstable, with limits broken, or dear."""
+    first = family.scenarios[0]
+    points = candidates(first.problem, _TRIED, seed)
+    burdens = []
+    for scenario in family.scenarios:
+        alone = FamilyProblem(scenarios=(scenario,))
+        stable = np.array([point for point in points if alone.stable(point)])
+        merits = _merits(alone, stable)[0] if len(stable) else np.zeros(0)
+        burdens.append(np.minimum(merits, _WORST).sum() + _WORST * (len(points) - len(stable)))
+    return int(np.argmax(burdens))
 
 
 def scattered(family: FamilyProblem, values: FloatArray, count: int, seed: int) -> list[FloatArray]:

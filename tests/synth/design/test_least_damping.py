@@ -68,7 +68,7 @@ def test_a_case_and_every_member_given_are_followed_by_their_least_damped() -> N
     assert cases[2:] == [cases[0].with_least_damping, cases[1].with_least_damping]
     assert posed.names[2] == "a tenth of the rope's damping, M_s up to 2.5"
     assert difference_text(case, cases[2]) == posed.names[2]
-    assert [q.case for q in posed.alone.questions] == [case]
+    assert [q.case for q in posed.alone(0).questions] == [case]
     assert pose_family(exhibit(), [shorter]).given == len(pose_family(exhibit(), [shorter]).names)
 
 
