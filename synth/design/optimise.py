@@ -409,15 +409,29 @@ def _again(
         ends = [solved.values, *ends[1:]]
     if family.objective is Objective.REGRET:
         family = with_bests(family, seed, ends, progress)
-    found = None
+    standing = None
     if tuning.ok and family.objective is not Objective.REGRET:
-        found = _where_it_stands(family, tuning.found)
-    if found is None or any(start.cost < family.total(found.costs) for start in others[1:]):
+        standing = _where_it_stands(family, tuning.found)
+    found = standing
+    if standing is None:
         found = search(family, 1, seed, ends, progress, only_guesses=True)
+    elif better := [s.end for s in others[1:] if s.cost < family.total(standing.costs)]:
+        # What was better before may break the limits of the others: then the answer stands.
+        other = search(family, 1, seed, better, progress, only_guesses=True, kept_only=True)
+        found = other if _beats(other, standing) else standing
+    assert found is not None
     again = tuning_of(family, no_worse(family, found, known))
     if not again.ok and tuning.ok:
         again = tuning_of(family, search(family, starts, seed, ends[:1], progress))
     return replace(again, starts=tuning.starts, agreed=tuning.agreed)
+
+
+def _beats(found: Found, other: Found) -> bool:
+    """Return whether an answer keeps the limits and is better than another, which keeps them."""
+    one, two = found.solved, other.solved
+    if one is None or two is None or found.excess > KEPT or not one.converged:
+        return False
+    return one.objective < two.objective
 
 
 def _where_it_stands(family: FamilyProblem, found: Found) -> Found | None:

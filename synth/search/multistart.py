@@ -128,6 +128,7 @@ def search(
     progress: Progress | None = None,
     *,
     only_guesses: bool = False,
+    kept_only: bool = False,
 ) -> Found:
     """Return the best answer of a multi-start search over a family.
 
@@ -143,13 +144,15 @@ def search(
         Called as progress(stage, done, total).
     only_guesses
         Draw nothing: start from the guesses alone, if any of them is stable.
+    kept_only
+        Look for nothing else where no start arrives at an answer that keeps the limits.
     """
     tell = progress or (lambda stage, done, total: None)
     family = FamilyProblem.of(asked)
     kept = [np.asarray(guess, dtype=np.float64) for guess in guesses]
     count = len(kept) + max(starts - len(kept), _LEAST)
     begins = [guess for guess in kept if family.stable(guess)] if only_guesses else []
-    if not begins:
+    if not begins and not kept_only:
         # The reserve is picked together with the starts, so that it lies apart from them.
         begins = begin_points(family, count + _RESERVE, seed, kept)
     if not begins:
@@ -159,6 +162,8 @@ def search(
     if not only_guesses:
         _hopped(family, places, reference, starts, seed, tell)
     records, first = _descents(family, places, reference, starts, tell)
+    if not first and kept_only:
+        return Found(solved=None, starts=records, reference=reference)
     if not first:
         solved = least_violation(family, begins, reference)
         assessments, excess = assess(family, solved)
