@@ -60,6 +60,7 @@ ROUNDS = 6  # of asking an answer for what the rope asks of it
 _RESUMED = 3  # ends of a search that the next one, on more masses, begins from
 _HAIR = 1e-4  # relative excess over a limit in the largest sea
 _ALIKE = 1e-3  # relative difference of two seas that are as large
+_NO_DESIGN = "no ok design"  # for the least damping of the rope
 _CALMER_ROUNDS = 6  # of looking for parameters in the largest sea
 _CALMER = 3.0  # logarithm of what the largest sea may have to be calmer by, for the sensors' noise
 
@@ -366,25 +367,30 @@ def _answer(
     posed = posed.on(_fitted(posed.alone(one), tuning).masses)
     family = posed.problem if drive else posed.without_drive
     again = _again(family, tuning, starts, seed, progress, known)
-    if tuning.ok and not again.ok:
-        again = replace(again, status=_damped_too_little(posed, again) or again.status)
+    last = not drive or not any(question.drive for question in posed.questions)
+    if not again.ok and last and len(posed.questions) > posed.given:
+        agreed = tuning.ok
+        if one >= posed.given:
+            given = FamilyProblem(scenarios=family.scenarios[: posed.given])
+            agreed = agreed or tuning_of(given, search(given, starts, seed, known, progress)).ok
+        if agreed:
+            again = replace(again, status=_damped_too_little(posed, again))
     return posed, again
 
 
 def _damped_too_little(posed: PosedFamily, tuning: Tuning) -> str:
-    """Return what the least damping of the rope breaks, "" where that is not what is in the way."""
-    each = zip(posed.questions, (tuning, *tuning.members), strict=False)
-    for question, member in [*each][posed.given :]:
+    """Return what the least damping of the rope breaks, in one sentence."""
+    words = least_damping_text(posed.first.case)
+    each = [*zip(posed.questions, (tuning, *tuning.members), strict=False)][posed.given :]
+    for question, member in each:
         peak = member.limits.get("max_sensitivity")
-        if member.margins is None or peak is None or peak.kept:
-            continue
-        words = least_damping_text(posed.first.case)
-        return (
-            f"no ok design: at {words} M_s is {_number(peak.value, peak.bound)} instead of "
-            f"{_number(question.case.limits.max_sensitivity, peak.value)} near "
-            f"{member.margins.peak:.3g} rad/s"
-        )
-    return ""
+        if member.margins is not None and peak is not None and not peak.kept:
+            return (
+                f"{_NO_DESIGN}: at {words} M_s is {_number(peak.value, peak.bound)} instead of "
+                f"{_number(question.case.limits.max_sensitivity, peak.value)} near "
+                f"{member.margins.peak:.3g} rad/s"
+            )
+    return f"{_NO_DESIGN}: at {words} the limits cannot all be kept"
 
 
 def _again(
@@ -464,7 +470,7 @@ def _best_possible(
     posed, free = _answer(posed, starts, seed, known, progress, drive=False)
     if not free.ok:
         status = free.status
-        if not status.startswith("no ok design"):
+        if not status.startswith(_NO_DESIGN):
             status = f"whatever the drive: {status}"
         return _family_design(posed, replace(free, status=status), drive_kept=False)
     short = shortfall(posed.problem, free, progress)
@@ -699,7 +705,7 @@ def verified(design: Design, progress: Progress | None) -> Design:
     status = design.status
     if design.payload_rms > design.payload_rms_before:
         status += "; with the drum held the payload moves less"
-    if not checked.ok:
+    if not checked.ok and not status.startswith(_NO_DESIGN):
         status = f"not verified: {checked.status}"
     return replace(
         design,

@@ -8,7 +8,7 @@ import pytest
 
 from models import Case, load_case
 from models.basics import InputError
-from synth.design import evaluate_gains, prepare
+from synth.design import evaluate_gains, optimise_gains, prepare
 from synth.question import difference_text, pose_family
 
 HYSTERETIC = {"rope.damping_law": "hysteretic"}
@@ -85,6 +85,20 @@ def test_given_gains_hold_only_if_they_hold_with_the_least_damping_too() -> None
     assert not brisk.members[0].ok
     one = evaluate_gains(case.replace({"rope.damping_measured": [0.002, 0.01]}), BRISK)
     assert not one.members
+
+
+@pytest.mark.ci
+def test_a_status_says_that_the_least_damping_is_in_the_way() -> None:
+    # Slow motion is to be held to 0.7, which asks for more gain than the second mode stands.
+    changes = {"limits.low_frequency.ratio": 0.7, "limits.drive": "report", "rope.masses": 5}
+    case = crane(**changes)
+    design = optimise_gains(case, "payload-feedback", starts=2)
+    assert not design.ok
+    start = "no ok design: at a tenth of the rope's damping M_s is "
+    assert design.status.startswith(start), design.status
+    measured = case.replace({"rope.damping_measured": [0.002, 0.004]})
+    alone = optimise_gains(measured, "payload-feedback", starts=2)
+    assert all(use.kept for use in alone.limits.values() if use.enforced), alone.status
 
 
 def test_a_view_looks_at_both() -> None:
