@@ -83,7 +83,7 @@ def operability(
     each signal's own k = sqrt(2 ln(T/T_z)); sqrt(static^2 + loss^2 + sigma^2) for continuous
     ratings.  The payload's drag agrees with its motion in each sea, so the response is not linear
     in H_s, and the limit is found as a root; where the spectrum is known at one H_s only it is
-    rebuilt at each step.
+    rebuilt at each step.  The rope is damped as the case says.
 
     Parameters
     ----------

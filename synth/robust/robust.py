@@ -48,6 +48,8 @@ def optimise_robust(
 ) -> RobustDesign:
     """Return one set of gains for a family of plants and seas.
 
+    The rope is damped as the case and the family say, and no less.
+
     Parameters
     ----------
     case

@@ -203,6 +203,9 @@ def schedule_gains(
 ) -> GainSchedule:
     """Return gains over the rope's length that hold everywhere between two lengths.
 
+    The rope is damped as the case says; whether the gains hold with the least damping too, as
+    designs of a hysteretic rope do, `evaluate_gains` says.
+
     Parameters
     ----------
     case

@@ -140,6 +140,9 @@ def co_design(
 ) -> CoDesign:
     """Return the gear, and the drum radius if asked for, with which the payload is stillest.
 
+    The search that all begins from holds with the least damping of a hysteretic rope too; gears are
+    compared with the damping of the case: `evaluate_gains` says whether the gains hold with less.
+
     Parameters
     ----------
     case

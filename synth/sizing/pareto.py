@@ -178,6 +178,9 @@ def pareto_front(
 ) -> ParetoFront:
     """Return the least payload rms against another quantity, for payload feedback.
 
+    The rope is damped as the case says; whether the gains hold with the least damping too, as
+    designs of a hysteretic rope do, `evaluate_gains` says.
+
     Parameters
     ----------
     case

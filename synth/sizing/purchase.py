@@ -267,6 +267,9 @@ def worth(
 ) -> Worth:
     """Return what each limit, sensor, delay and the gear of a case are worth.
 
+    The design that all begins from holds with the least damping of a hysteretic rope too; what
+    becomes of it with other figures is told with the damping of the case.
+
     Parameters
     ----------
     case

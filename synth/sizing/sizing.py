@@ -145,6 +145,9 @@ def size_winch(
 ) -> Sizing:
     """Return the smallest motor and gear with which the payload moves no more than a target.
 
+    The rope is damped as the case says; whether the gains hold with the least damping too, as
+    designs of a hysteretic rope do, `evaluate_gains` says.
+
     Parameters
     ----------
     case

@@ -211,6 +211,8 @@ def frequency_sweep(
 ) -> xr.Dataset:
     """Return what a spread does to a design: one case after the other along "case".
 
+    The rope is damped as the case and the spread say.
+
     Parameters
     ----------
     design
