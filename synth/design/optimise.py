@@ -219,6 +219,7 @@ def _on_the_rope(
     On the way there limits hold a reserve for the distributed rope instead of more masses; at the
     end only where no more masses are to be had.
     """
+    damped = tuning.status.startswith(_NO_DESIGN)
     for _ in range(ROUNDS):
         fitted = _fitted(posed, tuning)
         if fitted is posed:
@@ -236,6 +237,8 @@ def _on_the_rope(
             if told is posed or least < MAX_MASSES:
                 break
         posed, tuning = told, _again(told.problem, tuning, starts, seed, progress)
+    if damped and not tuning.ok:
+        tuning = replace(tuning, status=_damped_too_little(posed, tuning))
     return posed, tuning
 
 
@@ -386,11 +389,11 @@ def _damped_too_little(posed: PosedFamily, tuning: Tuning) -> str:
         peak = member.limits.get("max_sensitivity")
         if member.margins is not None and peak is not None and not peak.kept:
             return (
-                f"{_NO_DESIGN}: at {words} M_s is {_number(peak.value, peak.bound)} instead of "
+                f"{_NO_DESIGN}: at {words}, M_s is {_number(peak.value, peak.bound)} instead of "
                 f"{_number(question.case.limits.max_sensitivity, peak.value)} near "
                 f"{member.margins.peak:.3g} rad/s"
             )
-    return f"{_NO_DESIGN}: at {words} the limits cannot all be kept"
+    return f"{_NO_DESIGN}: at {words}, the limits cannot all be kept"
 
 
 def _again(

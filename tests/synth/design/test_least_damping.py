@@ -89,16 +89,16 @@ def test_given_gains_hold_only_if_they_hold_with_the_least_damping_too() -> None
 
 @pytest.mark.ci
 def test_a_status_says_that_the_least_damping_is_in_the_way() -> None:
-    # Slow motion is to be held to 0.7, which asks for more gain than the second mode stands.
-    changes = {"limits.low_frequency.ratio": 0.7, "limits.drive": "report", "rope.masses": 5}
-    case = crane(**changes)
+    # To hold slow motion to 0.45 takes more gain than the second mode stands with so little.
+    changes = {"limits.low_frequency.ratio": 0.45, "limits.drive": "report", "rope.masses": 5}
+    case = crane(**changes, **{"rope.damping_ratio": 0.1, "rope.damping_measured": [5e-4, 0.1]})
     design = optimise_gains(case, "payload-feedback", starts=2)
     assert not design.ok
-    start = "no ok design: at a tenth of the rope's damping M_s is "
+    start = "no ok design: at the least damping measured, 0.0005, M_s is "
     assert design.status.startswith(start), design.status
-    measured = case.replace({"rope.damping_measured": [0.002, 0.004]})
-    alone = optimise_gains(measured, "payload-feedback", starts=2)
-    assert all(use.kept for use in alone.limits.values() if use.enforced), alone.status
+    sure = case.replace({"rope.damping_measured": [0.1, 0.1]})
+    alone = optimise_gains(sure, "payload-feedback", starts=2)
+    assert alone.ok, alone.status
 
 
 def test_a_view_looks_at_both() -> None:
