@@ -20,6 +20,7 @@ import numpy as np
 
 from models.basics import ComplexArray, FloatArray, InputError, Quadrature, SolverError, one_thread
 from models.case import Case
+from models.plant import MAX_MASSES
 
 from ..loop import Assessment, consistent_coefficient
 from ..question import (
@@ -199,20 +200,19 @@ class View:
         posed = replace(self.posed, questions=tuple(questions))
         reference = np.array(posed.first.values(parameters))
         solved, ended = self._descent(posed, reference, reference, begin)
-        settled = False
+        least = 0  # masses that `evaluate` asks for there; until then limits may hold a reserve
         for _ in range(ROUNDS):
             # What a descent arrives at may ask for more, or for less, than where it began.
             if ended is None:
                 break
-            if (fitted := posed.fitted(ended)) is posed:
-                if settled:
-                    break
+            fitted = posed if 0 < least < MAX_MASSES else posed.fitted(ended)
+            if fitted is posed:
                 there = posed.first.named([float(v) for v in solved.values])
                 looks = on_common_masses([partial(one.loop, there) for one in self._members])
-                fewer = max(question.masses for question, _, _ in looks)
-                if fewer >= posed.masses:
+                least = max([least, *(question.masses for question, _, _ in looks)])
+                fitted = self.posed.on(least)
+                if least == posed.masses and (least == MAX_MASSES or not posed.reserves):
                     break
-                settled, fitted = True, self.posed.on(fewer)
             again = self._assessed(fitted, reference)
             if again is None:
                 break

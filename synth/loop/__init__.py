@@ -29,7 +29,7 @@ if TYPE_CHECKING:
         value_of,
         where,
     )
-    from .margins import Margins, level_ends, loop_margins, refine_minima
+    from .margins import Margins, least_distances, level_ends, loop_margins, refine_minima
     from .pole_region import PoleRegion, counted_poles, with_delay_models
     from .responses import Closing, LoopBlocks, LoopResponses
 else:

@@ -20,7 +20,7 @@ from models.plant import MAX_MASSES, masses_for_bandwidth
 from models.sensing import sensed_line_at
 
 from ..limits import DelayMargin, GainMargin, GainMarginDown, Limit, MaxSensitivity
-from ..loop import Assessment, LoopResponses, Margins, loop_margins
+from ..loop import Assessment, LoopResponses, Margins, least_distances, loop_margins
 from .problem import Values
 from .question import DesignQuestion, with_masses
 
@@ -31,6 +31,7 @@ _CLOSE = 1.05  # of the peak of |S| on those frequencies, at which margins are r
 _FAR = 0.1  # relative length of the longest step
 _FELT = 0.15  # loop gain below which no margin is looked for
 _WEAK = 0.5  # loop gain below which S is at most 2, wherever a mode stands
+_NEAR = 0.1  # relative distance of peaks that are the same on masses and rope
 _KEPT = 1e-3  # relative excess on the rope as it is over a limit that its masses keep
 _RESERVED = 0.03  # ... that a limit may hold in reserve
 _STEPS = 8  # of Newton's method towards a pole
@@ -71,7 +72,7 @@ def _masses(
 ) -> tuple[int, Mapping[str, float]]:
     """Return the masses with which no margin's excess on the rope is above `most`, and those.
 
-    The excess is negative of a margin that is broken on the masses only.
+    The excess is negative of a margin that is broken, or binds, on the masses only.
     """
     data = question.data
     if data.masses is not None or data.lumping == "thesis":
@@ -84,7 +85,7 @@ def _masses(
     if wanted > question.masses:
         return wanted, {}
     excess = line.excess
-    # For given gains it matters as well that none is broken on the masses that the rope keeps.
+    # For given gains it matters as well that none binds on the masses that the rope keeps.
     apart = excess.values() if most > _KEPT else map(abs, excess.values())
     if (largest := max(apart, default=0.0)) > most:
         # The error of a lumped rope's modes falls with the square of its masses.
@@ -131,28 +132,54 @@ class _OnTheRope:
     def excess(self) -> dict[str, float]:
         """What each margin is broken by on the rope more than on the masses, relatively.
 
-        Nothing where it is broken on both.
+        Nothing where it is broken on both; negative where the masses alone break it or bind by it.
         """
         margins = MaxSensitivity | GainMargin | GainMarginDown | DelayMargin
         limits = [limit for limit in self.question.loop if isinstance(limit, margins)]
-        found = dict.fromkeys((limit.name for limit in limits), 0.0)
+        lumped = {limit.name: limit.use(limit.measure(self.loop)) for limit in limits}
+        binding = any(1.0 - _KEPT < use < 1.0 + _KEPT for use in lumped.values())
+        found = dict.fromkeys(lumped, -math.inf)
+        apart = 0.0
         for i, gain in enumerate(self.gains if limits else ()):
             felt = np.abs(gain) > _FELT
             peak = _CLOSE / float(np.abs(1.0 + gain).min())
             kept = all(limit.use(_least(limit, peak)) <= 1.0 for limit in limits)
-            if kept or not felt.any():
+            if (kept and not binding) or not felt.any():
+                found = {name: max(use, 0.0) for name, use in found.items()}
                 continue
-            grid = self.grid[felt]
-            own = loop_margins(partial(self._gain, i), grid, gain[felt])
+            grid, loop = self.grid[felt], partial(self._gain, i)
+            minima = least_distances(loop, grid, gain[felt])
+            own = loop_margins(loop, grid, gain[felt], minima)
             seen = _Seen(max_sensitivity=own.max_sensitivity, margins=own)
             for limit in limits:
                 use = limit.use(limit.measure(seen))  # type: ignore[arg-type]  # all it asks for
-                found[limit.name] = max(found[limit.name], use - 1.0)
+                found[limit.name] = max(found[limit.name], use)
+                if isinstance(limit, MaxSensitivity):
+                    apart = max(apart, self._missed(i, limit.bound, *minima[0]))
         for limit in limits:
-            lumped = max(limit.use(limit.measure(self.loop)) - 1.0, 0.0)
-            both = min(found[limit.name], lumped) > _KEPT
-            found[limit.name] = 0.0 if both else found[limit.name] - lumped
+            name = limit.name
+            rope, masses = found[name], lumped[name]
+            if min(rope, masses) > 1.0 + _KEPT:
+                found[name] = 0.0
+            elif masses > 1.0 - _KEPT and rope < masses:
+                found[name] = rope - masses
+            else:
+                found[name] = max(rope - 1.0, 0.0)
+            if isinstance(limit, MaxSensitivity) and apart > abs(found[name]):
+                found[name] = -apart
         return found
+
+    def _missed(self, index: int, bound: float, places: FloatArray, least: FloatArray) -> float:
+        """Return what the rope has less of |S| than the masses at a peak that binds, relatively.
+
+        From the places and values of the minima of |1 + L| on the rope.
+        """
+        at = self.loop.sensitivity_peaks((1.0 - _KEPT) * bound)
+        size = 1.0 / np.abs(1.0 + self.loop.loop_gain(at, index))
+        near = np.abs(places - at[:, None]) < _NEAR * at[:, None]
+        rope = np.max(np.where(near, 1.0 / least, 0.0), axis=1, initial=0.0)
+        binds = (size > (1.0 - _KEPT) * bound) & (size < (1.0 + _KEPT) * bound) & (rope > 0.0)
+        return float(np.max((size - rope)[binds] / bound, initial=0.0))
 
     def _gains(self, s: ComplexArray) -> ComplexArray:
         """Return L of each loop at points [1/s], (loops, k)."""
