@@ -137,7 +137,7 @@ class _OnTheRope:
         margins = MaxSensitivity | GainMargin | GainMarginDown | DelayMargin
         limits = [limit for limit in self.question.loop if isinstance(limit, margins)]
         lumped = {limit.name: limit.use(limit.measure(self.loop)) for limit in limits}
-        binding = any(1.0 - _KEPT < use < 1.0 + _KEPT for use in lumped.values())
+        binding = any(use > 1.0 - _KEPT for use in lumped.values())
         found = dict.fromkeys(lumped, -math.inf)
         apart = 0.0
         for i, gain in enumerate(self.gains if limits else ()):
