@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .assess import Assessment, consistent_coefficient, frequency_grid, integration_band
     from .controller import LinearController, closed_loop_matrix, closed_loop_poles
     from .disturbance import CoherentError, Disturbance, disturbances
-    from .drag_element import DragElement, with_drag
+    from .elements import DragElement, with_drag
     from .dual import (
         Dual,
         at_least,

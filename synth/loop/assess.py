@@ -27,7 +27,7 @@ from models.plant import LinearPlant, consistent_drag, settled_drag
 
 from .controller import LinearController, closed_loop_plant, closed_loop_poles
 from .disturbance import CoherentError, Disturbance
-from .drag_element import DragElement, with_drag
+from .elements import DragElement, with_drag
 from .margins import Margins, least_distances, loop_margins, refine_minima, worst_margins
 from .pole_region import PoleRegion, with_delay_models
 from .responses import LoopBlocks, LoopResponses
