@@ -485,7 +485,9 @@ for name, (a, a1, a2) in designs.items():
     there = saturation.case_for(sea)
     view = pose(there.replace({"payload.drag": {"method": "stochastic"}})).assess(own)
     law = sh.LinearFeedback(there, own).controller
-    margins = TorqueLoop.from_case(there, law, sample_time=SAMPLE_TIME).margins(view.coefficient)
+    margins = TorqueLoop.from_case(there, law, sample_time=SAMPLE_TIME).margins(
+        view.coefficients[0]
+    )
     runs = saturation.runs_in(sea, 5, gains=own)
     found = [view.margins.max_sensitivity, view.margins.gain_down, margins.gain_down]
     rms = [1e3 * view.sigma("payload.displacement"), 1e3 * runs.summary["payload rms"].mean]

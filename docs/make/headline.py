@@ -103,7 +103,8 @@ def given_row(key: Row, case: sh.Case, gains: Mapping[str, float]) -> Row:
     than that changes it little, see the notebook.
     """
     question = pose(case)
-    view = question.assess(gains, question.drag_before)
+    known = question.coefficients_of(question.drag_before, 0.0)
+    view = question.assess(gains, known)
     growth = float(view.poles.real.max())
     if growth <= 0.0:
         return row_of(key, sh.evaluate_gains(case, gains))

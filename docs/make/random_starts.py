@@ -31,7 +31,7 @@ from stored import docs_folder, read_rows, study_parser, write_rows
 
 from models import PhysicsWarning, load_case
 from models.basics import one_thread
-from synth.loop import closed_loop_poles, with_drag
+from synth.loop import closed_loop_poles, with_elements
 from synth.question import Problem, pose
 from synth.search import Solution, briskest, settle, start_coefficients
 from synth.search.starts import crossover_grid
@@ -91,9 +91,7 @@ def drawn(problem: Problem, count: int, seed: int) -> tuple[list[FloatArray], in
 
 def unstable_poles(problem: Problem, solved: Solution) -> int:
     """Return the unstable poles of an answer's loop by its winding number, delays exact."""
-    plant = problem.plant
-    if problem.drag is not None and solved.coefficient is not None:
-        plant = with_drag(plant, problem.drag, solved.coefficient)
+    plant = with_elements(problem.plant, problem.elements, solved.coefficient)
     controller = problem.law.controller([float(v) for v in solved.values])
     marks = closed_loop_poles(plant.without_delays(8), controller)
     marks = marks[np.abs(marks) > 0.0]

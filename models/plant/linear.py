@@ -299,6 +299,28 @@ class LinearPlant(ReadOnlyArrays):
             Cz=self.Cz + np.outer(self.Fz[:, f], row),
         )
 
+    def with_disturbance(
+        self, name: str, per_state: Mapping[str, float], per_output: Mapping[str, float]
+    ) -> LinearPlant:
+        """Return the plant with one more disturbance: what it makes of states' rates and outputs.
+
+        Raises
+        ------
+        InputError
+            If a signal is unknown, or the name is one of an input or of a disturbance.
+        """
+        if name in (*self.inputs, *self.disturbances):
+            raise InputError(f"{_OWNER}: the name of a disturbance must be new, got {name!r}")
+        moved, shown = np.zeros((len(self.A), 1)), np.zeros((len(self.Cz), 1))
+        moved[pick(_OWNER, "state", self.states, list(per_state)), 0] = list(per_state.values())
+        shown[pick(_OWNER, "output", self.outputs, list(per_output)), 0] = list(per_output.values())
+        return self._with(
+            E=np.hstack([self.E, moved]),
+            F=np.hstack([self.F, np.zeros((len(self.F), 1))]),
+            Fz=np.hstack([self.Fz, shown]),
+            disturbances=(*self.disturbances, name),
+        )
+
     def opened(self, output: str, disturbance: str) -> LinearPlant:
         """Return the plant with an output measured and a disturbance commanded, last of their kind.
 

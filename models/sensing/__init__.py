@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .plant import (
         DRIFT_BAND,
         ENCODER,
+        LOAD,
         MEASURED,
         SAMPLE_TIME,
         SENSORS,
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
         sensed_line_at,
         sensed_plant,
         sensed_spectra,
+        with_loads,
         with_sensors,
     )
     from .sensing import NOISE, SensorModel

@@ -49,6 +49,7 @@ MEASURED = (
 SENSORS = {"mru.heave": "mru", "mru.heave_rate": "mru", "rope.tension": "load_cell"}
 #: What the drive's own encoder shows.
 ENCODER = ("drum.haul", "motor.speed")
+LOAD = "motor.load"  # torque on the motor's shaft, a disturbance where losses switch
 #: What disturbs the sensors, besides the plant's own disturbances.
 NOISES = (
     "mru.error",
@@ -108,6 +109,7 @@ def sensed_plant(
     *,
     masses: int | None = None,
     drag: float,
+    friction: float = 0.0,
     sensors: Sensors | None = None,
 ) -> LinearPlant:
     """Return the plant linearised at rest, with all that the winch's sensors show.
@@ -120,6 +122,8 @@ def sensed_plant(
         Masses along the rope; by default those of the case.
     drag
         Equivalent linear drag coefficient of the payload [N s/m].
+    friction
+        Viscous friction at the motor beside its own, that of losses which switch [N m s/rad].
     sensors
         The sensors, by default those of the case (`models.rig.sensors.Sensors`).
 
@@ -141,7 +145,19 @@ def sensed_plant(
     if isinstance(case, Case) and sensors is None:
         sensors = case.sensors
     plant = build_plant(case, masses)
-    return with_sensors(plant.linearise(drag=drag), sensors, plant.data.command_delay)
+    linear = plant.linearise(drag=drag)
+    if friction:
+        linear = with_loads(linear, plant.data).with_element("motor.speed", LOAD, -friction)
+    return with_sensors(linear, sensors, plant.data.command_delay)
+
+
+def with_loads(plant: LinearPlant, data: PlantData) -> LinearPlant:
+    """Return a linear plant of `models.plant.plant` with `LOAD`, a torque on the motor's shaft.
+
+    It stands for losses that switch with the direction.  The drive's signals are told without what
+    they take of it (`LinearPlant.loss`): it is no part of what is Gaussian in them.
+    """
+    return plant.with_disturbance(LOAD, {"motor.speed": 1.0 / data.inertia}, data.per_torque)
 
 
 def with_sensors(plant: LinearPlant, sensors: Sensors | None, command_delay: float) -> LinearPlant:
@@ -292,7 +308,12 @@ def aboard(case: Case) -> tuple[str, ...]:
 
 
 def sensed_line_at(
-    case: Case, s: npt.ArrayLike, *, drag: float, data: PlantData | None = None
+    case: Case,
+    s: npt.ArrayLike,
+    *,
+    drag: float,
+    friction: float = 0.0,
+    data: PlantData | None = None,
 ) -> PlantResponse:
     """Return the exact response of a case's rope, drive and sensors, delays and all.
 
@@ -304,6 +325,8 @@ def sensed_line_at(
         Points [1/s], (k,), none of them a pole (s = 0 is one).
     drag
         Equivalent linear drag coefficient of the payload [N s/m].
+    friction
+        Viscous friction at the motor beside its own, that of losses which switch [N m s/rad].
     data
         The case's numbers, where they are at hand.
 
@@ -313,7 +336,15 @@ def sensed_line_at(
         With the names of `sensed_plant`, on the distributed rope (`models.plant.line_response`).
     """
     data = PlantData.from_case(case) if data is None else data
-    line, sensors = line_response(data, s, drag=drag), case.sensors
+    loaded = replace(data, viscous_friction=data.viscous_friction + friction)
+    line, sensors = line_response(loaded, s, drag=drag), case.sensors
+    if friction:
+        # Signals of the drive without what losses take, see `with_loads`.
+        zw, zu, speed = line.zw.copy(), line.zu.copy(), line.outputs.index("motor.speed")
+        for name, per in data.per_torque.items():
+            for block in (zw, zu):
+                block[:, line.outputs.index(name)] -= friction * per * block[:, speed]
+        line = replace(line, zw=zw, zu=zu)
     points, nw, at = line.s, len(line.disturbances), MEASURED.index
     noises = tuple(name for name in NOISES if name != "mru.error_rate")
     yw = np.zeros((points.size, len(MEASURED), nw + len(noises)), complex)

@@ -316,6 +316,9 @@ def facts(design: Design, *, bound: bool = True) -> list[tuple[str, str]]:
     else:
         drag = f"{quantity(design.drag, 'N s/m')}, fixed by the case"
     rows = [("sea", sea_text(design)), ("rope", rope), ("drag", drag)]
+    if design.friction > 0.0:
+        friction = quantity(design.friction, "N m s/rad")
+        rows.append(("losses", f"as a friction of {friction} at the motor, by its speed"))
     if design.starts:
         agree = f"{design.agreed} of {len(design.starts)} starts agree"
         few = few_starts(design.agreed, len(design.starts))

@@ -94,6 +94,8 @@ class _Judged(Protocol):
     def masses(self) -> int: ...
     @property
     def drag(self) -> float: ...
+    @property
+    def friction(self) -> float: ...
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -225,8 +227,9 @@ class _Terms:
         The case and its hook motion.
     heard
         What a controller hears.
-    masses, drag
-        Rope masses of the bound's plant; linear drag coefficient [N s/m].
+    masses, drag, friction
+        Rope masses of the bound's plant; linear drag coefficient [N s/m]; friction of losses
+        [N m s/rad].
     faint
         See `bound_for`.
     limits
@@ -240,19 +243,19 @@ class _Terms:
     heard: tuple[str, ...]
     masses: int
     drag: float
+    friction: float
     faint: float
     limits: Mapping[str, float]
     said: tuple[str, ...]
 
     def plant(self, masses: int) -> LinearPlant:
         """Return the plant on so many rope masses."""
-        return sensed_plant(self.case, masses=masses, drag=self.drag).select(
-            measurements=self.heard
-        )
+        found = sensed_plant(self.case, masses=masses, drag=self.drag, friction=self.friction)
+        return found.select(measurements=self.heard)
 
     def line(self, omega: FloatArray) -> ComplexArray:
         """Return what is heard of the command on the distributed rope, (k, ny)."""
-        found = sensed_line_at(self.case, 1j * omega, drag=self.drag)
+        found = sensed_line_at(self.case, 1j * omega, drag=self.drag, friction=self.friction)
         return found.select(measurements=self.heard).yu[:, :, 0]
 
     def shaken(self, masses: int) -> tuple[LinearPlant, dict[str, Any], tuple[str, ...]]:
@@ -323,7 +326,7 @@ def bound_for(
         raise InputError("bound: the design's loop must be stable")
     question = pose(case, masses=subject.masses if masses is None else masses)
     heard = (*controller.measurements, *ENCODER) if measurements is None else measurements
-    terms = _terms(question, heard, subject.drag, faint)
+    terms = _terms(question, heard, subject.drag, faint, subject.friction)
     plant, sources = _loop(terms, controller)
     bode = bode_estimate(Assessment(plant, controller, sources))
     names = list(dict.fromkeys([PAYLOAD, *terms.limits]))
@@ -527,7 +530,13 @@ def command_limit(case: Case, plant: LinearPlant) -> tuple[str, float]:
     return name, float(drive.torque_peak or math.inf)
 
 
-def _terms(question: DesignQuestion, heard: Sequence[str], drag: float, faint: float) -> _Terms:
+def _terms(
+    question: DesignQuestion,
+    heard: Sequence[str],
+    drag: float,
+    faint: float,
+    friction: float = 0.0,
+) -> _Terms:
     """Return the terms of a case, with its limits on signals as limits on their rms."""
     case, hook = question.case, question.hook
     pick("bound", "measurement", MEASURED, heard)
@@ -538,6 +547,7 @@ def _terms(question: DesignQuestion, heard: Sequence[str], drag: float, faint: f
         heard=tuple(name for name in MEASURED if name in heard),
         masses=question.masses,
         drag=drag,
+        friction=friction,
         faint=faint,
         # A force on the payload is felt there at once, and what is white then has no variance.
         limits=rms_limits([x for x in question.limits if LOWER_TENSION not in x.outputs], period),

@@ -69,6 +69,9 @@ class Design:
         Use and price of every limit by name.
     drag, drag_before
         Linear drag coefficient with and without compensation [N s/m].
+    friction
+        What losses that switch with the direction come to as viscous friction at the motor
+        [N m s/rad].
     masses
         Rope masses of the design plant.
     starts, agreed
@@ -121,6 +124,7 @@ class Design:
     exhibit: Design | None = None
     fixed: tuple[str, ...] = ()
     built_for: Case | None = None
+    friction: float = 0.0
 
     @property
     def feasible(self) -> bool:
@@ -206,7 +210,8 @@ class Design:
         InputError
             If no controller was found.
         """
-        return self.question.assess(self._known, self.drag)
+        known = self.question.coefficients_of(self.drag, self.friction)
+        return self.question.assess(self._known, known)
 
     @cached_property
     def bound(self) -> BestPossible:

@@ -64,7 +64,7 @@ def high_order_gains(
         assert isinstance(question.law, LowOrderLaw)
         parameters = question.named([float(v) for v in question.law.values(found.controller)])
         view = question.assess(parameters)
-        drag = view.coefficient if question.drag is not None else drag
+        drag = question.equivalents(view.coefficients)[0] if question.drag is not None else drag
         if all(limit.use(limit.worst(view)) <= 1.0 for limit in question.limits):
             break
         rooms |= _rooms(question, view)

@@ -15,7 +15,7 @@ import numpy as np
 from models.basics import FloatArray
 
 from ..limits import Limit
-from ..loop import Assessment
+from ..loop import Assessment, Coefficients
 from ..question import FamilyProblem, Goal, Problem
 from ..search import Progress, Solution, assess, briskest, polish, settle
 from .tuning import Tuning
@@ -84,12 +84,19 @@ def shortfall(
 
 def _largest_sea(problem: FamilyProblem, free: Tuning) -> Solution | None:
     seas = (0.0, -1.5, -4.0)  # from the sea asked for down to a fiftieth of it
-    # Drag goes with the motion, so with the sea.
-    drags = [
-        tuple(None if drag is None else drag * np.exp(sea) for drag in _drags(free)) for sea in seas
+    # Drag goes with the motion, so with the sea; losses against it.
+    known = [
+        tuple(
+            tuple(
+                c * np.exp(sea if element.lasting else -sea)
+                for c, element in zip(own, member.problem.elements, strict=True)
+            )
+            for own, member in zip(_coefficients(free), problem.scenarios, strict=True)
+        )
+        for sea in seas
     ]
     begins = _begins(free)
-    found = _arrived(problem, begins, list(zip(drags, seas, strict=True)), Goal.SEA)
+    found = _arrived(problem, begins, list(zip(known, seas, strict=True)), Goal.SEA)
     if not found:
         return None
     best = min(found, key=lambda s: s.objective)
@@ -119,11 +126,14 @@ def larger_sea(
 def _arrived(
     problem: FamilyProblem,
     begins: Sequence[FloatArray],
-    tries: Sequence[tuple[Sequence[float | None], float]],
+    tries: Sequence[tuple[Sequence[Coefficients], float]],
     goal: Goal,
     relaxed: Sequence[str] = (),
 ) -> list[Solution]:
-    """Return from each point the answer of the first (drags, extra) that leads to a stable one."""
+    """Return from each point the answer of the first try that leads to a stable one.
+
+    A try is coefficients and extra.
+    """
     found, reference = [], briskest(problem, begins)
     for begin in begins:
         for coefficients, extra in tries:
@@ -148,7 +158,7 @@ def _required(
     """Return the least bounds of the binding limits for which the sea asked for is feasible."""
     begins = [*_begins(free), best.values]
     # From the limits as they are to twenty times those.
-    tries = [(_drags(free), room) for room in (0.0, 1.0, 3.0)]
+    tries = [(_coefficients(free), room) for room in (0.0, 1.0, 3.0)]
     # Where a limit bends that does not bind at the largest sea, all of the drive's may give way.
     every = [lim.name for lim in problem.scenarios[0].problem.limits if lim.drive]
     for given in (binding, every):
@@ -194,9 +204,9 @@ def _measured(
             yield lim, lim.worst(assessment)
 
 
-def _drags(free: Tuning) -> tuple[float | None, ...]:
-    """Return the drag coefficient of every member [N s/m]."""
-    return tuple(one.coefficient for one in (free, *free.members))
+def _coefficients(free: Tuning) -> tuple[tuple[float, ...], ...]:
+    """Return the coefficients of every member's elements."""
+    return tuple(one.coefficients for one in (free, *free.members))
 
 
 def _begins(free: Tuning) -> list[FloatArray]:

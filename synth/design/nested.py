@@ -151,8 +151,8 @@ def _as_it_is(family: FamilyProblem, values: Sequence[float]) -> Solution | None
     if not family.stable(values):
         return None
     loops = [(s.problem, s.problem.assess(s.values(values))) for s in family.scenarios]
-    drags = tuple(seen.coefficient if asked.drag is not None else None for asked, seen in loops)
-    if not family.stable(values, drags):
+    known = tuple(seen.coefficients for _, seen in loops)
+    if not family.stable(values, known):
         return None
     if any(lim.use(lim.worst(seen)) > 1.0 + KEPT for asked, seen in loops for lim in asked.limits):
         return None
@@ -161,7 +161,7 @@ def _as_it_is(family: FamilyProblem, values: Sequence[float]) -> Solution | None
     )
     return Solution(
         values=np.array(values, dtype=np.float64),
-        coefficients=drags,
+        coefficients=known,
         # A hair dearer than it is, so that a solve which arrives at the same point counts.
         objective=float(np.log(family.total(costs))) + _HAIR,
         converged=False,

@@ -448,11 +448,11 @@ def _where_it_stands(family: FamilyProblem, found: Found) -> Found | None:
     solved, reference = found.solved, found.reference
     if solved is None or reference is None:
         return None
-    drags = solved.coefficients
-    drags += drags[-1:] * (len(family.scenarios) - len(drags))
-    if not family.stable(solved.values, drags):
+    known = solved.coefficients
+    known += known[-1:] * (len(family.scenarios) - len(known))
+    if not family.stable(solved.values, known):
         return None
-    polished, assessments, excess = polish(family, replace(solved, coefficients=drags), reference)
+    polished, assessments, excess = polish(family, replace(solved, coefficients=known), reference)
     if not polished.converged or excess > KEPT:
         return None
     return replace(found, solved=polished, assessments=assessments, excess=excess)
@@ -662,9 +662,9 @@ def recorded(
     status: str,
 ) -> Design:
     """Return a design in the question's sea; `assessment` is None where the loop is unstable."""
-    drag, shares = question.drag_before, {}
+    drag, friction, shares = question.drag_before, 0.0, {}
     if assessment is not None:
-        drag = question.drag_in(assessment)
+        drag, friction = question.equivalents(assessment.coefficients)
         limits = (*question.limits, *question.reported)
         signals = dict.fromkeys([PAYLOAD, *(name for limit in limits for name in limit.outputs)])
         losses = question.plant.loss
@@ -689,6 +689,7 @@ def recorded(
         limits=uses,
         drag=drag,
         drag_before=question.drag_before,
+        friction=friction,
         masses=question.masses,
     )
 

@@ -97,8 +97,9 @@ class Tuning:
         The closed loop in numbers; None if no stable one was found.
     found
         The search's raw answer.
-    coefficient
-        The drag coefficient that agrees with the response [N s/m], if drag was asked for.
+    coefficients
+        Those of the problem's elements that agree with the response: of the drag [N s/m], if drag
+        was asked for.
     members
         The same controller on each further plant that it was tuned for.
     """
@@ -113,7 +114,7 @@ class Tuning:
     limits: Mapping[str, LimitUse]
     starts: tuple[Start, ...] = ()
     agreed: int = 0
-    coefficient: float | None = None
+    coefficients: tuple[float, ...] = ()
     members: tuple[Tuning, ...] = ()
     assessment: Assessment | None = field(repr=False)
     found: Found = field(repr=False)
@@ -326,7 +327,7 @@ def _of_member(family: FamilyProblem, found: Found, index: int) -> Tuning:
         controller=problem.law.controller(values),
         margins=assessment.margins,
         limits=limit_uses(problem.limits, assessment, prices),
-        coefficient=solved.coefficient,
+        coefficients=solved.coefficient,
         assessment=assessment,
         found=own,
     )
@@ -419,5 +420,5 @@ def _problem(
         disturbances=disturbances(spectrum, plant.independent_disturbances),
         minimise={name: float(w) for name, w in minimise.items() if w > 0.0},
         limits=tuple(limits),
-        drag=drag,
+        elements=() if drag is None else (drag,),
     )

@@ -22,7 +22,7 @@ from models.basics import ComplexArray, FloatArray, InputError, Quadrature, Solv
 from models.case import Case
 from models.plant import MAX_MASSES
 
-from ..loop import Assessment, consistent_coefficient
+from ..loop import Assessment, Coefficients, consistent_coefficients
 from ..question import (
     HOOK,
     PAYLOAD,
@@ -110,13 +110,13 @@ class View:
     ----------
     posed
         The questions of all members, on the rope masses that their cases ask for.
-    drags
-        Drag coefficient of each member to begin with [N s/m].
+    begin
+        Coefficients of each member's elements to begin with.
     """
 
-    def __init__(self, posed: PosedFamily, drags: Sequence[float | None] = ()) -> None:
+    def __init__(self, posed: PosedFamily, begin: Sequence[Coefficients | None] = ()) -> None:
         self.posed = posed
-        known = [*drags, *[None] * (len(posed.questions) - len(drags))]
+        known = [*begin, *[None] * (len(posed.questions) - len(begin))]
         each = zip(posed.questions, known, strict=False)
         self._members = [_Member(*one) for one in each]
         self._problems: dict[tuple[int, ...], FamilyProblem] = {}
@@ -164,7 +164,7 @@ class View:
         first, *others = (question.case.replace(dict(changes)) for question in given)
         objective = self.posed.objective
         posed = pose_family(first, others, self.structure, objective=objective, known=self.posed)
-        return View(posed, [member.drag for member in self._members])
+        return View(posed, [member.begin for member in self._members])
 
     @one_thread()
     def optimise(self, start: object = None, *, verify: bool = False) -> Design:
@@ -234,8 +234,7 @@ class View:
         if binding := dict.fromkeys(name for one in every for name in one.binding):
             design = replace(design, status=f"{design.status}, at {', '.join(binding)}")
         for member, one in zip(self._members, every, strict=True):
-            if member.question.drag is not None:
-                member.drag = one.drag
+            member.begin = member.question.coefficients_of(one.drag, one.friction)
         return verified(design, None) if verify else design
 
     def _descent(
@@ -247,9 +246,8 @@ class View:
     ) -> tuple[Solution, list[Assessment] | None]:
         """Return where a descent from some values ends, and the loops there if all are stable."""
         problem = self._problem(posed, [reference])
-        each = zip(posed.questions, near, strict=True)
-        drags = [None if question.drag is None else loop.coefficient for question, loop in each]
-        solved = settle(problem, values, drags, reference=reference, fine=True)
+        known = [loop.coefficients for loop in near]
+        solved = settle(problem, values, known, reference=reference, fine=True)
         ends = solved.coefficients
         if not np.isfinite(solved.objective) or not problem.stable(solved.values, ends):
             return solved, None
@@ -265,12 +263,12 @@ class View:
         return self._problems[masses]
 
     def _assessed(
-        self, posed: PosedFamily, values: Values, drags: Sequence[float | None] = ()
+        self, posed: PosedFamily, values: Values, known: Sequence[Coefficients] = ()
     ) -> list[Assessment] | None:
         """Return the loop of every member; None where no drag agrees with one of them."""
-        coefficients = drags or [None] * len(posed.questions)
+        coefficients: Sequence[Coefficients | None] = known or [None] * len(posed.questions)
         each = zip(self._members, posed.questions, coefficients, strict=True)
-        found = [member.assessed(question, values, drag) for member, question, drag in each]
+        found = [member.assessed(question, values, own) for member, question, own in each]
         loops = [loop for loop in found if loop is not None]
         return loops if len(loops) == len(found) else None
 
@@ -296,8 +294,8 @@ class View:
 class _Member:
     """One member's loop, with what is kept from one look to the next."""
 
-    def __init__(self, question: DesignQuestion, drag: float | None) -> None:
-        self.question, self.drag = question, drag
+    def __init__(self, question: DesignQuestion, begin: Coefficients | None) -> None:
+        self.question, self.begin = question, begin
         self._posed = {question.masses: question}
 
     def loop(
@@ -316,11 +314,11 @@ class _Member:
         return self._posed[masses]
 
     def assessed(
-        self, question: DesignQuestion, values: Values, coefficient: float | None = None
+        self, question: DesignQuestion, values: Values, coefficients: Coefficients | None = None
     ) -> Assessment | None:
         """Return a loop on nodes that are made from its poles; None where no drag agrees with it.
 
-        The drag begins where the last one agreed.
+        The coefficients begin where the last ones agreed.
         """
         problem = question.problem
         controller = problem.law.controller([float(v) for v in values])
@@ -331,16 +329,18 @@ class _Member:
             last.append(cost_nodes(problem, poles))
             return last[-1]
 
-        if problem.drag is not None and coefficient is None:
+        if problem.elements and coefficients is None:
             try:
-                coefficient = self.drag = consistent_coefficient(
-                    *loop, problem.drag, start=self.drag, nodes=nodes
+                coefficients = self.begin = consistent_coefficients(
+                    *loop, problem.elements, start=self.begin, nodes=nodes
                 )
             except SolverError:
                 return None
         grid = partial(margin_nodes, problem, per_decade=_PER_DECADE)
-        same = (lambda _: last[-1]) if last else nodes  # what the drag was found on does
-        return Assessment(*loop, drag=problem.drag, coefficient=coefficient, nodes=same, grid=grid)
+        same = (lambda _: last[-1]) if last else nodes  # what coefficients were found on does
+        return Assessment(
+            *loop, elements=problem.elements, coefficients=coefficients, nodes=same, grid=grid
+        )
 
 
 def _look(

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .assess import Assessment, consistent_coefficient, frequency_grid, integration_band
+    from .assess import Assessment, consistent_coefficients, frequency_grid, integration_band
     from .controller import LinearController, closed_loop_matrix, closed_loop_poles
     from .disturbance import CoherentError, Disturbance, disturbances
-    from .elements import DragElement, with_drag
     from .dual import (
         Dual,
         at_least,
@@ -28,6 +27,15 @@ if TYPE_CHECKING:
         squared,
         value_of,
         where,
+    )
+    from .elements import (
+        Coefficients,
+        DragElement,
+        Element,
+        LossElement,
+        switching_friction,
+        with_elements,
+        without_losses,
     )
     from .margins import Margins, least_distances, level_ends, loop_margins, refine_minima
     from .pole_region import PoleRegion, counted_poles, with_delay_models

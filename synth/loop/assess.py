@@ -1,8 +1,9 @@
 """`Assessment`: the closed loop of any linear controller in numbers.
 
 This is what every report looks through, and the warm view on nodes and frequencies that are made
-from poles alone: one plant, one controller, what shakes them, and (if there is quadratic drag) the
-drag coefficient that agrees with the response.  Everything is computed when asked for and kept.
+from poles alone: one plant, one controller, what shakes them, and (if there is quadratic drag, or
+losses that switch) the coefficients that agree with the response.  Everything is computed when
+asked for and kept.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from copy import copy
 from functools import cache, cached_property, partial
 
 import numpy as np
+from scipy.optimize import brentq
 
 from models.basics import (
     ComplexArray,
@@ -27,15 +29,19 @@ from models.plant import LinearPlant, consistent_drag, settled_drag
 
 from .controller import LinearController, closed_loop_plant, closed_loop_poles
 from .disturbance import CoherentError, Disturbance
-from .elements import DragElement, with_drag
+from .elements import Coefficients, DragElement, Element, with_elements, without_losses
 from .margins import Margins, least_distances, loop_margins, refine_minima, worst_margins
 from .pole_region import PoleRegion, with_delay_models
-from .responses import LoopBlocks, LoopResponses
+from .responses import LoopBlocks, LoopResponses, with_loops
 
 _RTOL = 1e-8  # of every variance
 _GRID_PER_DECADE = 150
 _LOW = 0.3  # of the largest value on the grid, below which no peak between its points is looked for
+_SETTLED = 1e-3  # ... and for which adapted nodes do
 _SAME_NODES = 0.05  # relative change of the drag for which nodes made from poles do
+_NODE_ROUNDS = 6  # of finding nodes for losses
+_LOSS_ROUNDS, _LOSS_AGREES = 200, 1e-12  # of their coefficients on given nodes
+_LEAST = -12.0  # logarithm of the share of its losses with which a stuck loop may move
 _VERGE = 1e-5  # damping ratio below which only its own nodes see a pole
 
 Nodes = Callable[[ComplexArray], Quadrature]
@@ -51,10 +57,11 @@ class Assessment:
         The two ends of the loop.
     disturbances
         What shakes the plant.
-    drag
-        Quadratic drag, if any; its coefficient is then solved with the response.
-    coefficient
-        The drag coefficient [N s/m] if it is known already (the optimiser's own).
+    elements
+        Quadratic drag and losses that switch, if any, drag first; their coefficients are then
+        solved with the response.  Stability and margins hold with the losses and without.
+    coefficients
+        The coefficients if they are known already (the optimiser's own).
     nodes, grid
         From the closed loop's poles [1/s] to quadrature nodes for its variances, and to frequencies
         [rad/s] dense enough to see every peak and crossing; by default nodes that adapt to the
@@ -67,18 +74,18 @@ class Assessment:
         controller: LinearController,
         disturbances: Sequence[Disturbance],
         *,
-        drag: DragElement | None = None,
-        coefficient: float | None = None,
+        elements: Sequence[Element] = (),
+        coefficients: Coefficients | None = None,
         nodes: Nodes | None = None,
         grid: Grid | None = None,
     ) -> None:
         self._bare = plant
         self.controller = controller
         self.disturbances = tuple(disturbances)
-        self._drag = drag
-        self._given = coefficient
+        self.elements = tuple(elements)
+        self._given = coefficients
         self._nodes, self._dense = nodes, grid
-        self._parts: dict[tuple[str, ...], LinearPlant] = {}
+        self._parts: dict[tuple[LinearPlant, tuple[str, ...]], LinearPlant] = {}
         self._signs: FloatArray = np.zeros(0)
         # What `members` share: nodes; m_0 and m_2 of outputs and covariances of pairs, the means
         # over the signs and what each sign adds, (.., 1 + e); and standard deviations by cause.
@@ -88,22 +95,28 @@ class Assessment:
         self._shares: dict[str, dict[str, float]] = {}
 
     @cached_property
-    def coefficient(self) -> float:
-        """The drag coefficient that agrees with the response [N s/m]; 0 without drag."""
-        if self._drag is None:
-            return 0.0
+    def coefficients(self) -> tuple[float, ...]:
+        """The coefficients of the elements that agree with the response."""
+        if not self.elements:
+            return ()
         if self._given is not None:
-            return self._given
-        return consistent_coefficient(
-            self._bare, self.controller, self.disturbances, self._drag, nodes=self._nodes
+            return tuple(self._given)
+        return consistent_coefficients(
+            self._bare, self.controller, self.disturbances, self.elements, nodes=self._nodes
         )
 
     @cached_property
     def plant(self) -> LinearPlant:
-        """The plant with its drag."""
-        if self._drag is None:
-            return self._bare
-        return with_drag(self._bare, self._drag, self.coefficient)
+        """The plant with its elements."""
+        return with_elements(self._bare, self.elements, self.coefficients)
+
+    @cached_property
+    def _plants(self) -> list[LinearPlant]:
+        """The plant that moves, and without its losses where it has some."""
+        still = without_losses(self.elements, self.coefficients)
+        if still == list(self.coefficients):
+            return [self.plant]
+        return [self.plant, with_elements(self._bare, self.elements, still)]
 
     @cached_property
     def poles(self) -> ComplexArray:
@@ -121,8 +134,13 @@ class Assessment:
 
     @property
     def stable(self) -> bool:
-        """Whether all poles lie in the left half plane."""
-        return bool(self.poles.real.max(initial=-np.inf) < 0.0)
+        """Whether all poles lie in the left half plane, without losses too."""
+        others = [closed_loop_poles(with_delay_models(p)[0], self.controller) for p in self._still]
+        return all(bool(poles.real.max(initial=-np.inf) < 0.0) for poles in (self.poles, *others))
+
+    @property
+    def _still(self) -> list[LinearPlant]:
+        return self._plants[1:]
 
     @cached_property
     def grid(self) -> FloatArray:
@@ -144,7 +162,7 @@ class Assessment:
 
     @cached_property
     def gains(self) -> list[ComplexArray]:
-        """L of each loop on the grid, (k,) each."""
+        """L of each loop on the grid, (k,) each; with the losses first, then without."""
         return self._gains(self.grid)
 
     @cached_property
@@ -161,8 +179,10 @@ class Assessment:
         return float(1.0 / min(least.min() for (_, least), _ in self._minima))
 
     def loop_gain(self, omega: FloatArray, index: int = 0) -> ComplexArray:
-        """Return L of the loop broken at input `index`, (k,)."""
-        return self._gains(np.asarray(omega, dtype=np.float64))[index]
+        """Return L of the loop broken at input `index`, (k,); further ones are without losses."""
+        side, at = divmod(index, len(self._bare.inputs))
+        loop = self._closed((), (), np.asarray(omega, dtype=np.float64), self._plants[side])
+        return np.asarray(loop.difference(at) - 1.0)
 
     def response(self, output: str, disturbance: str, omega: FloatArray) -> ComplexArray:
         """Return the closed-loop response of `output` to `disturbance`, (k,)."""
@@ -247,7 +267,8 @@ class Assessment:
             if channel is None:
                 curves = [np.asarray(1.0 + gain) for gain in self._gains(omega)]
             else:
-                curves = [self.response(*channel, omega)]
+                others = [self._closed([channel[0]], [channel[1]], omega, p) for p in self._still]
+                curves = [self.response(*channel, omega), *(o.responses[0, 0] for o in others)]
             return np.asarray(np.max([size(omega, curve) for curve in curves], axis=0))
 
         places = np.append(self.grid, [share * edge for edge in edges for share in (1e-4, 1.0)])
@@ -351,13 +372,17 @@ class Assessment:
         return found.zw
 
     def _closed(
-        self, outputs: Sequence[str], sources: Sequence[str], omega: FloatArray
+        self,
+        outputs: Sequence[str],
+        sources: Sequence[str],
+        omega: FloatArray,
+        plant: LinearPlant | None = None,
     ) -> LoopResponses:
-        key = tuple(outputs)
+        key = plant or self.plant, tuple(outputs)
         if key not in self._parts:
-            self._parts[key] = self.plant.select(outputs=key)
-        plant = self._parts[key]
-        response = plant.response(plant.beside_poles(omega))
+            self._parts[key] = key[0].select(outputs=key[1])
+        part = self._parts[key]
+        response = part.response(part.beside_poles(omega))
         return LoopResponses.of(response, self.controller, sources)
 
     @cached_property
@@ -376,9 +401,11 @@ class Assessment:
         return self._responses(outputs, [d.name for d in self.disturbances], omega), densities
 
     def _gains(self, omega: FloatArray) -> list[ComplexArray]:
-        """Return L of each loop, (k,) each."""
-        loop = self._closed((), (), omega)  # no loop gain needs an output
-        return [np.asarray(loop.difference(i) - 1.0) for i in range(len(self.plant.inputs))]
+        """Return L of each loop, (k,) each; with the losses first, then without."""
+        # No loop gain needs an output.
+        loops = [self._closed((), (), omega, plant) for plant in self._plants]
+        inputs = range(len(self.plant.inputs))
+        return [np.asarray(loop.difference(i) - 1.0) for loop in loops for i in inputs]
 
 
 def frequency_grid(poles: ComplexArray) -> FloatArray:
@@ -416,64 +443,113 @@ def integration_band(
     return min(b[0] for b in bands), max(b[1] for b in bands), False
 
 
-def consistent_coefficient(
+def consistent_coefficients(
     plant: LinearPlant,
     controller: LinearController,
     disturbances: Sequence[Disturbance],
-    drag: DragElement,
+    elements: Sequence[Element],
     *,
-    start: float | None = None,
+    start: Coefficients | None = None,
     nodes: Nodes | None = None,
-) -> float:
-    """Return the drag coefficient [N s/m] that agrees with the closed loop's own velocity.
+) -> tuple[float, ...]:
+    """Return the coefficients of elements that agree with the closed loop's own velocities.
 
     Parameters
     ----------
-    plant, controller, disturbances, drag, nodes
+    plant, controller, disturbances, elements, nodes
         As `Assessment` takes them.
     start
-        A coefficient to begin with [N s/m]; by default that of the plant.
+        Coefficients to begin with; by default such of usual size.
 
     Raises
     ------
     SolverError
-        If no coefficient agrees: the loop is unstable with any drag.
+        If none agree: the loop is unstable with any drag.
     """
+    drag = next((e for e in elements if isinstance(e, DragElement)), None)
+    losses = [e for e in elements if e is not drag]
+    first = [e.begin for e in elements] if start is None else list(start)
+    slack = first[len(first) - len(losses) :]  # coefficients of the losses, as known so far
+    asked = list(slack)  # what the motion with these asks for
+    held = False  # whether they stay as they are
 
     @cache
     def loop(coefficient: float) -> Assessment:
+        known = [*([] if drag is None else [coefficient]), *slack]
         return Assessment(
-            plant, controller, disturbances, drag=drag, coefficient=coefficient, nodes=nodes
+            plant, controller, disturbances, elements=elements, coefficients=known, nodes=nodes
         )
 
+    def swings(coefficient: float) -> bool:
+        return not bool(loop(coefficient).poles.real.max(initial=-np.inf) < 0.0)
+
     at = np.nan  # the coefficient that the nodes are for
-    plain = loop(drag.reference)  # the plant as it is, decomposed once for all
+    # The plant as it is, decomposed once for all.
+    plain = Assessment(plant, controller, disturbances, nodes=nodes)
+    velocities = [e.velocity for e in elements]
+    names = [*(d.name for d in disturbances), *(e.force for e in elements)]
 
     def about(coefficient: float) -> Callable[[float], float]:
         nonlocal at
-        at, calm, found = coefficient, np.inf, loop(coefficient).quadrature([drag.velocity])
-        names = [*(d.name for d in disturbances), drag.force]
-        *shaken, felt = plain._responses([drag.velocity], names, found.omega)[0]
-        pairs = zip(disturbances, shaken, strict=True)
-        density = np.sum([np.abs(v) ** 2 * d.density(found.omega) for d, v in pairs], axis=0)
-        weights = found.weights * density
+        at, calm, found = coefficient, np.inf, loop(coefficient).quadrature(velocities)
+        closed = plain._responses(velocities, names, found.omega)
+        shaken, felt = closed[:, : len(disturbances)], closed[:, len(disturbances) :]
+        densities = [d.density(found.omega) for d in disturbances]
 
         def velocity(other: float) -> float:
             nonlocal calm  # the least drag known to do; more of it does too, as is checked below
-            if other < calm:
-                if not loop(other).stable:
+            if other < calm and drag is not None:
+                if swings(other):
                     return np.inf
                 calm = other
-            # More drag is a rank-one change of the closed loop (Woodbury).
-            return float(np.sqrt(np.abs(1.0 + (other - drag.reference) * felt) ** -2 @ weights))
+            # Other coefficients are a change of the closed loop of low rank (Woodbury).
+            if not losses:
+                turned = 1.0 + (other - elements[0].reference) * felt[0, 0]
+                return float(np.sqrt(np.abs(turned) ** -2 @ weights))
+            for _ in range(_LOSS_ROUNDS):
+                known = [*([] if drag is None else [other]), *slack]
+                more = [c - e.reference for c, e in zip(known, elements, strict=True)]
+                moved = with_loops(shaken, felt, more)
+                squared = sum(
+                    d * (v.real**2 + v.imag**2)
+                    for d, v in zip(densities, moved.swapaxes(0, 1), strict=True)
+                )
+                variances = np.asarray(squared @ found.weights)
+                own = variances[len(variances) - len(losses) :]
+                before = np.array(slack)
+                asked[:] = [float(e.coefficient(v)) for e, v in zip(losses, own, strict=True)]
+                if held:
+                    break
+                slack[:] = asked
+                if np.all(np.abs(slack - before) <= _LOSS_AGREES * before):
+                    break
+            return float(np.sqrt(variances[0]))
 
+        if not losses:
+            pairs = zip(shaken[0], densities, strict=True)
+            density = np.sum([np.abs(v) ** 2 * d for v, d in pairs], axis=0)
+            weights = found.weights * density
         return velocity
 
-    begin = drag.reference if start is None else start
+    def solved(begin: float, settled: float | None = None) -> float:
+        """Return the drag that agrees, the losses with it, on nodes that suit both."""
+        for _ in range(_NODE_ROUNDS):
+            before = np.array(slack)
+            if drag is None:
+                about(begin)(begin)
+            elif settled is None:
+                begin = settled_drag(drag.quadratic, about, begin)
+            else:
+                begin = settled_drag(drag.quadratic, about, begin, settled=settled)
+            if np.all(np.abs(slack - before) <= (settled or _SETTLED) * before):
+                break
+        return begin
+
+    begin = first[0] if drag is not None else 0.0
     found = None
     if nodes is None:
         try:
-            found = settled_drag(drag.quadratic, about, begin)
+            found = solved(begin)
         except SolverError:
             if any(d.band is None for d in disturbances):
                 raise
@@ -483,14 +559,29 @@ def consistent_coefficient(
     if found is None:
         # Nodes that do not adapt are as good for a loop with a little more drag, unless it is on
         # the verge of stability, where nothing but its own nodes sees how it swings.
-        found = settled_drag(drag.quadratic, about, begin, settled=_SAME_NODES)
+        found = solved(begin, _SAME_NODES)
         damping = [PoleRegion.of(loop(C).poles).damping for C in (found, at)]
-        if damping[0] < max(0.5 * damping[1], _VERGE):
+        if drag is not None and damping[0] < max(0.5 * damping[1], _VERGE):
             found = consistent_drag(drag.quadratic, lambda C: about(C)(C))
             about(found)
-    if not loop(found).stable:
+    if swings(found) and losses:
+        # Stuck by its losses it swings: it moves as much as leaves it less of them.
+        held, stuck = True, np.array(slack)
+
+        def surplus(size: float) -> float:
+            nonlocal found
+            slack[:] = (np.exp(size) * stuck).tolist()
+            with suppress(SolverError):
+                found = solved(begin, _SAME_NODES)
+                if not swings(found):
+                    return float(np.log(asked[0] / slack[0]))
+            return -1.0
+
+        if surplus(_LEAST) > 0.0:
+            surplus(float(brentq(surplus, _LEAST, 0.0, xtol=1e-10)))
+    if swings(found):
         raise SolverError(f"drag: the loop is unstable at {found:.4g} N s/m but not with less")
-    return found
+    return (*([] if drag is None else [found]), *slack)
 
 
 def _known_nodes(disturbances: Sequence[Disturbance], poles: ComplexArray) -> Quadrature:

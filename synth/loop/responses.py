@@ -314,5 +314,31 @@ def _inverse(a: ComplexArray) -> ComplexArray:
     if len(a) == 2:
         determinant = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]
         return np.asarray(np.array([[a[1, 1], -a[0, 1]], [-a[1, 0], a[0, 0]]]) / determinant)
+    if len(a) == 3:
+        turned = np.array([[_cofactor(a, i, j) for i in range(3)] for j in range(3)])
+        return np.asarray(
+            turned / (a[0, 0] * turned[0, 0] + a[0, 1] * turned[1, 0] + a[0, 2] * turned[2, 0])
+        )
     found: ComplexArray = np.linalg.inv(np.moveaxis(a, (0, 1), (-2, -1))).astype(np.complex128)
     return np.moveaxis(found, (-2, -1), (0, 1))
+
+
+def _cofactor(a: ComplexArray, i: int, j: int) -> Any:
+    """Return the cofactor of an entry of 3 x 3 matrices on the first two axes."""
+    (i, k), (j, m) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)
+    return a[i, j] * a[k, m] - a[i, m] * a[k, j]
+
+
+def with_loops(shaken: ComplexArray, felt: ComplexArray, gains: Sequence[float]) -> ComplexArray:
+    """Return responses of velocities with forces -gain velocity closed around them, (m, nw, k).
+
+    Parameters
+    ----------
+    shaken, felt
+        Responses of the m velocities to disturbances, (m, nw, k), and to the forces, (m, m, k).
+    gains
+        One for each.
+    """
+    m = len(gains)
+    opened = np.eye(m)[:, :, None] + felt * np.asarray(gains)[None, :, None]
+    return _times(_inverse(opened), shaken)

@@ -113,7 +113,9 @@ class SeaColumn:
             shaken = np.array([heave, *(noise.density(omega) for noise in system.noises)])
             rows = [heave[None]]
             for c in coefficients:
-                rows.append((base.gains(c) * shaken).reshape(-1, omega.size))
+                # Losses of usual size: they move no pole far.
+                slack = [] if system.loss is None else [system.loss.begin]
+                rows.append((base.gains([c, *slack]) * shaken).reshape(-1, omega.size))
             return np.concatenate(rows)
 
         return adaptive_nodes(

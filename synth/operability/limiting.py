@@ -34,6 +34,8 @@ _STEPS = 25  # of the coarse grid
 _ROUNDS = 10  # of making it finer, each by halves
 _BETWEEN = np.linspace(0.0, 1.0, 11)  # where a cubic is looked at between two heights
 _SPEEDS = (1e-9, 1e3)  # rms speeds of the payload between which the drag's is looked for [m/s]
+_LOSS_ROUNDS, _LOSS_AGREES = 60, 1e-10  # of the coefficients of losses beside the drag's
+_FAINT = 1e-6  # of the friction at the edge, below which none is looked for
 _DRAG_RTOL = 1e-13  # of the logarithm's step, so of the drag
 _HEIGHT_TOL = 1e-10  # of the logarithm of H_s
 _BROKEN = 10.0  # excess of what is broken beyond measure
@@ -87,11 +89,36 @@ class SeaStates:
                 found.append(noise.density(omega)[None])
         return found
 
-    def coefficients(self, densities: Sequence[FloatArray]) -> FloatArray:
-        """Return the drag coefficients that agree with the motion (r,) [N s/m].
+    def coefficients(self, densities: Sequence[FloatArray]) -> list[FloatArray]:
+        """Return the coefficients of drag [N s/m] and losses that agree with the motion, (r,) each.
 
-        NaN where there is none: no stationary motion, or one that does not vanish with the sea.
+        NaN where there are none: no stationary motion, or one that does not vanish with the sea.
         """
+        system, rows = self.system, densities[0].shape[0]
+        if system.loss is None:
+            return [self._drag(densities, [np.zeros(rows)])]
+        # By substitution; where that leaves the bracket, as it would go back and forth between
+        # a drum that is stuck and one that swings, by its middle.
+        edge = system.friction_edge
+        slack = np.full(rows, min(system.loss.begin, 0.5 * edge))
+        low, high = np.full(rows, _FAINT * edge), np.full(rows, edge)
+        for _ in range(_LOSS_ROUNDS):
+            C = self._drag(densities, [np.zeros(rows), slack])
+            known = [np.where(np.isfinite(C), C, system.reference), slack]
+            turned = self.responses.weighted_speeds(densities, known)[1]
+            found = system.loss.coefficient(self.responses.variance(turned, known))
+            low, high = np.where(found > slack, slack, low), np.where(found < slack, slack, high)
+            if np.all(np.abs(found - slack) <= _LOSS_AGREES * slack):
+                break
+            inside = (low < found) & (found < high)
+            ahead = np.where(inside, found, np.sqrt(low * high))
+            if np.all(np.abs(ahead - slack) <= _LOSS_AGREES * slack):
+                break
+            slack = ahead
+        return [C, slack]
+
+    def _drag(self, densities: Sequence[FloatArray], known: Sequence[FloatArray]) -> FloatArray:
+        """Return the drag that agrees with the motion for known losses, (r,) [N s/m]."""
         system = self.system
         rows = densities[0].shape[0]
         low, high = system.stable_range
@@ -101,11 +128,11 @@ class SeaStates:
             return np.full(rows, system.reference)
         # C = slope sigma_v(C) is one equation in one unknown: its sides are compared in a bounded
         # ratio over log C, which a bracketing method likes whatever the sea.
-        weighted = self.responses.weighted_speed(densities)
+        weighted = self.responses.weighted_speeds(densities, known)[0]
 
         def surplus(size: FloatArray, row: FloatArray) -> FloatArray:
-            C = np.exp(size)
-            speed = self.responses.speed_variance(weighted[row.astype(np.intp)], C)
+            C, at = np.exp(size), row.astype(np.intp)
+            speed = self.responses.variance(weighted[at], [C, *(own[at] for own in known[1:])])
             wanted = system.slope * np.sqrt(np.maximum(speed, 0.0))
             # An unstable loop moves without end, however large its spectral integral.
             found = (wanted - C) / (wanted + C)
@@ -137,9 +164,9 @@ class SeaStates:
     def moments_at(self, heights: FloatArray, index: IndexArray) -> tuple[SeaMoments, FloatArray]:
         """Return moments and drag coefficients at heights (r,) [m] in headings `index` (r,)."""
         densities = self.densities(heights, index)
-        C = self.coefficients(densities)
+        C, *slack = self.coefficients(densities)
         known = np.where(np.isfinite(C), C, self.system.reference)
-        return self.responses.moments(densities, known), C
+        return self.responses.moments(densities, [known, *slack]), C
 
 
 def _excess(limit: Limit, moments: SeaMoments, stationary: BoolArray) -> FloatArray:

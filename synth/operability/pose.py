@@ -109,6 +109,7 @@ def pose_operability(
             slope=slope,
             reference=drag.reference if drag is not None else question.drag_before,
             noises=noises,
+            loss=question.loss,
             mru=reported.sensors.mru if any(n.name == "mru.error" for n in noises) else None,
             plant=question.plant,
             controller=question.controller(source.parameters),
@@ -141,6 +142,6 @@ def _stationary(question: DesignQuestion, parameters: Mapping[str, float]) -> As
 def _loop(question: DesignQuestion, values: Values) -> Assessment | None:
     loop = question.problem.assess(values)
     try:
-        return loop if loop.coefficient >= 0.0 else None
+        return loop if min(loop.coefficients, default=0.0) >= 0.0 else None
     except SolverError:
         return None  # no drag agrees with the motion

@@ -3,8 +3,7 @@
     sea on the contour -> case in that sea -> its own plant and nodes -> value against bound,
                                                          drag coefficient against the motion
 
-Nothing of this room is used: neither the rank-one update nor its nodes nor its root search.  The
-drag coefficient is taken over, and shown to agree with the motion that it leads to.
+Nothing of this room is used: neither the update of low rank nor its nodes nor its root search.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.case import Case
-from models.plant import PlantData
 
 from ..design import Design
 from ..loop import Assessment
@@ -37,7 +35,7 @@ class ContourCheck:
     value, bound
         Of the criterion, by the single evaluation, and what it may be.
     drag, agreed
-        Drag coefficient of the contour, and the one that its motion asks for [N s/m].
+        Drag coefficient of the contour, and of the single evaluation [N s/m].
     """
 
     period: float
@@ -62,9 +60,7 @@ class ContourCheck:
         return self.difference <= _TOLERANCE
 
 
-def evaluate_in(
-    design: Design, case: Case, drag: float | None = None, masses: int | None = None
-) -> Assessment:
+def evaluate_in(design: Design, case: Case, masses: int | None = None) -> Assessment:
     """Return a design's loop in the sea of a case, in numbers.
 
     Parameters
@@ -73,15 +69,12 @@ def evaluate_in(
         The design; its gains or parameters are kept.
     case
         The case: its sea, vessel and rope.
-    drag
-        Drag coefficient [N s/m] where it is known; else it is solved with the motion.
     masses
         Rope masses; by default the design's.
     """
     case, masses = case.variant({"limits.drive": "report"}), masses or design.masses
-    return pose(case, design.structure, masses, built_for=design.built_for).assess(
-        design.parameters, drag
-    )
+    question = pose(case, design.structure, masses, built_for=design.built_for)
+    return question.assess(design.parameters)
 
 
 def recheck(design: Design, at: AtDepth, count: int) -> tuple[ContourCheck, ...]:
@@ -107,10 +100,9 @@ def recheck(design: Design, at: AtDepth, count: int) -> tuple[ContourCheck, ...]
         height = float(limit[h, p])
         case = at.columns[p].cases[h].replace({"sea.significant_height": height})
         drag = float(contour.drag[h, p])
-        assessment = evaluate_in(design, case, drag, at.masses)
-        # The velocity's drag; a coefficient that the case fixes agrees with itself.
+        assessment = evaluate_in(design, case, at.masses)
+        # A coefficient that the case fixes agrees with itself.
         fixed = case.payload.fixed_drag is not None
-        slope = PlantData.from_case(case).quadratic_drag * float(np.sqrt(8.0 / np.pi))
         found.append(
             ContourCheck(
                 period=float(contour.periods[p]),
@@ -120,7 +112,7 @@ def recheck(design: Design, at: AtDepth, count: int) -> tuple[ContourCheck, ...]
                 value=criterion.worst(assessment),
                 bound=criterion.bound,
                 drag=drag,
-                agreed=drag if fixed else slope * assessment.sigma("payload.velocity"),
+                agreed=drag if fixed else assessment.coefficients[0],
             )
         )
     return tuple(found)

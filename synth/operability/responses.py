@@ -1,4 +1,4 @@
-r"""Closed-loop responses on nodes for every drag coefficient at once, and their moments.
+r"""Closed-loop responses on nodes for all coefficients of drag and losses, and their moments.
 
 A payload's quadratic drag enters a linear loop as a force f = -(C - C_0) v on top of the drag C_0
 that the loop holds already, so the responses for any C follow from those for C_0 by a rank-one
@@ -10,9 +10,19 @@ update (Sherman and Morrison 1950): with D = C - C_0,
               = (F_{zw} + D\, G) / (1 + D\, F_{vf}), \qquad
     G = F_{zw} F_{vf} - F_{zf} F_{vw},
 
-and its squared modulus is a quadratic in D over another.  Moments of all outputs, for all seas and
-all coefficients, are then products of real matrices.  That is what makes a contour over sea states
-cost no more than a handful of single evaluations, without an approximation.
+and its squared modulus is a quadratic in D over another.  With losses that switch as a torque -b
+omega besides, numerator and denominator are the determinants
+
+.. math::
+
+    \begin{vmatrix} F_{zw} & D F_{zf} & b F_{zg} \\
+        F_{vw} & 1 + D F_{vf} & b F_{vg} \\
+        F_{\omega w} & D F_{\omega f} & 1 + b F_{\omega g} \end{vmatrix}, \qquad
+    \begin{vmatrix} 1 + D F_{vf} & b F_{vg} \\ D F_{\omega f} & 1 + b F_{\omega g} \end{vmatrix},
+
+both sums of 1, D, b and D b times what does not depend on them.  Moments of all outputs, for all
+seas and all coefficients, are then products of real matrices.  That is what makes a contour over
+sea states cost no more than a handful of single evaluations, without an approximation.
 """
 
 from __future__ import annotations
@@ -21,7 +31,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
+from itertools import combinations_with_replacement, product
 
 import numpy as np
 
@@ -83,9 +93,12 @@ class DragResponses:
         Names of the o outputs.
     table
         Responses of the outputs and, last, of the payload's velocity, to the w disturbances and,
-        last, to a force on the payload, at the coefficient `reference` (o + 1, w + 1, n).
+        last, to a force on the payload, at the coefficient `reference` (o + 1, w + 1, n); with
+        losses the motor's speed and a torque on it follow (o + 2, w + 2, n).
     reference
         Drag coefficient C_0 that the responses hold [N s/m].
+    losses
+        Whether there are losses; the responses hold none.
     shares
         Gain and phase error of the reference unit over the heave at the nodes, (0 to 2, n).
     error
@@ -96,18 +109,23 @@ class DragResponses:
     outputs: tuple[str, ...]
     table: ComplexArray
     reference: float
+    losses: bool = False
     shares: ComplexArray | None = None
     error: int = 0
 
-    @property
-    def _vf(self) -> ComplexArray:
-        return np.asarray(self.table[-1, -1])
-
     @cached_property
-    def _update(self) -> ComplexArray:
-        """G of the outputs (o, w, n)."""
-        zf, vw = self.table[:-1, -1:], self.table[-1:, :-1]
-        return np.asarray(self.table[:-1, :-1] * self._vf - zf * vw)
+    def _updates(self) -> list[ComplexArray]:
+        """What the numerators of the outputs have with 1 and D, b and D b, (o, w, n) each."""
+        o, w = len(self.outputs), self.table.shape[1] - 1 - self.losses
+        zw, t = self.table[:o, :w], self.table
+        zf, vw, vf = t[:o, w, None], t[o, :w], t[o, w]
+        found = [zw, zw * vf - zf * vw]
+        if self.losses:
+            zg, vg, sw, sf, sg = t[:o, w + 1, None], t[o, w + 1], t[o + 1, :w], t[-1, w], t[-1, -1]
+            found.append(zw * sg - zg * sw)
+            whole = zw * (vf * sg - vg * sf)
+            found.append(whole - zf * (vw * sg - vg * sw) + zg * (vw * sf - vf * sw))
+        return found
 
     @property
     def _pairs(self) -> list[tuple[int, int]]:
@@ -118,14 +136,20 @@ class DragResponses:
         return pairs
 
     def _products(self, one: ComplexArray, other: ComplexArray) -> FloatArray:
-        """Return coefficients of 1, D, D^2 of Re(conj(F) F') of pairs, (w, n, 2 x 3 x p).
+        """Return coefficients of Re(conj(F) F') of pairs, (w, n, 2 x products x p).
 
-        First those of the densities, then those times omega^2; F and F', times the denominator, are
-        `one` and `other`, (2, o, w, n): what they are at the reference, and what D adds.
+        Those of the products of any two of `_factors`; first of the densities, then times omega^2.
+        F and F', times the denominator, are `one` and `other`, what goes with each of the factors,
+        (2 or 4, o, w, n).
         """
         left, right = np.array(self._pairs).T
         a, b = one[:, left].conj(), other[:, right]
-        parts = np.stack([a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[1] * b[1]]).real  # (3, p, w, n)
+        parts = np.stack(
+            [
+                (a[i] * b[i] if i == j else a[i] * b[j] + a[j] * b[i]).real
+                for i, j in combinations_with_replacement(range(len(one)), 2)
+            ]
+        )  # (products, p, w, n)
         both = np.stack([parts, parts * self.nodes.omega**2])
         moved = np.transpose(both, (3, 4, 0, 1, 2))
         return read_only(moved.reshape(*moved.shape[:2], -1))
@@ -133,7 +157,7 @@ class DragResponses:
     @cached_property
     def _tables(self) -> FloatArray:
         """Coefficients of the moments over the densities of the disturbances; see `_products`."""
-        every = np.stack([self.table[:-1, :-1], self._update])
+        every = np.stack(self._updates)
         return self._products(every, every)
 
     @cached_property
@@ -141,52 +165,80 @@ class DragResponses:
         """Coefficients of what gain and phase error add over the heave's density, (0 to 2, ..)."""
         if self.shares is None or not len(self.shares):
             return np.zeros((0, 0, 0))
-        every = np.stack([self.table[:-1, :-1], self._update])
+        every = np.stack(self._updates)
         heave, error = every[:, :, :1], every[:, :, self.error, None] * self.shares
         heave = np.broadcast_to(heave, error.shape)
         return self._products(heave, error) + self._products(error, heave)
 
-    def weighted_speed(self, densities: Sequence[FloatArray]) -> FloatArray:
-        """Return what `speed_variance` sums up, at the reference, (r, n).
+    def _factors(self, coefficients: Sequence[FloatArray]) -> list[FloatArray]:
+        """Return 1 and D, b and D b, (r,) each."""
+        D = coefficients[0] - self.reference
+        found = [np.ones_like(D), D]
+        return found + [factor * coefficients[1] for factor in found] if self.losses else found
+
+    def weighted_speeds(
+        self, densities: Sequence[FloatArray], coefficients: Sequence[FloatArray]
+    ) -> list[FloatArray]:
+        """Return what `variance` sums up of the velocity and of the motor's speed, (r, n) each.
+
+        The first does not depend on the drag, nor the other on the losses.
 
         Parameters
         ----------
         densities
             One-sided densities of the disturbances at the nodes, each (r, n) or (1, n).
+        coefficients
+            Of drag [N s/m] and of losses [N m s/rad], (r,) each.
         """
-        squared = np.abs(self.table[-1, :-1]) ** 2
-        total = sum(row * density for row, density in zip(squared, densities, strict=True))
-        return np.asarray(total * self.nodes.weights, dtype=np.float64)
+        o, w = len(self.outputs), self.table.shape[1] - 1 - self.losses
+        t, rows = self.table, [self.table[o, :w]]
+        if self.losses:
+            D, b = (x[:, None, None] for x in self._factors(coefficients)[1:3])
+            moved = rows[0] + b * (t[o, :w] * t[-1, -1] - t[o, w + 1] * t[-1, :w])
+            turned = t[-1, :w] + D * (t[-1, :w] * t[o, w] - t[-1, w] * t[o, :w])
+            rows = [moved.swapaxes(0, 1), turned.swapaxes(0, 1)]
+        return [
+            np.asarray(
+                sum(s * d for s, d in zip(np.abs(row) ** 2, densities, strict=True))
+                * self.nodes.weights,
+                dtype=np.float64,
+            )
+            for row in rows
+        ]
 
-    def speed_variance(self, weighted: FloatArray, coefficient: FloatArray) -> FloatArray:
-        """Return the variance of the payload's velocity [m2/s2] (r,).
+    def variance(self, weighted: FloatArray, coefficients: Sequence[FloatArray]) -> FloatArray:
+        """Return the variance of a speed (r,).
 
         Parameters
         ----------
         weighted
-            Of :meth:`weighted_speed`, (r, n).
-        coefficient
-            Drag coefficients (r,) [N s/m].
+            Of :meth:`weighted_speeds`, (r, n).
+        coefficients
+            Of drag [N s/m] and of losses [N m s/rad], (r,) each.
         """
-        return np.asarray((weighted / self._denominator(coefficient)).sum(axis=1))
+        return np.asarray((weighted / self._denominator(coefficients)).sum(axis=1))
 
-    def moments(self, densities: Sequence[FloatArray], coefficient: FloatArray) -> SeaMoments:
+    def moments(
+        self, densities: Sequence[FloatArray], coefficients: Sequence[FloatArray]
+    ) -> SeaMoments:
         """Return the moments of every output.
 
         Parameters
         ----------
         densities
             One-sided densities of the disturbances at the nodes, each (r, n) or (1, n).
-        coefficient
-            Drag coefficients (r,) [N s/m].
+        coefficients
+            Of drag [N s/m] and of losses [N m s/rad], (r,) each.
         """
-        rows, count = coefficient.size, len(self.outputs)
-        weights = self.nodes.weights / self._denominator(coefficient)  # (r, n)
-        D = (coefficient - self.reference)[:, None, None]
+        rows, count = coefficients[0].size, len(self.outputs)
+        weights = self.nodes.weights / self._denominator(coefficients)  # (r, n)
+        factors = list(combinations_with_replacement(self._factors(coefficients), 2))
 
-        def of_drag(found: FloatArray) -> FloatArray:
-            parts = found.reshape(rows, 2, 3, -1)
-            both = parts[:, :, 0] + D * (parts[:, :, 1] + D * parts[:, :, 2])
+        def of_elements(found: FloatArray) -> FloatArray:
+            parts = found.reshape(rows, 2, len(factors), -1)
+            both = np.zeros((rows, 2, parts.shape[-1]))
+            for k, (a, b) in enumerate(factors):
+                both += parts[:, :, k] * (a * b)[:, None, None]
             return both.transpose(1, 2, 0)  # (2, p, r)
 
         def named(both: FloatArray, signed: Sequence[SeaMoments] = ()) -> SeaMoments:
@@ -197,21 +249,29 @@ class DragResponses:
             return SeaMoments(m0=m0, m2=m2, together=together, signed=signed)
 
         pairs = zip(self._tables, densities, strict=True)
-        mean = of_drag(sum((weights * density) @ table for table, density in pairs))
-        cross = [of_drag((weights * densities[0]) @ table) for table in self._crossed]
+        mean = of_elements(sum((weights * density) @ table for table, density in pairs))
+        cross = [of_elements((weights * densities[0]) @ table) for table in self._crossed]
         signs = product((1.0, -1.0), repeat=len(cross)) if cross else ()
         members = [
             named(mean + sum(s * part for s, part in zip(own, cross, strict=True))) for own in signs
         ]
         return named(mean, members)
 
-    def gains(self, coefficient: float) -> FloatArray:
-        """Return the squared moduli of the responses for one coefficient [N s/m], (o, w, n)."""
-        D = coefficient - self.reference
-        changed = (self.table[:-1, :-1] + D * self._update) / (1.0 + D * self._vf)
-        return np.asarray(np.abs(changed) ** 2)
+    def gains(self, coefficients: Sequence[float]) -> FloatArray:
+        """Return the squared moduli of the responses for given coefficients, (o, w, n)."""
+        known = [np.array([c]) for c in coefficients]
+        pairs = zip(self._factors(known), self._updates, strict=True)
+        changed = sum(factor * update for factor, update in pairs)
+        return np.asarray(np.abs(changed) ** 2 / self._denominator(known)[0])
 
-    def _denominator(self, coefficient: FloatArray) -> FloatArray:
-        D = (coefficient - self.reference)[:, None]
+    def _denominator(self, coefficients: Sequence[FloatArray]) -> FloatArray:
+        o, w = len(self.outputs), self.table.shape[1] - 1 - self.losses
+        vf = self.table[o, w]
+        if self.losses:
+            vg, sf, sg = self.table[o, w + 1], self.table[-1, w], self.table[-1, -1]
+            _, D, b, both = (factor[:, None] for factor in self._factors(coefficients))
+            found = 1.0 + D * vf + b * sg + both * (vf * sg - vg * sf)
+            return np.asarray(found.real**2 + found.imag**2)
+        D = (coefficients[0] - self.reference)[:, None]
         # The modulus without complex numbers: this is what the search for the drag spends.
-        return np.asarray(1.0 + D * (2.0 * self._vf.real + D * np.abs(self._vf) ** 2))
+        return np.asarray(1.0 + D * (2.0 * vf.real + D * np.abs(vf) ** 2))

@@ -28,14 +28,18 @@ from ..loop import (
     Assessment,
     Disturbance,
     DragElement,
+    Element,
     LinearController,
     LoopResponses,
+    LossElement,
 )
 from ..question import HOOK, PAYLOAD, held_poles, held_transfers
 from .responses import DragResponses
 
 VELOCITY, FORCE = "payload.velocity", "payload.force"
 _COEFFICIENTS = np.concatenate([[0.0], np.geomspace(1e-6, 1e2, 33)])  # over the slope [m/s]
+_USUAL = 0.1  # rms speed of a payload whose drag the edge of friction is looked for with [m/s]
+_SHARES = np.geomspace(1e-3, 1.0, 25)  # of the friction at rest, at which it is looked for
 _EDGE = 1e-18  # how well the edge of stability is known, over the slope [m/s]
 _DECAY = 1e-9  # growth over the size of the largest pole that is none
 _HIGHEST = 60.0  # where seas end [rad/s]
@@ -57,6 +61,8 @@ class System(ABC):
         the size that is to be expected.
     noises
         What disturbs besides the sea.
+    loss
+        Losses that switch with the motor's direction, if there are some.
     mru
         The motion reference unit whose error, which grows with the sea, is among the noises.
     """
@@ -66,6 +72,7 @@ class System(ABC):
     reference: float
     noises: tuple[Disturbance, ...] = field(default=())
     mru: MRU | None = None
+    loss: LossElement | None = None
 
     @abstractmethod
     def transfers(self, omega: FloatArray) -> ComplexArray:
@@ -80,13 +87,42 @@ class System(ABC):
             outputs=self.outputs,
             table=self.transfers(nodes.omega),
             reference=self.reference,
+            losses=self.loss is not None,
             shares=None if unit is None else coherent_error(unit, nodes.omega),
             error=0 if unit is None else 1 + names.index("mru.error"),
         )
 
     @abstractmethod
-    def poles(self, coefficient: float) -> ComplexArray:
-        """Return the poles [1/s] for a drag coefficient [N s/m]; those above the real axis do."""
+    def poles(self, coefficient: float, friction: float = 0.0) -> ComplexArray:
+        """Return the poles [1/s] for a drag coefficient [N s/m]; those above the real axis do.
+
+        `friction` is that of losses [N m s/rad].
+        """
+
+    @cached_property
+    def friction_edge(self) -> float:
+        """Friction of losses from which on the system swings [N m s/rad]; that at rest for none.
+
+        In a sea that hardly moves it the drum sticks and slips, and moves on average as much as
+        leaves it less friction than this.
+        """
+        assert self.loss is not None
+        most = float(self.loss.coefficient(0.0))
+        low, high = self.stable_range
+        drag = min(max(self.slope * _USUAL, 1.05 * low), 0.95 * high) or self.reference
+        before = 0.0
+        for share in _SHARES:
+            if float(self.poles(drag, share * most).real.max(initial=-np.inf)) >= 0.0:
+                return float(
+                    brentq(
+                        lambda b: self.poles(drag, b).real.max(),
+                        before * most,
+                        share * most,
+                        rtol=1e-6,
+                    )
+                )
+            before = share
+        return most
 
     @cached_property
     def stable_range(self) -> tuple[float, float]:
@@ -138,7 +174,8 @@ class LoopSystem(System):
     plant, controller
         The two ends of the loop; the plant holds the drag `DragElement.reference`.
     drag
-        Quadratic drag, or None where the plant holds a fixed coefficient.
+        Quadratic drag, or None where the plant holds a fixed coefficient.  Of losses it holds none:
+        what is stable without them counts as stable.
     """
 
     plant: LinearPlant
@@ -148,14 +185,19 @@ class LoopSystem(System):
     @override
     def transfers(self, omega: FloatArray) -> ComplexArray:
         causes = [HOOK, *(noise.name for noise in self.noises), FORCE]
+        shown = [*self.outputs, VELOCITY]
+        if self.loss is not None:
+            causes, shown = [*causes, self.loss.force], [*shown, self.loss.velocity]
         found = LoopResponses.of(self.plant.response(omega), self.controller)
-        return np.array([[found.response(z, w) for w in causes] for z in (*self.outputs, VELOCITY)])
+        return np.array([[found.response(z, w) for w in causes] for z in shown])
 
     @override
-    def poles(self, coefficient: float) -> ComplexArray:
-        return Assessment(
-            self.plant, self.controller, (), drag=self.drag, coefficient=coefficient
-        ).poles
+    def poles(self, coefficient: float, friction: float = 0.0) -> ComplexArray:
+        drag: tuple[Element, ...] = () if self.drag is None else (self.drag,)
+        known = [coefficient][: len(drag)]
+        if self.loss is not None and friction:
+            drag, known = (*drag, self.loss), [*known, friction]
+        return Assessment(self.plant, self.controller, (), elements=drag, coefficients=known).poles
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -179,7 +221,7 @@ class HeldSystem(System):
         return np.array([rows[z] for z in (*self.outputs, VELOCITY)])
 
     @override
-    def poles(self, coefficient: float) -> ComplexArray:
+    def poles(self, coefficient: float, friction: float = 0.0) -> ComplexArray:
         # Those of the payload on its rope: what a quadrature has to look for, and no more.
         return held_poles(self.data, coefficient, _HIGHEST)
 
@@ -215,6 +257,6 @@ class PerfectSystem(System):
         return np.array([*rows, (nothing, nothing)])
 
     @override
-    def poles(self, coefficient: float) -> ComplexArray:
-        del coefficient
+    def poles(self, coefficient: float, friction: float = 0.0) -> ComplexArray:
+        del coefficient, friction
         return np.zeros(0, dtype=np.complex128)

@@ -19,7 +19,7 @@ import numpy as np
 
 from models.basics import FloatArray, InputError, check_range
 
-from ..loop import Disturbance
+from ..loop import Coefficients, Disturbance
 from ..structures import Parameter
 from .problem import Problem, Values
 
@@ -138,7 +138,7 @@ class FamilyProblem:
     def groups(self) -> tuple[tuple[int, ...], ...]:
         """Scenarios that share one loop and differ in what shakes it, by index.
 
-        With quadratic drag no two share a loop: the drag follows the sea.
+        With drag or losses no two share a loop: their coefficients follow the sea.
         """
         found: dict[tuple[object, ...], list[int]] = {}
         for i, scenario in enumerate(self.scenarios):
@@ -146,7 +146,7 @@ class FamilyProblem:
             loop_limits = tuple(lim for lim in problem.limits if not lim.drive)
             key: tuple[object, ...] = (id(problem.plant), loop_limits)
             key += (None if blend is None else blend.tobytes(),)
-            found.setdefault(key if problem.drag is None else (i,), []).append(i)
+            found.setdefault((i,) if problem.elements else key, []).append(i)
         return tuple(tuple(members) for members in found.values())
 
     def shaken_by_all(self, group: Sequence[int]) -> Problem:
@@ -159,7 +159,9 @@ class FamilyProblem:
         summed = tuple(_summed([d for d in every if d.name == name]) for name in names)
         return replace(problems[0], disturbances=summed)
 
-    def stable(self, values: Values, coefficients: Sequence[float | None] | None = None) -> bool:
+    def stable(
+        self, values: Values, coefficients: Sequence[Coefficients | None] | None = None
+    ) -> bool:
         """Return whether every loop is stable."""
         for group in self.groups:
             scenario = self.scenarios[group[0]]
@@ -179,7 +181,7 @@ class FamilyProblem:
             problem, own = scenario.problem, scenario.values(values)
             largest = max(largest, problem.abscissa(own))
             if largest < enough and problem.swings(own):
-                largest = max(largest, problem.abscissa(own, 0.0))
+                largest = max(largest, problem.abscissa(own, problem.nothing))
             if largest >= enough:
                 break
         return largest
@@ -189,8 +191,9 @@ class FamilyProblem:
         firsts = [self.scenarios[group[0]] for group in self.groups]
         found = [s.problem.growth(s.values(values)) for s in firsts]
         for s in firsts:
-            if s.problem.drag is not None:
-                found.append(float(s.problem.loop_poles(s.values(values), 0.0).real.max()))
+            if s.problem.dragged:
+                poles = s.problem.loop_poles(s.values(values), s.problem.nothing)
+                found.append(float(poles.real.max()))
         return max(found)
 
     def total(self, costs: Sequence[float] | FloatArray) -> float:

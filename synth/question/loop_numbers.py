@@ -1,18 +1,17 @@
 """The numbers that a search needs of a loop, with slopes: cost, moments, curves, margins, poles.
 
-The responses are `synth.loop`'s.  Quadratic drag, linearised, is one more loop around the plant: a
-force -(c - c_0) v with the logarithm of c as its variable.  At many parameter vectors at once and
-without slopes, the same numbers screen candidates.
+The responses are `synth.loop`'s.  Quadratic drag and losses that switch, linearised, are further
+loops around the plant: forces -(c - c_0) v with the logarithm of c as variable.  At many parameter
+vectors at once and without slopes, the same numbers screen candidates.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from itertools import pairwise
-from operator import methodcaller
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,20 +58,27 @@ class Point:
     ----------
     values
         The law's parameters, one array each, () or (b, 1).
-    drag
-        Coefficient of the drag [N s/m] or None, () or (b, 1).
+    coefficients
+        One for each of the problem's elements, () or (b, 1).
     slopes
-        Whether derivatives are asked for: by the parameters, then by the drag's logarithm.
+        Whether derivatives are asked for: by the parameters, then by the coefficients' logarithms.
     """
 
     values: Sequence[Any]
-    drag: Any = None
+    coefficients: Sequence[Any] = ()
     slopes: bool = False
+
+    def sides(self, problem: Problem) -> list[Point]:
+        """Return the point, and that without losses where it has some: margins hold at both."""
+        still = problem.still(self.coefficients)
+        if all(a is b for a, b in zip(still, self.coefficients, strict=True)):
+            return [self]
+        return [self, replace(self, coefficients=still)]
 
     def closing(self, problem: Problem, s: ComplexArray) -> Closing:
         """Return what closes the loop of a problem at points `s`, (k,) [1/s]."""
         law: ParametrisedController = problem.law
-        count, drag = len(self.values), problem.drag
+        count = len(self.values)
         values: list[Any] = list(self.values)
         if self.slopes:
             values = [Dual(np.array([v]), np.ones((1, 1)), (i,)) for i, v in enumerate(values)]
@@ -92,11 +98,11 @@ class Point:
                     slope = np.broadcast_to(entry.slope, (len(entry.at), s.size))
                     slopes[i, j] = list(entry.at), np.asarray(slope, dtype=np.complex128)
         m, length = len(law_entries), len(law_entries[0])
-        if drag is not None:
-            added = np.asarray(self.drag - drag.reference, dtype=np.complex128)
+        for element, coefficient in zip(problem.elements, self.coefficients, strict=True):
+            added = np.asarray(coefficient - element.reference, dtype=np.complex128)
             entries[m, length] = np.broadcast_to(-added, (*added.shape[:-1], s.size))
             if self.slopes:
-                slopes[m, length] = [count], np.full((1, s.size), -self.drag, np.complex128)
+                slopes[m, length] = [count], np.full((1, s.size), -coefficient, np.complex128)
             m, length, count = m + 1, length + 1, count + 1
         return Closing(
             entries=entries,
@@ -114,8 +120,8 @@ def moment_weights(problem: Problem, nodes: Quadrature) -> FloatArray:
     return np.vstack([*densities, still])
 
 
-Fresh = Callable[[FloatArray, bool], LoopResponses]
-Take = Callable[[LoopResponses], Any]
+Fresh = Callable[[FloatArray, bool], Sequence[LoopResponses]]
+Take = Callable[[Sequence[LoopResponses]], Any]
 
 
 class _Sought(NamedTuple):
@@ -135,13 +141,14 @@ class LoopNumbers:
     problem
         The problem.
     cost, margins
-        The closed loop on the quadrature nodes and on the margin frequencies.
+        The closed loop on the quadrature nodes, and on the margin frequencies at each side of the
+        point (`Point.sides`).
     weights, omega
         The weights of the moments on those nodes, and those frequencies [rad/s].
     point
         What the loop is closed with.
-    log_drag
-        Logarithm of the drag coefficient, or None.
+    logs
+        Logarithms of the elements' coefficients, for `balances`.
     extra
         The variable of a goal other than the cost, or None.
     goal
@@ -152,23 +159,23 @@ class LoopNumbers:
         self,
         problem: Problem,
         cost: LoopResponses,
-        margins: LoopResponses,
+        margins: Sequence[LoopResponses],
         weights: FloatArray,
         omega: FloatArray,
         point: Point,
         *,
-        log_drag: Any = None,
+        logs: Sequence[Any] = (),
         extra: Any = None,
         goal: Goal = Goal.COST,
     ) -> None:
         self._problem, self._weights = problem, weights
         self._cost, self._margins = cost, margins
         self.omega, self._point = omega, point
-        self.log_drag, self.extra = log_drag, extra
+        self._logs, self.extra = logs, extra
         self._goal = goal
         self._amplitude = exp(extra * 2.0) if goal is Goal.SEA else None
         self._fresh: Fresh | None = None
-        self._responses: dict[tuple[str, str], Any] = {}
+        self._responses: dict[tuple[str, str], list[Any]] = {}
         self._shaken: dict[tuple[str, str], Any] = {}
         self._crosses: dict[tuple[str, str], Any] = {}
         self._peaks: dict[tuple[str, float], Any] = {}
@@ -183,16 +190,15 @@ class LoopNumbers:
             weights,
             self.omega,
             self._point,
-            log_drag=self.log_drag,
+            logs=self._logs,
             extra=self.extra,
             goal=self._goal,
         )
 
     @cached_property
     def differences(self) -> list[Any]:
-        """1 + L of every loop at the margin frequencies, (k,) each."""
-        loops = range(len(self._problem.plant.inputs))
-        return [self._padded(self._margins.difference(i)) for i in loops]
+        """1 + L of every loop at the margin frequencies, (k,) each; at each side of the point."""
+        return [self._padded(take(self._margins)) for take in self._takes(None)]
 
     @property
     def module_margin(self) -> float:
@@ -268,17 +274,20 @@ class LoopNumbers:
 
     def _takes(self, channel: tuple[str, str] | None) -> list[Take]:
         """Return how to take the curves that a limit is on from a closed loop."""
+        sides = range(len(self._margins))
         if channel is not None:
-            return [methodcaller("response", *channel)]
-        return [methodcaller("difference", i) for i in range(len(self.differences))]
+            return [partial(_response, k, channel) for k in sides]
+        inputs = range(len(self._problem.plant.inputs))
+        return [partial(_difference, k, i) for k in sides for i in inputs]
 
     def _on_grid(self, channel: tuple[str, str] | None) -> list[Any]:
         """Return the curves that a limit is on at the margin frequencies."""
         if channel is None:
             return self.differences
         if channel not in self._responses:
-            self._responses[channel] = self._padded(self._margins.response(*channel))
-        return [self._responses[channel]]
+            takes = self._takes(channel)
+            self._responses[channel] = [self._padded(take(self._margins)) for take in takes]
+        return self._responses[channel]
 
     def curves(self, limit: Limit) -> list[tuple[FloatArray, Any]]:
         """Return the curves that a limit is on, at the margin frequencies and at peaks between.
@@ -300,13 +309,13 @@ class LoopNumbers:
         """
         problem, point = self._problem, self._point
         plant, models = problem.modelled
-        drag = point.drag
+        known = point.coefficients
         if not point.slopes:
-            given = [*point.values, *([] if drag is None else [drag])]
+            given = [*point.values, *known]
             rows = np.stack(np.broadcast_arrays(*given), axis=-1)
             count, found = len(point.values), []
             for row in rows.reshape(-1, len(given)):
-                matrix = problem.loop_matrix(plant, row[:count], *row[count:])
+                matrix = problem.loop_matrix(plant, row[:count], row[count:].tolist())
                 poles = np.linalg.eigvals(matrix).astype(np.complex128)
                 found.append((poles, *_counted(poles, models)))
             shape = (*rows.shape[:-2], -1)
@@ -316,7 +325,7 @@ class LoopNumbers:
         uneven = np.linspace(-1.0, 1.0, values.size) if values.size > 1 else np.ones(1)
         for nudge in (0.0, _NUDGE):
             near = values * (1.0 + nudge * uneven)
-            matrix = problem.loop_matrix(plant, near, drag)
+            matrix = problem.loop_matrix(plant, near, known)
             poles, left, right = eig(matrix, left=True, right=True)  # type: ignore[misc]  # its stub
             product = np.einsum("ik,ik->k", left.conj(), right)
             if np.abs(product).min() > _SINGLE:
@@ -325,10 +334,11 @@ class LoopNumbers:
         scales = [_SMALL * p.scale for p in problem.law.parameters]
         steps = np.diag(SHIFT * np.maximum(np.abs(values), scales))
         slopes = []
-        ends = [[(values + sign * step, drag) for sign in (1.0, -1.0)] for step in steps]
+        ends = [[(values + sign * step, known) for sign in (1.0, -1.0)] for step in steps]
         widths = [2.0 * step.sum() for step in steps]
-        if problem.drag is not None:
-            ends.append([(values, drag * (1.0 + sign * SHIFT)) for sign in (1.0, -1.0)])
+        for unit in np.eye(len(known)):
+            shifts = [1.0 + sign * SHIFT * unit for sign in (1.0, -1.0)]
+            ends.append([(values, (np.array(known) * shift).tolist()) for shift in shifts])
             widths.append(2.0 * SHIFT)  # of its logarithm
         for (more, less), width in zip(ends, widths, strict=True):
             change = problem.loop_matrix(plant, *more) - problem.loop_matrix(plant, *less)
@@ -482,17 +492,24 @@ class LoopNumbers:
             found = np.pad(found, (0, 1))
         return found
 
-    def drag_balance(self) -> Any:
-        """Return log C - log(slope sigma_v), zero where drag and motion agree, (1,)."""
-        drag = self._problem.drag
-        assert drag is not None
-        return self.log_drag - (log(self.moment(drag.velocity, 0)) * 0.5 + np.log(drag.slope))
+    def balances(self) -> list[Any]:
+        """Return log c less that of the motion, zero where elements and motion agree, (1,) each."""
+        pairs = zip(self._logs, self._problem.elements, strict=True)
+        return [own - e.log_coefficient(self.moment(e.velocity, 0)) for own, e in pairs]
 
     def _padded(self, found: Any) -> Any:
         """Return a number with a slope of zero by the variable of the goal, if there is one."""
         if not isinstance(found, Dual) or not isinstance(self.extra, Dual):
             return found
         return Dual(found.value, np.concatenate([found.slope, np.zeros_like(found.slope[:1])]))
+
+
+def _response(side: int, channel: tuple[str, str], loops: Sequence[LoopResponses]) -> Any:
+    return loops[side].response(*channel)
+
+
+def _difference(side: int, index: int, loops: Sequence[LoopResponses]) -> Any:
+    return loops[side].difference(index)
 
 
 def _counted(poles: ComplexArray, models: ComplexArray) -> tuple[BoolArray, BoolArray]:

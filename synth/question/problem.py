@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,11 +17,13 @@ from models.plant import LinearPlant
 from ..limits import Limit
 from ..loop import (
     Assessment,
+    Coefficients,
     Disturbance,
-    DragElement,
+    Element,
     LoopBlocks,
     with_delay_models,
-    with_drag,
+    with_elements,
+    without_losses,
 )
 from ..structures import ParametrisedController
 
@@ -48,7 +51,7 @@ class Problem:
     disturbances: tuple[Disturbance, ...]
     minimise: dict[str, float]
     limits: tuple[Limit, ...]
-    drag: DragElement | None = None
+    elements: tuple[Element, ...] = ()
 
     @cached_property
     def slow_point(self) -> float:
@@ -58,11 +61,9 @@ class Problem:
 
     @cached_property
     def outputs(self) -> tuple[str, ...]:
-        """Names of the outputs that cost, limits and drag speak of."""
+        """Names of the outputs that cost, limits and elements speak of."""
         wanted = {*self.minimise, *(output for limit in self.limits for output in limit.signals)}
-        if self.drag is not None:
-            wanted.add(self.drag.velocity)
-        return tuple(sorted(wanted))
+        return tuple(sorted(wanted | {element.velocity for element in self.elements}))
 
     @cached_property
     def modelled(self) -> tuple[LinearPlant, ComplexArray]:
@@ -77,10 +78,11 @@ class Problem:
 
     @cached_property
     def _opened(self) -> LinearPlant:
-        """The plant with the drag's loop open, its input and its measurement the last."""
-        if self.drag is None:
-            return self.plant
-        return self.plant.opened(self.drag.velocity, self.drag.force)
+        """The plant with its elements' loops open, their inputs and measurements the last."""
+        plant = self.plant
+        for element in self.elements:
+            plant = plant.opened(element.velocity, element.force)
+        return plant
 
     @cached_property
     def _channels(self) -> tuple[LinearPlant, list[str]]:
@@ -90,7 +92,7 @@ class Problem:
         return self._opened.select(outputs=[*outputs]), [*dict.fromkeys(w for _, w in channels)]
 
     def blocks(self, s: npt.ArrayLike) -> LoopBlocks:
-        """Return what the plant's loop is closed about at points `s` [1/s], the drag's loop too."""
+        """Return what the plant's loop is closed about at points `s` [1/s], elements too."""
         return LoopBlocks.of(self._opened.response_at(s), self.outputs, self.sources)
 
     def margin_blocks(self, s: npt.ArrayLike) -> LoopBlocks:
@@ -98,31 +100,58 @@ class Problem:
         plant, sources = self._channels
         return LoopBlocks.of(plant.response_at(s), sources=sources)
 
-    def loop_poles(self, values: Values, coefficient: float | None = None) -> ComplexArray:
+    @property
+    def begin(self) -> tuple[float, ...]:
+        """Coefficients of the elements of usual size."""
+        return tuple(element.begin for element in self.elements)
+
+    @property
+    def nothing(self) -> list[float]:
+        """Coefficients of a loop without its elements."""
+        return [0.0] * len(self.elements)
+
+    @property
+    def dragged(self) -> bool:
+        """Whether there is drag that vanishes in small motion."""
+        return any(element.lasting for element in self.elements)
+
+    def coefficients_in(self, variance: Callable[[str], Any]) -> list[Any]:
+        """Return the coefficients that variances of the elements' velocities ask for."""
+        return [element.coefficient(variance(element.velocity)) for element in self.elements]
+
+    def still(self, coefficients: Coefficients) -> list[float]:
+        """Return coefficients without those of losses."""
+        return without_losses(self.elements, coefficients)
+
+    def loop_poles(self, values: Values, coefficients: Coefficients | None = None) -> ComplexArray:
         """Return the closed loop's poles [1/s], delays as Pade models."""
-        matrix = self.loop_matrix(self.modelled[0], values, coefficient)
+        matrix = self.loop_matrix(self.modelled[0], values, coefficients)
         return np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
 
     def loop_matrix(
-        self, plant: LinearPlant, values: Values, coefficient: float | None = None
+        self, plant: LinearPlant, values: Values, coefficients: Coefficients | None = None
     ) -> FloatArray:
         """Return the closed loop's state matrix on a rational model of the plant."""
-        if self.drag is not None and coefficient is not None:
-            plant = with_drag(plant, self.drag, coefficient)
+        if coefficients is not None:
+            plant = with_elements(plant, self.elements, coefficients)
         return self.law.closed_loop_matrix(plant, [float(v) for v in values])
 
     def growth(self, values: Values) -> float:
         """Return the largest real part of a closed-loop pole [1/s], drag as the plant holds it."""
         return float(self.loop_poles(values).real.max(initial=-np.inf))
 
-    def abscissa(self, values: Values, coefficient: float | None = None) -> float:
+    def abscissa(self, values: Values, coefficients: Coefficients | None = None) -> float:
         """Return the largest real part of a closed-loop pole over the size of the largest."""
-        poles = self.loop_poles(values, coefficient)
+        poles = self.loop_poles(values, coefficients)
         return float(poles.real.max(initial=-1.0) / max(1.0, float(np.abs(poles).max(initial=1.0))))
 
-    def held(self, values: Values, coefficient: float | None = None) -> bool:
-        """Return whether the closed loop is stable with this drag."""
-        return self.abscissa(values, coefficient) < -_DECAY
+    def held(self, values: Values, coefficients: Coefficients | None = None) -> bool:
+        """Return whether the closed loop is stable with these coefficients, without losses too."""
+        if not self.abscissa(values, coefficients) < -_DECAY:
+            return False
+        if coefficients is None or (still := self.still(coefficients)) == list(coefficients):
+            return True
+        return self.abscissa(values, still) < -_DECAY
 
     def swings(self, values: Values) -> bool:
         """Return whether the closed loop swings by itself in small motion.
@@ -130,18 +159,18 @@ class Problem:
         Quadratic drag vanishes there: a loop that is unstable without it swings in any sea, and in
         none, at the amplitude that gives it drag enough.
         """
-        return self.drag is not None and self.abscissa(values, 0.0) > _DECAY
+        return self.dragged and self.abscissa(values, self.nothing) > _DECAY
 
-    def stable(self, values: Values, coefficient: float | None = None) -> bool:
-        """Return whether the closed loop is stable, with this drag and in small motion."""
-        return self.held(values, coefficient) and not self.swings(values)
+    def stable(self, values: Values, coefficients: Coefficients | None = None) -> bool:
+        """Return whether the closed loop is stable, with these coefficients and in small motion."""
+        return self.held(values, coefficients) and not self.swings(values)
 
-    def assess(self, values: Values, coefficient: float | None = None) -> Assessment:
-        """Return the closed loop in numbers, its drag solved for where no coefficient is given."""
+    def assess(self, values: Values, coefficients: Coefficients | None = None) -> Assessment:
+        """Return the closed loop in numbers, its elements solved for where nothing is given."""
         return Assessment(
             self.plant,
             self.law.controller([float(v) for v in values]),
             self.disturbances,
-            drag=self.drag,
-            coefficient=None if self.drag is None else coefficient,
+            elements=self.elements,
+            coefficients=coefficients,
         )

@@ -37,7 +37,15 @@ from models.plant import (
     rope_transfers,
     settled_drag,
 )
-from models.sensing import SAMPLE_TIME, UnitError, sensed_plant, sensed_spectra, with_sensors
+from models.sensing import (
+    LOAD,
+    SAMPLE_TIME,
+    UnitError,
+    sensed_plant,
+    sensed_spectra,
+    with_loads,
+    with_sensors,
+)
 
 from ..limits import (
     HOOK,
@@ -49,7 +57,15 @@ from ..limits import (
     loop_limits,
     modelled_bandwidth,
 )
-from ..loop import Assessment, DragElement, LinearController, disturbances
+from ..loop import (
+    Assessment,
+    Coefficients,
+    DragElement,
+    Element,
+    LinearController,
+    LossElement,
+    disturbances,
+)
 from ..structures import (
     Fixed,
     LowOrderFeedback,
@@ -63,6 +79,9 @@ from .problem import Problem
 
 GAINS = ("A", "a", "a1", "a2")
 """The thesis's gains; the amplifier A multiplies the others."""
+
+
+_TRIFLE = 1e-9  # of the static torque: what rounding makes of no losses
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,8 +138,9 @@ class DesignQuestion:
         What shakes it, by name of the disturbance: the sea, the reference unit, the sensors.
     loop, drive, reported
         Limits of the loop, limits of the drive, and limits that are reported only.
-    drag
-        The quadratic drag to be linearised with the response, or None if C is given.
+    elements
+        What is linearised with the response: quadratic drag, if no C is given, and losses that
+        switch with the motor's direction, if there are some.
     drag_before, payload_rms_before
         Linear drag [N s/m] and rms payload motion [m] with the drum held.
     held
@@ -137,7 +157,7 @@ class DesignQuestion:
     loop: tuple[Limit, ...]
     drive: tuple[Limit, ...]
     reported: tuple[Limit, ...]
-    drag: DragElement | None
+    elements: tuple[Element, ...]
     drag_before: float
     payload_rms_before: float
     held: Mapping[str, float] = field(default_factory=dict)
@@ -182,7 +202,7 @@ class DesignQuestion:
             disturbances=disturbances(self.spectra, self.plant.independent_disturbances),
             minimise={PAYLOAD: 1.0},
             limits=tuple(limits),
-            drag=self.drag,
+            elements=self.elements,
         )
 
     def values(self, parameters: Mapping[str, float]) -> list[float]:
@@ -198,17 +218,31 @@ class DesignQuestion:
         """Return the controller of given parameters."""
         return self.law.controller(self.values(parameters))
 
-    def drag_in(self, loop: Assessment) -> float:
-        """Return the linear drag coefficient in a loop [N s/m]: its own, or the case's."""
-        if self.drag is None:
-            return float(self.case.payload.fixed_drag or 0.0)
-        return loop.coefficient
+    @property
+    def drag(self) -> DragElement | None:
+        """The quadratic drag to be linearised with the response, or None if C is given."""
+        return next((e for e in self.elements if isinstance(e, DragElement)), None)
+
+    @property
+    def loss(self) -> LossElement | None:
+        """The losses to be linearised with the response, if there are some."""
+        return next((e for e in self.elements if isinstance(e, LossElement)), None)
+
+    def equivalents(self, coefficients: Coefficients) -> tuple[float, float]:
+        """Return linear drag [N s/m], the case's if it gives it, and friction [N m s/rad]."""
+        known = list(coefficients)
+        drag = float(self.case.payload.fixed_drag or 0.0) if self.drag is None else known.pop(0)
+        return drag, float(sum(known))
+
+    def coefficients_of(self, drag: float, friction: float) -> tuple[float, ...]:
+        """Return the elements' coefficients that `equivalents` tells of."""
+        return tuple(drag if e.lasting else friction for e in self.elements)
 
     def assess(
-        self, parameters: Mapping[str, float], coefficient: float | None = None
+        self, parameters: Mapping[str, float], coefficients: Coefficients | None = None
     ) -> Assessment:
         """Return the closed loop of given parameters in numbers."""
-        return self.problem.assess(self.values(parameters), coefficient)
+        return self.problem.assess(self.values(parameters), coefficients)
 
 
 def pose(
@@ -255,9 +289,8 @@ def pose(
         drag_before, rms_before = shaken.drag_before, shaken.payload_rms_before
     else:
         drag_before, rms_before = uncompensated(case, data, hook)
-    sensed = with_sensors(model.linearise(drag=drag_before), case.sensors, data.command_delay)
-    plant = sensed.select(measurements=named.measurements)
-    stochastic = case.payload.fixed_drag is None and data.quadratic_drag > 0.0
+    plant = loaded_plant(case, data, model, drag_before, named.measurements)
+    elements = equivalent_elements(case, data, hook, plant, drag_before)
     loop = loop_limits(case, data, model.masses)
     slow = [lim for lim in loop if isinstance(lim, LowFrequency) and not named.hears_payload]
     drive = drive_limits(case, plant)
@@ -273,12 +306,51 @@ def pose(
         loop=tuple(limit for limit in loop if limit not in slow),
         drive=drive if enforced else (),
         reported=(*slow, *(() if enforced else drive)),
-        drag=DragElement(quadratic=data.quadratic_drag, reference=drag_before)
-        if stochastic
-        else None,
+        elements=elements,
         drag_before=drag_before,
         payload_rms_before=rms_before,
     )
+
+
+def loaded_plant(
+    case: Case, data: PlantData, model: Plant, drag: float, measurements: Sequence[str]
+) -> LinearPlant:
+    """Return a model's linear plant with what is heard, and loads on a motor with losses."""
+    linear = model.linearise(drag=drag)
+    if _switching(linear) > 0.0:
+        linear = with_loads(linear, data)
+    sensed = with_sensors(linear, case.sensors, data.command_delay)
+    return sensed.select(measurements=measurements)
+
+
+def equivalent_elements(
+    case: Case, data: PlantData, hook: HookMotion, plant: LinearPlant, drag: float
+) -> tuple[Element, ...]:
+    """Return what of a case's plant is linearised with the response: drag, and losses.
+
+    Parameters
+    ----------
+    case, data, hook
+        The case, its numbers and the hook's motion.
+    plant
+        The linear plant, with loads on its motor where that has losses.
+    drag
+        The linear drag that the plant holds [N s/m].
+    """
+    elements: list[Element] = []
+    if case.payload.fixed_drag is None and data.quadratic_drag > 0.0:
+        elements.append(DragElement(quadratic=data.quadratic_drag, reference=drag))
+    if (torque := _switching(plant)) > 0.0:
+        # A drum that hauls as the hook heaves.
+        usual = float(hook.velocity.rms) * data.gear_ratio / data.drum_radius
+        elements.append(LossElement(force=LOAD, torque=torque, usual=usual))
+    return tuple(elements)
+
+
+def _switching(plant: LinearPlant) -> float:
+    """Return the losses at the motor that switch with its direction [N m]; zero for a trifle."""
+    torque = plant.loss.get("motor.torque", 0.0)
+    return torque if torque > _TRIFLE * abs(plant.static.get("motor.torque", 0.0)) else 0.0
 
 
 def _warn_of_waves(case: Case, measurements: Sequence[str]) -> None:
@@ -429,13 +501,11 @@ def locked_response(case: Case, omega: FloatArray, drag: float) -> ComplexArray:
 
 def with_masses(question: DesignQuestion, masses: int) -> DesignQuestion:
     """Return the question on another number of rope masses."""
-    model = build_plant(question.data, masses)
-    linear = model.linearise(drag=question.drag_before)
-    sensed = with_sensors(linear, question.case.sensors, question.data.command_delay)
+    model, heard = build_plant(question.data, masses), question.structure.measurements
     return replace(
         question,
         model=model,
-        plant=sensed.select(measurements=question.structure.measurements),
+        plant=loaded_plant(question.case, question.data, model, question.drag_before, heard),
         loop=tuple(_rescaled(lim, question.data, model.masses) for lim in question.loop),
     )
 

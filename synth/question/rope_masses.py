@@ -113,7 +113,8 @@ class _OnTheRope:
 
     def __init__(self, question: DesignQuestion, loop: Assessment) -> None:
         self.question, self.loop = question, loop
-        self.drag = question.drag_in(loop)
+        self.drag, friction = question.equivalents(loop.coefficients)
+        self.frictions = tuple(dict.fromkeys([friction, 0.0]))  # nothing may hang on the losses
         poles = self._poles()
         omega, width = poles.imag, np.maximum(-poles.real, _NARROW * poles.imag)
         near = omega[:, None] + width[:, None] * np.array(_BESIDE)
@@ -181,21 +182,32 @@ class _OnTheRope:
         binds = (size > (1.0 - _KEPT) * bound) & (size < (1.0 + _KEPT) * bound) & (rope > 0.0)
         return float(np.max((size - rope)[binds] / bound, initial=0.0))
 
-    def _gains(self, s: ComplexArray) -> ComplexArray:
-        """Return L of each loop at points [1/s], (loops, k)."""
-        question, controller = self.question, self.loop.controller
-        line = sensed_line_at(question.case, s, drag=self.drag, data=question.data)
-        heard = line.select(measurements=controller.measurements)
-        found = LoopResponses.of(heard, controller)
-        loops = range(len(controller.inputs))
-        return np.array([found.difference(i) - 1.0 for i in loops])
+    def _gains(self, s: ComplexArray, frictions: Sequence[float] | None = None) -> ComplexArray:
+        """Return L of each loop at points [1/s], (frictions and loops, k)."""
+        question, controller, found = self.question, self.loop.controller, []
+        for friction in self.frictions if frictions is None else frictions:
+            line = sensed_line_at(
+                question.case, s, drag=self.drag, friction=friction, data=question.data
+            )
+            heard = line.select(measurements=controller.measurements)
+            loop = LoopResponses.of(heard, controller)
+            found += [loop.difference(i) - 1.0 for i in range(len(controller.inputs))]
+        return np.array(found)
 
     def _gain(self, index: int, omega: FloatArray) -> ComplexArray:
         """Return L of one loop at frequencies [rad/s], (k,)."""
-        return np.asarray(self._gains(np.asarray(1j * omega, dtype=np.complex128))[index])
+        side, at = divmod(index, len(self.loop.controller.inputs))
+        s = np.asarray(1j * omega, dtype=np.complex128)
+        return np.asarray(self._gains(s, self.frictions[side : side + 1])[at])
 
     def _poles(self) -> ComplexArray:
         """Return the light poles of the rope with the loop open and with it closed [1/s]."""
+        found = np.concatenate([self._poles_with(friction) for friction in self.frictions])
+        # Points about a pole that is there twice would lie apart by rounding only.
+        same = np.abs(found[:, None] - found) < _SAME * np.abs(found)
+        return np.asarray(found[~np.tril(same, -1).any(axis=1)])
+
+    def _poles_with(self, friction: float) -> ComplexArray:
         lumped = np.concatenate([self.loop.plant.poles(), self.loop.poles])
         lumped = lumped[(lumped.imag > 0.0) & (-lumped.real < _LIGHT * np.abs(lumped))]
         begins = np.concatenate([self.question.data.damped_modes(MAX_MASSES), lumped])
@@ -203,12 +215,9 @@ class _OnTheRope:
 
         def open_and_closed(s: ComplexArray, at: IndexArray) -> ComplexArray:
             # 1/L and 1 + 1/L, which are smooth where L has a pole.
-            return np.asarray(1.0 / self._gains(s)[0] + ~half[at])
+            return np.asarray(1.0 / self._gains(s, [friction])[0] + ~half[at])
 
-        found = np.concatenate([begins, _zeros(open_and_closed, np.tile(begins, 2))])
-        # Points about a pole that is there twice would lie apart by rounding only.
-        same = np.abs(found[:, None] - found) < _SAME * np.abs(found)
-        return np.asarray(found[~np.tril(same, -1).any(axis=1)])
+        return np.concatenate([begins, _zeros(open_and_closed, np.tile(begins, 2))])
 
 
 def on_enough_masses(
@@ -243,7 +252,7 @@ def on_enough_masses(
             question, growth = most, there
     while growth <= 0.0:
         loop = assess(question, values)
-        if loop is None or not question.problem.held(values, loop.coefficient):
+        if loop is None or not question.problem.held(values, loop.coefficients):
             break
         if (masses := masses_for(question, loop)) <= question.masses:
             return question, loop, growth

@@ -402,8 +402,8 @@ class _ScheduleSearch:
         assert own is not None
         values = blend_of(self.lengths[list(nodes)], float(self.lengths[index])) @ gains
         assessment = problem.assess(values)
-        drag = assessment.coefficient if problem.drag is not None else None
-        solved = replace(own.solved, values=np.asarray(values), coefficients=(drag,))
+        known = (assessment.coefficients,)
+        solved = replace(own.solved, values=np.asarray(values), coefficients=known)
         failed = replace(own, solved=solved, assessment=assessment).tuning.verify().failed
         return not [name for name in failed if not name.startswith("limits")]
 

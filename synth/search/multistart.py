@@ -16,7 +16,7 @@ import numpy as np
 
 from models.basics import FloatArray, InputError
 
-from ..loop import Assessment
+from ..loop import Assessment, Coefficients
 from ..question import FamilyLoop, FamilyProblem, Goal, Problem, Values
 from .polishing import KEPT, assess, polish, settle, stated
 from .programme import Solution
@@ -222,7 +222,7 @@ def _come_by(
     family: FamilyProblem,
     places: list[_Place],
     begin: FloatArray,
-    coefficients: Sequence[float | None],
+    coefficients: Sequence[Coefficients],
     reference: FloatArray,
 ) -> None:
     """Add a start to the places where it leads."""

@@ -14,7 +14,7 @@ import numpy as np
 from models.basics import FloatArray
 
 from ..limits import Limit
-from ..loop import Assessment
+from ..loop import Assessment, Coefficients
 from ..question import FamilyProblem, Goal, Problem, Values
 from .nodes import cost_nodes, margin_nodes
 from .programme import Programme, Solution
@@ -32,7 +32,7 @@ _HAIRS = 3  # rounds of it
 def stated(
     asked: FamilyProblem | Problem,
     values: Values,
-    coefficients: Sequence[float | None] | None = None,
+    coefficients: Sequence[Coefficients] | None = None,
     goal: Goal = Goal.COST,
     *,
     reference: FloatArray,
@@ -46,7 +46,7 @@ def stated(
     Parameters
     ----------
     asked, values, coefficients
-        The family, and where it stands: searched parameters, and drag coefficients [N s/m].
+        The family, and where it stands: searched parameters, and coefficients of elements.
     goal, reference, relaxed
         As `Programme` takes them.
     rough, fine
@@ -58,12 +58,12 @@ def stated(
     nodes, omega = [], []
     for group in family.groups:
         scenario = family.scenarios[group[0]]
-        drag = None if coefficients is None else coefficients[group[0]]
+        known = None if coefficients is None else coefficients[group[0]]
         own, shaken = scenario.values(values), family.shaken_by_all(group)
-        poles = scenario.problem.loop_poles(own, drag)
+        poles = scenario.problem.loop_poles(own, known)
         if fine and any(shaken.plant.delays) and any(d.band is None for d in shaken.disturbances):
             # A delay ripples the spectrum of white noise far above all poles.
-            found = shaken.assess(own, drag).quadrature(shaken.outputs)
+            found = shaken.assess(own, known).quadrature(shaken.outputs)
             # The plant's blocks may have a pole at zero, where the closed loop has none.
             least = _NEARLY_ZERO * float(found.omega[found.omega > 0.0].min())
             nodes.append(replace(found, omega=np.maximum(found.omega, least)))
@@ -89,7 +89,7 @@ def stated(
 def settle(
     asked: FamilyProblem | Problem,
     values: Values,
-    coefficients: Sequence[float | None] | None,
+    coefficients: Sequence[Coefficients] | None,
     goal: Goal = Goal.COST,
     *,
     reference: FloatArray,

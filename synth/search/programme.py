@@ -3,7 +3,8 @@ r"""The programme of gain synthesis: one set of parameters, one loop or a family
 .. math::
 
     \min_{p, C_i, t} t \quad\text{s.t. } \log J_i - \log r_i \le t, \;
-    \text{limits of every member } i \le 0, \; C_i = q_i \sqrt{8/\pi}\,\sigma_{v,i},
+    \text{limits of every member } i \le 0, \; C_i = q_i \sqrt{8/\pi}\,\sigma_{v,i}, \;
+    b_i = \Delta_i \sqrt{2/\pi} / \sigma_{\omega,i},
     \qquad J_i^2 = \sum_z \lambda_z \sum_w \int |F_{zw}|^2 S_w \, d\omega
 
 with r_i = 1 for the worst case and the best cost of its own for the worst regret; a mean is
@@ -32,7 +33,7 @@ import numpy as np
 from models.basics import FloatArray, Quadrature
 
 from ..limits import Limit
-from ..loop import Dual, LoopResponses, exp, real, sqrt, squared, value_of
+from ..loop import Coefficients, Dual, LoopResponses, exp, real, sqrt, squared, value_of
 from ..question import (
     FamilyLoop,
     FamilyProblem,
@@ -69,7 +70,7 @@ class Solution:
     values
         The searched parameters.
     coefficients
-        Drag coefficient of each member [N s/m], None without drag.
+        Those of each member's elements: of drag [N s/m], of losses [N m s/rad].
     objective
         Logarithm of what the family's objective makes of the costs.
     extra
@@ -82,7 +83,7 @@ class Solution:
     """
 
     values: FloatArray
-    coefficients: tuple[float | None, ...]
+    coefficients: tuple[tuple[float, ...], ...]
     objective: float
     converged: bool
     message: str
@@ -93,8 +94,8 @@ class Solution:
     extra: float = 0.0
 
     @property
-    def coefficient(self) -> float | None:
-        """Drag coefficient of the first member [N s/m]."""
+    def coefficient(self) -> tuple[float, ...]:
+        """Coefficients of the first member's elements."""
         return self.coefficients[0]
 
 
@@ -141,9 +142,11 @@ class Programme:
         self._tolerance, self._calm = tolerance, in_a_calm
         many = _MOST_STEPS if count > _MANY else _STEPS
         self._most = many if max_iterations is None else max_iterations
-        drags = [i for i, s in enumerate(scenarios) if s.problem.drag is not None]
-        self._drag_at = {i: count + k for k, i in enumerate(drags)}
-        at = count + len(drags)
+        # Where the logarithms of each member's coefficients stand.
+        at, self._elements_at = count, []
+        for scenario in scenarios:
+            self._elements_at.append(slice(at, at + len(scenario.problem.elements)))
+            at += len(scenario.problem.elements)
         self._mean = family.objective is Objective.MEAN and len(scenarios) > 1
         # A family of one needs no variable above its costs.
         self._bound_at = None
@@ -181,29 +184,29 @@ class Programme:
             self._logarithmic, np.log(np.where(self._logarithmic, given, 1.0)), given / self._unit
         )
 
-    def _coefficients(self, x: FloatArray) -> tuple[float | None, ...]:
-        every, drags = range(len(self.family.scenarios)), self._drag_at
-        return tuple(float(np.exp(x[drags[i]])) if i in drags else None for i in every)
+    def _coefficients(self, x: FloatArray) -> tuple[tuple[float, ...], ...]:
+        return tuple(tuple(np.exp(x[at]).tolist()) for at in self._elements_at)
 
     def pack(
         self,
         values: Values,
-        coefficients: Sequence[float | None] | None = None,
+        coefficients: Sequence[Coefficients | None] | None = None,
         extra: float | None = None,
     ) -> FloatArray:
         """Return the programme's vector for given parameters.
 
-        Drag, sea and factors stand in it as logarithms: they stay positive, and a step is a share.
+        Coefficients, sea and factors stand in it as logarithms: they stay positive, and a step is
+        a share.
         """
         scenarios = self.family.scenarios
         x = np.zeros(self.size)
         x[: self._unit.size] = self._placed(values)
-        for i, at in self._drag_at.items():
-            drag, given = scenarios[i].problem.drag, None
-            if coefficients is not None:
-                given = coefficients[i]
-            assert drag is not None
-            x[at] = np.log(given or drag.reference)
+        for i, at in enumerate(self._elements_at):
+            given = None if coefficients is None else coefficients[i]
+            pairs = zip(
+                given or scenarios[i].problem.begin, scenarios[i].problem.begin, strict=True
+            )
+            x[at] = np.log([one or begin for one, begin in pairs])
         if self._extra_at is not None:
             x[self._extra_at] = 0.0 if extra is None else extra
         if self._bound_at is not None:
@@ -294,13 +297,10 @@ class Programme:
         balances: list[tuple[Any, int]] = []
         for group, loop in zip(family.groups, self._loops, strict=True):
             first = group[0]
-            at = self._drag_at.get(first)
-            log_drag = None if at is None else float(x[at])
+            logs = x[self._elements_at[first]]
             extra = None if self._extra_at is None else float(x[self._extra_at])
             own = family.scenarios[first].values(values)
-            numbers, slow = loop.at(
-                own, log_drag, extra, self._goal, slopes=slopes, exact=self._exact
-            )
+            numbers, slow = loop.at(own, logs, extra, self._goal, slopes=slopes, exact=self._exact)
             for k, i in enumerate(group):
                 problem = family.scenarios[i].problem
                 seen = numbers if i == first else numbers.under(problem, loop.weights[k])
@@ -319,12 +319,11 @@ class Programme:
                 if slopes:
                     curvatures[i] = seen.cost_curvature()
             # No limit of the case: it stops a real pole from creeping to zero, below every node.
-            rows.append(((first, _SLOW), slow, first))
-            if log_drag is not None:
-                if self._calm:
-                    row = loop.in_a_calm(own, log_drag, extra, slopes)
-                    rows.append(((first, _CALM), row, first))
-                balances.append((numbers.drag_balance(), first))
+            rows += [((first, _SLOW), row, first) for row in slow]
+            if self._calm and family.scenarios[first].problem.dragged:
+                row = loop.in_a_calm(own, logs, extra, slopes)
+                rows.append(((first, _CALM), row, first))
+            balances += [(balance, first) for balance in numbers.balances()]
         every = range(len(family.scenarios))
         bends = [curvatures[i] for i in every] if slopes else []
         return [(costs[i], i) for i in every], rows, balances, bends
@@ -388,8 +387,8 @@ class Programme:
         if scenario.blend is not None:
             by_own = by_own @ scenario.blend
         result[:, : family.scales.size] = by_own * np.where(self._logarithmic, values, self._unit)
-        if i in self._drag_at:
-            result[:, self._drag_at[i]] = slope[own]
+        of = self._elements_at[i]
+        result[:, of] = slope[own : own + of.stop - of.start].T
         if self._extra_at is not None:
             result[:, self._extra_at] = slope[-1]
         return result
@@ -461,8 +460,9 @@ class _Loop:
         self._s = np.concatenate([blocks.s for blocks in self._blocks])
         ends = [0, nodes.omega.size, nodes.omega.size + omega.size, self._s.size]
         self._parts = [slice(*pair) for pair in pairwise(ends)]
-        drag = None if problem.drag is None else problem.drag.reference
-        begin = Point(values=list(members[0].values(reference)), drag=drag)
+        # Reference coefficients: the loop as the plant holds it.
+        known = [element.reference for element in problem.elements]
+        begin = Point(values=list(members[0].values(reference)), coefficients=known)
         self._scales = np.array([p.scale for p in problem.law.parameters])
         slow = self._blocks[-1]
         there = LoopResponses(slow, begin.closing(problem, slow.s)).determinant()
@@ -471,20 +471,32 @@ class _Loop:
     def at(
         self,
         values: FloatArray,
-        log_drag: float | None,
+        logs: FloatArray,
         extra: float | None,
         goal: Goal,
         *,
         slopes: bool,
         exact: bool,
-    ) -> tuple[LoopNumbers, Any]:
-        """Return the loop's numbers at a point, and the row that keeps slow poles off."""
-        point = _point(values, log_drag, slopes)
+    ) -> tuple[LoopNumbers, list[Any]]:
+        """Return the loop's numbers at a point, and the rows that keep slow poles off."""
+        point = Point(
+            values=[float(v) for v in values],
+            coefficients=np.exp(logs).tolist(),
+            slopes=slopes,
+        )
         closing = point.closing(self.problem, self._s)
-        cost, margins, slow = (
+        cost, *both = (
             LoopResponses(blocks, closing.part(part))
             for blocks, part in zip(self._blocks, self._parts, strict=True)
         )
+        margins, slow = ([one] for one in both)
+        for still in point.sides(self.problem)[1:]:
+            closing = still.closing(self.problem, self._s)
+            for found, blocks, part in zip(
+                (margins, slow), self._blocks[1:], self._parts[1:], strict=True
+            ):
+                found.append(LoopResponses(blocks, closing.part(part)))
+        count = values.size + logs.size
         numbers = LoopNumbers(
             self.problem,
             cost,
@@ -492,18 +504,21 @@ class _Loop:
             self.weights[0],
             self.omega,
             point,
-            log_drag=_variable(log_drag, values.size, values.size, extra, slopes),
-            extra=_variable(extra, -1, values.size + (log_drag is not None), extra, slopes),
+            logs=[
+                _variable(float(v), values.size + k, count, extra, slopes)
+                for k, v in enumerate(logs)
+            ],
+            extra=_variable(extra, -1, count, extra, slopes),
             goal=goal,
         )
         if exact:
             numbers.measure(lambda w, d: self._fresh(w, replace(point, slopes=d)))
-        return numbers, self._no_slow_pole(slow, extra)
+        return numbers, [self._no_slow_pole(one, extra) for one in slow]
 
-    def _fresh(self, omega: FloatArray, point: Point) -> LoopResponses:
-        """Return the closed loop at other frequencies."""
-        blocks = self.problem.margin_blocks(1j * omega)
-        return LoopResponses(blocks, point.closing(self.problem, blocks.s))
+    def _fresh(self, omega: FloatArray, point: Point) -> list[LoopResponses]:
+        """Return the closed loop at other frequencies, at each side of the point."""
+        blocks, problem = self.problem.margin_blocks(1j * omega), self.problem
+        return [LoopResponses(blocks, p.closing(problem, blocks.s)) for p in point.sides(problem)]
 
     def _no_slow_pole(self, slow: LoopResponses, extra: float | None) -> Any:
         """Return a row that keeps real poles from crossing -decay.
@@ -519,7 +534,7 @@ class _Loop:
         return 1e-6 - _padded(real(found), extra) / self._there
 
     def in_a_calm(
-        self, values: FloatArray, log_drag: float, extra: float | None, slopes: bool
+        self, values: FloatArray, logs: FloatArray, extra: float | None, slopes: bool
     ) -> Any:
         """Return rows that keep the poles which hang on drag stable without it.
 
@@ -528,10 +543,12 @@ class _Loop:
         that knew no row there would end at the edge of what it may evaluate.  The slope of a pole
         s is that of det(I - C yu) by the parameters over that by s.
         """
+        problem = self.problem
         calm, dragged = (
             poles[poles.imag > 0.0]
             for poles in map(
-                partial(self.problem.loop_poles, values), (0.0, float(np.exp(log_drag)))
+                partial(problem.loop_poles, values),
+                (problem.nothing, problem.still(np.exp(logs).tolist())),
             )
         )
         if not calm.size or not dragged.size:
@@ -541,15 +558,18 @@ class _Loop:
         poles = calm[calm.real > _HANGS * dragged.real]
         # At the pole itself the matrix is singular.
         points = np.concatenate([poles * (1.0 + _BESIDE), poles * (1.0 - _BESIDE)])
-        point = Point(values=[float(v) for v in values], drag=0.0, slopes=True)
-        closing = point.closing(self.problem, points)
-        found = LoopResponses(self.problem.blocks(points), closing).determinant()
+        own = [float(v) for v in values]
+        closing = Point(values=own, coefficients=problem.nothing, slopes=True).closing(
+            problem, points
+        )
+        found = LoopResponses(problem.blocks(points), closing).determinant()
         above, below = np.split(found.value, 2)
         by_parameters = sum(np.split(found.slope, 2, axis=1))
         moved = by_parameters * (_BESIDE * poles) / (below - above)
         pole = Dual(poles, moved)
         damping = real(pole) / -sqrt(squared(pole))
-        sizes = np.append(np.maximum(np.abs(values), _SMALL * self._scales), 1.0)
+        sizes = np.maximum(np.abs(values), _SMALL * self._scales)
+        sizes = np.append(sizes, np.ones(logs.size))
         movable = np.abs(damping.slope * sizes[:, None]).max(axis=0) > _LEAST_DAMPING
         row = (_LEAST_DAMPING - damping[movable]) * _STEEP
         return _padded(row, extra) if slopes else row.value
@@ -562,11 +582,6 @@ def _padded(found: Dual, extra: float | None) -> Dual:
     return Dual(found.value, np.concatenate([found.slope, np.zeros_like(found.slope[:1])]))
 
 
-def _point(values: FloatArray, log_drag: float | None, slopes: bool) -> Point:
-    drag = None if log_drag is None else float(np.exp(log_drag))
-    return Point(values=[float(v) for v in values], drag=drag, slopes=slopes)
-
-
 def _variable(value: float | None, at: int, count: int, extra: float | None, slopes: bool) -> Any:
     """Return one of the variables that follow the parameters, with its own slope."""
     if value is None:
@@ -574,6 +589,6 @@ def _variable(value: float | None, at: int, count: int, extra: float | None, slo
     number = np.array([value])
     if not slopes:
         return number
-    slope = np.zeros((count + 1 + (at != -1 and extra is not None), 1))
+    slope = np.zeros((count + (extra is not None), 1))
     slope[at] = 1.0
     return Dual(number, slope)

@@ -43,7 +43,7 @@ _STABLE = -1e-9  # relative abscissa below which a candidate counts
 _WEIGHTS = (5.0, 1.0)  # of broken limits against the log cost
 _WORST = 20.0  # what one broken limit may add to the merit of a candidate
 _AT_ONCE = 64  # candidates whose merits are computed together
-_DRAGS = 4  # rounds in which a candidate's drag is made to agree with its motion
+_DRAGS = 4  # rounds in which a candidate's coefficients are made to agree with its motion
 _PER_DECADE = 20  # margin nodes of the screening
 _SAMPLE = 4  # loops whose poles the screening's nodes know
 
@@ -217,10 +217,9 @@ def briskest(asked: FamilyProblem | Problem, points: Sequence[FloatArray]) -> Fl
     return min(points, key=FamilyProblem.of(asked).abscissa)
 
 
-def start_coefficients(asked: FamilyProblem | Problem) -> tuple[float | None, ...]:
-    """Return the drag coefficients that a search begins with [N s/m]."""
-    drags = [scenario.problem.drag for scenario in FamilyProblem.of(asked).scenarios]
-    return tuple(None if drag is None else drag.reference for drag in drags)
+def start_coefficients(asked: FamilyProblem | Problem) -> tuple[tuple[float, ...], ...]:
+    """Return the coefficients of each member's elements that a search begins with."""
+    return tuple(scenario.problem.begin for scenario in FamilyProblem.of(asked).scenarios)
 
 
 def _merits(family: FamilyProblem, points: FloatArray) -> list[FloatArray]:
@@ -246,16 +245,16 @@ def _merits(family: FamilyProblem, points: FloatArray) -> list[FloatArray]:
             own = [
                 column[:, None] for column in np.array([first.values(p) for p in points[some]]).T
             ]
-            drag = None
-            if problem.drag is not None:
-                drag = _consistent(problem, own, parts[0], weights[0])
-            point = Point(values=own, drag=drag)
+            known = _consistent(problem, own, parts[0], weights[0])
+            point = Point(values=own, coefficients=known)
             closing = point.closing(problem, every)
             cuts = slice(0, nodes.omega.size), slice(nodes.omega.size, None)
-            cost, margins = (
+            cost, *margins = (
                 LoopResponses(part, closing.part(cut))
                 for part, cut in zip(parts, cuts, strict=True)
             )
+            for still in point.sides(problem)[1:]:
+                margins.append(LoopResponses(parts[1], still.closing(problem, parts[1].s)))
             numbers = LoopNumbers(problem, cost, margins, weights[0], omega, point)
             for k, i in enumerate(group):
                 member = family.scenarios[i].problem
@@ -275,13 +274,12 @@ def _merits(family: FamilyProblem, points: FloatArray) -> list[FloatArray]:
 
 def _consistent(
     problem: Problem, values: Sequence[FloatArray], blocks: LoopBlocks, weights: FloatArray
-) -> FloatArray:
-    """Return the drag coefficients that agree with the motion of many candidates, (b, 1)."""
-    element = problem.drag
-    assert element is not None
-    drag = np.full((len(values[0]), 1), element.reference)
-    for _ in range(_DRAGS):
-        closing = Point(values=values, drag=drag).closing(problem, blocks.s)
-        variance = LoopResponses(blocks, closing).moments([element.velocity], weights, [0])[0]
-        drag = element.slope * np.sqrt(variance)
-    return drag
+) -> list[FloatArray]:
+    """Return the coefficients that agree with the motion of many candidates, (b, 1) each."""
+    known = [np.full((len(values[0]), 1), begin) for begin in problem.begin]
+    names = [element.velocity for element in problem.elements]
+    for _ in range(_DRAGS if names else 0):
+        closing = Point(values=values, coefficients=known).closing(problem, blocks.s)
+        variances = LoopResponses(blocks, closing).moments(names, weights, [0])
+        known = problem.coefficients_in(dict(zip(names, variances, strict=True)).__getitem__)
+    return known

@@ -13,8 +13,10 @@ moves with every number too.  With theta the number and all slopes logarithmic,
     \frac{dC}{d\theta} = C\,\frac{\partial_\theta\ln q + \partial_\theta\ln\sigma_v}
         {1 - C\,\partial_C \ln\sigma_v}
 
-(implicit differentiation of the fixed point).  Figure 32 of the 1975 thesis is the preset
-`Sensitivity.moved`: its gains 10 % up, one at a time, the response recomputed in full.
+(implicit differentiation of the fixed point).  Losses Delta that switch have such an equation too,
+b = sqrt(2/pi) Delta / sigma_omega, and both are then solved together.  Figure 32 of the 1975 thesis
+is the preset `Sensitivity.moved`: its gains 10 % up, one at a time, the response recomputed in
+full.
 """
 
 from __future__ import annotations
@@ -87,10 +89,13 @@ def _first(
     assessment = fixed.assessment()
     if assessment is None:
         raise InputError("sensitivity: the loop must be stable; an unstable one has no rms")
-    drag = assessment.coefficient or fixed.fixed_drag
+    coefficients = assessment.coefficients
+    drag, friction = fixed.design.question.equivalents(coefficients)
+    drag = drag if fixed.stochastic else fixed.fixed_drag
     outputs = {**_OUTPUTS, "velocity": "payload.velocity"}
     signals = tuple(outputs.values())
-    slopes = LoopSlopes(fixed, drag, signals, assessment.quadrature(signals))
+    nodes = assessment.quadrature(signals)
+    slopes = LoopSlopes(fixed, coefficients, drag, friction, signals, nodes)
     known: list[tuple[str, float, str, str]] = []  # paths, values, units, sides
     steps: list[str] = []
     numbers = [n for n in numbers_of(fixed.case) if only is None or n.path == only]
@@ -113,15 +118,29 @@ def _first(
     sigmas, heights = slopes.figures(peaks)
     figures = {name: float(np.exp(sigmas[output].value[0])) for name, output in _OUTPUTS.items()}
     figures["max_sensitivity"] = assessment.max_sensitivity
-    # By every variable, and last by the drag; then with the drag that moves along.
+    # By every variable, and last by drag and friction; then with these two moving along.
     own = {name: sigmas[output].slope[:, 0] for name, output in outputs.items()}
-    moved = np.zeros(len(known))
+    moved = np.zeros((2, len(known)))
     if fixed.stochastic:
-        velocity, of_drag = own["velocity"][:-1], own["velocity"][-1]
-        moved = drag * (velocity + slopes.quadratic_drag()) / (1.0 - drag * of_drag)
+        velocity, of_drag = own["velocity"][:-2], own["velocity"][-2]
+        moved[0] = drag * (velocity + slopes.quadratic_drag()) / (1.0 - drag * of_drag)
+    if friction > 0.0:
+        torque, by_torque = slopes.losses()
+        # d ln b = d ln Delta - sigma^2/(sigma^2 + turn^2) d ln sigma, of the capped gain.
+        share = 1.0 - (friction / torque) ** 2  # [(rad/s)^2], of omega_0 = 1 rad/s
+        speed = own["speed_rms"]
+        matrix = np.eye(2)
+        matrix[1] += friction * share * speed[-2:]
+        right = np.array(
+            [np.zeros(len(known)), friction * (by_torque / torque - share * speed[:-2])]
+        )
+        if fixed.stochastic:
+            matrix[0] -= drag * own["velocity"][-2:]
+            right[0] = drag * (own["velocity"][:-2] + slopes.quadratic_drag())
+        moved = np.linalg.solve(matrix, right)
     scale = np.array([value for _, value, _, _ in known])
-    whole = {name: scale * (own[name][:-1] + own[name][-1] * moved) for name in _OUTPUTS}
-    of_peaks = scale * (heights.slope[:-1, 0].T + heights.slope[-1, 0][:, None] * moved)
+    whole = {name: scale * (own[name][:-2] + own[name][-2:] @ moved) for name in _OUTPUTS}
+    of_peaks = scale * (heights.slope[:-2, 0].T + heights.slope[-2:, 0].T @ moved)
     most = np.abs(of_peaks).argmax(axis=0)
     whole["max_sensitivity"] = of_peaks[most, np.arange(len(known))]
     found, idle = [], []

@@ -14,12 +14,11 @@ from functools import cached_property
 from models.basics import InputError, SolverError
 from models.case import Case
 from models.hook import HookMotion
-from models.plant import LinearPlant, PlantData
-from models.sensing import sensed_plant
+from models.plant import LinearPlant, PlantData, build_plant
 
 from ..design import Design
-from ..loop import Assessment, DragElement, disturbances
-from ..question import heard_spectra
+from ..loop import Assessment, Coefficients, Element, disturbances
+from ..question import equivalent_elements, heard_spectra, loaded_plant
 from ..structures import ParametrisedController
 from .fields import numbers_of
 
@@ -34,14 +33,15 @@ class FixedDesign:
         The design, whose structure stays bound to the plant that it was made for.
     case, values
         The case that the figures hold for, and the structure's parameters.
-    drag
-        The linear drag coefficient [N s/m], where it is known: on the unchanged case.
+    known
+        Coefficients of the elements that are linearised with the response, where they are known:
+        on the unchanged case.
     """
 
     design: Design
     case: Case
     values: tuple[float, ...]
-    drag: float | None
+    known: Coefficients | None
 
     @classmethod
     def of(cls, design: Design) -> FixedDesign:
@@ -51,7 +51,7 @@ class FixedDesign:
             design=design,
             case=design.sea_case,
             values=tuple(question.values(design.parameters)),
-            drag=design.drag if question.drag is not None else None,
+            known=question.coefficients_of(design.drag, design.friction),
         )
 
     @property
@@ -86,13 +86,13 @@ class FixedDesign:
         shaken = shaken or self.case
         hook = HookMotion.from_case(shaken, warn=False)
         spectra = heard_spectra(shaken, hook, self.design.measurements)
-        plant, drag = self._plant
+        plant, elements = self._plant
         assessment = Assessment(
             plant,
             self.law.controller(list(self.values)),
             disturbances(spectra, tuple(spectra)),
-            drag=drag,
-            coefficient=self.drag,
+            elements=elements,
+            coefficients=self.known,
         )
         try:
             return assessment if assessment.stable else None
@@ -100,15 +100,15 @@ class FixedDesign:
             return None  # no drag agrees: unstable with any
 
     @cached_property
-    def _plant(self) -> tuple[LinearPlant, DragElement | None]:
-        """The plant, and its quadratic drag where that is linearised with the response."""
-        stochastic = self.stochastic
+    def _plant(self) -> tuple[LinearPlant, tuple[Element, ...]]:
+        """The plant, and what of it is linearised with the response."""
         # Where a consistent drag is counted from: that before compensation.
-        start = self.design.question.drag_before if stochastic else self.fixed_drag
-        plant = sensed_plant(self.case, masses=self.design.masses, drag=start)
-        quadratic = PlantData.from_case(self.case).quadratic_drag
-        drag = DragElement(quadratic=quadratic, reference=start) if stochastic else None
-        return plant.select(measurements=self.design.measurements), drag
+        start = self.design.question.drag_before if self.stochastic else self.fixed_drag
+        data = PlantData.from_case(self.case)
+        model = build_plant(data, self.design.masses)
+        plant = loaded_plant(self.case, data, model, start, self.design.measurements)
+        hook = HookMotion.from_case(self.case, warn=False)
+        return plant, equivalent_elements(self.case, data, hook, plant, start)
 
     def with_number(self, path: str, factor: float) -> FixedDesign | None:
         """Return the same design with a number of its case, or a gain, times a factor.
@@ -126,7 +126,7 @@ class FixedDesign:
                 raise InputError(f"sensitivity: there is no gain {gain!r}; there are: {self.names}")
             pairs = zip(self.names, self.values, strict=True)
             values = (value * factor if gain in (name, "A") else value for name, value in pairs)
-            return replace(self, values=tuple(values), drag=None)
+            return replace(self, values=tuple(values), known=None)
         number = next((n for n in numbers_of(self.case) if n.path == path), None)
         if number is None:
             raise InputError(f"sensitivity: there is no number {path!r} in the case")
@@ -134,4 +134,4 @@ class FixedDesign:
             case = self.case.variant(number.change(number.value * factor))
         except InputError:
             return None
-        return replace(self, case=case, drag=None)
+        return replace(self, case=case, known=None)

@@ -26,8 +26,8 @@ from models.case import Case
 from models.hook import HookMotion
 from models.plant import lump_rope
 
-from ..loop import Dual
-from ..sweeps import columns_of, dual_figures
+from ..loop import Coefficients, Dual
+from ..sweeps import at_rest, columns_of, dual_figures
 from .differences import derivative, sided_derivatives
 from .fields import Number
 from .fixed_design import FixedDesign
@@ -42,8 +42,10 @@ class LoopSlopes:
     ----------
     fixed
         The design on its case.
-    drag
-        The linear drag coefficient in its loop [N s/m].
+    known
+        The coefficients of the elements in its loop, as `FixedDesign.known`.
+    drag, friction
+        The same as linear drag [N s/m] and friction of losses [N m s/rad].
     outputs
         The signals whose standard deviations are figures.
     nodes
@@ -51,12 +53,19 @@ class LoopSlopes:
     """
 
     def __init__(
-        self, fixed: FixedDesign, drag: float, outputs: Sequence[str], nodes: Quadrature
+        self,
+        fixed: FixedDesign,
+        known: Coefficients,
+        drag: float,
+        friction: float,
+        outputs: Sequence[str],
+        nodes: Quadrature,
     ) -> None:
-        self._fixed, self._drag, self._outputs, self._nodes = fixed, drag, tuple(outputs), nodes
-        self._numbers = columns_of(fixed.case)
+        self._fixed, self._outputs, self._nodes = fixed, tuple(outputs), nodes
+        self._drag, self._friction = drag, friction
+        self._numbers = {**columns_of(fixed.case), "friction": np.array([friction])}
         self._there = [name for name, value in self._numbers.items() if np.isfinite(value[0])]
-        self._still = replace(fixed, drag=drag)  # the loop, in whatever sea
+        self._still = replace(fixed, known=known)  # the loop, in whatever sea
         # One row for every variable.
         self._of_numbers: list[FloatArray] = []
         self._of_motion: list[FloatArray] = []  # of ln sigma of the outputs
@@ -80,7 +89,8 @@ class LoopSlopes:
 
         def numbers(value: float) -> FloatArray:
             columns = columns_of(changed(case, number, value))
-            return np.concatenate([columns[name] for name in self._there])
+            columns["losses"] = at_rest(columns)[1]["motor.torque"]
+            return np.concatenate([columns[name] for name in [*self._there, "losses"]])
 
         own = np.asarray(derivative(numbers, number.value), dtype=np.float64)
         no_gain = np.zeros(len(self._fixed.values))
@@ -101,20 +111,22 @@ class LoopSlopes:
         """Add a parameter of the controller."""
         unit = np.zeros(len(self._fixed.values))
         unit[index] = 1.0
-        self._add(np.zeros(len(self._there)), np.zeros(len(self._outputs)), unit)
+        self._add(np.zeros(len(self._there) + 1), np.zeros(len(self._outputs)), unit)
 
     def figures(self, peaks: FloatArray) -> tuple[Mapping[str, Dual], Dual]:
         """Return ln sigma of the outputs, (1,), and ln |S| at frequencies [rad/s], (1, p).
 
-        Their slopes are by the variables added, in that order, and by the drag coefficient where
+        Their slopes are by the variables added, in that order, and by drag and friction where
         nothing else moves.
         """
         fixed = self._fixed
-        by_name = dict(zip(self._there, np.array(self._of_numbers).T, strict=True))
+        by_name = dict(zip([*self._there, "losses"], np.array(self._of_numbers).T, strict=True))
         numbers = {
             name: _dual(value, by_name[name]) if name in by_name else value
             for name, value in self._numbers.items()
         }
+        more = np.zeros(len(self._of_numbers))
+        numbers["friction"] = Dual(self._numbers["friction"], np.append(more, [0.0, 1.0])[:, None])
         drag_slope = by_name.get("fixed_drag", np.zeros(len(self._of_numbers)))
         gains = np.array(self._of_gains).T
         hook = HookMotion.from_case(fixed.case, warn=False)
@@ -123,14 +135,14 @@ class LoopSlopes:
             fixed.law,
             fixed.design.measurements,
             [_dual(np.array([v]), own) for v, own in zip(fixed.values, gains, strict=True)],
-            Dual(np.array([self._drag]), np.append(drag_slope, 1.0)[:, None]),
+            Dual(np.array([self._drag]), np.append(drag_slope, [1.0, 0.0])[:, None]),
             lumps=lump_rope(fixed.design.masses, fixed.case.rope.lumping),
             nodes=self._nodes,
             density=hook.density(self._nodes.omega)[None],
             outputs=self._outputs,
             peaks=peaks,
         )
-        moved = np.vstack([*self._of_motion, np.zeros(len(self._outputs))])[:, :, None]
+        moved = np.vstack([*self._of_motion, np.zeros((2, len(self._outputs)))])[:, :, None]
         return {
             name: Dual(sigmas[name].value, sigmas[name].slope + moved[:, k])
             for k, name in enumerate(self._outputs)
@@ -139,7 +151,13 @@ class LoopSlopes:
     def quadratic_drag(self) -> FloatArray:
         """Return the slopes of ln q, q of the drag force q |v| v, by the variables added, (n,)."""
         at = self._there.index("quadratic_drag")
-        return np.array([own[at] for own in self._of_numbers]) / self._numbers["quadratic_drag"]
+        slopes = np.array([own[at] for own in self._of_numbers])
+        return np.asarray(slopes / self._numbers["quadratic_drag"])
+
+    def losses(self) -> tuple[float, FloatArray]:
+        """Return the losses [N m], and their slopes by the variables added, (n,)."""
+        torque = float(at_rest(self._numbers)[1]["motor.torque"][0])
+        return torque, np.array([own[-1] for own in self._of_numbers])
 
     def _add(self, numbers: FloatArray, motion: FloatArray, gains: FloatArray) -> None:
         self._of_numbers.append(numbers)
@@ -159,5 +177,5 @@ def changed(case: Case, number: Number, value: float) -> Case:
 
 
 def _dual(value: FloatArray, slopes: FloatArray) -> Any:
-    """Return a number, (1,), with its slopes by the variables and by the drag, if it has any."""
-    return Dual(value, np.append(slopes, 0.0)[:, None]) if slopes.any() else value
+    """Return a number, (1,), with its slopes by variables, drag and friction, if it has any."""
+    return Dual(value, np.append(slopes, [0.0, 0.0])[:, None]) if slopes.any() else value

@@ -19,7 +19,7 @@ from models.case import Case
 
 from ..design import Design, Tuning, design_of, tuning_of, verified
 from ..limits import drive_limits
-from ..loop import Assessment
+from ..loop import Assessment, Coefficients
 from ..question import PAYLOAD, DesignQuestion, Goal, Problem, pose
 from ..search import (
     KEPT,
@@ -126,7 +126,7 @@ def follow(
     *,
     goal: Goal = Goal.COST,
     relaxed: Sequence[str] = (),
-    coefficient: float | None = None,
+    coefficients: Coefficients | None = None,
 ) -> Answer | None:
     """Return the optimum of a problem from starts close to it, or None if none arrives.
 
@@ -139,20 +139,20 @@ def follow(
         left out.
     goal, relaxed
         See `synth.search.Programme`.
-    coefficient
-        Drag coefficient of starts that are no answers [N s/m].
+    coefficients
+        Of the elements, for starts that are no answers.
     """
-    drag = None if problem.drag is None else coefficient or problem.drag.reference
+    known = tuple(coefficients or problem.begin)
     starts = [
         (b.carried(problem), b.solved.coefficient, b.solved.extra)
         if isinstance(b, Answer)
-        else (b, drag, 0.0)
+        else (b, known, 0.0)
         for b in begins
     ]
     stable = [s for s in starts if problem.stable(s[0], s[1])]
     if not stable and starts:
         fresh = begin_points(problem, _FRESH, 0, [values for values, _, _ in starts])
-        stable = [(values, drag, 0.0) for values in fresh]
+        stable = [(values, known, 0.0) for values in fresh]
     found = [_arrived(problem, *start, goal, relaxed) for start in stable]
     arrived = (answer for answer in found if answer is not None)
     return min(arrived, key=lambda answer: answer.solved.objective, default=None)
@@ -161,7 +161,7 @@ def follow(
 def _arrived(
     problem: Problem,
     begin: FloatArray,
-    coefficient: float | None,
+    coefficients: Coefficients,
     extra: float,
     goal: Goal,
     relaxed: Sequence[str],
@@ -169,7 +169,7 @@ def _arrived(
     solved = settle(
         problem,
         begin,
-        (coefficient,),
+        (coefficients,),
         goal,
         reference=begin,
         relaxed=relaxed,
@@ -196,8 +196,8 @@ def answer_of(design: Design) -> Answer | None:
     if design.drive_kept and design.feasible:
         problem = asked_by(design.case, question)
     values = np.array([design.parameters[p.name] for p in problem.law.parameters])
-    drag = design.drag if problem.drag is not None else None
-    return follow(problem, [problem.law.clipped(values)], coefficient=drag)
+    known = question.coefficients_of(design.drag, design.friction)
+    return follow(problem, [problem.law.clipped(values)], coefficients=known)
 
 
 def designed(

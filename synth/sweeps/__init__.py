@@ -14,6 +14,6 @@ if TYPE_CHECKING:
     from .dual_loop import dual_figures
     from .frequency import FrequencyEngine, frequency_sweep
     from .metrics import METRICS
-    from .numbers import columns_of
+    from .numbers import at_rest, columns_of
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -29,6 +29,7 @@ Nothing is divided by what may be zero: but for the controller's own poles, whic
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -46,7 +47,7 @@ from .numbers import BRANCH_GAINS, BRANCH_TIMES, Numbers, at_rows, part_of
 from .sweep_nodes import SweepNodes
 
 BLOCK = 12_000  # numbers of an array at once: the half dozen in use stay in the cache
-VELOCITY = "payload.velocity"
+VELOCITY, SPEED = "payload.velocity", "motor.speed"
 
 Pair = tuple[str, str]
 # Coefficients of y, of f and of 1 in the numerator of an output over `closed`; None for zero.
@@ -125,9 +126,10 @@ class ChainLoops:
             drag=part_of(self.drag, index),
         )
 
-    def with_drag(self, drag: FloatArray) -> ChainLoops:
-        """Return the loops with other drag [N s/m]."""
-        return replace(self, drag=drag)
+    def with_drag(self, drag: FloatArray, friction: FloatArray | None = None) -> ChainLoops:
+        """Return the loops with other drag [N s/m] and friction of losses [N m s/rad]."""
+        numbers = self.numbers if friction is None else {**self.numbers, "friction": friction}
+        return replace(self, drag=drag, numbers=numbers)
 
     def responses(self, rows: IndexArray, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Return closed and open characteristic functions of some loops, (m, k) each.
@@ -181,6 +183,10 @@ class Chain:
         self._inertial = self._own("inertia") * (s * s) + self._own("viscous_friction") * s
         self._back = self._own("beta") * s
         e = 1.0 + s * self._own("lag")
+        # Losses act on the shaft; signals of the drive are told without what they take.
+        self.friction = self._own("friction")
+        if np.any(value_of(self.friction)):
+            self._back = self._back + self.friction * s * e
         self.W = self._inertial * e + self._back
         self.pull = (self._own("load") * h) * e
         self.drive = h * phi
@@ -466,6 +472,15 @@ class Chain:
             command=(W * H, self.pull * asks - W * self.E, -W * self.G),
         )
 
+    def with_friction(self, friction: FloatArray) -> Chain:
+        """Return the same loops with other friction of losses, (m,) [N m s/rad]."""
+        found, lag = copy(self), 1.0 + self.s * self._own("lag")
+        found.friction = friction[:, None]
+        found._back = self._own("beta") * self.s + found.friction * self.s * lag
+        found.W = self._inertial * lag + found._back
+        found._of_y = found.W + self.drive * self.D
+        return found
+
     def _of_noise(self) -> Mapping[str, Numerator]:
         """Return the numerators of outputs over `closed`, for noise on the command."""
         phi = self._own("phi")
@@ -479,6 +494,12 @@ class Chain:
     def _numerators(
         self, *, payload: ComplexArray, turn: Numerator, torque: Numerator, command: Numerator
     ) -> Mapping[str, Numerator]:
+        voltage = command
+        if np.any(value_of(self.friction)):
+            taken = self._own("resistance") / self._own("torque_constant") * self.friction
+            pairs = zip(command, _times(-taken * self.s, turn), strict=True)
+            a, b, c = (x if y is None else y if x is None else x + y for x, y in pairs)
+            voltage = a, b, c
         return {
             "payload.displacement": (None, None, payload),
             VELOCITY: (None, None, self.s * payload),
@@ -487,7 +508,7 @@ class Chain:
             "motor.torque": torque,
             "motor.current": _times(1.0 / self._own("torque_constant"), torque),
             "drive.command": command,
-            "motor.voltage": command,
+            "motor.voltage": voltage,
             "rope.tension": (None, self._own("reeved") * payload, None),
         }
 

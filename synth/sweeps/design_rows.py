@@ -29,11 +29,12 @@ from models.plant import lump_rope
 from models.sensing import DRIFT_BAND, sensed_plant
 from models.spread import Spread
 
+from ..loop import switching_friction
 from ..question import DesignQuestion, SampledNoise
-from .chain import BLOCK, VELOCITY, Chain, ChainLoops, Pair, Shaken
+from .chain import BLOCK, SPEED, VELOCITY, Chain, ChainLoops, Pair, Shaken
 from .kernel import SpringLoops
 from .law_rows import DesignLaw
-from .numbers import NOISE_OF, at_rest, numbers_of
+from .numbers import NOISE_OF, at_rest, numbers_of, part_of
 from .sea_rows import SeaRows
 from .sweep_nodes import Panel, SweepNodes, halved, sweep_nodes, sweep_panels
 from .winding_count import calming_drag, light_poles, survey
@@ -50,6 +51,7 @@ _AT_ONCE = 2000  # rows of one pass where each has a density of its own, or fine
 _EDGE = 1.0 + 1e-6  # drag over the least that is stable, up to which a loop counts as unstable
 _LAST = 1e-3  # difference of two rules that is told where no finer nodes are left
 _DRAG_ROUNDS = 60
+_LOSS_ROUNDS, _LOSS_AGREES = 30, 1e-9  # of the friction of losses beside the drag
 _AGREES = 3e-13  # of the logarithm of C
 _CLOSE = 1e-10  # ... and what will do
 _STEP = 1.5  # of it, at most
@@ -63,8 +65,8 @@ class SolvedRows:
     at_rest, loss
         What holding the load takes, and what losses that switch with the direction carry it to
         either side of that, by output, (n,) or (1,).
-    drag
-        Linear drag coefficient, (n,) [N s/m].
+    drag, friction
+        Linear drag coefficient, (n,) [N s/m]; friction of losses that switch, (n,) [N m s/rad].
     heave
         Standard deviation of the hook's heave, (n,) [m].
     stable
@@ -88,6 +90,7 @@ class SolvedRows:
     ) -> None:
         count, (self.at_rest, self.loss) = len(loops), at_rest(loops.numbers)
         self.drag, self.heave = np.full(count, np.nan), np.full(count, np.nan)
+        self.friction = np.zeros(count)
         self.stable = np.zeros(count, dtype=bool)
         self.peak = np.full(count, np.nan)
         self.moments = {name: np.full((count, k, rules), np.nan) for name, k in orders.items()}
@@ -117,6 +120,7 @@ class SolvedRows:
     def put(self, at: IndexArray, other: SolvedRows) -> None:
         """Take over some rows' numbers, of the rule that counts."""
         self.drag[at], self.heave[at] = other.drag, other.heave
+        self.friction[at] = other.friction
         self.stable[at], self.peak[at] = other.stable, other.peak
         for name, column in other.moments.items():
             self.moments[name][at] = column[:, :, :1]
@@ -189,9 +193,11 @@ class DesignRows:
         self.columns: bool | None = None  # whether column arithmetic suffices
         self.refined = 0  # rows that needed finer nodes
         self.unresolved = 0  # ... and those that none of them resolved
-        consistent = bool(np.isnan(self._loops(self._pilots).drag).any())
-        # The drag agrees with the velocity.
-        wanted = [*outputs, *([VELOCITY] * consistent)]
+        pilots = self._loops(self._pilots)
+        consistent = bool(np.isnan(pilots.drag).any())
+        self._losses = bool(np.any(at_rest(pilots.numbers)[1]["motor.torque"] > 0.0))
+        # Drag and losses agree with the speeds.
+        wanted = [*outputs, *([VELOCITY] * consistent), *([SPEED] * self._losses)]
         self._orders = {name: 2 if name in second else 1 for name in wanted}
         self._peaks, self._start = peaks, start
         # A variance whose largest is asked for hangs on the signs of the reference unit's errors.
@@ -204,7 +210,9 @@ class DesignRows:
             path.endswith(("delay", "latency", "rate")) for path in spread.paths
         )
         three = question.structure.name == "payload-feedback"
-        alone = self.lumps.masses.size == 1 and not (delayed or consistent or self._noisy)
+        alone = self.lumps.masses.size == 1 and not (
+            delayed or consistent or self._noisy or self._losses
+        )
         alone = alone and case.crane.tip_stiffness is None and case.rigging.stiffness is None
         alone = alone and not self._pairs
         self.spring = alone and three and case.rope.damping_law == "kelvin-voigt"
@@ -243,7 +251,7 @@ class DesignRows:
         for k in at:  # at the very edge of stability: nodes that know the loop's own poles
             one = np.array([k])
             own = loops.part(one)
-            nodes = self._closely(own.with_drag(_sound(solved.drag[one])))
+            nodes = self._closely(own.with_drag(_sound(solved.drag[one]), solved.friction[one]))
             found = self._solved(rows[one], own, nodes)
             solved.put(one, found)
             self.unresolved += self._doubt(found, _LEVELS).size
@@ -255,8 +263,8 @@ class DesignRows:
     def loop_gain(self, rows: FloatArray, omega: FloatArray) -> ComplexArray:
         """Return L(i omega) of rows, (n, k), at frequencies above zero [rad/s]."""
         loops = self._loops(rows)
-        drag = self._solved(rows, loops, self.level_nodes()).drag
-        loops = loops.with_drag(_sound(drag))
+        found = self._solved(rows, loops, self.level_nodes())
+        loops = loops.with_drag(_sound(found.drag), found.friction)
         s = np.asarray(1j * omega, dtype=np.complex128)
         closed, free = loops.responses(np.arange(len(rows)), s)
         return np.asarray(closed / free - 1.0)
@@ -377,17 +385,27 @@ class DesignRows:
         if alone:
             return found
         # Whether a chain is stable costs more than its variance: it is asked at the answer first.
-        settled = loops.with_drag(_sound(found.drag))
-        count, found.peak[:] = survey(settled, peaks=self._peaks)
+        count, found.peak[:] = self._surveyed(loops, found, at)
         again = np.flatnonzero(free & (count != 0))
         if again.size:
             edge = np.zeros(at.size)
             edge[again] = calming_drag(loops.part(again))
             self._settle(loops, again, nodes, shaken, edge, found, free)
-            settled = loops.with_drag(_sound(found.drag))
-            count[again], found.peak[again] = survey(settled, again, peaks=self._peaks)
+            count[again], found.peak[again] = self._surveyed(loops, found, again)
         found.stable[:] = np.isfinite(found.drag) & (count == 0)
         return found
+
+    def _surveyed(
+        self, loops: ChainLoops, found: SolvedRows, chosen: IndexArray
+    ) -> tuple[IndexArray, FloatArray]:
+        """Return unstable poles and M_s of chosen loops, (m,) each, with losses or without."""
+        drag = _sound(found.drag)
+        count, peak = survey(loops.with_drag(drag), chosen, peaks=self._peaks)
+        if not self._losses:
+            return count, peak
+        with_losses = loops.with_drag(drag, found.friction)
+        other = survey(with_losses, chosen, peaks=self._peaks)
+        return np.maximum(count, other[0]), np.maximum(peak, other[1])
 
     def _settle(
         self,
@@ -406,12 +424,24 @@ class DesignRows:
         for at in range(0, chosen.size, step):
             rows = chosen[at : at + step]
             chain = Chain(loops, rows, s)
-            if free[rows].any():
-                velocity = _velocity_of(chain.velocity_of_drag(nodes, shaken), edge[rows])
-                agreed = _agreeing_drag(quadratic[rows], self._start, velocity)
-                # At the very edge the motion that calms a loop is that of its own instability.
-                agreed = np.where(agreed <= _EDGE * edge[rows], np.inf, agreed)
-                found.drag[rows] = np.where(free[rows], agreed, found.drag[rows])
+            for _ in range(_LOSS_ROUNDS if self._losses else 1):
+                if self._losses:
+                    chain = chain.with_friction(found.friction[rows])
+                if free[rows].any():
+                    velocity = _velocity_of(chain.velocity_of_drag(nodes, shaken), edge[rows])
+                    agreed = _agreeing_drag(quadratic[rows], self._start, velocity)
+                    # At the very edge the motion that calms a loop is of its own instability.
+                    agreed = np.where(agreed <= _EDGE * edge[rows], np.inf, agreed)
+                    found.drag[rows] = np.where(free[rows], agreed, found.drag[rows])
+                if not self._losses:
+                    break
+                drag = _sound(found.drag[rows])
+                speed = chain.moments([SPEED], nodes, shaken, drag)[SPEED][:, 0]
+                before, torque = found.friction[rows], found.loss["motor.torque"]
+                known = switching_friction(part_of(torque, rows), speed)
+                found.friction[rows] = known
+                if np.all(np.abs(known - before) <= _LOSS_AGREES * known):
+                    break
             if self._orders:
                 moments = chain.moments(self._orders, nodes, shaken, _sound(found.drag[rows]))
                 for name, column in moments.items():

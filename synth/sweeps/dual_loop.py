@@ -15,7 +15,7 @@ import numpy as np
 from models.basics import FloatArray, Quadrature
 from models.plant import RopeLumps
 
-from ..loop import Dual, log, sqrt
+from ..loop import Dual, log, sqrt, value_of, where
 from ..structures import ParametrisedController
 from .chain import Chain, ChainLoops, Shaken, abs2
 from .law_rows import LawColumns
@@ -38,7 +38,8 @@ def dual_figures(
 ) -> tuple[Mapping[str, Dual], Dual]:
     """Return ln sigma of each output, (1,), and ln |S| at some frequencies, (1, p).
 
-    All that is `Any`, and the numbers, may be arrays or `Dual`.
+    |S| is the larger one of that with the losses and without.  All that is `Any`, and the numbers,
+    may be arrays or `Dual`.
 
     Parameters
     ----------
@@ -66,14 +67,19 @@ def dual_figures(
     loops = ChainLoops(count=1, numbers=numbers, law=own, drag=drag, lumps=lumps)
     row = np.zeros(1, dtype=np.intp)
     s = [np.asarray(1j * omega, dtype=np.complex128) for omega in (nodes.omega, peaks)]
-    along, at_peaks = (Chain(loops, row, points) for points in s)
+    along = Chain(loops, row, s[0])
+    sides = [loops]
+    if np.any(value_of(numbers["friction"])):
+        sides.append(loops.with_drag(drag, np.zeros(1)))
     shaken = Shaken(
         factors=np.ones(1), ratios=density, heave_rms=sqrt(density @ nodes.weights), noisy=True
     )
     moments = along.moments(outputs, SweepNodes.of(nodes, np.ones_like), shaken, drag)
-    y, f = at_peaks.ends(drag[:, None])
-    free = at_peaks.W * y + at_peaks.pull * f
-    return (
-        {name: 0.5 * log(both[..., 0]) for name, both in moments.items()},
-        0.5 * (log(abs2(free)) - log(abs2(at_peaks.closed(y, f)))),
-    )
+    heights: Any = None
+    for side in sides:
+        at_peaks = Chain(side, row, s[1])
+        y, f = at_peaks.ends(drag[:, None])
+        free = at_peaks.W * y + at_peaks.pull * f
+        own = 0.5 * (log(abs2(free)) - log(abs2(at_peaks.closed(y, f))))
+        heights = own if heights is None else where(value_of(own) > value_of(heights), own, heights)
+    return {name: 0.5 * log(both[..., 0]) for name, both in moments.items()}, heights

@@ -94,6 +94,7 @@ def columns_of(case: Case) -> dict[str, FloatArray]:
     * ``damping_time``, ``slow`` and the gains and times [s] of its branches: the rope's EA(s)/EA,
       by `PlantData.damping_time` and `PlantData.branches`;
     * ``fixed_drag``: linear drag coefficient [N s/m]; NaN where it agrees with the response;
+    * ``friction``: what losses that switch come to, zero before it is found [N m s/rad];
     * the sensors' numbers; NaN where there is no such sensor;
     * ``noise_passes``: 1 where noise of the payload's signals passes their low-passes, else 0.
     """
@@ -113,7 +114,7 @@ def columns_of(case: Case) -> dict[str, FloatArray]:
         # Without a speed regulator the command is the torque itself.
         phi = np.where(np.asarray(beta) > 0.0, beta, 1.0)
     found |= {"phi": phi, "beta": beta, "lag": lag, "switches": float(data.switching)}
-    found |= {**_rope(data), "fixed_drag": math.nan if drag is None else drag}
+    found |= {**_rope(data), "fixed_drag": math.nan if drag is None else drag, "friction": 0.0}
     found["noise_passes"] = float(case.sensors.payload.noise_enters == "before-filter")
     for name, path in _SENSED.items():
         value: Any = case

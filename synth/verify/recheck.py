@@ -143,6 +143,8 @@ class CheckedLoop(Loop):
         What is demanded of it, by name.
     own
         Outputs whose variances are wanted besides.
+    still
+        The loop without losses that switch, whose margins count too; None where it has none.
     members
         The same with each combination of signs of the reference unit's errors, where it has some.
     """
@@ -150,6 +152,7 @@ class CheckedLoop(Loop):
     sources: Sequence[SpectralSource]
     demands: Mapping[str, Demand]
     own: Iterable[str]
+    still: CheckedLoop | None = None
     members: Sequence[CheckedLoop] = ()
 
     @classmethod
@@ -188,7 +191,9 @@ class CheckedLoop(Loop):
     def margins(self) -> CurveMargins:
         """Its margins, root by root: the worst over all loops broken at an input."""
         count = len(self.plant.inputs)
-        pieces = (curve_margins(self.broken(i), self.marks) for i in range(count))
+        pieces = [curve_margins(self.broken(i), self.marks) for i in range(count)]
+        if self.still is not None:
+            pieces.append(self.still.margins)
         return reduce(CurveMargins.worse, pieces)
 
     @cached_property
@@ -233,6 +238,9 @@ class CheckedLoop(Loop):
         """Return what the loop makes of a demand, with the worst signs of the unit's errors."""
         each = self.members if demand.orders and self.members else (self,)
         found = [demand.measured(one, self.margins, self.region, one.moments) for one in each]
+        if self.still is not None and not demand.orders:
+            still = self.still
+            found.append(demand.measured(still, self.margins, still.region, self.moments))
         return min(found) if demand.at_least else max(found)
 
     def margin_checks(self, claimed: object | None) -> list[Check]:

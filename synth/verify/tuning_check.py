@@ -17,7 +17,7 @@ import numpy as np
 from models.basics import SolverError, White, one_thread
 from models.plant import LinearPlant
 
-from .claims import ControllerMatrices, TuningClaims
+from .claims import ControllerMatrices, EquivalentElement, TuningClaims
 from .demands import limit_demand
 from .recheck import (
     PADE,
@@ -59,7 +59,7 @@ def verify_tuning(tuning: TuningClaims) -> Verification:
         "parameters": loop.parameters,
         "margins": lambda: loop.checked.margin_checks(tuning.margins),
         "cost": loop.cost,
-        "coefficient": loop.drag,
+        "coefficients": loop.coefficients,
         "limits": loop.limits,
     }
     return looked_at(steps, ": stable with the exact delays")
@@ -74,20 +74,20 @@ class _TunedLoop:
 
     @cached_property
     def plant(self) -> LinearPlant:
-        """The plant with its drag: force = -(C - reference) velocity."""
-        plant, element = self.tuning.problem.plant, self.tuning.problem.drag
-        if element is None or self.tuning.coefficient is None:
-            return plant
-        row = plant.outputs.index(element.velocity)
-        column = plant.disturbances.index(element.force)
-        more = element.reference - self.tuning.coefficient
-        velocity, force = plant.Cz[row], more * plant.E[:, column]
-        return replace(
-            plant,
-            A=plant.A + np.outer(force, velocity),
-            C=plant.C + more * np.outer(plant.F[:, column], velocity),
-            Cz=plant.Cz + more * np.outer(plant.Fz[:, column], velocity),
-        )
+        """The plant with its elements: force = -(c - reference) velocity."""
+        plant, claimed = self.tuning.problem.plant, self.tuning.coefficients
+        for element, coefficient in zip(self.tuning.problem.elements, claimed, strict=False):
+            row = plant.outputs.index(element.velocity)
+            column = plant.disturbances.index(element.force)
+            more = element.reference - coefficient
+            velocity, force = plant.Cz[row], more * plant.E[:, column]
+            plant = replace(
+                plant,
+                A=plant.A + np.outer(force, velocity),
+                C=plant.C + more * np.outer(plant.F[:, column], velocity),
+                Cz=plant.Cz + more * np.outer(plant.Fz[:, column], velocity),
+            )
+        return plant
 
     @cached_property
     def unknown(self) -> dict[str, str]:
@@ -105,7 +105,7 @@ class _TunedLoop:
         asked = self.tuning.problem
         known = [limit for limit in asked.limits if limit.name not in self.unknown]
         demands = {limit.name: limit_demand(limit) for limit in known}
-        own = [*asked.minimise, *([] if asked.drag is None else [asked.drag.velocity])]
+        own = [*asked.minimise, *(element.velocity for element in asked.elements)]
         return CheckedLoop.of(self.plant, self.controller, asked.disturbances, demands, own)
 
     @cached_property
@@ -168,14 +168,23 @@ class _TunedLoop:
         names = [check.name for check in told]
         return [*(check for check in checks if check.name not in names), *told]
 
-    def drag(self) -> list[Check]:
-        element, claimed = self.tuning.problem.drag, self.tuning.coefficient
-        if element is None:
-            return []
-        if claimed is None:
-            return [failure("coefficient", "there is drag but no coefficient is claimed")]
-        needed = element.quadratic * math.sqrt(8.0 / math.pi) * self.checked.rms(element.velocity)
-        return [agreement("coefficient", claimed, needed, TIGHT, "q sqrt(8/pi) sigma")]
+    def coefficients(self) -> list[Check]:
+        elements, claimed = self.tuning.problem.elements, self.tuning.coefficients
+        if len(elements) != len(claimed):
+            return [failure("coefficients", f"{len(elements)} are asked for, not {len(claimed)}")]
+        note = "by the variance of its velocity"
+        return [
+            agreement(f"coefficients.{e.force}", c, self._needed(e), TIGHT, note)
+            for e, c in zip(elements, claimed, strict=True)
+        ]
+
+    def _needed(self, element: EquivalentElement) -> float:
+        """Return the coefficient that the motion asks for: the mean slope of the force."""
+        sigma = self.checked.rms(element.velocity)
+        slope = getattr(element, "quadratic", None)
+        if slope is not None:
+            return float(slope) * math.sqrt(8.0 / math.pi) * sigma
+        return float(getattr(element, "torque", 0.0)) / math.sqrt(1.0 + 0.5 * math.pi * sigma**2)
 
 
 def _cost(weights: Mapping[str, float], variances: Mapping[str, float]) -> float:

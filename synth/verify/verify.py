@@ -13,6 +13,7 @@ the question, the search or the design is used.  `verify_tuning` does the same f
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -47,6 +48,7 @@ from .verification import Check, Verification, agreement, bounded
 from .winding import count_unstable, open_loop_poles
 
 _GAINS = ("a", "a1", "a2")
+_TORQUE, _SPEED = "motor.torque", "motor.speed"
 _UNDAMPED = 1e-5  # a rope damped less than this has modes without end on the axis
 _MARGINAL = 1e-9  # growth over the size of the fastest pole that is none
 _DECAY = 1e-7  # slowest decay that counts as stable [1/s]: a time constant of four months
@@ -165,42 +167,49 @@ class _Winch:
             return "the case's own one-spring rope"
         return f"a rope of {self.more_masses} masses (undamped, so its modes have no end)"
 
-    def _plant(self, masses: int, drag: float | None = None) -> LinearPlant:
+    def _plant(self, masses: int, friction: float, drag: float | None = None) -> LinearPlant:
         drag = self.design.drag if drag is None else drag
-        plant = sensed_plant(self.design.case, masses=masses, drag=drag)
+        plant = sensed_plant(self.design.case, masses=masses, drag=drag, friction=friction)
         return plant.select(measurements=self.design.controller.measurements)
 
-    def _line(self, s: ComplexArray) -> PlantResponse:
-        line = sensed_line_at(self.design.case, s, drag=self.design.drag, data=self.data)
+    def _line(self, friction: float, s: ComplexArray) -> PlantResponse:
+        line = sensed_line_at(
+            self.design.case, s, drag=self.design.drag, friction=friction, data=self.data
+        )
         return line.select(measurements=self.design.controller.measurements)
 
     @cached_property
     def coarse_plant(self) -> LinearPlant:
         """The design's plant."""
-        return self._plant(self.design.masses)
+        return self._plant(self.design.masses, self.design.friction)
+
+    def _loop(self, masses: int, own: Iterable[str], *, rope: bool) -> CheckedLoop:
+        """Return the loop on some rope masses, or on the rope itself, without losses beside it."""
+        found: CheckedLoop | None = None
+        for friction in (0.0, self.design.friction) if self.design.friction else (0.0,):
+            plant = self._plant(masses, friction)
+            exact = partial(self._line, friction) if rope else None
+            controller, still = self.design.controller, found
+            found = CheckedLoop.of(plant, controller, self.sources, self.demands, own, exact)
+            found = replace(found, still=still)
+            if exact is not None:
+                # A mode with hardly any damping is narrower than its place on masses is off by.
+                begins = np.concatenate([found.marks, self.data.damped_modes(_HELD_MODES)])
+                near = roots_near(partial(_near_pole, found), begins[begins.imag > 0.0])
+                found = replace(found, marks=np.concatenate([found.marks, near]))
+        assert found is not None
+        return self._signed(found)
 
     @cached_property
     def coarse(self) -> CheckedLoop:
         """The loop on the design's plant."""
-        own = {PAYLOAD, VELOCITY, *self.design.shares}
-        controller = self.design.controller
-        loop = CheckedLoop.of(self.coarse_plant, controller, self.sources, self.demands, own)
-        return self._signed(loop)
+        own = {PAYLOAD, VELOCITY, _SPEED, *self.design.shares}
+        return self._loop(self.design.masses, own, rope=False)
 
     @cached_property
     def fine(self) -> CheckedLoop:
         """The loop on the distributed rope, or on the best there is in its place."""
-        exact = self._line if self.distributed else None
-        plant = self._plant(self.more_masses)
-        controller = self.design.controller
-        loop = CheckedLoop.of(plant, controller, self.sources, self.demands, [PAYLOAD], exact)
-        loop = self._signed(loop)
-        if exact is None:
-            return loop
-        # A mode with hardly any damping is narrower than what its place on masses is off by.
-        begins = np.concatenate([loop.marks, self.data.damped_modes(_HELD_MODES)])
-        own = roots_near(partial(_near_pole, loop), begins[begins.imag > 0.0])
-        return replace(loop, marks=np.concatenate([loop.marks, own]))
+        return self._loop(self.more_masses, [PAYLOAD], rope=self.distributed)
 
     @cached_property
     def demands(self) -> dict[str, Demand]:
@@ -216,19 +225,26 @@ class _Winch:
         }
 
     def stability(self) -> list[Check]:
-        plant, law = self.fine.plant, self.fine.law
+        found = self._stability(self.fine, self.coarse)
+        if self.fine.still is not None and self.coarse.still is not None:
+            still = self._stability(self.fine.still, self.coarse.still)
+            found += [replace(one, name=f"{one.name} without losses") for one in still]
+        return found
+
+    def _stability(self, on_rope: CheckedLoop, own: CheckedLoop) -> list[Check]:
+        plant, law = on_rope.plant, on_rope.law
         if self.distributed:
             # The rope is damped, so its open loop has no pole right of the axis; the lumped
             # one has the same integrators, and would show an unstable drive.
             poles = np.concatenate([open_loop_poles(plant.A), open_loop_poles(law.A)])
             winding = count_unstable(
-                self.fine.difference,
+                on_rope.difference,
                 poles=poles[(np.abs(poles) == 0.0) | (poles.real > 0.0)],
-                marks=self.fine.marks,
+                marks=on_rope.marks,
                 per_decade=_ROPE_PER_DECADE,
             )
         else:
-            winding = winding_of_plant(plant, law, self.fine.marks)
+            winding = winding_of_plant(plant, law, on_rope.marks)
         spring = self.data.lumping == "thesis"
         coarse, fine = (
             "the one spring" if spring else f"a rope of {masses} masses"
@@ -237,14 +253,17 @@ class _Winch:
         return [
             winding_check(winding, self.yardstick_name),
             pole_check("poles", plant, law, fine, _DECAY),
-            pole_check("poles.design", self.coarse.plant, self.coarse.law, coarse, _DECAY),
+            pole_check("poles.design", own.plant, own.law, coarse, _DECAY),
         ]
 
     def in_a_calm(self) -> list[Check]:
         """Return the check of the poles without drag, which in small motion there is none of."""
         if self.design.case.payload.fixed_drag is not None or self.data.quadratic_drag == 0.0:
             return []
-        plant, fastest = self._plant(self.more_masses, 0.0), float(np.abs(self.fine.marks).max())
+        plant, fastest = (
+            self._plant(self.more_masses, 0.0, 0.0),
+            float(np.abs(self.fine.marks).max()),
+        )
         on = f"a rope of {self.more_masses} masses, without drag"
         check = pole_check("poles.calm", plant, self.fine.law, on, -_MARGINAL * fastest)
         # What is told to swing may do so.
@@ -269,7 +288,14 @@ class _Winch:
         if drag is None:
             drag = self.data.quadratic_drag * math.sqrt(8.0 / math.pi) * self.coarse.rms(VELOCITY)
             note = "[N s/m], q sqrt(8/pi) sigma of the payload's velocity"
+        # The slope of least square error of a switch, tanh(omega) at its steepest.
+        torque, checks = switching_losses(self.design.case).get(_TORQUE, 0.0), []
+        if torque > 0.0 or self.design.friction != 0.0:
+            found = torque / math.sqrt(1.0 + 0.5 * math.pi * self.coarse.rms(_SPEED) ** 2)
+            slope = "[N m s/rad], sqrt(2/pi) Delta over sigma of the motor's speed"
+            checks.append(agreement("friction", self.design.friction, found, TIGHT, slope))
         return [
+            *checks,
             agreement("payload_rms", self.design.payload_rms, rms, _RMS, "[m] by other quadrature"),
             agreement("drag", self.design.drag, drag, TIGHT, note),
         ]
@@ -344,8 +370,13 @@ class _Winch:
         if self.data.lumping != "thesis" or self.data.mass_per_length == 0.0:
             return []
         data = replace(self.data, lumping="distributed", masses=None)
-        drag, sensors = self.design.drag, self.design.case.sensors
-        plant = sensed_plant(data, masses=_MODAL_MASSES, drag=drag, sensors=sensors)
+        plant = sensed_plant(
+            data,
+            masses=_MODAL_MASSES,
+            drag=self.design.drag,
+            friction=self.design.friction,
+            sensors=self.design.case.sensors,
+        )
         plant = plant.select(measurements=self.design.controller.measurements)
         law = LawMatrices.of(self.design.controller, plant)
         check = pole_check("rope modes", plant, law, f"a rope of {_MODAL_MASSES} masses", 0.0)

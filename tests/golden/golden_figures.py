@@ -398,7 +398,7 @@ def structures(found: Figures) -> None:
         posed = pose(structure_case(name, structure), structure)
         controller = posed.controller(parameters)
         problem = posed.problem
-        view = Assessment(posed.plant, controller, problem.disturbances, drag=problem.drag)
+        view = Assessment(posed.plant, controller, problem.disturbances, elements=problem.elements)
         prefix = f"structures.{name}.{structure}"
         found.put(f"{prefix}.payload_rms", view.sigma(PAYLOAD))
         found.put(f"{prefix}.torque_rms", view.sigma("motor.torque"))

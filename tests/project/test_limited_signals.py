@@ -122,8 +122,13 @@ def test_the_warm_view_and_a_sweep_say_the_same(design: Design) -> None:
     ],
 )
 def test_operability_ends_where_the_design_says(design: Design, name: str, path: str) -> None:
-    bound = design.limits[name].value
-    case = design.case.replace({path: bound, "vessel.heading": design.case.vessel.heading})
+    case = design.case
+    if name == "rope.tension.peak":
+        # In seas that hardly move it the drum's losses leave noise more of the rope's tension than
+        # a sea of 2 m makes of it: the limit would be broken from a flat sea on.
+        case = case.replace({"sea.significant_height": 6.0})
+    bound = sh.evaluate_gains(case, design.parameters, structure="combined").limits[name].value
+    case = case.replace({path: bound})
     tight = sh.evaluate_gains(case, design.parameters, structure="combined")
     period, heading = case.sea.spectral_peak_period, case.vessel.heading
     study = operability(tight, periods=[period], headings=[heading])
@@ -167,7 +172,11 @@ def test_losses_as_they_were_before_there_was_a_choice(design: Design) -> None:
     continuous = before.limits["motor.torque.continuous"].value
     assert continuous == pytest.approx(math.hypot(hauled, sigma), rel=1e-7)
     less = design.limits["motor.torque.peak"].value - before.limits["motor.torque.peak"].value
-    assert less == pytest.approx(FRICTION, rel=1e-6)
+    # But for the dry friction that was left out and for what losses as friction make of the motion.
+    exposure = case.limits.equivalent_exposure
+    reach, reached = (d.assessment.peak("motor.torque", exposure) for d in (design, before))
+    assert less - (reach - reached) == pytest.approx(FRICTION, rel=1e-6)
+    assert before.friction == 0.0 < design.friction
     assert before.verification is not None
     assert before.verification.ok, before.verification.status
 

@@ -115,7 +115,9 @@ def test_a_stored_design_does_what_its_row_says(rows, key):
     problem = posed.problem_with(posed.loop)
     controller = posed.law.controller([row.parameters[p.name] for p in posed.law.parameters])
     with one_thread():
-        view = Assessment(problem.plant, controller, problem.disturbances, drag=problem.drag)
+        view = Assessment(
+            problem.plant, controller, problem.disturbances, elements=problem.elements
+        )
         assert view.sigma("payload.displacement") == pytest.approx(row.payload_rms, rel=1e-4)
         assert view.max_sensitivity == pytest.approx(row.max_sensitivity, rel=1e-4)
         law = LawMatrices.of(controller, view.plant)

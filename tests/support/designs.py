@@ -65,7 +65,7 @@ def structure_design(
     """Parameters of a structure as a design, found by nobody and not verified."""
     question = pose(case, structure, masses)
     view = question.assess(parameters)
-    fixed = float(case.payload.fixed_drag or 0.0)
+    drag, friction = question.equivalents(view.coefficients)
     return Design(
         case=case,
         structure=structure,
@@ -80,7 +80,8 @@ def structure_design(
         shares={},
         margins=view.margins if view.stable else None,
         limits={},
-        drag=view.coefficient if question.drag is not None else fixed,
+        drag=drag,
+        friction=friction,
         drag_before=question.drag_before,
         masses=question.masses,
     )

@@ -283,7 +283,7 @@ def test_rms_by_another_quadrature() -> None:
     plant = found.free.plant.select(measurements=design.measurements)
     sources = [s for s in found.free.sources if s.name in plant.disturbances]
     heard = [s for s in sources if not s.name.startswith(("drum.", "motor."))]
-    other = Assessment(plant, design.assessment.controller, heard, coefficient=None)
+    other = Assessment(plant, design.assessment.controller, heard)
     assert other.sigma("payload.displacement") == pytest.approx(found.rms, rel=1e-4)
 
 

@@ -85,7 +85,7 @@ def search_cost(problem, values) -> float:
     from synth.loop import Assessment
 
     controller = problem.law.controller(values)
-    view = Assessment(problem.plant, controller, problem.disturbances, drag=problem.drag)
+    view = Assessment(problem.plant, controller, problem.disturbances, elements=problem.elements)
     return view.sigma("payload.displacement")
 
 

@@ -106,9 +106,9 @@ def test_two_integrators_and_a_slow_pole_have_the_variance_of_lyapunov(slow: flo
 def test_drag_agrees_with_the_motion_that_it_leads_to(delay: float) -> None:
     """C = q sqrt(8/pi) sigma_v(C); without a delay sigma_v^2 = 1/(2 (c + C))."""
     drag = DragElement(quadratic=2.0, velocity="speed", force="f")
-    view = assessed(mass(delay=delay), spring_and_damper(), drag=drag)
-    C = view.coefficient
-    again = assessed(mass(delay=delay), spring_and_damper(), drag=drag, coefficient=C)
+    view = assessed(mass(delay=delay), spring_and_damper(), elements=[drag])
+    (C,) = view.coefficients
+    again = assessed(mass(delay=delay), spring_and_damper(), elements=[drag], coefficients=[C])
     assert pytest.approx(drag.slope * again.sigma("speed"), rel=1e-8) == C
     if not delay:
         assert pytest.approx(drag.slope * np.sqrt(0.5 / (DAMPING + C)), rel=1e-9) == C
@@ -117,8 +117,8 @@ def test_drag_agrees_with_the_motion_that_it_leads_to(delay: float) -> None:
 def test_drag_that_a_loop_needs_to_be_stable_is_found() -> None:
     """Negative damping of 3 N s/m less the controller's: stable only from C = 2.2 on."""
     drag = DragElement(quadratic=2.0, velocity="speed", force="f")
-    view = assessed(mass(damping=-3.0), spring_and_damper(), drag=drag)
-    C = view.coefficient
+    view = assessed(mass(damping=-3.0), spring_and_damper(), elements=[drag])
+    (C,) = view.coefficients
     assert C > 3.0 - DAMPING
     assert pytest.approx(drag.slope * np.sqrt(0.5 / (DAMPING + C - 3.0)), rel=1e-8) == C
     assert view.stable
@@ -128,4 +128,4 @@ def test_loop_that_no_drag_calms_has_none() -> None:
     drag = DragElement(quadratic=2.0, velocity="speed", force="f")
     pushing = LinearController.static([[10.0, 0.0]], ("x", "v"), ("u",))  # a negative spring
     with pytest.raises(SolverError, match="no linear drag coefficient agrees"):
-        assert assessed(mass(), pushing, drag=drag).coefficient
+        assert assessed(mass(), pushing, elements=[drag]).coefficients

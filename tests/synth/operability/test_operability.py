@@ -136,7 +136,11 @@ def test_responses_at_any_drag_are_those_of_the_plant_with_that_drag(C: float, w
     omega = np.array([w])
     base = asked.loop.responses(Quadrature(omega=omega, weights=np.ones(1)))
     view = Assessment(
-        asked.loop.plant, asked.loop.controller, (), drag=asked.loop.drag, coefficient=C
+        asked.loop.plant,
+        asked.loop.controller,
+        (),
+        elements=(asked.loop.drag,),
+        coefficients=[C],
     )
     for k, output in enumerate(base.outputs):
         expected = abs(view.response(output, "hook.heave", omega)[0]) ** 2
@@ -509,7 +513,7 @@ def test_an_unstable_loop_works_in_no_sea() -> None:
         operability(unstable_design(), periods=[8.0])
     asked = pose_operability(dragged(), payload_criteria(dragged().case, rms=1.0))
     assert asked.loop is not None
-    bad = pose(dragged().case).assess({**MILD, "A": -200.0}, 0.0).controller
+    bad = pose(dragged().case).assess({**MILD, "A": -200.0}, [0.0]).controller
     loop = replace(asked.loop, controller=bad)
     assert loop.stable_range == (np.inf, 0.0)
     heights, _ = limiting_heights(

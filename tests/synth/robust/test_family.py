@@ -94,7 +94,9 @@ def test_stacked_loops_agree_where_the_drag_follows_the_response(crane):
     for figures in figures_of(plants, (16.0, 44.0, 6.4), crane.draw(4, seed=2)):
         problem = plants.scenario(figures.member).problem
         controller = problem.law.controller([16.0, 44.0, 6.4])
-        view = Assessment(problem.plant, controller, problem.disturbances, drag=problem.drag)
+        view = Assessment(
+            problem.plant, controller, problem.disturbances, elements=problem.elements
+        )
         assert figures.payload_rms == pytest.approx(view.sigma("payload.displacement"), rel=1e-5)
         assert figures.max_sensitivity == pytest.approx(view.max_sensitivity, rel=1e-4)
         drive = [lim for lim in problem.limits if lim.drive]

@@ -31,7 +31,7 @@ from synth import (
     StaticGain,
     White,
 )
-from synth.loop import Assessment, disturbances
+from synth.loop import Assessment, Element, LossElement, disturbances
 from synth.question import Goal, Problem
 from synth.search import Programme
 from synth.structures import Structure
@@ -55,7 +55,7 @@ def problem(
     structure: Structure,
     limits: tuple[Limit, ...] = (),
     minimise: dict[str, float] | None = None,
-    drag: DragElement | None = None,
+    elements: tuple[Element, ...] = (),
 ) -> Problem:
     noises = {"f": White(1.0), "n": White(0.01), "w": White(1.0), "n1": White(0.01)}
     known = {name: n for name, n in noises.items() if name in plant.independent_disturbances}
@@ -65,23 +65,23 @@ def problem(
         disturbances=disturbances(known, plant.independent_disturbances),
         minimise=minimise or {"x": 1.0, "effort": 0.1},
         limits=limits,
-        drag=drag,
+        elements=elements,
     )
 
 
-def view(question: Problem, values, coefficient: float | None = None) -> Assessment:
+def view(question: Problem, values, known: tuple[float, ...] | None = None) -> Assessment:
     return Assessment(
         question.plant,
         question.law.controller(list(values)),
         question.disturbances,
-        drag=question.drag,
-        coefficient=coefficient,
+        elements=question.elements,
+        coefficients=known,
     )
 
 
 def programme(question: Problem, values, goal: Goal = Goal.COST, **options) -> Programme:
-    coefficient = None if question.drag is None else question.drag.reference
-    nodes = view(question, values, coefficient).quadrature(question.outputs)
+    known = tuple(element.reference for element in question.elements)
+    nodes = view(question, values, known).quadrature(question.outputs)
     return Programme(question, [nodes], [OMEGA], goal, reference=np.array(values), **options)
 
 
@@ -287,8 +287,8 @@ def test_slow_real_pole_is_kept_away_from_zero() -> None:
         assert np.sign(made.evaluate(made.pack(values)).rows[-1]) == sign
 
 
-def test_drag_balances_with_the_motion_at_the_answer() -> None:
-    plant = LinearPlant(
+def damped_mass() -> LinearPlant:
+    return LinearPlant(
         A=[[0.0, 1.0], [-4.0, -0.3]],
         B=[[0.0], [1.0]],
         E=[[0.0], [1.0]],
@@ -299,12 +299,61 @@ def test_drag_balances_with_the_motion_at_the_answer() -> None:
         disturbances=("f",),
         outputs=("x", "v", "effort"),
     )
-    drag = DragElement(quadratic=0.5, velocity="v", force="f", reference=0.3)
-    question = problem(plant, StaticGain(), drag=drag)
+
+
+DRAG = DragElement(quadratic=0.5, velocity="v", force="f", reference=0.3)
+LOSS = LossElement(torque=0.2, usual=1.0, velocity="v", force="f")
+
+
+@pytest.mark.parametrize("elements", [(DRAG,), (LOSS,), (DRAG, LOSS)])
+def test_elements_balance_with_the_motion_at_the_answer(elements: tuple[Element, ...]) -> None:
+    question = problem(damped_mass(), StaticGain(), elements=elements)
     made = programme(question, [-1.0, -1.0])
-    solved = made.solve(made.pack([-1.0, -1.0], [0.3]))
+    solved = made.solve(made.pack([-1.0, -1.0], [question.begin]))
     assert solved.converged
-    assert solved.coefficient is not None
-    seen = view(question, solved.values)  # solves the coefficient itself
-    assert solved.coefficient == pytest.approx(seen.coefficient, rel=1e-3)
-    assert seen.coefficient == pytest.approx(0.5 * np.sqrt(8.0 / np.pi) * seen.sigma("v"), rel=1e-8)
+    seen = view(question, solved.values)  # solves the coefficients itself
+    assert solved.coefficient == pytest.approx(seen.coefficients, rel=1e-3)
+    variance = seen.sigma("v") ** 2
+    needed = {
+        DRAG: 0.5 * np.sqrt(8.0 / np.pi * variance),
+        LOSS: 0.2 / np.sqrt(1.0 + 0.5 * np.pi * variance),
+    }
+    assert seen.coefficients == pytest.approx([needed[e] for e in elements], rel=1e-8)
+
+
+@pytest.mark.parametrize("exact", [False, True], ids=["on nodes", "where measured"])
+def test_slopes_by_coefficients_are_those_of_finite_differences(exact: bool) -> None:
+    """Rows with the losses and without, balances, cost: by gains and by both logarithms."""
+    # The roll-off's peak is sought anew at every point, to fewer digits than a difference asks for.
+    limits = tuple(limit for limit in LIMITS if limit.name != "roll_off")
+    question = problem(damped_mass(), StaticGain(), limits, elements=(DRAG, LOSS))
+    made = programme(question, [-9.0, -3.0], exact=exact)
+    x0 = made.pack([-9.0, -3.0], [(0.4, 0.15)])
+
+    def values(x):
+        found = made.evaluate(x)
+        return np.concatenate([[found.objective], found.rows, found.equations])
+
+    at = made.evaluate(x0)
+    assert at.equations.size == 2
+    analytic = np.vstack([at.slope[None], at.jacobian, at.equation_slopes])
+    for k in range(x0.size):
+        h = np.zeros(x0.size)
+        h[k] = 1e-5
+        numeric = (values(x0 + h) - values(x0 - h)) / 2e-5
+        np.testing.assert_allclose(analytic[:, k], numeric, rtol=1e-3, atol=1e-4)
+
+
+def test_margins_are_held_with_losses_and_without() -> None:
+    question = problem(damped_mass(), StaticGain(), LIMITS[:1], elements=(LOSS,))
+    alone = problem(damped_mass(), StaticGain(), LIMITS[:1])
+    both, one = (programme(q, [-0.7, -0.6]) for q in (question, alone))
+    rows = [
+        made.evaluate(made.pack([-0.7, -0.6], [known])).rows
+        for made, known in ((both, (0.15,)), (one, ()))
+    ]
+    # The limit's rows and that of slow poles, each twice; without losses as without an element.
+    assert rows[0].size == 2 * rows[1].size
+    half = rows[1].size - 1
+    np.testing.assert_allclose(rows[0][half : 2 * half], rows[1][:half], rtol=1e-9)
+    assert np.abs(rows[0][:half] - rows[1][:half]).max() > 1e-3

@@ -106,7 +106,7 @@ def largest_sea(request):
     with one_thread():
         begin = search(FamilyProblem.of(problem), 2, 0).reference
         assert begin is not None
-        drags = (problem.drag.reference * 0.1,)
+        drags = (tuple(0.1 * begin for begin in problem.begin),)
         sea = settle(problem, begin, drags, Goal.SEA, reference=begin, extra=-2.0)
         sea, (assessment,), excess = polish(problem, sea, begin, Goal.SEA)
     return problem, sea, assessment, excess

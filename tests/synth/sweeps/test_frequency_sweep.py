@@ -113,7 +113,7 @@ def few_nodes(case: Case) -> Quadrature:
 def alone(engine: FrequencyEngine, row: FloatArray, drag: float | None = None) -> Assessment:
     """The same case through `synth.question.question` and `synth.loop.assess`."""
     own = {**engine.design.parameters, **engine.spread.gains(row)}  # type: ignore[union-attr]
-    return posed(engine, tuple(row)).assess(own, drag)
+    return posed(engine, tuple(row)).assess(own, None if drag is None else [drag])
 
 
 @cache

@@ -139,7 +139,7 @@ def alone(engine: FrequencyEngine, row: FloatArray) -> Assessment | None:
     moved = engine.spread.gains(row)
     values = [moved.get(name, value) for name, value in zip(own.names, own.values, strict=True)]
     case = engine.spread.case_at(row)
-    return replace(own, case=case, values=tuple(values), drag=None).assessment()
+    return replace(own, case=case, values=tuple(values), known=None).assessment()
 
 
 def with_drag(view: Assessment, coefficient: float) -> Assessment:
@@ -148,8 +148,8 @@ def with_drag(view: Assessment, coefficient: float) -> Assessment:
         view._bare,
         view.controller,
         view.disturbances,
-        drag=view._drag,
-        coefficient=coefficient,
+        elements=view.elements,
+        coefficients=[coefficient],
     )
 
 
@@ -183,7 +183,7 @@ def test_sweep_of_a_structure_is_one_by_one_evaluation(name: str) -> None:
 
             C = consistent_drag(quadratic, velocity, tolerance=1e-13)
             assert found["drag"][k] == pytest.approx(C, rel=1e-10)
-        held = with_drag(view, float(found["drag"][k])) if view._drag is not None else view
+        held = with_drag(view, float(found["drag"][k])) if view.elements else view
         for metric, output in OUTPUTS.items():
             expected = np.sqrt(solved_variance(held, output, nodes))
             assert found[metric][k] == pytest.approx(expected, rel=digits), metric

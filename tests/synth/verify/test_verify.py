@@ -347,10 +347,10 @@ def test_tuning_of_an_unstable_plant_with_drag_and_delay() -> None:
     assert tuned.ok
     assert found.ok, str(found)
     assert "1 open-loop poles are unstable" in found["winding number"].note
-    assert found["coefficient"].found == pytest.approx(tuned.coefficient, rel=1e-4)
+    assert found["coefficients.drag"].found == pytest.approx(tuned.coefficients[0], rel=1e-4)
     assert found["limits.torque.peak"].ok
-    wrong = verify_tuning(replace(tuned, coefficient=1.05 * tuned.coefficient))
-    assert "coefficient" in wrong.failed
+    wrong = verify_tuning(replace(tuned, coefficients=(1.05 * tuned.coefficients[0],)))
+    assert "coefficients.drag" in wrong.failed
     assert "cost" in wrong.failed
     # A bound that it does not keep, and still counts as good.
     peak, sensitivity = tuned.problem.limits
