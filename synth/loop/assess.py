@@ -579,6 +579,8 @@ def consistent_coefficients(
 
         if surplus(_LEAST) > 0.0:
             surplus(float(brentq(surplus, _LEAST, 0.0, xtol=1e-10)))
+        elif drag is None:
+            return (0.0,) * len(losses)  # it moves without end, and losses count for nothing
     if swings(found):
         raise SolverError(f"drag: the loop is unstable at {found:.4g} N s/m but not with less")
     return (*([] if drag is None else [found]), *slack)

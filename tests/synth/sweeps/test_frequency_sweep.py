@@ -113,7 +113,11 @@ def few_nodes(case: Case) -> Quadrature:
 def alone(engine: FrequencyEngine, row: FloatArray, drag: float | None = None) -> Assessment:
     """The same case through `synth.question.question` and `synth.loop.assess`."""
     own = {**engine.design.parameters, **engine.spread.gains(row)}  # type: ignore[union-attr]
-    return posed(engine, tuple(row)).assess(own, None if drag is None else [drag])
+    question = posed(engine, tuple(row))
+    if drag is None or question.loss is None:
+        return question.assess(own, None if drag is None else [drag])
+    given = {"payload.drag": {"method": "given", "coefficient": drag}}
+    return pose(question.case.replace(given), masses=question.masses).assess(own)
 
 
 @cache
