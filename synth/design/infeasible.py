@@ -105,7 +105,7 @@ def _largest_sea(problem: FamilyProblem, free: Tuning) -> Solution | None:
 
 
 def larger_sea(
-    problem: FamilyProblem, values: FloatArray, drags: Sequence[float | None]
+    problem: FamilyProblem, values: FloatArray, known: Sequence[Coefficients]
 ) -> tuple[float, FloatArray] | None:
     """Return the share of a sea that near parameters can do, and those; None if it is not found.
 
@@ -113,10 +113,10 @@ def larger_sea(
     ----------
     problem
         The problem in that sea.
-    values, drags
-        Searched parameters that keep its limits there, and drag coefficients [N s/m].
+    values, known
+        Searched parameters that keep its limits there, and coefficients of each member's elements.
     """
-    solved = settle(problem, values, drags, Goal.SEA, reference=values, extra=0.0)
+    solved = settle(problem, values, known, Goal.SEA, reference=values, extra=0.0)
     if not solved.converged or not problem.stable(solved.values, solved.coefficients):
         return None
     polished, _, excess = polish(problem, solved, values, Goal.SEA)

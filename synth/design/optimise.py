@@ -516,8 +516,8 @@ def _in_the_largest_sea(posed: PosedFamily, short: Shortfall) -> Design:
     for _ in range(_CALMER_ROUNDS):
         there = _in_seas(posed, found.significant_height / asked)
         pairs = zip(there.questions, (found, *found.members), strict=True)
-        drags = [None if question.drag is None else one.drag for question, one in pairs]
-        better = larger_sea(there.problem, values, drags)
+        known = [question.coefficients_of(one.drag, one.friction) for question, one in pairs]
+        better = larger_sea(there.problem, values, known)
         if better is None or better[0] < 1.0 + _ALIKE:
             break
         share, values = better
