@@ -328,6 +328,13 @@ class PlantData:
         return _mean_of_ways(self.gear_efficiency * self.sheaves_efficiency)
 
     @property
+    def switching_torque(self) -> float:
+        """What losses that switch come to at the motor to either side of their mean [N m]."""
+        eta = self.gear_efficiency * self.sheaves_efficiency
+        held = self.hung_weight * self.drum_radius / self.gear_ratio / self.falls
+        return held * (1.0 / eta - self.mean_gear_factor) + self.coulomb_friction
+
+    @property
     def mean_sheaves_factor(self) -> float:
         """Rope tension at the drum over that below the sheaves, mean of both ways [-]."""
         return _mean_of_ways(self.sheaves_efficiency)

@@ -35,6 +35,7 @@ from ..plant import (
 )
 from ..rig import MRU, PayloadSensor, Sensors
 from .mru import PERFECT, coherent_error, error_density, low_pass, unit_response
+from .switching import SET_POINT, SwitchingNoise
 
 #: What is measured, in the order of the plant's measurements.
 MEASURED = (
@@ -413,6 +414,9 @@ def sensed_spectra(
     error = UnitError(unit=sensors.mru or PERFECT, hook=hook)
     if error.there:
         found["mru.error"] = error
+    remnant = SwitchingNoise.of(PlantData.from_case(case), hook)
+    if remnant is not None:
+        found[SET_POINT] = remnant
     for name in MEASUREMENTS:
         noise = payload_noise(sensors, name.removeprefix("payload."))
         if noise is not None:

@@ -40,7 +40,15 @@ from models.basics import (
 from models.case import Case
 from models.hook import HookMotion
 from models.plant import MAX_MASSES, LinearPlant, PlantData
-from models.sensing import ENCODER, MEASURED, aboard, sensed_line_at, sensed_plant, sensed_spectra
+from models.sensing import (
+    ENCODER,
+    MEASURED,
+    SET_POINT,
+    aboard,
+    sensed_line_at,
+    sensed_plant,
+    sensed_spectra,
+)
 
 from ..limits import (
     LOWER_TENSION,
@@ -608,4 +616,5 @@ def _heard_by(spectra: Mapping[str, Any], measurements: Sequence[str]) -> dict[s
     heard = set(measurements)
     own = {f"{name}{end}": {name} for name in MEASURED for end in ("_noise", ".faint")}
     own["mru.error"] = set(_MRU)
+    own[SET_POINT] = set()  # with less to shake it a bound is as good a bound
     return {name: value for name, value in spectra.items() if own.get(name, heard) & heard}

@@ -40,6 +40,7 @@ from models.plant import (
 from models.sensing import (
     LOAD,
     SAMPLE_TIME,
+    SET_POINT,
     UnitError,
     sensed_plant,
     sensed_spectra,
@@ -414,9 +415,9 @@ def heard_spectra(case: Case, hook: HookMotion, measurements: Sequence[str]) -> 
     """Return the spectra of what shakes a loop that hears some measurements, by disturbance."""
     heard = set(measurements)
     return {
-        source: value if source == HOOK else _sampled(value)
+        source: value if source in (HOOK, SET_POINT) else _sampled(value)
         for source, value in sensed_spectra(case, hook).items()
-        if source == HOOK
+        if source in (HOOK, SET_POINT)
         or (source == "mru.error" and "mru.heave" in heard)
         or source.removesuffix("_noise") in heard
     }

@@ -28,7 +28,14 @@ from models.plant import (
     PlantResponse,
     fit_shaping_filter,
 )
-from models.sensing import SAMPLE_TIME, UnitError, sensed_line_at, sensed_plant, sensed_spectra
+from models.sensing import (
+    SAMPLE_TIME,
+    SwitchingNoise,
+    UnitError,
+    sensed_line_at,
+    sensed_plant,
+    sensed_spectra,
+)
 
 from .claims import DesignClaims
 from .demands import PAYLOAD, VELOCITY, Demand, case_demands, switching_losses
@@ -120,6 +127,10 @@ class _Winch:
         heard = set(self.design.controller.measurements)
         found = [self.source]
         for name, spectrum in sensed_spectra(self.design.sea_case, self.hook).items():
+            if isinstance(spectrum, SwitchingNoise):
+                source = Source(name=name, density=spectrum.density, band=spectrum.band)
+                found.append(source)
+                continue
             unit = name == "mru.error" and "mru.heave" in heard
             if name == HOOK or not (unit or name.removesuffix("_noise") in heard):
                 continue
