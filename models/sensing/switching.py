@@ -9,9 +9,9 @@ and a remnant that is not correlated with the speed.  Its autocovariance is
 
 rho the speed's autocorrelation (Van Vleck and Middleton 1966; Price 1958), with
 kappa = sigma^2/(sigma^2 + (2/pi) omega_0^2) where the switch takes a speed of omega_0 to turn: a
-variance of (1 - 2/pi) Delta^2 whatever the sea.  Its harmonics reach the rope's modes, which may have
-no damping but that of steel, and its slow part lets the drum drift.  A drum that holds its load
-turns as the hook heaves, so that rho is the hook's, and the noise one more that no gain changes.
+variance of (1 - 2/pi) Delta^2 whatever the sea.  Its harmonics reach the rope's modes, which may
+have no damping but that of steel, and its slow part lets the drum drift.  A drum that holds its
+load turns as the hook heaves, so that rho is the hook's, and the noise one that no gain changes.
 
 A torque tau on the motor's shaft does to every signal what tau/K(s) on the command does, K the
 torque per command of a motor that stands; of the motor's torque, current and voltage what is left
@@ -23,6 +23,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -34,7 +35,7 @@ from ..plant import PlantData
 SET_POINT = "drive.set_point"
 """The disturbance that stands for it, on the drive's command."""
 
-_STEP, _COUNT = 0.01, 2**18  # of the autocorrelation [s]
+_STEP, _COUNT = 0.02, 2**16  # of the autocorrelation [s]
 _TOP = 70.0  # frequency up to which the hook's velocity counts [rad/s]
 _TURN = 1.0  # motor speed over which a loss changes sides, as in a simulation [rad/s]
 _KNOTS = 400
@@ -83,7 +84,7 @@ class SwitchingNoise:
     @property
     def band(self) -> tuple[float, float]:
         """Band that holds the variance [rad/s]: a slow drum drifts for as long as it likes."""
-        return 1e-6, math.pi / _STEP / 3.0
+        return 1e-6, math.pi / _STEP / 1.5
 
     @property
     def splits(self) -> tuple[float, ...]:
@@ -92,17 +93,21 @@ class SwitchingNoise:
 
     def density(self, omega: npt.ArrayLike) -> FloatArray:
         """Return the one-sided density [u^2 s/rad] at `omega` [rad/s]."""
+        lagged = 1.0 + (self.lag * np.asarray(omega, dtype=np.float64)) ** 2
+        return np.asarray((self.torque / self.gain) ** 2 * self.shape(omega) * lagged)
+
+    def shape(self, omega: npt.ArrayLike) -> FloatArray:
+        """Return the density of the torque over Delta^2 at `omega` [rad/s], [s/rad]."""
         frequency = np.asarray(omega, dtype=np.float64)
-        shape = np.exp(self._shape(np.log(np.maximum(frequency, self._lowest))))
-        lagged = 1.0 + (self.lag * frequency) ** 2
-        return np.asarray((self.torque / self.gain) ** 2 * shape * lagged, dtype=np.float64)
+        log_shape = self._log_shape(np.log(np.maximum(frequency, self._lowest)))
+        return np.asarray(np.exp(log_shape), dtype=np.float64)
 
     @property
     def _lowest(self) -> float:
         return 4.0 * math.pi / (_COUNT * _STEP)
 
     @cached_property
-    def _shape(self) -> object:
+    def _log_shape(self) -> Any:
         """The logarithm of the density of the torque over Delta^2, over that of frequency."""
         from scipy.interpolate import CubicSpline
 
