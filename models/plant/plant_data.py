@@ -331,7 +331,7 @@ class PlantData:
     def switching_torque(self) -> float:
         """What losses that switch come to at the motor to either side of their mean [N m]."""
         eta = self.gear_efficiency * self.sheaves_efficiency
-        held = self.hung_weight * self.drum_radius / self.gear_ratio / self.falls
+        held = self.hung_weight * self.drum_radius / self.gear_ratio
         return held * (1.0 / eta - self.mean_gear_factor) + self.coulomb_friction
 
     @property

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
         with_sensors,
     )
     from .sensing import NOISE, SensorModel
-    from .switching import SET_POINT, SwitchingNoise
+    from .switching import SET_POINT, SWITCHING_BAND, SwitchingNoise, SwitchingShape
     from .telemetry import LATE, Interval, Late, TelemetrySchedule, check_intervals
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -23,7 +23,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -36,10 +35,88 @@ SET_POINT = "drive.set_point"
 """The disturbance that stands for it, on the drive's command."""
 
 _STEP, _COUNT = 0.02, 2**16  # of the autocorrelation [s]
+#: Band that holds the variance [rad/s]: a slow drum drifts for as long as it likes.
+SWITCHING_BAND = 1e-6, math.pi / _STEP / 1.5
 _TOP = 70.0  # frequency up to which the hook's velocity counts [rad/s]
 _TURN = 1.0  # motor speed over which a loss changes sides, as in a simulation [rad/s]
 _KNOTS = 400
 _FAINT = 1e-12  # of the largest density, below which there is none
+_PER_DECADE, _POINTS = 12, 6  # motor speeds between which shapes are interpolated, and how many
+
+
+class SwitchingShape:
+    """The density of the remnant over Delta^2, with one motion of the hook.
+
+    Parameters
+    ----------
+    hook
+        Motion of the hook; only the shape of its velocity's density counts.
+    """
+
+    #: Frequencies beyond which it is taken for level [rad/s].
+    ends = 4.0 * math.pi / (_COUNT * _STEP), SWITCHING_BAND[1]
+
+    def __init__(self, hook: HookMotion) -> None:
+        self.hook = hook
+        self._knots = np.geomspace(*self.ends, _KNOTS)
+        self._levels: dict[float, FloatArray] = {}
+
+    def at(self, omega: npt.ArrayLike, speed: float) -> FloatArray:
+        """Return the one-sided density [s/rad] at `omega` [rad/s], of a motor's rms speed [rad/s].
+
+        Its integral over omega is 1 - 2/pi, but for a motor that hardly turns.
+        """
+        from scipy.interpolate import CubicSpline
+
+        inside = np.log(np.clip(np.asarray(omega, dtype=np.float64), *self.ends))
+        return np.asarray(np.exp(CubicSpline(np.log(self._knots), self._level(speed))(inside)))
+
+    def rows(self, omega: FloatArray, speeds: FloatArray) -> FloatArray:
+        """Return the densities (n, k) at `omega` (k,), of rms speeds (n,) [rad/s].
+
+        Interpolated between a dozen speeds in a decade, to some 1e-6 and better.
+        """
+        from scipy.interpolate import CubicSpline
+
+        place = np.log10(np.maximum(speeds, _FAINT)) * _PER_DECADE
+        first = np.floor(place).astype(np.int64) - (_POINTS // 2 - 1)
+        known = np.unique(first[:, None] + np.arange(_POINTS))
+        levels = np.stack([self._level(10.0 ** (float(j) / _PER_DECADE)) for j in known])
+        inside = np.log(np.clip(omega, *self.ends))
+        table = CubicSpline(np.log(self._knots), levels, axis=1)(inside)
+        found = np.zeros((speeds.size, omega.size))
+        for j in range(_POINTS):
+            weight = np.ones(speeds.size)
+            for m in range(_POINTS):
+                if m != j:
+                    weight *= (place - first - m) / (j - m)
+            found += weight[:, None] * table[np.searchsorted(known, first + j)]
+        return np.asarray(np.exp(found))
+
+    def _level(self, speed: float) -> FloatArray:
+        """Return the logarithm of the density at the knots."""
+        if speed not in self._levels:
+            kappa = speed**2 / (speed**2 + 2.0 / math.pi * _TURN**2)
+            rho = kappa * self._correlation
+            found = np.fft.rfft(2.0 / math.pi * (np.arcsin(rho) - rho)).real * _STEP / math.pi
+            least = max(_FAINT * float(found.max()), np.finfo(float).tiny)
+            values = np.interp(self._knots, _omega(), np.maximum(found, least))
+            self._levels[speed] = np.log(values)
+        return self._levels[speed]
+
+    @cached_property
+    def _correlation(self) -> FloatArray:
+        """The autocorrelation of the hook's velocity."""
+        omega = _omega()
+        seen = (omega > 0.0) & (omega < _TOP)
+        velocity = np.zeros(omega.size)
+        velocity[seen] = omega[seen] ** 2 * self.hook.density(omega[seen])
+        covariance = np.fft.irfft(velocity, _COUNT)
+        return np.asarray(covariance / covariance[0])
+
+
+def _omega() -> FloatArray:
+    return np.asarray(2.0 * math.pi / (_COUNT * _STEP) * np.arange(_COUNT // 2 + 1))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,52 +153,36 @@ class SwitchingNoise:
         return cls(
             torque=data.switching_torque,
             hook=hook,
-            per_heave=data.falls * data.gear_ratio / data.drum_radius,
+            per_heave=data.gear_ratio / data.drum_radius,
             gain=gain,
             lag=lag,
         )
 
     @property
     def band(self) -> tuple[float, float]:
-        """Band that holds the variance [rad/s]: a slow drum drifts for as long as it likes."""
-        return 1e-6, math.pi / _STEP / 1.5
+        """Band that holds the variance [rad/s]."""
+        return SWITCHING_BAND
 
     @property
     def splits(self) -> tuple[float, ...]:
         """It has no kinks."""
         return ()
 
-    def density(self, omega: npt.ArrayLike) -> FloatArray:
-        """Return the one-sided density [u^2 s/rad] at `omega` [rad/s]."""
-        lagged = 1.0 + (self.lag * np.asarray(omega, dtype=np.float64)) ** 2
-        return np.asarray((self.torque / self.gain) ** 2 * self.shape(omega) * lagged)
-
-    def shape(self, omega: npt.ArrayLike) -> FloatArray:
-        """Return the density of the torque over Delta^2 at `omega` [rad/s], [s/rad]."""
-        frequency = np.asarray(omega, dtype=np.float64)
-        log_shape = self._log_shape(np.log(np.maximum(frequency, self._lowest)))
-        return np.asarray(np.exp(log_shape), dtype=np.float64)
-
     @property
-    def _lowest(self) -> float:
-        return 4.0 * math.pi / (_COUNT * _STEP)
+    def speed(self) -> float:
+        """Standard deviation of the speed of a motor that follows the hook [rad/s]."""
+        return self.per_heave * float(self.hook.velocity.rms)
 
     @cached_property
-    def _log_shape(self) -> Any:
-        """The logarithm of the density of the torque over Delta^2, over that of frequency."""
-        from scipy.interpolate import CubicSpline
+    def shape(self) -> SwitchingShape:
+        """The torque's density over Delta^2."""
+        return SwitchingShape(self.hook)
 
-        step = 2.0 * math.pi / (_COUNT * _STEP)
-        omega = step * np.arange(_COUNT // 2 + 1)
-        seen = (omega > 0.0) & (omega < _TOP)
-        velocity = np.zeros(omega.size)
-        velocity[seen] = omega[seen] ** 2 * self.hook.density(omega[seen])
-        covariance = np.fft.irfft(velocity, _COUNT)
-        speed = (self.per_heave * float(self.hook.velocity.rms)) ** 2
-        kappa = speed / (speed + 2.0 / math.pi * _TURN**2)
-        rho = kappa * covariance / covariance[0]
-        remnant = 2.0 / math.pi * (np.arcsin(rho) - rho)
-        found = np.fft.rfft(remnant).real * _STEP / math.pi
-        knots = np.geomspace(self._lowest, self.band[1], _KNOTS)
-        values = np.interp(knots, omega, np.maximum(found, _FAINT * found.max()))
-        return CubicSpline(np.log(knots), np.log(values))
+    def density(self, omega: npt.ArrayLike) -> FloatArray:
+        """Return the one-sided density [u^2 s/rad] at `omega` [rad/s]."""
+        return self.as_command(omega, self.shape.at(omega, self.speed))
+
+    def as_command(self, omega: npt.ArrayLike, shape: FloatArray) -> FloatArray:
+        """Return the density [u^2 s/rad] of a torque's over Delta^2."""
+        lagged = 1.0 + (self.lag * np.asarray(omega, dtype=np.float64)) ** 2
+        return np.asarray((self.torque / self.gain) ** 2 * shape * lagged)

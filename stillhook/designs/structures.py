@@ -32,16 +32,21 @@ from ..text import (
     typeset,
 )
 from .bound_text import bound_cell, bound_figure, bounds_note
-from .summary import SHARES, share_of, unit_notes
+from .summary import SHARES, share_names, share_of, unit_notes
 
 if TYPE_CHECKING:
     from synth.design import Design
 
 _TORQUE = "motor.torque.peak"
-_COLOURS = {"sea": AFTER, "MRU": "#e69f00", "noise": "#cc79a7"}
+_COLOURS = {"sea": AFTER, "MRU": "#e69f00", "noise": "#cc79a7", "losses": "#56b4e9"}
 _BEST = "best with its sensors"
 _MARK: Mapping[str, Any] = {"marker": "|", "color": "black", "ms": 15.0, "mew": 2.2}
-_LABELS = {"sea": "from the sea", "MRU": "from the reference unit", "noise": "from other sensors"}
+_LABELS = {
+    "sea": "from the sea",
+    "MRU": "from the reference unit",
+    "noise": "from other sensors",
+    "losses": "from losses of the drive",
+}
 
 
 @drawn
@@ -130,7 +135,8 @@ def structures(designs: Sequence[Design], *, bound: bool = True) -> Figure:
 
 def structures_table(designs: Sequence[Design], *, bound: bool = True) -> Table:
     """Return the designs, one a row; `bound` asks for the bounds beside them too."""
-    shares = "".join(f"; {name} [%]" for name in SHARES)
+    names = share_names(designs)
+    shares = "".join(f"; {name} [%]" for name in names)
     heads = (
         *columns(f"structure; payload_rms=payload [m]; over best{shares}; max_sensitivity=M_s"),
         Column("delay", write=lambda s: "any" if math.isinf(s) else quantity(s, "s")),
@@ -138,7 +144,7 @@ def structures_table(designs: Sequence[Design], *, bound: bool = True) -> Table:
     )
     return Table(
         columns=heads,
-        rows=[_row(design, bound=bound) for design in designs],
+        rows=[_row(design, names, bound=bound) for design in designs],
         notes=(bounds_note(),) if bound else (),
         broken=tuple(k for k, design in enumerate(designs) if not design.ok),
     )
@@ -180,17 +186,22 @@ def limited_by(design: Design) -> str:
         return "nothing"
     # With no limit in the way it is what disturbs most that decides.
     largest = max(SHARES, key=lambda name: share_of(design, name))
-    return {"sea": "the structure itself", "MRU": "the MRU's error", "noise": "noise"}[largest]
+    return {
+        "sea": "the structure itself",
+        "MRU": "the MRU's error",
+        "noise": "noise",
+        "losses": "losses of the drive",
+    }[largest]
 
 
-def _row(design: Design, *, bound: bool) -> tuple[float | str, ...]:
+def _row(design: Design, names: Sequence[str], *, bound: bool) -> tuple[float | str, ...]:
     margins, torque = design.margins, design.limits.get(_TORQUE)
     found = math.isfinite(design.payload_rms)
     return (
         design.structure,
         design.payload_rms if found else "-",
         bound_cell(design) if bound else "-",
-        *(share_of(design, name) if found else "-" for name in SHARES),
+        *(share_of(design, name) if found else "-" for name in names),
         margins.max_sensitivity if margins is not None else "-",
         margins.delay if margins is not None else "-",
         torque.use if torque is not None else "-",

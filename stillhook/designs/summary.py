@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 
 from models.basics import digits_apart, residual_text
 from models.rig import DCMotor
+from models.sensing import SET_POINT
 from synth.design import SWITCHING_LOSS, Design, LimitUse, few_starts
 from synth.question import HOOK, PAYLOAD, difference_text
 
@@ -54,9 +55,13 @@ LIMITS: Mapping[str, tuple[str, str]] = {
 }
 AT_LEAST = ("gain_margin_up", "delay_margin", "rope.tension.least", "rope.lower_tension.least")
 """Limits whose bound is the least value."""
-SHARES: Mapping[str, tuple[str, ...]] = {"sea": (HOOK,), "MRU": ("mru.error",), "noise": ()}
+SHARES: Mapping[str, tuple[str, ...]] = {
+    "sea": (HOOK,),
+    "MRU": ("mru.error",),
+    "noise": (),
+    "losses": (SWITCHING_LOSS, SET_POINT),
+}
 """Which disturbances make up a share of a signal's variance, by its name; noise is the rest."""
-_LOSSES = "losses"
 _INSTRUMENTS: Mapping[str, set[str]] = {
     "payload": {"payload"},
     "MRU": {"mru"},
@@ -213,8 +218,7 @@ def share_table(design: Design) -> Table | None:
     """Return what sea, reference unit, losses and noise make of signals; None for the sea alone."""
     if all(len(parts) < 2 for parts in design.shares.values()):
         return None
-    lossy = any(SWITCHING_LOSS in parts for parts in design.shares.values())
-    names = (*SHARES, _LOSSES) if lossy else tuple(SHARES)
+    names = share_names([design])
     heads = columns("signal=share of the variance of" + "".join(f"; {n} [%]" for n in names))
     rows = [
         (_signal(signal), *(share_of(design, n, signal) for n in names)) for signal in design.shares
@@ -226,13 +230,18 @@ def _signal(name: str) -> str:
     return _SIGNALS.get(name, name.replace(".", " ").replace("_", " "))
 
 
+def share_names(designs: Sequence[Design]) -> tuple[str, ...]:
+    """Return the names of `SHARES`; ``losses`` only where there are some."""
+    shaken = {name for d in designs for parts in d.shares.values() for name in parts}
+    return tuple(n for n in SHARES if n != "losses" or shaken & {*SHARES[n]})
+
+
 def share_of(design: Design, name: str, signal: str = PAYLOAD) -> float:
-    """Return the share of a signal's variance from one of `SHARES`, or from ``losses``."""
+    """Return the share of a signal's variance from one of `SHARES`."""
     squares = {source: rms**2 for source, rms in design.shares.get(signal, {}).items()}
     total = sum(squares.values())
-    shares = {**SHARES, _LOSSES: (SWITCHING_LOSS,)}
-    known = [source for names in shares.values() for source in names]
-    chosen = shares[name] or [source for source in squares if source not in known]
+    known = [source for names in SHARES.values() for source in names]
+    chosen = SHARES[name] or [source for source in squares if source not in known]
     part = sum(squares.get(source, 0.0) for source in chosen)
     return part / total if total > 0.0 else 0.0
 

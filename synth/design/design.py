@@ -17,6 +17,7 @@ import numpy as np
 
 from models.basics import InputError, attenuation, residual_text
 from models.case import Case
+from models.sensing import SET_POINT
 
 from ..loop import Assessment, LinearController, Margins
 from ..question import GAINS, HOOK, DesignQuestion, controller_for, difference_text, pose
@@ -31,7 +32,11 @@ if TYPE_CHECKING:
 #: What shares call the losses of gear and dry friction, which switch with the direction.
 SWITCHING_LOSS = "switching.loss"
 #: What disturbances are called in reports; others by their own names.
-SOURCE_NAMES: Mapping[str, str] = {HOOK: "the sea", "mru.error": "the reference unit"}
+SOURCE_NAMES: Mapping[str, str] = {
+    HOOK: "the sea",
+    "mru.error": "the reference unit",
+    SET_POINT: "losses of gear and dry friction",
+}
 _PRICED = 1e-5  # a price below this share of the payload's rms is noise of the solver
 
 
@@ -61,7 +66,8 @@ class Design:
     shares
         By signal (the payload's motion and whatever the limits speak of), by disturbance (the sea
         ``hook.heave``, the reference unit ``mru.error``, each sensor's ``.._noise``, in the drive
-        the ``switching.loss`` of gear and dry friction): the standard deviation that this one alone
+        the ``switching.loss`` of gear and dry friction, and what of it shakes the loop and is no
+        friction, noise on the ``drive.set_point``): the standard deviation that this one alone
         makes; the squares add up to the signal's variance.
     margins
         Stability margins of the loop broken at the command; None if it is unstable.

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import elementwise
 
 from models.basics import BoolArray, FloatArray, IndexArray, SolverError
-from models.sensing import error_density
+from models.sensing import SET_POINT, SwitchingShape, error_density
 
 from ..limits import Limit
 from .columns import SeaColumn
@@ -85,9 +85,30 @@ class SeaStates:
             if noise.name == "mru.error":
                 rms = np.sqrt(heave @ self.responses.nodes.weights)
                 found.append(error_density(self.system.mru, omega, heave, rms[:, None]))
+            elif noise.name == SET_POINT:
+                found.append(self._switching(heave, heights, index))
             else:
                 found.append(noise.density(omega)[None])
         return found
+
+    @cached_property
+    def _shapes(self) -> list[SwitchingShape]:
+        return [SwitchingShape(hook) for hook in self.column.hooks]
+
+    def _switching(self, heave: FloatArray, heights: FloatArray, index: IndexArray) -> FloatArray:
+        """Return the density of the noise of losses that switch (r, n), see `densities`."""
+        nodes, noise = self.responses.nodes, self.system.switching
+        assert noise is not None
+        speeds = noise.per_heave * np.sqrt(heave @ (nodes.weights * nodes.omega**2))
+        shape = np.empty_like(heave)
+        if self.column.scalable:
+            for k in np.unique(index):
+                shape[index == k] = self._shapes[k].rows(nodes.omega, speeds[index == k])
+        else:
+            for row, (height, i) in enumerate(zip(heights, index, strict=True)):
+                hook = self.column.hook(int(i), max(float(height), self.column.floor))
+                shape[row] = SwitchingShape(hook).at(nodes.omega, float(speeds[row]))
+        return noise.as_command(nodes.omega, np.where(speeds[:, None] > 0.0, shape, 0.0))
 
     def coefficients(self, densities: Sequence[FloatArray]) -> list[FloatArray]:
         """Return the coefficients of drag [N s/m] and losses that agree with the motion, (r,) each.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from models.basics import InputError, SolverError
 from models.case import Case
+from models.sensing import SET_POINT
 
 from ..design import Design
 from ..limits import LOWER_TENSION, Limit
@@ -111,6 +112,7 @@ def pose_operability(
             noises=noises,
             loss=question.loss,
             mru=reported.sensors.mru if any(n.name == "mru.error" for n in noises) else None,
+            switching=question.spectra.get(SET_POINT),
             plant=question.plant,
             controller=question.controller(source.parameters),
             drag=drag,

@@ -21,7 +21,7 @@ from typing_extensions import override
 from models.basics import ComplexArray, FloatArray, Quadrature
 from models.plant import LinearPlant, PlantData
 from models.rig import MRU
-from models.sensing import coherent_error
+from models.sensing import SwitchingNoise, coherent_error
 
 from ..limits import LOWER_TENSION
 from ..loop import (
@@ -65,6 +65,8 @@ class System(ABC):
         Losses that switch with the motor's direction, if there are some.
     mru
         The motion reference unit whose error, which grows with the sea, is among the noises.
+    switching
+        The noise of losses that switch, which is among them too and hangs on the sea.
     """
 
     outputs: tuple[str, ...]
@@ -72,6 +74,7 @@ class System(ABC):
     reference: float
     noises: tuple[Disturbance, ...] = field(default=())
     mru: MRU | None = None
+    switching: SwitchingNoise | None = None
     loss: LossElement | None = None
 
     @abstractmethod

@@ -15,6 +15,7 @@ of its own that begin new panels at the kinks, with the loop and its drag as the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -25,14 +26,16 @@ from models.basics import FloatArray, Quadrature
 from models.case import Case
 from models.hook import HookMotion
 from models.plant import lump_rope
+from models.sensing import SwitchingShape
 
-from ..loop import Coefficients, Dual
+from ..loop import Coefficients, Dual, log
 from ..sweeps import at_rest, columns_of, dual_figures
 from .differences import derivative, sided_derivatives
 from .fields import Number
 from .fixed_design import FixedDesign
 
 _SHAKING = ("sea.", "vessel.")  # sections that the hook's motion depends on
+_STEP = 1e-3  # of the logarithm of the motor's speed
 
 
 class LoopSlopes:
@@ -141,12 +144,25 @@ class LoopSlopes:
             density=hook.density(self._nodes.omega)[None],
             outputs=self._outputs,
             peaks=peaks,
+            switching=self._switching(hook, numbers["haul"]),
         )
         moved = np.vstack([*self._of_motion, np.zeros((2, len(self._outputs)))])[:, :, None]
         return {
             name: Dual(sigmas[name].value, sigmas[name].slope + moved[:, k])
             for k, name in enumerate(self._outputs)
         }, heights
+
+    def _switching(self, hook: HookMotion, haul: Any) -> Any:
+        """Return the density of losses that switch, (1, k), with slopes by the speed of the motor."""
+        if self.losses()[0] == 0.0:
+            return None
+        shape, speed = SwitchingShape(hook), float(hook.velocity.rms / self._numbers["haul"][0])
+        found = shape.at(self._nodes.omega, speed)[None]
+        if not isinstance(haul, Dual):
+            return found
+        ends = [shape.at(self._nodes.omega, speed * math.exp(k * _STEP)) for k in (-1.0, 1.0)]
+        faster = (ends[1] - ends[0])[None] / (2.0 * _STEP)
+        return found - faster * (log(haul) - log(haul.value))[:, None]
 
     def quadratic_drag(self) -> FloatArray:
         """Return the slopes of ln q, q of the drag force q |v| v, by the variables added, (n,)."""

@@ -15,7 +15,7 @@ the command
 of a controller that hears the payload (through its low-passes, holds and delays: G), the drum
 (haul and speed: D), the tension (behind the load cell: E) and the hook Z (behind the reference
 unit's high-pass and delay: H), all late by the command's own delay; N is what the errors and the
-noise of all of these make of the command. Then
+noise of all of these make of the command, and losses that switch. Then
 
     open = W y + g h e f,    closed = open + h phi (G + D y + E f),
     P closed = (W + h phi (D + H)) Z + h phi N.
@@ -43,7 +43,7 @@ from models.sensing import SAMPLE_TIME
 from ..limits import LOWER_TENSION, PAYLOAD
 from ..loop import Dual, exp, squared, value_of, where
 from .law_rows import LawColumns
-from .numbers import BRANCH_GAINS, BRANCH_TIMES, Numbers, at_rows, part_of
+from .numbers import BRANCH_GAINS, BRANCH_TIMES, Numbers, at_rest, at_rows, part_of
 from .sweep_nodes import SweepNodes
 
 BLOCK = 12_000  # numbers of an array at once: the half dozen in use stay in the cache
@@ -69,13 +69,17 @@ class Shaken:
     heave_rms
         Standard deviation of each hook's heave [m], (n,) or (1,).
     noisy
-        Whether sensors have noise and errors.
+        Whether sensors have noise and errors, or losses switch.
+    switching
+        Density at the nodes of what losses that switch are besides friction, over their square
+        (`models.sensing.SwitchingShape`), (n, k) or (1, k) [s/rad]; None without.
     """
 
     factors: FloatArray
     ratios: FloatArray | None
     heave_rms: FloatArray
     noisy: bool
+    switching: Any = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -310,9 +314,15 @@ class Chain:
         follows = {"mru.heave", "mru.heave_rate"} & self._heard.keys()
         return heave + self.s * rate if follows else np.zeros((1, 1))
 
-    def noise(self, heave_rms: FloatArray) -> Any:
-        """Return the density of what errors and noise of the sensors make of the command."""
+    def noise(self, shaken: Shaken) -> Any:
+        """Return the density of the command that errors and noise of sensors, and losses, make."""
         total: Any = np.zeros((1, 1))
+        if shaken.switching is not None:
+            # A torque over what a command makes of it; see `models.sensing.switching`.
+            torque = at_rows(at_rest(self.loops.numbers)[1]["motor.torque"], self.rows)
+            command, turn = torque / self._own("phi"), self.s.imag * self._own("lag")
+            own = part_of(shaken.switching, self.rows)
+            total = total + own * (command * command * (1.0 + turn * turn))
         passes = self._own("noise_passes")
         for name in _PAYLOAD:
             # An amplitude density a root hertz is white noise of half its square.
@@ -327,7 +337,7 @@ class Chain:
             total = total + size * (SAMPLE_TIME * _UNIT * (cell * cell))
         floor, w = self._own("mru_floor"), self._own("mru_bandwidth")
         if _there(floor):
-            error = self._own("mru_fraction") * at_rows(heave_rms, self.rows)
+            error = self._own("mru_fraction") * at_rows(shaken.heave_rms, self.rows)
             error = where(value_of(error) > value_of(floor), error, floor)
             white, output = self._own("mru_noise"), self._own("mru_output")
             drift, slow = self._own("mru_drift"), 2.0 * np.pi / self._own("mru_drift_period")
@@ -387,7 +397,7 @@ class Chain:
         hung = (self._own("payload_mass") * self.s + drag[:, None]) * self.s
         sources = [(heave, right, factors, self._of_heave())]
         if shaken.noisy:
-            white = inverse * self.noise(shaken.heave_rms)
+            white = inverse * self.noise(shaken)
             right = _both(nodes.weights, nodes.omega)
             sources.append((white, right, np.ones((1, 1)), self._of_noise()))
             if self.coherent is not None:
@@ -426,7 +436,7 @@ class Chain:
             return _sum_of(numerators[kind][own], y, f) * times
 
         share = 0.0 if self.coherent is None else self.coherent
-        noise = inverse * self.noise(shaken.heave_rms) if shaken.noisy else 0.0 * inverse
+        noise = inverse * self.noise(shaken) if shaken.noisy else 0.0 * inverse
         shares = [self._own(name) * k for name, k in (("mru_gain", 1.0), ("mru_phase", 1j))]
         found = []
         for one, other in pairs:
@@ -453,7 +463,7 @@ class Chain:
         total = abs2(self._of_heave()[VELOCITY][2]) * heave
         if shaken.noisy:
             driven = abs2(self._of_noise()[VELOCITY][2])
-            total = total + driven * (self.noise(shaken.heave_rms) * nodes.weights[0])
+            total = total + driven * (self.noise(shaken) * nodes.weights[0])
             if self.coherent is not None:
                 total = total + driven * (self.coherent * heave)
         shape = self.rows.size, len(nodes)

@@ -26,7 +26,7 @@ from models.basics import (
     White,
 )
 from models.plant import lump_rope
-from models.sensing import DRIFT_BAND, sensed_plant
+from models.sensing import DRIFT_BAND, SWITCHING_BAND, sensed_plant
 from models.spread import Spread
 
 from ..loop import switching_friction
@@ -320,6 +320,8 @@ class DesignRows:
     def _frame(self) -> tuple[FrequencyAxis, list[float]]:
         """The band of all disturbances, and kinks of the hook's density [rad/s]."""
         low, high, splits = self.sea.frame()
+        if self._losses:
+            low, high = min(low, SWITCHING_BAND[0]), max(high, SWITCHING_BAND[1])
         if not self._noisy:
             return FrequencyAxis(low, high, half_line=False), splits
         noise = SampledNoise(spectrum=White().density).band
@@ -370,7 +372,10 @@ class DesignRows:
             factors=self.sea.factors(rows),
             ratios=ratios,
             heave_rms=self.sea.heave_rms(rows, ratios, nodes.weights[0]),
-            noisy=bool(self._noisy),
+            noisy=bool(self._noisy) or self._losses,
+            switching=self.sea.switching(rows, nodes.omega, loops.numbers["haul"])
+            if self._losses
+            else None,
         )
         found.drag[:], found.heave[:] = loops.drag, shaken.heave_rms
         if self.spring:

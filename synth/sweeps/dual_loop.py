@@ -35,6 +35,7 @@ def dual_figures(
     density: Any,
     outputs: Sequence[str],
     peaks: FloatArray,
+    switching: Any = None,
 ) -> tuple[Mapping[str, Dual], Dual]:
     """Return ln sigma of each output, (1,), and ln |S| at some frequencies, (1, p).
 
@@ -57,6 +58,8 @@ def dual_figures(
         Names of outputs.
     peaks
         The frequencies, (p,) [rad/s].
+    switching
+        Density at the nodes of losses that switch, (1, k), as `Shaken` has it.
     """
     own = LawColumns(
         law=law,
@@ -72,7 +75,11 @@ def dual_figures(
     if np.any(value_of(numbers["friction"])):
         sides.append(loops.with_drag(drag, np.zeros(1)))
     shaken = Shaken(
-        factors=np.ones(1), ratios=density, heave_rms=sqrt(density @ nodes.weights), noisy=True
+        factors=np.ones(1),
+        ratios=density,
+        heave_rms=sqrt(density @ nodes.weights),
+        noisy=True,
+        switching=switching,
     )
     moments = along.moments(outputs, SweepNodes.of(nodes, np.ones_like), shaken, drag)
     heights: Any = None

@@ -13,6 +13,7 @@ import numpy as np
 from models.basics import FloatArray
 from models.case import Case
 from models.hook import HookMotion
+from models.sensing import SwitchingShape
 from models.spread import Spread
 
 _HEIGHT = "sea.significant_height"
@@ -37,6 +38,7 @@ class SeaRows:
         self.hook = HookMotion.from_case(case, warn=False)
         self._columns = [j for j, p in enumerate(spread.paths) if p.startswith(_SEA)]
         self._known: dict[bytes, HookMotion] = {}
+        self._shapes: dict[bytes, SwitchingShape] = {}
         names = {spread.paths[j] for j in self._columns}
         # How the density follows from the case's own: a factor, a stretch, or not at all.
         self._height = _HEIGHT if _HEIGHT in names else None
@@ -93,6 +95,32 @@ class SeaRows:
         sea = np.asarray(self.hook.sea.density((stretch[:, None] * omega).ravel()))
         heave = np.abs(self.hook.rao.response(omega)) ** 2
         return np.asarray(sea.reshape(len(rows), -1) * stretch[:, None] * heave)
+
+    def switching(self, rows: FloatArray, omega: FloatArray, haul: FloatArray) -> FloatArray:
+        """Return the density of what losses are besides friction, (n, k) or (1, k) [s/rad].
+
+        Over their square, see `models.sensing.SwitchingShape`; `haul` is the rope that a turn of
+        each motor hauls, (n,) or (1,) [m].
+        """
+        if self.varies:
+            found = np.empty((len(rows), omega.size))
+            for k, (row, per) in enumerate(np.broadcast(range(len(rows)), haul)):
+                shape = self._shape(rows[row])
+                found[k] = shape.at(omega, float(shape.hook.velocity.rms) / float(per))
+            return found
+        own = self._shape(np.array([self.spread.nominal[path] for path in self.spread.paths]))
+        speeds = np.sqrt(self.factors(rows)) * float(self.hook.velocity.rms) / haul
+        if np.ptp(speeds) == 0.0:
+            return own.at(omega, float(speeds[0]))[None]
+        return own.rows(omega, speeds)
+
+    def _shape(self, row: FloatArray) -> SwitchingShape:
+        key = row[self._columns].tobytes()
+        if key not in self._shapes:
+            if len(self._shapes) > 100:
+                self._shapes.clear()
+            self._shapes[key] = SwitchingShape(self._own(row) if self.varies else self.hook)
+        return self._shapes[key]
 
     def _holds(self, names: set[str]) -> bool:
         """Return whether the scaling holds on some rows, and nothing else of the sea varies."""
