@@ -129,6 +129,7 @@ def test_spectra_are_those_of_the_sensors() -> None:
     hook = HookMotion.from_case(case)
     spectra = sensed_spectra(case, hook, sample_time=0.02)
     assert set(spectra) == {
+        "drive.set_point",
         "hook.heave",
         "mru.error",
         "payload.velocity_noise",
@@ -152,7 +153,7 @@ def test_spectra_are_those_of_the_sensors() -> None:
     error = np.trapezoid(spectra["mru.error"](omega), omega)
     assert error == pytest.approx(0.05**2, rel=1e-3)  # 5 cm are more than 5 % of this heave
     plant = sensed_plant(case, drag=DRAG)
-    assert len(disturbances(spectra, plant.independent_disturbances)) == 4
+    assert len(disturbances(spectra, plant.independent_disturbances)) == 5
 
 
 def test_noise_behind_the_low_pass_is_that_of_samples() -> None:

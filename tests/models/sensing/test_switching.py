@@ -10,7 +10,7 @@ from scipy.signal import welch
 
 from models import HookMotion, load_case
 from models.plant import PlantData
-from models.sensing import SwitchingNoise
+from models.sensing import SwitchingNoise, sensed_plant
 
 
 def noise_of(**changes):
@@ -44,4 +44,20 @@ def test_its_variance_is_what_no_friction_stands_for():
 
 
 def test_without_losses_there_is_none():
-    assert noise_of(**{"winch.gearbox.efficiency": 1.0}) is None
+    assert noise_of(**{"winch.gearbox.efficiency": 1.0, "rope.sheave_efficiency": 1.0}) is None
+
+
+def test_shapes_between_speeds_are_those_at_them():
+    shape = noise_of().shape
+    omega, speeds = np.geomspace(1e-5, 10.0, 200), np.array([4.1, 17.3, 31.5, 88.8])
+    alone = np.array([shape.at(omega, float(speed)) for speed in speeds])
+    np.testing.assert_allclose(shape.rows(omega, speeds), alone, rtol=1e-7)
+
+
+def test_its_torque_is_the_loss_of_the_plant_on_any_falls():
+    case = load_case("subsea-crane").replace({"rope.falls": 2, "rope.length": 700.0})
+    data = PlantData.from_case(case)
+    noise = SwitchingNoise.of(data, HookMotion.from_case(case))
+    wanted = sensed_plant(case, drag=0.0).loss["motor.torque"]
+    assert noise.torque == pytest.approx(wanted, rel=1e-12)
+    assert noise.per_heave == case.winch.gearbox.ratio / case.haul_radius

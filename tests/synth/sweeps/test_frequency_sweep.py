@@ -110,14 +110,27 @@ def few_nodes(case: Case) -> Quadrature:
     return spectral_nodes(*hook.band, splits=hook.splits, per_panel=6)
 
 
-def alone(engine: FrequencyEngine, row: FloatArray, drag: float | None = None) -> Assessment:
+def alone(
+    engine: FrequencyEngine,
+    row: FloatArray,
+    drag: float | None = None,
+    nodes: Quadrature | None = None,
+) -> Assessment:
     """The same case through `synth.question.question` and `synth.loop.assess`."""
     own = {**engine.design.parameters, **engine.spread.gains(row)}  # type: ignore[union-attr]
     question = posed(engine, tuple(row))
     if drag is None or question.loss is None:
         return question.assess(own, None if drag is None else [drag])
     given = {"payload.drag": {"method": "given", "coefficient": drag}}
-    return pose(question.case.replace(given), masses=question.masses).assess(own)
+    posed_so = pose(question.case.replace(given), masses=question.masses)
+    problem = posed_so.problem
+    return Assessment(
+        problem.plant,
+        posed_so.controller(own),
+        problem.disturbances,
+        elements=problem.elements,
+        nodes=None if nodes is None else lambda _: nodes,
+    )
 
 
 @cache
@@ -223,13 +236,13 @@ def test_rope_sweep_is_one_by_one_evaluation_on_the_same_nodes(
         case = engine.spread.case_at(row)
 
         def velocity(C: float, row: FloatArray = row) -> float:
-            return float(np.sqrt(variance(alone(engine, row, C), "payload.velocity", nodes)))
+            return float(np.sqrt(variance(alone(engine, row, C, nodes), "payload.velocity", nodes)))
 
         C = consistent_drag(case.payload.quadratic_drag, velocity, tolerance=1e-13)
-        assert bool(found["stable"][k]) == alone(engine, row, C).stable
+        assert bool(found["stable"][k]) == alone(engine, row, C, nodes).stable
         if found["stable"][k]:
             assert found["drag"][k] == pytest.approx(C, rel=1e-10)
-            view = alone(engine, row, float(found["drag"][k]))
+            view = alone(engine, row, float(found["drag"][k]), nodes)
             # Of the friction of losses beside it a torque that nearly cancels has fewer digits.
             for name, output in OUTPUTS.items():
                 expected = np.sqrt(solved_variance(view, output, nodes))
