@@ -40,6 +40,7 @@ SWITCHING_BAND = 1e-6, math.pi / _STEP / 1.5
 _TOP = 70.0  # frequency up to which the hook's velocity counts [rad/s]
 _TURN = 1.0  # motor speed over which a loss changes sides, as in a simulation [rad/s]
 _KNOTS = 400
+_SPLITS = 32  # with which nodes made from poles alone have a peak's torque to some 3e-7
 _FAINT = 1e-12  # of the largest density, below which there is none
 _PER_DECADE, _POINTS = 16, 10  # motor speeds between which shapes are interpolated
 
@@ -165,8 +166,8 @@ class SwitchingNoise:
 
     @property
     def splits(self) -> tuple[float, ...]:
-        """It has no kinks."""
-        return ()
+        """Where panels end that follow its harmonics [rad/s]; it has no kinks."""
+        return tuple(np.geomspace(0.05, 10.0, _SPLITS).tolist())
 
     @property
     def speed(self) -> float:

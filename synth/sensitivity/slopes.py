@@ -153,7 +153,7 @@ class LoopSlopes:
         }, heights
 
     def _switching(self, hook: HookMotion, haul: Any) -> Any:
-        """Return the density of losses that switch, (1, k), with slopes by the speed of the motor."""
+        """Return the density of losses that switch, (1, k), with its slopes."""
         if self.losses()[0] == 0.0:
             return None
         shape, speed = SwitchingShape(hook), float(hook.velocity.rms / self._numbers["haul"][0])
