@@ -19,7 +19,7 @@ from models.basics import ComplexArray, FloatArray, SolverError
 
 from .winding import Function, axis_clusters, lively, trace
 
-_FLOOR = 1e-3  # |L| below which the curve's phase is not followed
+_FLOOR = 5e-5  # |L| below which the curve's phase is not followed, for no check asks for 1e-4
 _VALLEYS = 6  # local extrema that are solved for, the most extreme first
 _SEEN = 0.5  # |log|L|| at an extremum that might still hide a crossing
 

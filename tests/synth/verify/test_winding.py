@@ -219,6 +219,12 @@ def test_lively_has_points_inside_every_resonance() -> None:
         assert np.sum(np.abs(omega - at) <= half_width) >= 5
 
 
+def test_a_faint_loop_has_a_gain_margin_too() -> None:
+    # k/(s + 1)^3 crosses the axis at sqrt(3) rad/s, at -k/8.
+    margins = curve_margins(lambda s: 1 + 8.0 / 3000.0 / (s + 1) ** 3, np.array([-1.0 + 0j]))
+    assert margins.gain == pytest.approx(3000.0, rel=1e-9)
+
+
 def test_margins_of_a_textbook_loop() -> None:
     # L = 1/(s (s + 1)^2): phase -180 deg at 1 rad/s, where |L| = 1/2.
     margins = curve_margins(lambda s: 1 + 1 / (s * (s + 1) ** 2), np.array([-1.0 + 0j]))
