@@ -23,6 +23,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +31,9 @@ import numpy.typing as npt
 from ..basics import FloatArray
 from ..hook import HookMotion
 from ..plant import PlantData
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 SET_POINT = "drive.set_point"
 """The disturbance that stands for it, on the drive's command."""
@@ -39,7 +43,6 @@ _STEP, _COUNT = 0.02, 2**16  # of the autocorrelation [s]
 SWITCHING_BAND = 1e-6, math.pi / _STEP / 1.5
 _TOP = 70.0  # frequency up to which the hook's velocity counts [rad/s]
 _TURN = 1.0  # motor speed over which a loss changes sides, as in a simulation [rad/s]
-_KNOTS = 400
 _SPLITS = 32  # with which nodes made from poles alone have a peak's torque to some 3e-7
 _FAINT = 1e-12  # of the largest density, below which there is none
 _PER_DECADE, _POINTS = 16, 10  # motor speeds between which shapes are interpolated
@@ -54,37 +57,27 @@ class SwitchingShape:
         Motion of the hook; only the shape of its velocity's density counts.
     """
 
-    #: Frequencies beyond which it is taken for level [rad/s].
-    ends = 4.0 * math.pi / (_COUNT * _STEP), SWITCHING_BAND[1]
-
     def __init__(self, hook: HookMotion) -> None:
         self.hook = hook
-        self._knots = np.geomspace(*self.ends, _KNOTS)
-        self._levels: dict[float, FloatArray] = {}
+        self._levels: dict[float, CubicSpline] = {}
 
     def at(self, omega: npt.ArrayLike, speed: float) -> FloatArray:
         """Return the one-sided density [s/rad] at `omega` [rad/s], of a motor's rms speed [rad/s].
 
         Its integral over omega is 1 - 2/pi, but for a motor that hardly turns.
         """
-        from scipy.interpolate import CubicSpline
-
-        inside = np.log(np.clip(np.asarray(omega, dtype=np.float64), *self.ends))
-        return np.asarray(np.exp(CubicSpline(np.log(self._knots), self._level(speed))(inside)))
+        return np.asarray(np.exp(self._level(speed)(np.minimum(omega, SWITCHING_BAND[1]))))
 
     def rows(self, omega: FloatArray, speeds: FloatArray) -> FloatArray:
         """Return the densities (n, k) at `omega` (k,), of rms speeds (n,) [rad/s].
 
         Interpolated between 16 speeds in a decade, to some 1e-9.
         """
-        from scipy.interpolate import CubicSpline
-
         place = np.log10(np.maximum(speeds, _FAINT)) * _PER_DECADE
         first = np.floor(place).astype(np.int64) - (_POINTS // 2 - 1)
         known = np.unique(first[:, None] + np.arange(_POINTS))
-        levels = np.stack([self._level(10.0 ** (float(j) / _PER_DECADE)) for j in known])
-        inside = np.log(np.clip(omega, *self.ends))
-        table = CubicSpline(np.log(self._knots), levels, axis=1)(inside)
+        inside = np.minimum(omega, SWITCHING_BAND[1])
+        table = np.stack([self._level(10.0 ** (float(j) / _PER_DECADE))(inside) for j in known])
         found = np.zeros((speeds.size, omega.size))
         for j in range(_POINTS):
             weight = np.ones(speeds.size)
@@ -94,15 +87,27 @@ class SwitchingShape:
             found += weight[:, None] * table[np.searchsorted(known, first + j)]
         return np.asarray(np.exp(found))
 
-    def _level(self, speed: float) -> FloatArray:
-        """Return the logarithm of the density at the knots."""
+    def _level(self, speed: float) -> CubicSpline:
+        """Return the logarithm of the density as a function of omega [rad/s].
+
+        The remnant forgets within minutes, so that its density is smooth between the transform's
+        frequencies.
+        """
+        from scipy.interpolate import CubicSpline
+
         if speed not in self._levels:
             kappa = speed**2 / (speed**2 + 2.0 / math.pi * _TURN**2)
             rho = kappa * self._correlation
             found = np.fft.rfft(2.0 / math.pi * (np.arcsin(rho) - rho)).real * _STEP / math.pi
             least = max(_FAINT * float(found.max()), np.finfo(float).tiny)
-            values = np.interp(self._knots, _omega(), np.maximum(found, least))
-            self._levels[speed] = np.log(values)
+            omega = _omega()
+            held = slice(int(np.searchsorted(omega, SWITCHING_BAND[1])) + 1)
+            level = np.log(np.maximum(found, least)[held])
+            self._levels[speed] = CubicSpline(
+                omega[held],
+                level,
+                bc_type=("clamped", "not-a-knot"),  # it is even in omega
+            )
         return self._levels[speed]
 
     @cached_property
