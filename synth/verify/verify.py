@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -29,6 +29,7 @@ from models.plant import (
     fit_shaping_filter,
 )
 from models.sensing import (
+    LOAD,
     SAMPLE_TIME,
     SwitchingNoise,
     UnitError,
@@ -106,6 +107,7 @@ class _Winch:
     """A design on its plants."""
 
     design: DesignClaims
+    _plants: dict[int, LinearPlant] = field(default_factory=dict)
 
     @cached_property
     def data(self) -> PlantData:
@@ -178,8 +180,13 @@ class _Winch:
             return "the case's own one-spring rope"
         return f"a rope of {self.more_masses} masses (undamped, so its modes have no end)"
 
-    def _plant(self, masses: int, friction: float, drag: float | None = None) -> LinearPlant:
-        drag = self.design.drag if drag is None else drag
+    def _plant(self, masses: int) -> LinearPlant:
+        """Return the plant that moves, on some rope masses."""
+        if masses not in self._plants:
+            self._plants[masses] = self._plant_with(masses, self.design.friction, self.design.drag)
+        return self._plants[masses]
+
+    def _plant_with(self, masses: int, friction: float, drag: float) -> LinearPlant:
         plant = sensed_plant(self.design.case, masses=masses, drag=drag, friction=friction)
         return plant.select(measurements=self.design.controller.measurements)
 
@@ -192,13 +199,15 @@ class _Winch:
     @cached_property
     def coarse_plant(self) -> LinearPlant:
         """The design's plant."""
-        return self._plant(self.design.masses, self.design.friction)
+        return self._plant(self.design.masses)
 
     def _loop(self, masses: int, own: Iterable[str], *, rope: bool) -> CheckedLoop:
         """Return the loop on some rope masses, or on the rope itself, without losses beside it."""
         found: CheckedLoop | None = None
         for friction in (0.0, self.design.friction) if self.design.friction else (0.0,):
-            plant = self._plant(masses, friction)
+            plant = self._plant(masses)
+            if friction != self.design.friction:
+                plant = plant.with_element(_SPEED, LOAD, self.design.friction - friction)
             exact = partial(self._line, friction) if rope else None
             controller, still = self.design.controller, found
             found = CheckedLoop.of(plant, controller, self.sources, self.demands, own, exact)
@@ -271,10 +280,8 @@ class _Winch:
         """Return the check of the poles without drag, which in small motion there is none of."""
         if self.design.case.payload.fixed_drag is not None or self.data.quadratic_drag == 0.0:
             return []
-        plant, fastest = (
-            self._plant(self.more_masses, 0.0, 0.0),
-            float(np.abs(self.fine.marks).max()),
-        )
+        plant = self._plant_with(self.more_masses, 0.0, 0.0)
+        fastest = float(np.abs(self.fine.marks).max())
         on = f"a rope of {self.more_masses} masses, without drag"
         check = pole_check("poles.calm", plant, self.fine.law, on, -_MARGINAL * fastest)
         # What is told to swing may do so.
