@@ -26,7 +26,7 @@ import numpy.typing as npt
 import scipy.linalg
 from scipy.optimize import brentq, nnls
 
-from ..basics import FloatArray, InputError, ReadOnlyArrays
+from ..basics import FloatArray, InputError, ReadOnlyArrays, read_only
 
 MAX_MASSES = 40  # more states cost more in every eigenvalue than they add to any design
 
@@ -192,6 +192,7 @@ def chain_of(p: Mapping[str, Any], lumps: RopeLumps, length: Any) -> list[Link]:
     return links
 
 
+@functools.lru_cache(maxsize=256)
 def fixed_top_modes(
     axial_stiffness: float,
     length: float,
@@ -245,9 +246,9 @@ def fixed_top_modes(
         stiffness = 1.0 / (length / axial_stiffness + 1.0 / tip_stiffness)
         if held == 2:
             springs, masses = [stiffness, sling_stiffness], [block_mass, payload_mass]
-            return _chain_modes(np.array(springs), np.array(masses))[:count]
+            return read_only(_chain_modes(np.array(springs), np.array(masses))[:count])
         stiffness = stiffness if rigid else 1.0 / (1.0 / stiffness + 1.0 / sling_stiffness)
-        return np.array([math.sqrt(stiffness / (payload_mass + block_mass))])
+        return read_only(np.array([math.sqrt(stiffness / (payload_mass + block_mass))]))
     if math.isinf(sling_stiffness):
         payload_mass, block_mass = payload_mass + block_mass, 0.0
     eps = mass_per_length * length / payload_mass
@@ -271,7 +272,7 @@ def fixed_top_modes(
             brentq(phase, max(0.0, (j - 1.5) * math.pi), (j + 0.5) * math.pi, (j,), xtol=1e-15)
             for j in range(count)
         ]
-    return np.array(roots) / length * math.sqrt(axial_stiffness / mass_per_length)
+    return read_only(np.array(roots) / length * math.sqrt(axial_stiffness / mass_per_length))
 
 
 def first_root(eps: FloatArray) -> FloatArray:
