@@ -55,13 +55,11 @@ def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) ->
     P_Y, P_F, T_Y, T_F = rope_transfers(data, s, drag)
 
     # Motor: torque = forward command - back s theta, both with the drive's dynamics in them.
+    forward = data.torque_per_command(s)
     if data.motor == "dc":
-        forward = data.torque_constant / (data.resistance + data.inductance * s)
         back = forward * data.back_emf_constant
     else:
         lag = 1.0 / (1.0 + s / data.torque_bandwidth)  # 1 for an infinite bandwidth
-        speed_mode = data.speed_gain > 0.0
-        forward = lag * data.speed_gain if speed_mode else lag
         back = lag * data.speed_gain
     h = data.drum_radius / data.gear_ratio
     load = data.mean_gear_factor * h
@@ -70,8 +68,7 @@ def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) ->
     # columns: command, heave, force on the payload, set-point
     zero = np.zeros_like(s)
     one = np.ones_like(s)
-    drive = forward + zero
-    angle = np.stack([drive, -load * T_Y, -load * T_F, drive]) / shaft
+    angle = np.stack([forward, -load * T_Y, -load * T_F, forward]) / shaft
     command = np.stack([one, zero, zero, one])
     heave = np.stack([zero, one, zero, zero])
     force = np.stack([zero, zero, one, zero])

@@ -334,6 +334,13 @@ class PlantData:
         held = self.hung_weight * self.drum_radius / self.gear_ratio
         return held * (1.0 / eta - self.mean_gear_factor) + self.coulomb_friction
 
+    def torque_per_command(self, s: ComplexArray) -> ComplexArray:
+        """Return the torque per command of a motor that stands, at points `s` [1/s], (k,)."""
+        if self.motor == "dc":
+            return np.asarray(self.torque_constant / (self.resistance + self.inductance * s))
+        # An infinite bandwidth has no lag.
+        return np.asarray((self.speed_gain or 1.0) / (1.0 + s / self.torque_bandwidth))
+
     @property
     def mean_sheaves_factor(self) -> float:
         """Rope tension at the drum over that below the sheaves, mean of both ways [-]."""

@@ -30,9 +30,9 @@ from models.plant import LinearPlant, consistent_drag, settled_drag
 from .controller import LinearController, closed_loop_plant, closed_loop_poles
 from .disturbance import CoherentError, Disturbance
 from .elements import Coefficients, DragElement, Element, with_elements, without_losses
-from .margins import Margins, least_distances, loop_margins, refine_minima, worst_margins
+from .margins import Margins, least_distances, loop_margins, refine_minima
 from .pole_region import PoleRegion, with_delay_models
-from .responses import LoopBlocks, LoopResponses, with_loops
+from .responses import LoopBlocks, LoopResponses, differences, with_loops
 
 _RTOL = 1e-8  # of every variance
 _GRID_PER_DECADE = 150
@@ -41,6 +41,7 @@ _SETTLED = 1e-3  # ... and for which adapted nodes do
 _SAME_NODES = 0.05  # relative change of the drag for which nodes made from poles do
 _NODE_ROUNDS = 6  # of finding nodes for losses
 _LOSS_ROUNDS, _LOSS_AGREES = 200, 1e-12  # of their coefficients on given nodes
+_SECANTS, _AGREED, _LONGEST = 25, 1e-12, 2.0  # steps, accuracy, longest step in logarithms
 _LEAST = -12.0  # logarithm of the share of its losses with which a stuck loop may move
 _VERGE = 1e-5  # damping ratio below which only its own nodes see a pole
 
@@ -133,10 +134,15 @@ class Assessment:
         return with_delay_models(self.plant)
 
     @property
+    def decays(self) -> bool:
+        """Whether all poles lie in the left half plane."""
+        return bool(self.poles.real.max(initial=-np.inf) < 0.0)
+
+    @property
     def stable(self) -> bool:
         """Whether all poles lie in the left half plane, without losses too."""
         others = [closed_loop_poles(with_delay_models(p)[0], self.controller) for p in self._still]
-        return all(bool(poles.real.max(initial=-np.inf) < 0.0) for poles in (self.poles, *others))
+        return self.decays and all(poles.real.max(initial=-np.inf) < 0.0 for poles in others)
 
     @property
     def _still(self) -> list[LinearPlant]:
@@ -153,25 +159,17 @@ class Assessment:
     @cached_property
     def margins(self) -> Margins:
         """Margins of the loops broken at the inputs."""
-        return worst_margins(
-            [
-                loop_margins(partial(self.loop_gain, index=i), self.grid, gain, self._minima[i])
-                for i, gain in enumerate(self.gains)
-            ]
-        )
+        return loop_margins(self._gains, self.grid, self.gains, self._minima)
 
     @cached_property
-    def gains(self) -> list[ComplexArray]:
-        """L of each loop on the grid, (k,) each; with the losses first, then without."""
+    def gains(self) -> ComplexArray:
+        """L of each loop on the grid, (loops, k); with the losses first, then without."""
         return self._gains(self.grid)
 
     @cached_property
     def _minima(self) -> list[list[tuple[FloatArray, FloatArray]]]:
         """Places and values of the local minima of |1 + L| and of 1/|S - 1/2| of each loop."""
-        return [
-            least_distances(partial(self.loop_gain, index=i), self.grid, gain)
-            for i, gain in enumerate(self.gains)
-        ]
+        return least_distances(self._gains, self.grid, self.gains)
 
     @property
     def max_sensitivity(self) -> float:
@@ -180,9 +178,7 @@ class Assessment:
 
     def loop_gain(self, omega: FloatArray, index: int = 0) -> ComplexArray:
         """Return L of the loop broken at input `index`, (k,); further ones are without losses."""
-        side, at = divmod(index, len(self._bare.inputs))
-        loop = self._closed((), (), np.asarray(omega, dtype=np.float64), self._plants[side])
-        return np.asarray(loop.difference(at) - 1.0)
+        return np.asarray(self._gains(np.asarray(omega, dtype=np.float64))[index])
 
     def response(self, output: str, disturbance: str, omega: FloatArray) -> ComplexArray:
         """Return the closed-loop response of `output` to `disturbance`, (k,)."""
@@ -400,12 +396,20 @@ class Assessment:
         densities = np.array([d.density(omega) for d in self.disturbances])
         return self._responses(outputs, [d.name for d in self.disturbances], omega), densities
 
-    def _gains(self, omega: FloatArray) -> list[ComplexArray]:
-        """Return L of each loop, (k,) each; with the losses first, then without."""
-        # No loop gain needs an output.
-        loops = [self._closed((), (), omega, plant) for plant in self._plants]
-        inputs = range(len(self.plant.inputs))
-        return [np.asarray(loop.difference(i) - 1.0) for loop in loops for i in inputs]
+    def _gains(self, omega: FloatArray) -> ComplexArray:
+        """Return L of each loop, (loops, k); with the losses first, then without."""
+        plant, losses, sides = self._broken
+        response = plant.response(plant.beside_poles(omega))
+        return differences(response, self.controller, losses, sides) - 1.0
+
+    @cached_property
+    def _broken(self) -> tuple[LinearPlant, list[tuple[str, str]], list[list[float]]]:
+        """The plant of all loops, velocities and forces of its losses, their coefficients."""
+        pairs = list(zip(self.elements, self.coefficients, strict=True))
+        losses = [(e, c) for e, c in pairs if not e.lasting and c]
+        plant = self._plants[-1].select(outputs=[e.velocity for e, _ in losses])
+        sides = [[c for _, c in losses], [0.0] * len(losses)] if losses else [[]]
+        return plant, [(e.velocity, e.force) for e, _ in losses], sides
 
 
 def frequency_grid(poles: ComplexArray) -> FloatArray:
@@ -474,14 +478,16 @@ def consistent_coefficients(
     held = False  # whether they stay as they are
 
     @cache
-    def loop(coefficient: float) -> Assessment:
-        known = [*([] if drag is None else [coefficient]), *slack]
+    def loop(*known: float) -> Assessment:
         return Assessment(
             plant, controller, disturbances, elements=elements, coefficients=known, nodes=nodes
         )
 
+    def all_with(coefficient: float) -> list[float]:
+        return [*([] if drag is None else [coefficient]), *slack]
+
     def swings(coefficient: float) -> bool:
-        return not bool(loop(coefficient).poles.real.max(initial=-np.inf) < 0.0)
+        return not loop(*all_with(coefficient)).decays
 
     at = np.nan  # the coefficient that the nodes are for
     # The plant as it is, decomposed once for all.
@@ -489,12 +495,43 @@ def consistent_coefficients(
     velocities = [e.velocity for e in elements]
     names = [*(d.name for d in disturbances), *(e.force for e in elements)]
 
-    def about(coefficient: float) -> Callable[[float], float]:
-        nonlocal at
-        at, calm, found = coefficient, np.inf, loop(coefficient).quadrature(velocities)
+    def moved(known: Sequence[float]) -> Callable[[Sequence[float]], FloatArray]:
+        """Return the variances of the velocities by coefficients, on nodes that suit some."""
+        found = loop(*known).quadrature(velocities)
         closed = plain._responses(velocities, names, found.omega)
         shaken, felt = closed[:, : len(disturbances)], closed[:, len(disturbances) :]
-        densities = [d.density(found.omega) for d in disturbances]
+        density = np.array([d.density(found.omega) for d in disturbances]) * found.weights
+        cross = np.einsum("awk,bwk->abk", shaken * density, shaken.conj())
+        reference = np.array([e.reference for e in elements])
+
+        def variances(others: Sequence[float]) -> FloatArray:
+            return with_loops(cross, felt, np.array(others) - reference)
+
+        return variances
+
+    def agreed(known: Sequence[float], settled: float) -> Sequence[float] | None:
+        """Return all coefficients together, as near to known ones as they mostly are."""
+        for _ in range(_NODE_ROUNDS):
+            variances = moved(known)
+            found = _fixed_point(
+                lambda others, variances=variances: [  # type: ignore[misc]  # it is bound here
+                    float(e.coefficient(v))
+                    for e, v in zip(elements, variances(others), strict=True)
+                ],
+                known,
+            )
+            if found is None or not loop(*found).decays:
+                return None
+            if np.all(np.abs(found - np.array(known)) <= settled * found):
+                damping = [PoleRegion.of(loop(*each).poles).damping for each in (found, known)]
+                on_the_verge = damping[0] < max(0.5 * damping[1], _VERGE)
+                return None if on_the_verge and nodes is not None else found.tolist()
+            known = found.tolist()
+        return None
+
+    def about(coefficient: float) -> Callable[[float], float]:
+        nonlocal at
+        at, calm, variances = coefficient, np.inf, moved(all_with(coefficient))
 
         def velocity(other: float) -> float:
             nonlocal calm  # the least drag known to do; more of it does too, as is checked below
@@ -502,34 +539,25 @@ def consistent_coefficients(
                 if swings(other):
                     return np.inf
                 calm = other
-            # Other coefficients are a change of the closed loop of low rank (Woodbury).
-            if not losses:
-                turned = 1.0 + (other - elements[0].reference) * felt[0, 0]
-                return float(np.sqrt(np.abs(turned) ** -2 @ weights))
             for _ in range(_LOSS_ROUNDS):
-                known = [*([] if drag is None else [other]), *slack]
-                more = [c - e.reference for c, e in zip(known, elements, strict=True)]
-                moved = with_loops(shaken, felt, more)
-                squared = sum(
-                    d * (v.real**2 + v.imag**2)
-                    for d, v in zip(densities, moved.swapaxes(0, 1), strict=True)
-                )
-                variances = np.asarray(squared @ found.weights)
-                own = variances[len(variances) - len(losses) :]
+                found = variances(all_with(other))
+                own = found[len(found) - len(losses) :]
                 before = np.array(slack)
                 asked[:] = [float(e.coefficient(v)) for e, v in zip(losses, own, strict=True)]
-                if held:
+                if held or not losses:
                     break
                 slack[:] = asked
                 if np.all(np.abs(slack - before) <= _LOSS_AGREES * before):
                     break
-            return float(np.sqrt(variances[0]))
+            return float(np.sqrt(found[0]))
 
-        if not losses:
-            pairs = zip(shaken[0], densities, strict=True)
-            density = np.sum([np.abs(v) ** 2 * d for v, d in pairs], axis=0)
-            weights = found.weights * density
         return velocity
+
+    if losses:
+        with suppress(SolverError):
+            together = agreed(first, _SETTLED if nodes is None else _SAME_NODES)
+            if together is not None:
+                return tuple(together)
 
     def solved(begin: float, settled: float | None = None) -> float:
         """Return the drag that agrees, the losses with it, on nodes that suit both."""
@@ -560,7 +588,7 @@ def consistent_coefficients(
         # Nodes that do not adapt are as good for a loop with a little more drag, unless it is on
         # the verge of stability, where nothing but its own nodes sees how it swings.
         found = solved(begin, _SAME_NODES)
-        damping = [PoleRegion.of(loop(C).poles).damping for C in (found, at)]
+        damping = [PoleRegion.of(loop(*all_with(C)).poles).damping for C in (found, at)]
         if drag is not None and damping[0] < max(0.5 * damping[1], _VERGE):
             found = consistent_drag(drag.quadratic, lambda C: about(C)(C))
             about(found)
@@ -584,6 +612,38 @@ def consistent_coefficients(
     if swings(found):
         raise SolverError(f"drag: the loop is unstable at {found:.4g} N s/m but not with less")
     return (*([] if drag is None else [found]), *slack)
+
+
+def _fixed_point(
+    function: Callable[[FloatArray], Sequence[float]], begin: Sequence[float]
+) -> FloatArray | None:
+    """Return positive numbers that a function leaves as they are, or None.
+
+    By secants of as many steps as there are numbers (Anderson, J. ACM 12, 1965), in logarithms.
+    """
+    if not np.all(np.array(begin) > 0.0):
+        return None
+    at = np.log(begin)
+    steps: list[FloatArray] = []
+    turns: list[FloatArray] = []
+    for _ in range(_SECANTS):
+        found = np.array(function(np.exp(at)))
+        if not np.all((found > 0.0) & np.isfinite(found)):
+            return None
+        apart = np.log(found) - at
+        if np.all(np.abs(apart) <= _AGREED):
+            return found
+        if steps:
+            turns[-1] = apart - turns[-1]
+        step = apart
+        if steps:
+            kept = slice(-at.size, None)
+            moved, turned = np.array(steps[kept]).T, np.array(turns[kept]).T
+            step = apart - (moved + turned) @ np.linalg.lstsq(turned, apart, rcond=None)[0]
+        steps.append(np.clip(step, -_LONGEST, _LONGEST))
+        turns.append(apart)
+        at = at + steps[-1]
+    return None
 
 
 def _known_nodes(disturbances: Sequence[Disturbance], poles: ComplexArray) -> Quadrature:

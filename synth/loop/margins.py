@@ -15,6 +15,7 @@ import numpy as np
 from models.basics import BoolArray, ComplexArray, FloatArray
 
 LoopGain = Callable[[FloatArray], ComplexArray]
+"""From frequencies [rad/s], (k,), to L there, (k,), or that of n loops, (n, k)."""
 
 _NOTHING = 1e-9  # |L| below which neither a peak nor a crossing matters to any margin
 _CLOSE, _MOST_STEPS = 1e-14, 60  # relative width of a bracket that is a point; steps towards it
@@ -69,29 +70,51 @@ class Margins:
 
 
 def loop_margins(
-    loop: LoopGain,
+    loops: LoopGain,
     grid: FloatArray,
-    gain: ComplexArray,
-    minima: Sequence[tuple[FloatArray, FloatArray]] | None = None,
+    gains: ComplexArray,
+    minima: Sequence[Sequence[tuple[FloatArray, FloatArray]]] | None = None,
 ) -> Margins:
-    """Return the margins of `loop`(omega) -> L, (k,), known as `gain` on a grid [rad/s].
+    """Return the margins of `loops`(omega) -> L, known as `gains` on a grid [rad/s].
 
-    `minima` are its `least_distances`, where they are known already.
+    L is (k,), or (n, k) of n loops, of which the worst of each figure is told.  `minima` are their
+    `least_distances`, where they are known already.
     """
-    (peak_at, distance), (_, disk) = minima or least_distances(loop, grid, gain)
+    gains = np.atleast_2d(gains)
+    count, known = len(gains), minima or least_distances(loops, grid, gains)
 
     def heights(at: ComplexArray) -> FloatArray:
-        return np.array([np.abs(at) - 1.0, at.imag])
+        return np.concatenate([np.abs(at) - 1.0, at.imag])
 
-    turns = _turns(grid, heights(gain))
+    turns = _turns(grid, heights(gains))
     grid, order = np.unique(np.append(grid, turns), return_index=True)
-    gain = np.append(gain, loop(turns))[order]
-    felt = np.abs(gain) > _NOTHING
-    among = np.array([np.ones_like(felt), felt])
-    crossovers, axis = _crossings(lambda w: heights(loop(w)), grid, heights(gain), among)
-    turn = np.angle(-loop(crossovers))  # angle beyond -180 deg
-    axis = np.append(axis, grid[[0, -1]][level_ends(gain)])
-    on_axis = loop(axis).real
+    gains = np.concatenate([gains, np.atleast_2d(loops(turns))], axis=1)[:, order]
+    felt = np.abs(gains) > _NOTHING
+    among = np.concatenate([np.ones_like(felt), felt])
+    places = _crossings(lambda w: heights(np.atleast_2d(loops(w))), grid, heights(gains), among)
+    for i in range(count):
+        places[count + i] = np.append(places[count + i], grid[[0, -1]][level_ends(gains[i])])
+    # All loops where any of them is asked for.
+    ends = np.cumsum([at.size for at in places])
+    there = np.split(np.atleast_2d(loops(np.concatenate(places))), ends[:-1], axis=1)
+    return worst_margins(
+        [
+            _margins(known[i], places[i], there[i][i], places[count + i], there[count + i][i].real)
+            for i in range(count)
+        ]
+    )
+
+
+def _margins(
+    minima: Sequence[tuple[FloatArray, FloatArray]],
+    crossovers: FloatArray,
+    on_circle: ComplexArray,
+    axis: FloatArray,
+    on_axis: FloatArray,
+) -> Margins:
+    """Return the margins of a loop: L at its crossovers and where it meets the real axis."""
+    (peak_at, distance), (_, disk) = minima
+    turn = np.angle(-on_circle)  # angle beyond -180 deg
     negative = on_axis < 0.0
     above, below = on_axis[negative & (on_axis > -1.0)], on_axis[negative & (on_axis < -1.0)]
     return Margins(
@@ -126,18 +149,20 @@ def worst_margins(margins: list[Margins]) -> Margins:
 
 
 def least_distances(
-    loop: LoopGain, grid: FloatArray, gain: ComplexArray
-) -> list[tuple[FloatArray, FloatArray]]:
-    """Return places and values of the local minima of |1 + L| and of 1/|S - 1/2|."""
+    loops: LoopGain, grid: FloatArray, gains: ComplexArray
+) -> list[list[tuple[FloatArray, FloatArray]]]:
+    """Return places and values of the local minima of |1 + L| and of 1/|S - 1/2| of each loop."""
 
     def distances(at: ComplexArray) -> FloatArray:
         # |S - 1/2| = |1 - L| / (2 |1 + L|); 1 - L may vanish: the distance is then unbounded, which
         # a least value does not mind.
         own = np.abs(1.0 + at)
-        return np.array([own, 2.0 * own / np.maximum(np.abs(1.0 - at), 1e-300)])
+        return np.concatenate([own, 2.0 * own / np.maximum(np.abs(1.0 - at), 1e-300)])
 
-    felt = np.abs(gain) > _NOTHING
-    return _all_minima(lambda w: distances(loop(w)), grid, distances(gain), felt)
+    gains = np.atleast_2d(gains)
+    felt = np.tile(np.abs(gains) > _NOTHING, (2, 1))
+    found = _all_minima(lambda w: distances(np.atleast_2d(loops(w))), grid, distances(gains), felt)
+    return [[found[i], found[len(gains) + i]] for i in range(len(gains))]
 
 
 def refine_minima(
@@ -166,7 +191,7 @@ def _all_minima(
     vectors.
     """
     centre, beside = values[:, 1:-1], np.array([values[:, :-2], values[:, 2:]])
-    lower = (centre <= beside.min(axis=0)) & (True if among is None else among[1:-1])
+    lower = (centre <= beside.min(axis=0)) & (True if among is None else among[..., 1:-1])
     level = beside.max(axis=0) - centre <= _LEVEL * np.abs(centre)
     which, inner = np.nonzero(lower & ~level)
     inner = inner + 1

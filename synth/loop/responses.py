@@ -297,6 +297,51 @@ class LoopResponses:
         return _real_product(slope, slope)
 
 
+def differences(
+    response: PlantResponse,
+    controller: LinearController,
+    elements: Sequence[tuple[str, str]],
+    sides: Sequence[Sequence[float]],
+) -> ComplexArray:
+    """Return 1 + L of each loop broken at a command, by elements' coefficients, (loops, k).
+
+    Parameters
+    ----------
+    response
+        That of the plant without the elements, with what the controller hears.
+    controller
+        What closes the loops.
+    elements
+        Velocity and force of each element.
+    sides
+        Coefficients of the elements, force = -c velocity; all loops of one set after the other's.
+    """
+    law = controller.response_at(response.s)
+    z = [response.outputs.index(velocity) for velocity, _ in elements]
+    w = [response.disturbances.index(force) for _, force in elements]
+    heard = np.concatenate([response.yu, response.yw[:, :, w]], axis=2)
+    moved = np.concatenate([response.zu[:, z], response.zw[:, z][:, :, w]], axis=2)
+    yu = np.concatenate([heard, moved], axis=1).transpose(1, 2, 0)
+    rows, columns, k = yu.shape
+    blocks = LoopBlocks(
+        s=response.s,
+        zw=np.zeros((0, 0, k), complex),
+        zu=np.zeros((0, columns, k), complex),
+        yw=np.zeros((rows, 0, k), complex),
+        yu=yu,
+        outputs=(),
+        sources=(),
+    )
+    m, n = law.shape[1:]
+    entries = {(i, j): law[:, i, j] for i in range(m) for j in range(n)}
+    found = []
+    for side in sides:
+        own = {(m + i, n + i): np.full(len(law), -c, complex) for i, c in enumerate(side) if c}
+        loop = LoopResponses(blocks, Closing(entries=entries | own, size=(columns, rows)))
+        found += [loop.difference(i) for i in range(m)]
+    return np.array(found)
+
+
 def _real_product(a: ComplexArray, b: ComplexArray) -> FloatArray:
     """Return Re a b^H of matrices whose rows are long."""
     return np.asarray(a.view(np.float64) @ b.view(np.float64).T)
@@ -329,16 +374,17 @@ def _cofactor(a: ComplexArray, i: int, j: int) -> Any:
     return a[i, j] * a[k, m] - a[i, m] * a[k, j]
 
 
-def with_loops(shaken: ComplexArray, felt: ComplexArray, gains: Sequence[float]) -> ComplexArray:
-    """Return responses of velocities with forces -gain velocity closed around them, (m, nw, k).
+def with_loops(cross: ComplexArray, felt: ComplexArray, gains: FloatArray) -> FloatArray:
+    """Return variances of velocities with forces -gain velocity closed around them, (m,).
 
     Parameters
     ----------
-    shaken, felt
-        Responses of the m velocities to disturbances, (m, nw, k), and to the forces, (m, m, k).
+    cross
+        Cross-densities of the m velocities without, times quadrature weights, (m, m, k).
+    felt
+        Their responses to the forces, (m, m, k).
     gains
-        One for each.
+        One for each, (m,).
     """
-    m = len(gains)
-    opened = np.eye(m)[:, :, None] + felt * np.asarray(gains)[None, :, None]
-    return _times(_inverse(opened), shaken)
+    closed = _inverse(np.eye(len(gains))[:, :, None] + felt * gains[None, :, None])
+    return np.asarray(np.einsum("abk,bck,ack->a", closed, cross, closed.conj()).real)

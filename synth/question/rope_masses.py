@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -139,24 +138,20 @@ class _OnTheRope:
         limits = [limit for limit in self.question.loop if isinstance(limit, margins)]
         lumped = {limit.name: limit.use(limit.measure(self.loop)) for limit in limits}
         binding = any(use > 1.0 - _KEPT for use in lumped.values())
-        found = dict.fromkeys(lumped, -math.inf)
-        apart = 0.0
-        for i, gain in enumerate(self.gains if limits else ()):
-            felt = np.abs(gain) > _FELT
-            peak = _CLOSE / float(np.abs(1.0 + gain).min())
-            kept = all(limit.use(_least(limit, peak)) <= 1.0 for limit in limits)
-            if (kept and not binding) or not felt.any():
-                found = {name: max(use, 0.0) for name, use in found.items()}
-                continue
-            grid, loop = self.grid[felt], partial(self._gain, i)
-            minima = least_distances(loop, grid, gain[felt])
-            own = loop_margins(loop, grid, gain[felt], minima)
+        found, apart = dict.fromkeys(lumped, 0.0), 0.0
+        felt = np.abs(self.gains).max(axis=0) > _FELT
+        peak = _CLOSE / float(np.abs(1.0 + self.gains).min())
+        kept = all(limit.use(_least(limit, peak)) <= 1.0 for limit in limits)
+        if (binding or not kept) and felt.any():
+            grid, gains = self.grid[felt], self.gains[:, felt]
+            minima = least_distances(self._loops, grid, gains)
+            own = loop_margins(self._loops, grid, gains, minima)
             seen = _Seen(max_sensitivity=own.max_sensitivity, margins=own)
             for limit in limits:
-                use = limit.use(limit.measure(seen))  # type: ignore[arg-type]  # all it asks for
-                found[limit.name] = max(found[limit.name], use)
+                found[limit.name] = limit.use(limit.measure(seen))  # type: ignore[arg-type]
                 if isinstance(limit, MaxSensitivity):
-                    apart = max(apart, self._missed(i, limit.bound, *minima[0]))
+                    each = enumerate(minima)
+                    apart = max(self._missed(i, limit.bound, *least) for i, (least, _) in each)
         for limit in limits:
             name = limit.name
             rope, masses = found[name], lumped[name]
@@ -182,42 +177,42 @@ class _OnTheRope:
         binds = (size > (1.0 - _KEPT) * bound) & (size < (1.0 + _KEPT) * bound) & (rope > 0.0)
         return float(np.max((size - rope)[binds] / bound, initial=0.0))
 
-    def _gains(self, s: ComplexArray, frictions: Sequence[float] | None = None) -> ComplexArray:
-        """Return L of each loop at points [1/s], (frictions and loops, k)."""
-        question, controller, found = self.question, self.loop.controller, []
-        for friction in self.frictions if frictions is None else frictions:
-            line = sensed_line_at(
-                question.case, s, drag=self.drag, friction=friction, data=question.data
-            )
-            heard = line.select(measurements=controller.measurements)
-            loop = LoopResponses.of(heard, controller)
-            found += [loop.difference(i) - 1.0 for i in range(len(controller.inputs))]
-        return np.array(found)
+    def _loops(self, omega: FloatArray) -> ComplexArray:
+        """Return L with each friction at frequencies [rad/s], (frictions, k)."""
+        return self._gains(np.asarray(1j * omega, dtype=np.complex128))
 
-    def _gain(self, index: int, omega: FloatArray) -> ComplexArray:
-        """Return L of one loop at frequencies [rad/s], (k,)."""
-        side, at = divmod(index, len(self.loop.controller.inputs))
-        s = np.asarray(1j * omega, dtype=np.complex128)
-        return np.asarray(self._gains(s, self.frictions[side : side + 1])[at])
+    def _gains(self, s: ComplexArray) -> ComplexArray:
+        """Return L with each friction at points [1/s], (frictions, k)."""
+        gain, turned = self._still(s)
+        return np.array([gain / (1.0 + friction * turned) for friction in self.frictions])
+
+    def _still(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return L without losses, and the motor's speed by a torque on its shaft, (k,) each."""
+        data, controller = self.question.data, self.loop.controller
+        line = sensed_line_at(self.question.case, s, drag=self.drag, data=data)
+        speed = line.zu[:, line.outputs.index("motor.speed"), 0] / data.torque_per_command(s)
+        heard = line.select(measurements=controller.measurements)
+        return np.asarray(LoopResponses.of(heard, controller).difference(0) - 1.0), speed
 
     def _poles(self) -> ComplexArray:
         """Return the light poles of the rope with the loop open and with it closed [1/s]."""
-        found = np.concatenate([self._poles_with(friction) for friction in self.frictions])
-        # Points about a pole that is there twice would lie apart by rounding only.
-        same = np.abs(found[:, None] - found) < _SAME * np.abs(found)
-        return np.asarray(found[~np.tril(same, -1).any(axis=1)])
-
-    def _poles_with(self, friction: float) -> ComplexArray:
         lumped = np.concatenate([self.loop.plant.poles(), self.loop.poles])
         lumped = lumped[(lumped.imag > 0.0) & (-lumped.real < _LIGHT * np.abs(lumped))]
         begins = np.concatenate([self.question.data.damped_modes(MAX_MASSES), lumped])
-        half = np.arange(2 * begins.size) < begins.size
+        # Of each friction the open loop's, then the closed one's.
+        closed = np.repeat(np.tile([0.0, 1.0], len(self.frictions)), begins.size)
+        friction = np.repeat(self.frictions, 2 * begins.size)
 
         def open_and_closed(s: ComplexArray, at: IndexArray) -> ComplexArray:
             # 1/L and 1 + 1/L, which are smooth where L has a pole.
-            return np.asarray(1.0 / self._gains(s, [friction])[0] + ~half[at])
+            gain, turned = self._still(s)
+            return np.asarray((1.0 + friction[at] * turned) / gain + closed[at])
 
-        return np.concatenate([begins, _zeros(open_and_closed, np.tile(begins, 2))])
+        own = _zeros(open_and_closed, np.tile(begins, 2 * len(self.frictions)))
+        found = np.concatenate([begins, own])
+        # Points about a pole that is there twice would lie apart by rounding only.
+        same = np.abs(found[:, None] - found) < _SAME * np.abs(found)
+        return np.asarray(found[~np.tril(same, -1).any(axis=1)])
 
 
 def on_enough_masses(
