@@ -237,12 +237,12 @@ def test_a_light_deep_load_hangs_on_a_tight_rope_or_is_not_ok() -> None:
     checked = {check.name for check in design.verification.checks}
     assert {"limits.rope.lower_tension.least", "rope.rope.lower_tension.least"} <= checked
     # Of what moves the load's end (10.1 kN) all but 3.6 kN is the unit's error, 5 cm up to a sea of
-    # 4.3 m and 5 % above: 2.6 m keep the limit, a unit a fifth worse breaks it alone, and 6 m with
+    # 4.3 m and 5 % above: 2.4 m keep the limit, a unit a fifth worse breaks it alone, and 6 m with
     # others that have nothing to do with the rope.
     lower_end = ["rope.lower_tension.least"]
     drives = ["motor.speed.peak", "motor.power.peak"]
     for changes, others, slack in (
-        ({"sea.significant_height": 2.6}, [], []),
+        ({"sea.significant_height": 2.4}, [], []),
         ({"sensors.mru.noise_floor": 0.06}, [], lower_end),
         ({"sea.significant_height": 6.0}, drives, lower_end),
     ):

@@ -143,7 +143,8 @@ def test_a_warm_descent_of_a_family_finds_its_optimum_nearby() -> None:
 def test_a_loop_that_swings_by_itself_without_its_drag_is_seen_on_the_verge() -> None:
     """Its pole is 4e-5 1/s from the axis, where nodes for a little more drag do not see it."""
     gains = {"A": 2.275003319, "a": 3.517917461, "a1": 34.96444923, "a2": 8.398323470}
-    case = load_case("subsea-crane")
+    # With losses the drum is calmer and the payload has less drag, too little without them.
+    case = load_case("subsea-crane").replace({"winch.losses": "hauling"})
     look, design = prepare(case).evaluate(gains), evaluate_gains(case, gains)
     assert look.stable
     assert design.margins is not None
@@ -155,10 +156,10 @@ def test_a_loop_that_swings_by_itself_without_its_drag_is_seen_on_the_verge() ->
         assert not one.ok
         assert one.status.startswith("unstable in small motion, where drag vanishes: it swings by")
     problem, values = design.question.problem, design.question.values(gains)
-    assert problem.held(values, design.drag)
+    assert problem.held(values, [design.drag])
     assert problem.swings(values)
-    assert not problem.stable(values, design.drag)
-    assert not FamilyProblem.of(problem).stable(values, [design.drag])
+    assert not problem.stable(values, [design.drag])
+    assert not FamilyProblem.of(problem).stable(values, [[design.drag]])
     assert FamilyProblem.of(problem).abscissa(values) > 0.0
     assert FamilyProblem.of(problem).growth(values) > 0.0 > problem.growth(values)
     asked = pose_operability(design, ())
@@ -180,7 +181,7 @@ def test_a_loop_that_nothing_damps_does_not_swing_by_itself() -> None:
     posed = pose(load_case("subsea-crane").replace(changes), "payload-feedback", 3)
     assert posed.drag is not None
     still = [0.0] * len(posed.law.parameters)
-    assert abs(posed.problem.loop_poles(still, 0.0).real.max()) < 1e-8
+    assert abs(posed.problem.loop_poles(still, posed.problem.nothing).real.max()) < 1e-8
     assert not posed.problem.swings(still)
 
 

@@ -144,7 +144,7 @@ def test_responses_at_any_drag_are_those_of_the_plant_with_that_drag(C: float, w
     )
     for k, output in enumerate(base.outputs):
         expected = abs(view.response(output, "hook.heave", omega)[0]) ** 2
-        assert base.gains(C)[k, 0, 0] == pytest.approx(expected, rel=1e-8)
+        assert base.gains([C])[k, 0, 0] == pytest.approx(expected, rel=1e-8)
 
 
 def test_the_held_drum_is_that_of_the_uncompensated_payload() -> None:
