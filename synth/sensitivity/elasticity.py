@@ -28,6 +28,7 @@ import numpy as np
 from models.basics import InputError
 
 from ..design import Design
+from ..loop import switching_friction
 from ..question import PAYLOAD
 from ..search import Progress
 from .differences import StepError
@@ -124,16 +125,16 @@ def _first(
     if fixed.stochastic:
         velocity, of_drag = own["velocity"][:-2], own["velocity"][-2]
         moved[0] = drag * (velocity + slopes.quadratic_drag()) / (1.0 - drag * of_drag)
-    if friction > 0.0:
-        torque, by_torque = slopes.losses()
-        # d ln b = d ln Delta - sigma^2/(sigma^2 + turn^2) d ln sigma, of the capped gain.
-        share = 1.0 - (friction / torque) ** 2  # [(rad/s)^2], of omega_0 = 1 rad/s
+    by_torque = slopes.losses()[1]
+    if friction > 0.0 or by_torque.any():
+        # d b = g d Delta - b sigma^2/(sigma^2 + turn^2) d ln sigma of the capped gain b = g Delta:
+        # a gear that loses nothing may begin to.
+        gain = float(switching_friction(1.0, figures["speed_rms"] ** 2))
+        share = 1.0 - gain**2  # [(rad/s)^2], of omega_0 = 1 rad/s
         speed = own["speed_rms"]
         matrix = np.eye(2)
         matrix[1] += friction * share * speed[-2:]
-        right = np.array(
-            [np.zeros(len(known)), friction * (by_torque / torque - share * speed[:-2])]
-        )
+        right = np.array([np.zeros(len(known)), gain * by_torque - friction * share * speed[:-2]])
         if fixed.stochastic:
             matrix[0] -= drag * own["velocity"][-2:]
             right[0] = drag * (own["velocity"][:-2] + slopes.quadratic_drag())

@@ -189,7 +189,7 @@ class Chain:
         e = 1.0 + s * self._own("lag")
         # Losses act on the shaft; signals of the drive are told without what they take.
         self.friction = self._own("friction")
-        if np.any(value_of(self.friction)):
+        if isinstance(self.friction, Dual) or np.any(self.friction):
             self._back = self._back + self.friction * s * e
         self.W = self._inertial * e + self._back
         self.pull = (self._own("load") * h) * e
@@ -505,7 +505,7 @@ class Chain:
         self, *, payload: ComplexArray, turn: Numerator, torque: Numerator, command: Numerator
     ) -> Mapping[str, Numerator]:
         voltage = command
-        if np.any(value_of(self.friction)):
+        if isinstance(self.friction, Dual) or np.any(self.friction):
             taken = self._own("resistance") / self._own("torque_constant") * self.friction
             pairs = zip(command, _times(-taken * self.s, turn), strict=True)
             a, b, c = (x if y is None else y if x is None else x + y for x, y in pairs)

@@ -72,7 +72,7 @@ def dual_figures(
     s = [np.asarray(1j * omega, dtype=np.complex128) for omega in (nodes.omega, peaks)]
     along = Chain(loops, row, s[0])
     sides = [loops]
-    if np.any(value_of(numbers["friction"])):
+    if isinstance(numbers["friction"], Dual) or np.any(numbers["friction"]):
         sides.append(loops.with_drag(drag, np.zeros(1)))
     shaken = Shaken(
         factors=np.ones(1),
@@ -88,5 +88,10 @@ def dual_figures(
         y, f = at_peaks.ends(drag[:, None])
         free = at_peaks.W * y + at_peaks.pull * f
         own = 0.5 * (log(abs2(free)) - log(abs2(at_peaks.closed(y, f))))
-        heights = own if heights is None else where(value_of(own) > value_of(heights), own, heights)
+        if heights is not None:
+            # Where there is no friction yet the worst is what more of it makes of them: its slope
+            # is the last.
+            less = value_of(own) - value_of(heights)
+            own = where((less > 0.0) | ((less == 0.0) & (heights.slope[-1] < 0.0)), own, heights)
+        heights = own
     return {name: 0.5 * log(both[..., 0]) for name, both in moments.items()}, heights

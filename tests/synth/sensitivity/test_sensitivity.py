@@ -56,10 +56,19 @@ def by_differences(answers, path, side=""):
         weighted = zip((-11.0, 18.0, -9.0, 2.0), there, strict=True)
         return sum(w * figures(a.assessment()) for w, a in weighted) / (6.0 * sign * STEP)
     up, down = (answers.with_number(path, np.exp(sign * STEP)) for sign in (1.0, -1.0))
-    if up is None:  # at the end of its range
-        more = answers.with_number(path, np.exp(-2.0 * STEP))
-        here, less, least = (figures(a.assessment()) for a in (answers, down, more))
-        return (1.5 * here - 2.0 * less + 0.5 * least) / STEP
+    if up is None:  # at the end of its range, where losses and the band of their noise begin
+        steps = -STEP * np.arange(1, 5)
+        there = [figures(answers.with_number(path, np.exp(k)).assessment()) for k in steps]
+        return np.polyfit(steps, np.array(there), 3)[-2]
+    if path.endswith("efficiency"):  # losses bend with it more than central differences stand
+        more = answers.with_number(path, np.exp(2.0 * STEP))
+        if more is not None:
+            less = answers.with_number(path, np.exp(-2.0 * STEP))
+            near, far = (
+                figures(one.assessment()) - figures(other.assessment())
+                for one, other in ((up, down), (more, less))
+            )
+            return (8.0 * near - far) / (12.0 * STEP)
     return (figures(up.assessment()) - figures(down.assessment())) / (2.0 * STEP)
 
 
