@@ -181,6 +181,7 @@ def test_a_limit_that_binds_on_a_rope_mode_is_kept_on_the_distributed_rope() -> 
     assert np.max(on_the_rope[far]) == pytest.approx(bound, rel=1e-3)
 
     # As few masses as the crossovers ask for keep it, and the rope does not.
+    case = case.replace({"winch.losses": "hauling"})  # whose friction would move the peak
     few = evaluate_gains(case.replace({"rope.masses": 7}), LATE_ON_7)
     assert few.limits["max_sensitivity"].kept
     assert few.verification is not None

@@ -124,7 +124,7 @@ def test_a_descent_goes_along_the_edge_of_what_is_stable_in_small_motion(largest
     # In its largest sea the loop has next to all damping of its slowest mode from drag.
     problem, sea, _, _ = largest_sea
     assert problem.stable(sea.values, sea.coefficient)
-    calm = problem.loop_poles(sea.values, 0.0)
+    calm = problem.loop_poles(sea.values, problem.nothing)
     slowest = calm[(calm.imag > 0.0) & (np.abs(calm) < 2.0)]
     assert (-slowest.real / np.abs(slowest)).min() == pytest.approx(3e-4, rel=1e-3)
     # One that stopped where it came upon the edge told exp(0.82) and exp(0.12) of the sea.
