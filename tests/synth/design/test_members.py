@@ -61,7 +61,7 @@ def test_a_tenth_of_the_ropes_damping_costs_little() -> None:
     case = load_case("subsea-crane")
     design = optimise_gains(case, "combined", members=[{"rope.damping_ratio": 2e-4}])
     assert design.ok, design.status
-    assert design.family_rms < 20.2e-3  # 19.87 mm for the case alone
+    assert design.family_rms < 20.3e-3  # 19.93 mm for the case alone
 
 
 @pytest.mark.ci
