@@ -47,17 +47,19 @@ COMBINED = {
 GAINS = {"payload-feedback": THREE, "combined": COMBINED}
 
 
+def plain(synthesis):
+    return load_case(synthesis.CASE).replace(synthesis.PLAIN)
+
+
 @pytest.fixture(scope="module")
 def lines(synthesis, peers):
-    return {
-        name: peers.SampledLine(synthesis.pose(load_case(synthesis.CASE), name)) for name in GAINS
-    }
+    return {name: peers.SampledLine(synthesis.pose(plain(synthesis), name)) for name in GAINS}
 
 
 @pytest.mark.parametrize("structure", GAINS)
 def test_a_sampled_loop_is_the_verified_one(structure, lines, synthesis):
     line = lines[structure]
-    design = evaluate_gains(load_case(synthesis.CASE), GAINS[structure], structure)
+    design = evaluate_gains(plain(synthesis), GAINS[structure], structure)
     found = line.measure(np.array([line.question.values(GAINS[structure])]))
     assert found.stable[0]
     assert design.verification is not None

@@ -225,7 +225,7 @@ def test_shares_of_every_signal_are_told_where_more_than_the_sea_shakes_it():
     assert torque[3] > 9.0 * torque[1]  # the noise of the payload's velocity, amplified
     assert torque[2] == 0.0  # the reference unit is not heard
     assert torque[4] > torque[3]  # the gear's loss, which the sea does not make
-    assert payload[4] == 0.0
+    assert 0.0 < payload[4] < 1e-3  # which their noise alone moves
 
 
 def test_margins_in_words():
