@@ -30,7 +30,14 @@ from stored import digest_of, docs_folder, read_rows, study_parser, write_rows
 
 import stillhook as sh
 from models import Case, load_case
-from models.basics import GRAVITY, InputError, PhysicsWarning, StillhookError
+from models.basics import (
+    GRAVITY,
+    FloatArray,
+    InputError,
+    PhysicsWarning,
+    Quadrature,
+    StillhookError,
+)
 from models.hook import HookDemand
 from models.plant import MAX_MASSES
 from models.rig.winch import DrumGeometry
@@ -83,6 +90,7 @@ SIGNALS: Mapping[str, tuple[str, str, str]] = {
 #: one that is found, and dynamic parts of the extremes, above and below what is static.
 FIGURES = ("sigma", "found", "error", "up", "ups", "down", "downs")
 POWER = ("power.up", "power.ups")
+REMNANT = "drive.set_point"  # where a design hears the noise of losses that switch
 KEYS = ("question", "case", "depth", "mass", "delay", "H_s", "T_p", "structure")
 COLUMNS = (
     *KEYS,
@@ -483,9 +491,37 @@ def signals_in(design: Design, told: Statistics) -> list[str]:
     ]
 
 
+def with_losses(
+    design: Design, signal: str, *, noise: bool = True
+) -> tuple[Quadrature, FloatArray]:
+    """Return nodes, and there the density of a signal with the losses in it.
+
+    A simulated torque has its loss, Delta sgn(omega), in it, and so has a drum's line tension.  A
+    design tells both without, and has friction b omega and noise r on the command for the loss in
+    what moves: the signal is g + s (b omega + r), s its share of the motor's loss, all of it
+    coherent.  Without `noise` the remnant r is left out.
+    """
+    loop, loss = design.assessment, design.question.plant.loss
+    share = loss.get(signal, 0.0) / loss["motor.torque"] if loss.get(signal, 0.0) else 0.0
+    nodes = loop.quadrature([signal, "motor.speed"] if share else [signal])
+    omega, density = nodes.omega, np.zeros(nodes.omega.size)
+    for source in loop.disturbances:
+        if source.name == REMNANT and not noise:
+            continue
+        found = loop.response(signal, source.name, omega)
+        if share:
+            speed = loop.response("motor.speed", source.name, omega)
+            found = found + share * design.friction * speed
+            if source.name == REMNANT:
+                found = found - share * design.question.data.torque_per_command(1j * omega)
+        density += np.abs(found) ** 2 * source.density(omega)
+    return nodes, density
+
+
 def printed_sigma(design: Design, signal: str) -> float:
     """Return the standard deviation that a design claims of a signal, its losses in it."""
-    return math.hypot(design.question.plant.loss.get(signal, 0.0), design.assessment.sigma(signal))
+    nodes, density = with_losses(design, signal)
+    return math.sqrt(nodes.integrate(density))
 
 
 def found_sigma(told: Sequence[Statistics], signal: str) -> float:
@@ -538,10 +574,9 @@ def relative_error(design: Design, signal: str, duration: float) -> float:
 
     Of a Gaussian signal of the printed spectrum, var(s^2) = (2 pi/T) int S^2 domega (Bartlett).
     """
-    loop = design.assessment
-    nodes = loop.quadrature([signal])
-    power = nodes.integrate(loop.spectrum(signal, nodes.omega) ** 2)
-    return 0.5 * math.sqrt(2.0 * math.pi * power / duration) / loop.sigma(signal) ** 2
+    nodes, density = with_losses(design, signal)
+    power = nodes.integrate(density**2)
+    return 0.5 * math.sqrt(2.0 * math.pi * power / duration) / nodes.integrate(density)
 
 
 class Book:
