@@ -316,7 +316,7 @@ def test_words_of_a_bound() -> None:
     rows = dict(facts(crane()))
     assert "no linear controller does better than 1.15 mm whatever its margins" in rows["bound"]
     assert "the best found at M_s 2 with order" in rows["bound"]
-    assert "the resonance at 13.2 rad/s" in rows["feedback"]
+    assert "the resonance at 13.3 rad/s" in rows["feedback"]
     assert not {"bound", "feedback"} & dict(facts(crane(), bound=False)).keys()
 
 
