@@ -247,12 +247,15 @@ def _turns(grid: FloatArray, values: FloatArray) -> FloatArray:
     which, at = np.nonzero(nearest)
     x0, x1, x2 = (np.log(grid[at + i]) for i in range(3))
     f0, f1, f2 = (values[which, at + i] for i in range(3))
-    # Newton's form: f1 + (first) (x - x1) + bend (x - x1) (x - x0).
-    first = (f1 - f0) / (x1 - x0)
-    bend = ((f2 - f1) / (x2 - x1) - first) / (x2 - x0)
-    step = -0.5 * (first + bend * (x1 - x0)) / bend
-    lowest = f1 + step * (first + bend * (x1 - x0) + bend * step)
-    return np.asarray(np.exp((x1 + step)[lowest / f1 < _NEARER]))
+    # Newton's form: f1 + (first) (x - x1) + bend (x - x1) (x - x0); what is level to rounding has
+    # no vertex.
+    with np.errstate(all="ignore"):
+        first = (f1 - f0) / (x1 - x0)
+        bend = ((f2 - f1) / (x2 - x1) - first) / (x2 - x0)
+        step = -0.5 * (first + bend * (x1 - x0)) / bend
+        lowest = f1 + step * (first + bend * (x1 - x0) + bend * step)
+        inside = (x0 < x1 + step) & (x1 + step < x2)
+        return np.asarray(np.exp((x1 + step)[inside & (lowest / f1 < _NEARER)]))
 
 
 def _crossings(

@@ -299,7 +299,8 @@ def _zeros(
 
     The function takes points, and of which beginning each is.
     """
-    s, at = begins, np.arange(begins.size)
+    # Not at a pole that the controller has for itself, where its response has no value.
+    s, at = begins * (1.0 + _SAME), np.arange(begins.size)
     arrived: list[ComplexArray] = [begins[:0]]
     with np.errstate(all="ignore"):
         for _ in range(_STEPS):

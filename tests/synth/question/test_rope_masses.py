@@ -76,3 +76,13 @@ def test_a_peak_that_binds_on_the_masses_alone_asks_for_masses() -> None:
         asked.append(masses_for(question, loop))
     assert asked[0] > 7
     assert asked[1] == 15
+
+
+def test_a_light_pole_that_the_controller_has_for_itself_is_no_obstacle() -> None:
+    # Far above the loop a closed-loop pole is the roll-off's own, to the last digit.
+    question = pose(load_case("subsea-crane"), "combined", masses=15)
+    values = [1e-9, 1e-9, 1e-9, 0.5, 0.9, 500.0, 0.2, 0.0, 2.0]
+    loop = question.problem.assess(values)
+    own = np.linalg.eigvals(loop.controller.A)
+    assert np.isclose(own, -100.0 + 489.8979486j).any()
+    assert masses_for(question, loop) >= 15
