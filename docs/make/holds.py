@@ -553,7 +553,8 @@ def extremes_of(
     if signal == PAYLOAD:
         most = design.assessment.peak(signal, exposure)
         return {"up": (most, ups), "down": (most, downs)}
-    ways = {"up": (peak, ups), "down": (peak if rest == 0.0 else least, downs)}
+    still = peak in design.limits and abs(rest) < 1e-9 * design.limits[peak].value
+    ways = {"up": (peak, ups), "down": (peak if still else least, downs)}
     found = {}
     for way, (name, values) in ways.items():
         if name not in design.limits:
