@@ -162,6 +162,8 @@ class Programme:
         # Parameters that are positive stand as logarithms: their products are what acts.
         self._logarithmic = np.array([p.low > 0.0 for p in family.parameters], dtype=np.bool_)
         self._unit = np.where(self._logarithmic, 1.0, family.scales)
+        ranges = np.array([(p.low, p.high) for p in family.parameters], dtype=np.float64)
+        self._range = ranges.reshape(-1, 2).T
         self._loops = [
             _Loop([scenarios[i] for i in group], where, margins, reference)
             for group, where, margins in zip(family.groups, nodes, omega, strict=True)
@@ -410,7 +412,8 @@ class Programme:
         if self._extra_at is not None:
             objective = found.at.objective
         return Solution(
-            values=self._values(x),
+            # At the end of a range a step and a logarithm round, and what is beyond it is refused.
+            values=np.clip(self._values(x), *self._range),
             coefficients=self._coefficients(x),
             objective=objective,
             extra=extra,

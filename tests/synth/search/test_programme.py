@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from loop_numbers import (
@@ -357,3 +359,16 @@ def test_margins_are_held_with_losses_and_without() -> None:
     half = rows[1].size - 1
     np.testing.assert_allclose(rows[0][half : 2 * half], rows[1][:half], rtol=1e-9)
     assert np.abs(rows[0][:half] - rows[1][:half]).max() > 1e-3
+
+
+def test_an_answer_at_the_end_of_a_range_does_not_round_beyond_it() -> None:
+    # exp(log(b)) of these ends rounds upwards, and a design with it was refused by `evaluate`.
+    ends = [float(b) for b in np.linspace(0.3, 1.0, 400) if np.exp(np.log(b)) > b][:3]
+    assert len(ends) == 3
+    for end in ends:
+        law = StaticGain(bounds={"K[u,y]": (1e-3, end)})
+        question = problem(replace(integrator(0.3), B=[[-1.0]]), law)
+        made = programme(question, [0.9 * end])
+        solved = made.solve(made.pack([0.9 * end]))
+        assert solved.values == pytest.approx([end])
+        assert solved.values[0] <= end
